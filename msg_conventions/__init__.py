@@ -1,0 +1,1 @@
+"""Messages <-> domain types: pure functions, one place."""

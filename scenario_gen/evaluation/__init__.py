@@ -1,0 +1,1 @@
+"""DTW features (paper V-B), realism, criticality and the report."""

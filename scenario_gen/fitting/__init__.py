@@ -1,0 +1,1 @@
+"""Changepoints -> the target road (paper III-A, eqs 7-9 put right)."""

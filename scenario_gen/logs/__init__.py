@@ -1,0 +1,1 @@
+"""Raw files and bags -> encounters (paper II-A)."""

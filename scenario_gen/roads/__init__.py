@@ -1,0 +1,1 @@
+"""Occupancy grids, their entries and exits, and the readers of map formats."""

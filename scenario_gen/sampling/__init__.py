@@ -1,0 +1,1 @@
+"""Time law and Gaussian process -> candidate scenarios (paper III-C)."""

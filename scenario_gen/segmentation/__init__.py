@@ -1,0 +1,1 @@
+"""Encounter -> primitives and changepoints, with their posterior (paper II-B)."""
