@@ -25,3 +25,24 @@ def frozen_ints(values: npt.ArrayLike) -> Ints:
 def wrap_angle(angle: Floats) -> Floats:
     """Wrap angles [rad], any shape, to [-pi, pi)."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def canonical_angle(angle: npt.ArrayLike) -> Floats:
+    """Wrap angles [rad] to [-pi, pi) and round them to a nanoradian, any shape.
+
+    A quaternion on the wire gives an angle back to 1e-16; rounded, it is the very same number, so a value that went
+    through a message equals one that did not, bit for bit.
+    """
+    return frozen(np.round(wrap_angle(np.asarray(angle, dtype=np.float64)), 9))
+
+
+def canonical_heading(heading: npt.ArrayLike) -> Floats:
+    """Canonical angles made continuous along the last axis (time or path)."""
+    return frozen(np.unwrap(canonical_angle(heading), axis=-1))
+
+
+def canonical_poses(poses: npt.ArrayLike, *, continuous: bool = False) -> Floats:
+    """Poses (..., 3+) of x, y, yaw, ... with the yaw canonical; `continuous` unwraps it along the first axis."""
+    array = np.array(poses, dtype=np.float64, order="C")
+    array[..., 2] = canonical_heading(array[..., 2]) if continuous else canonical_angle(array[..., 2])
+    return frozen(array)

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from scenario_gen.arrays import Floats, frozen
+from scenario_gen.arrays import Floats, canonical_heading, frozen
 from scenario_gen.errors import InputError
 
 
@@ -43,8 +43,8 @@ class Encounter:
     origin: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        for field in ("position", "heading", "speed"):
-            object.__setattr__(self, field, frozen(getattr(self, field)))
+        object.__setattr__(self, "position", frozen(self.position))
+        object.__setattr__(self, "speed", frozen(self.speed))
         n, t = self.speed.shape
         if n < 2 or t < 2:
             raise InputError(f"encounter {self.name!r} has {n} vehicle(s) and {t} sample(s); at least 2 of each are needed")
@@ -52,6 +52,7 @@ class Encounter:
             raise InputError(f"encounter {self.name!r}: arrays disagree in shape")
         if not all(np.isfinite(a).all() for a in (self.position, self.heading, self.speed)):
             raise InputError(f"encounter {self.name!r} holds a value that is not finite")
+        object.__setattr__(self, "heading", canonical_heading(self.heading))
         if (self.speed < 0.0).any():
             raise InputError(f"encounter {self.name!r} holds a negative speed")
         ids = [vehicle.id for vehicle in self.vehicles]

@@ -5,7 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from scenario_gen.arrays import Floats, frozen
+import numpy as np
+
+from scenario_gen.arrays import Floats, canonical_heading, canonical_poses, frozen
 from scenario_gen.encounter import Vehicle
 
 
@@ -38,8 +40,10 @@ class Scenario:
     frame_id: str = "map"
 
     def __post_init__(self) -> None:
-        for name in ("time", "position", "heading", "speed", "acceleration"):
+        for name in ("position", "speed", "acceleration"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
+        object.__setattr__(self, "time", frozen(np.round(self.time, 9)))  # whole nanoseconds, as on the wire
+        object.__setattr__(self, "heading", canonical_heading(self.heading))
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +54,8 @@ class BoundaryStates:
     end: Floats
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", frozen(self.start))
-        object.__setattr__(self, "end", frozen(self.end))
+        object.__setattr__(self, "start", canonical_poses(self.start))
+        object.__setattr__(self, "end", canonical_poses(self.end))
 
 
 class Cause(StrEnum):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from scenario_gen.arrays import Bools, Floats, Ints, frozen
+from scenario_gen.arrays import Bools, Floats, Ints, canonical_poses, frozen
 from scenario_gen.encounter import Vehicle
 from scenario_gen.scenario import BoundaryStates
 
@@ -26,7 +26,7 @@ class FittedVehicle:
     manoeuvre: str
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "anchors", frozen(self.anchors))
+        object.__setattr__(self, "anchors", canonical_poses(self.anchors))
         object.__setattr__(self, "moved", frozen(self.moved))
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from scenario_gen.arrays import Floats, Ints, frozen, frozen_ints
+from scenario_gen.arrays import Floats, Ints, canonical_poses, frozen, frozen_ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,6 +20,6 @@ class Route:
     length: Floats
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", frozen(self.points))
+        object.__setattr__(self, "points", canonical_poses(self.points, continuous=True))
         object.__setattr__(self, "anchor", frozen_ints(self.anchor))
         object.__setattr__(self, "length", frozen(self.length))

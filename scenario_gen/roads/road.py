@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.arrays import Bools, Floats, frozen
+from scenario_gen.arrays import Bools, Floats, canonical_poses, frozen
 from scenario_gen.errors import InputError
 
 
@@ -13,13 +13,12 @@ class Road:
     """An occupancy grid with entries and exits.
 
     Attributes:
-        name: e.g. "t_intersection", or the stem of the map's file.
+        name: e.g. "t_intersection", or the stem of the map's file; for people, nothing is computed from it.
         drivable: (H, W) bool; row 0 is the lowest y, column 0 the lowest x (nav_msgs/OccupancyGrid order).
         resolution: cell size in metres, exactly representable in float32 (as it is on the wire).
         origin: (2,) x, y in metres of the lower-left corner of cell (0, 0); the grid is not rotated.
         entries: (E, 3) x, y, yaw: centre of each lane by which traffic comes in, heading into the road.
         exits: (X, 3) x, y, yaw: centre of each lane by which traffic leaves, heading out of the road.
-        left_traffic: True where traffic keeps left.
         frame_id: the frame of all poses.
     """
 
@@ -29,7 +28,6 @@ class Road:
     origin: Floats
     entries: Floats
     exits: Floats
-    left_traffic: bool = False
     frame_id: str = "map"
 
     def __post_init__(self) -> None:
@@ -38,8 +36,8 @@ class Road:
         object.__setattr__(self, "drivable", drivable)
         object.__setattr__(self, "resolution", float(np.float32(self.resolution)))
         object.__setattr__(self, "origin", frozen(self.origin))
-        object.__setattr__(self, "entries", frozen(np.reshape(self.entries, (-1, 3))))
-        object.__setattr__(self, "exits", frozen(np.reshape(self.exits, (-1, 3))))
+        object.__setattr__(self, "entries", canonical_poses(np.reshape(self.entries, (-1, 3))))
+        object.__setattr__(self, "exits", canonical_poses(np.reshape(self.exits, (-1, 3))))
         if drivable.ndim != 2 or drivable.size == 0 or not drivable.any():
             raise InputError(f"road {self.name!r} has no drivable cell")
         if not (np.isfinite(self.resolution) and self.resolution > 0.0):

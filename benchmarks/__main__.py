@@ -1,0 +1,78 @@
+"""`python -m benchmarks NAME [--json]`: run one benchmark (or `all`); `--list` names them."""
+
+import argparse
+import importlib
+import json
+import os
+import pkgutil
+import platform
+import sys
+from dataclasses import asdict
+
+import numpy
+import scipy
+
+import benchmarks
+from benchmarks.row import Row
+
+FRAME = {"__main__", "row"}
+
+
+def names() -> list[str]:
+    """Return the names of all benchmarks: the modules of this package that define `run`."""
+    return [
+        module.name
+        for module in pkgutil.iter_modules(benchmarks.__path__)
+        if module.name not in FRAME and not module.name.startswith("_")
+    ]
+
+
+def machine() -> dict[str, str | int]:
+    """Describe the machine that the figures were measured on."""
+    return {
+        "cores": os.cpu_count() or 0,
+        "architecture": platform.machine(),
+        "system": platform.system(),
+        "python": platform.python_version(),
+        "numpy": numpy.__version__,
+        "scipy": scipy.__version__,
+    }
+
+
+def table(rows: list[Row]) -> str:
+    """Lay the rows out as a table for people."""
+    lines = [f"{'figure':<58} {'value':>12} {'unit':<10} {'target':>12}  met  peer"]
+    for row in rows:
+        sign = "≥" if row.better == "higher" else "≤"
+        target = "" if row.target is None else f"{sign} {row.target:g}"
+        met = {None: "", True: "yes", False: "NO"}[row.met]
+        lines.append(f"{row.id:<58} {row.value:>12.4g} {row.unit:<10} {target:>12}  {met:<4} {row.peer or ''}")
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Run what the command line names."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("name", nargs="?", help="a benchmark, or all")
+    parser.add_argument("--list", action="store_true", help="name the benchmarks")
+    parser.add_argument("--json", action="store_true", help="end with one JSON object on the last line")
+    arguments = parser.parse_args()
+    known = names()
+    if arguments.list or arguments.name is None:
+        print("\n".join(known))
+        return 0
+    if arguments.name != "all" and arguments.name not in known:
+        print(f"unknown benchmark {arguments.name!r}; choose one of: all, {', '.join(known)}", file=sys.stderr)
+        return 2
+    for name in known if arguments.name == "all" else [arguments.name]:
+        rows: list[Row] = importlib.import_module(f"benchmarks.{name}").run()
+        if arguments.json:
+            report = [asdict(row) | {"met": row.met} for row in rows]
+            print(json.dumps({"benchmark": name, "rows": report, "machine": machine()}), flush=True)
+        else:
+            print(f"{name}\n{table(rows)}\n", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
