@@ -8,7 +8,7 @@ from scenario_gen.encounter import Encounter, Vehicle
 
 @dataclass(frozen=True)
 class Wait:
-    """Vehicle `vehicle` stands from `start` to `end` (seconds from the encounter's start): smoothed speed < 0.5 m/s for >= 1 s."""
+    """Vehicle `vehicle` stands from `start` to `end` [s]: smoothed speed below 0.5 m/s for at least 1 s."""
 
     vehicle: int
     start: float

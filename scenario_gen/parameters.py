@@ -1,5 +1,6 @@
 """Parameters declared once: default, unit, range and meaning; the command line, the nodes and docs/ read them here."""
 
+import math
 from dataclasses import Field, field, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
@@ -39,7 +40,7 @@ def check_value(name: str, entry: "Field[Any]", value: Any) -> None:
     if meta["choices"] and value not in meta["choices"]:
         raise InputError(f"parameter {name} is {value!r}; choose one of {', '.join(meta['choices'])}")
     if wanted in (int, float):
-        if value != value:
+        if math.isnan(value):
             raise InputError(f"parameter {name} is not a number")
         if meta["low"] is not None and value < meta["low"]:
             raise InputError(f"parameter {name} is {value}; it must be at least {meta['low']} {meta['unit']}".rstrip())

@@ -10,7 +10,7 @@ class Route:
     """A smooth path through a vehicle's anchors.
 
     Attributes:
-        points: (M, 3) x [m], y [m], yaw [rad, unwrapped]; dense (<= 0.5 m apart), no two equal; M = 1 for a vehicle that stands throughout.
+        points: (M, 3) x [m], y [m], yaw [rad, unwrapped]; at most 0.5 m apart, no two equal; M = 1 if it stands throughout.
         anchor: (K + 2,) index into `points` of each anchor, non-decreasing; equal neighbours are a dwell.
         length: (M,) arc length [m] from the start to each point.
     """
