@@ -7,6 +7,8 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
+LARGEST_ANGLE = 3.141592653  # the last whole nanoradian inside (-pi, pi); rounding must not step over the cut
+
 
 def frozen(values: npt.ArrayLike) -> Floats:
     """Return `values` as a C-contiguous, read-only float64 array (a copy if it was writable)."""
@@ -33,7 +35,8 @@ def canonical_angle(angle: npt.ArrayLike) -> Floats:
     A quaternion on the wire gives an angle back to 1e-16; rounded, it is the very same number, so a value that went
     through a message equals one that did not, bit for bit.
     """
-    return frozen(np.round(wrap_angle(np.asarray(angle, dtype=np.float64)), 9))
+    rounded = np.round(wrap_angle(np.asarray(angle, dtype=np.float64)), 9)
+    return frozen(np.clip(rounded, -LARGEST_ANGLE, LARGEST_ANGLE))
 
 
 def canonical_heading(heading: npt.ArrayLike) -> Floats:

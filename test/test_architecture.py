@@ -1,0 +1,83 @@
+"""The shape of the house: stages import only what stands before them, rclpy only in the nodes, nothing local leaks out."""
+
+import ast
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "scenario_gen"
+
+# The data flow, first to last; modules of one tuple may import each other.
+ORDER = (
+    ("errors", "arrays", "kernels", "parameters"),
+    ("encounter", "scenario", "interaction"),
+    ("logs",),
+    ("segmentation",),
+    ("roads",),
+    ("fitting",),
+    ("planning",),
+    ("sampling",),
+    ("validity",),
+    ("evaluation",),
+    ("pipeline",),
+    ("bags",),
+    ("nodes", "cli", "demo", "doctor"),
+)
+RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
+PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])
+
+
+def imported(path: Path) -> set[str]:
+    """Return the dotted names of all modules that the file imports, at any depth."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+def stage(path: Path) -> str:
+    """Return the stage a file of scenario_gen belongs to."""
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def test_every_stage_has_a_place_in_the_order():
+    assert {stage(path) for path in PACKAGE.rglob("*.py")} - {"__init__"} <= set(RANK)
+
+
+@pytest.mark.parametrize("path", [p for p in PYTHON_FILES if PACKAGE in p.parents and stage(p) != "__init__"], ids=str)
+def test_a_stage_imports_only_what_stands_before_it(path):
+    for name in imported(path):
+        parts = name.split(".")
+        if parts[0] == "scenario_gen" and len(parts) > 1 and parts[1] in RANK:
+            assert RANK[parts[1]] <= RANK[stage(path)], f"{path.name} imports {name}"
+
+
+@pytest.mark.parametrize("path", PYTHON_FILES, ids=str)
+def test_rclpy_is_imported_only_in_the_nodes(path):
+    if PACKAGE / "nodes" not in path.parents:
+        assert not {name for name in imported(path) if name.split(".")[0] == "rclpy"}
+
+
+def test_no_file_needs_a_map():
+    for path in PYTHON_FILES:
+        assert len(path.read_text().splitlines()) <= 500, path
+
+
+def test_nothing_of_this_machine_and_no_registry_is_named():
+    """Tracked text names no absolute home or work path and no package registry's host."""
+    files = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if files.returncode:
+        pytest.skip("not a git checkout")
+    leak = re.compile(r"(?<![\w.])/(?:work|root|home/\w+)/|pypi\.org|pythonhosted|npmjs\.org|index-url", re.IGNORECASE)
+    for name in files.stdout.split():
+        path = ROOT / name
+        if path == Path(__file__) or not path.is_file() or path.suffix in {".mcap", ".png", ".db3"}:
+            continue
+        found = leak.search(path.read_text(errors="replace"))
+        assert not found, f"{name}: {found.group() if found else ''}"
