@@ -1,0 +1,82 @@
+"""Flood fill: which parts of a road a disc can reach from which.
+
+Cells whose centre has more clearance than the disc's radius are joined to their four neighbours. Between two such centres
+the clearance is nowhere less than at one of them (a square's profile is flat for half a cell to either side of its
+middle), so every step is a move that the disc can really make: where the flood says there is a way, there is one.
+"""
+
+from collections.abc import Iterator
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from scenario_gen.arrays import Bools, Floats, Ints
+from scenario_gen.kernels import B2, OUTI2, kernel
+from scenario_gen.roads.clearance import clearance_in_cells, segments_free, to_cells, to_metres
+from scenario_gen.roads.road import Road
+
+_labels: "WeakKeyDictionary[Road, dict[float, Ints]]" = WeakKeyDictionary()
+
+
+def components(road: Road, radius: float) -> Ints:
+    """Connected components for a disc of `radius` [m]: (H, W), 0 where its centre cannot be, else 1, 2, …; read-only, cached."""
+    known = _labels.setdefault(road, {})
+    if radius not in known:
+        labels = np.zeros(road.drivable.shape, dtype=np.int64)
+        label_components(clearance_in_cells(road) > radius / road.resolution, labels)
+        labels.setflags(write=False)
+        known[radius] = labels
+    return known[radius]
+
+
+def component_at(road: Road, xy: Floats, radius: float) -> int:
+    """The component that a disc of `radius` [m] at `xy` (2,) [m] can move to at once; 0 if it collides or is walled in."""
+    return next(_reachable(road, np.asarray(xy, dtype=np.float64), radius), 0)
+
+
+def connected(road: Road, start_xy: Floats, goal_xy: Floats, radius: float) -> bool:
+    """Whether a disc of `radius` [m] can move from start (2,) [m] to goal (2,) [m]."""
+    start, goal = np.asarray(start_xy, dtype=np.float64), np.asarray(goal_xy, dtype=np.float64)
+    if segments_free(road, start[None], goal[None], radius)[0]:
+        return True
+    return not set(_reachable(road, start, radius)).isdisjoint(_reachable(road, goal, radius))
+
+
+def _reachable(road: Road, xy: Floats, radius: float) -> Iterator[int]:
+    """Labels of the cell centres near `xy` that a straight move leads to, nearest first."""
+    labels = components(road, radius)
+    height, width = labels.shape
+    column, row = np.floor(to_cells(road, xy)).astype(int)
+    i, j = np.mgrid[max(row - 2, 0) : min(row + 3, height), max(column - 2, 0) : min(column + 3, width)].reshape(2, -1)
+    i, j = i[labels[i, j] > 0], j[labels[i, j] > 0]
+    centres = to_metres(road, np.stack((j + 0.5, i + 0.5), axis=-1))
+    order = np.argsort(np.hypot(*(centres - xy).T), kind="stable")
+    for k in order:
+        if segments_free(road, xy[None], centres[k : k + 1], radius)[0]:
+            yield int(labels[i[k], j[k]])
+
+
+@kernel(B2, OUTI2)
+def label_components(free: Bools, labels: Ints) -> int:
+    """Number the 4-connected components of `free` (H, W) from 1 on into `labels` (zero at first); returns how many."""
+    height, width = free.shape
+    stack = np.empty(free.size, dtype=np.int64)
+    count = 0
+    for seed in range(free.size):
+        i, j = seed // width, seed % width
+        if not free[i, j] or labels[i, j] != 0:
+            continue
+        count += 1
+        labels[i, j] = count
+        stack[0] = seed
+        top = 1
+        while top > 0:
+            top -= 1
+            i, j = stack[top] // width, stack[top] % width
+            for side in range(4):
+                ni, nj = i + (side == 0) - (side == 1), j + (side == 2) - (side == 3)
+                if 0 <= ni < height and 0 <= nj < width and free[ni, nj] and labels[ni, nj] == 0:
+                    labels[ni, nj] = count
+                    stack[top] = ni * width + nj
+                    top += 1
+    return count
