@@ -1,1 +1,1 @@
-"""Messages <-> domain types: pure functions, one place."""
+"""Message ⇄ domain type: the one place where a message is made or read, straight between arrays and CDR bytes, without ROS."""

@@ -1,0 +1,109 @@
+"""(Encounter, Segmentation) ⇄ `changepoints` and `posterior`.
+
+`changepoints` (conventions: trajectory.py) has one point per changepoint: the state of every vehicle there, in the template's
+frame. It is all that the stages after the segmenter need, so another segmenter may publish it too.
+`posterior` (sensor_msgs/PointCloud2, frame as tracks) has one row per vehicle and one column per sample: x, y, z [m, float32],
+vehicle, primitive [uint16], t [s since the stamp, float64], p [posterior probability of a changepoint, float64].
+Both bear the stamp of their tracks. QoS: reliable, transient_local, depth 1.
+"""
+
+import numpy as np
+
+from msg_conventions import trajectory
+from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.tracks import FRAME
+from msg_conventions.trajectory import TYPE, Trajectory
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+from scenario_gen.segmentation.result import Segmentation
+
+__all__ = ["POSTERIOR_TYPE", "TYPE", "decode_changepoints", "decode_posterior", "encode_changepoints", "encode_posterior"]
+
+POSTERIOR_TYPE = "sensor_msgs/msg/PointCloud2"
+UINT16, FLOAT32, FLOAT64 = 4, 7, 8  # sensor_msgs/PointField datatypes
+POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("vehicle", "<u2"), ("primitive", "<u2"), ("t", "<f8"), ("p", "<f8")])
+DATATYPES = {"<f4": FLOAT32, "<u2": UINT16, "<f8": FLOAT64}
+
+
+def encode_changepoints(encounter: Encounter, segmentation: Segmentation) -> bytes:
+    """Return the states at the changepoints as CDR bytes."""
+    at = segmentation.changepoints
+    return trajectory.encode(
+        Trajectory(
+            stamp_ns=encounter.start_ns,
+            frame_id=FRAME,
+            vehicles=encounter.vehicles,
+            time_ns=at * encounter.dt_ns,
+            position=encounter.position[:, at],
+            heading=encounter.heading[:, at],
+            speed=encounter.speed[:, at],
+            acceleration=np.gradient(encounter.speed, encounter.dt, axis=1)[:, at],
+        )
+    )
+
+
+def decode_changepoints(data: bytes, encounter: Encounter, what: str = "changepoints") -> Segmentation:
+    """Return the segmentation that the message and its tracks describe: a primitive of its own for every segment.
+
+    Shared labels, probabilities and descriptions are in `posterior` and the diagnostics; no later stage needs them.
+
+    Raises:
+        InputError: the message is damaged, bears another stamp, or has a changepoint off the template's clock.
+    """
+    message = trajectory.decode(data, what)
+    if message.stamp_ns != encounter.start_ns:
+        raise InputError(f"{what}: stamp {message.stamp_ns} ns is not that of the tracks ({encounter.start_ns} ns)")
+    index, rest = np.divmod(message.time_ns, encounter.dt_ns)
+    samples = encounter.speed.shape[1]
+    if rest.any() or (np.diff(index) <= 0).any() or (index < 1).any() or (index >= samples).any():
+        raise InputError(f"{what}: times must increase and be those of samples 1 to {samples - 1} of the tracks")
+    marks = np.zeros(samples)
+    marks[index] = 1.0
+    return Segmentation(
+        labels=np.cumsum(marks).astype(np.int64),
+        changepoints=index,
+        changepoint_probability=marks,
+        descriptions=tuple(f"segment {k}" for k in range(len(index) + 1)),
+    )
+
+
+def encode_posterior(encounter: Encounter, segmentation: Segmentation) -> bytes:
+    """Return labels and changepoint probabilities as CDR bytes of a PointCloud2."""
+    n, samples = encounter.speed.shape
+    cloud = np.zeros((n, samples), dtype=POINT)
+    cloud["x"], cloud["y"] = np.moveaxis(encounter.position, -1, 0)
+    cloud["vehicle"] = np.arange(n)[:, None]
+    cloud["primitive"] = segmentation.labels
+    cloud["t"] = encounter.time
+    cloud["p"] = segmentation.changepoint_probability
+    writer = CdrWriter().header(encounter.start_ns, FRAME).pack("I", n, samples, len(POINT.names or ()))
+    for name, (kind, offset, *_) in (POINT.fields or {}).items():
+        writer.string(name).pack("I", offset).pack("B", DATATYPES[kind.str]).pack("I", 1)
+    writer.pack("B", 0).pack("I", POINT.itemsize, POINT.itemsize * samples, cloud.nbytes)
+    return writer.raw(cloud.tobytes()).pack("B", 1).finish()
+
+
+def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str = "posterior") -> Segmentation:
+    """Return the segmentation; its sentences for people travel on the diagnostics.
+
+    Raises:
+        InputError: the message is damaged or not of this convention.
+    """
+    reader = CdrReader(data, what)
+    reader.header()
+    n, samples = reader.number(), reader.number()
+    names = []
+    for _ in range(reader.count()):
+        names.append(reader.string())
+        _offset, _datatype, _count = reader.number(), reader.one("B"), reader.number()
+    _big_endian, point_step, _row_step, size = reader.one("B"), reader.number(), reader.number(), reader.count()
+    if tuple(names) != POINT.names or point_step != POINT.itemsize or size != n * samples * POINT.itemsize or size == 0:
+        raise InputError(f"{what}: expected a cloud of vehicles by samples with the fields {', '.join(POINT.names or ())}")
+    cloud = reader.array(POINT, n * samples, 1).reshape(n, samples)
+    labels = cloud["primitive"][0].astype(np.int64)
+    return Segmentation(
+        labels=labels,
+        changepoints=1 + np.flatnonzero(np.diff(labels)),
+        changepoint_probability=cloud["p"][0].astype(np.float64),
+        descriptions=descriptions,
+    )

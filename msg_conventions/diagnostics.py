@@ -1,0 +1,152 @@
+"""Reports ⇄ diagnostic_msgs/DiagnosticArray: key-values with full node names, one status per subject.
+
+Used for `scenarios/info` (one per scenario, then one per request) and `/diagnostics`. `header.stamp` is the template's.
+QoS: reliable, transient_local; `scenarios/info` depth 1000, the others 10.
+"""
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.scenarios import digest
+from scenario_gen.errors import InputError
+from scenario_gen.fitting.result import Fit
+from scenario_gen.scenario import Cause, Scenario, ScenarioSet
+
+TYPE = "diagnostic_msgs/msg/DiagnosticArray"
+
+
+class Level(IntEnum):
+    """diagnostic_msgs/DiagnosticStatus levels."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+@dataclass(frozen=True)
+class Status:
+    """One diagnostic_msgs/DiagnosticStatus."""
+
+    name: str
+    level: Level
+    message: str
+    values: Mapping[str, str] = field(default_factory=dict)
+
+
+def encode_diagnostics(statuses: Sequence[Status], stamp_ns: int) -> bytes:
+    """Return the statuses as CDR bytes."""
+    writer = CdrWriter().header(stamp_ns, "").pack("I", len(statuses))
+    for status in statuses:
+        writer.pack("B", status.level).string(status.name).string(status.message).string("").pack("I", len(status.values))
+        for key, value in status.values.items():
+            writer.string(key).string(value)
+    return writer.finish()
+
+
+def decode_diagnostics(data: bytes, what: str = "diagnostics") -> tuple[int, tuple[Status, ...]]:
+    """Return stamp [ns] and statuses.
+
+    Raises:
+        InputError: the message is damaged.
+    """
+    reader = CdrReader(data, what)
+    stamp_ns, _ = reader.header()
+    statuses = []
+    for _ in range(reader.count()):
+        level, name, message, _hardware = reader.one("B"), reader.string(), reader.string(), reader.string()
+        values = {}
+        for _ in range(reader.count()):
+            key = reader.string()
+            values[key] = reader.string()
+        statuses.append(Status(name, Level(min(level, Level.STALE)), message, values))
+    return stamp_ns, tuple(statuses)
+
+
+def states_text(scenario: Scenario, at: int) -> str:
+    """Return the vehicles' x, y, yaw, speed at sample `at` as a JSON list, exact to the bit."""
+    rows = zip(scenario.position[:, at], scenario.heading[:, at], scenario.speed[:, at], strict=True)
+    return json.dumps([[*map(float, position), float(heading), float(speed)] for position, heading, speed in rows])
+
+
+def scenario_status(scenario: Scenario, data: bytes, request: str, node: str, **more: str) -> Status:
+    """Return the `scenarios/info` entry of one scenario whose CDR bytes are `data`.
+
+    Args:
+        scenario: the scenario.
+        data: its CDR bytes.
+        request: the request's id.
+        node: full name of the publishing node.
+        more: what else a reader wants to know (template, road, asked states).
+    """
+    values = {
+        "request": request,
+        "index": str(scenario.index),
+        "seed": str(scenario.seed),
+        "sha256": digest(data),
+        "achieved_start": states_text(scenario, 0),
+        "achieved_end": states_text(scenario, -1),
+        **more,
+    }
+    return Status(f"{node}: scenario", Level.OK, f"scenario {scenario.index} of request {request}", values)
+
+
+def request_status(result: ScenarioSet, request: str, node: str, seed: int) -> Status:
+    """Return the closing `scenarios/info` entry of a request."""
+    complete = len(result.scenarios) == result.requested
+    values = {
+        "request": request,
+        "seed": str(seed),
+        "requested": str(result.requested),
+        "published": str(len(result.scenarios)),
+        "candidates": str(result.candidates),
+        **{f"refused.{cause.value}": str(count) for cause, count in sorted(result.refused.items())},
+        **{f"adaptation.{k}": text for k, text in enumerate(result.adaptations)},
+    }
+    message = f"{len(result.scenarios)} of {result.requested} scenarios from {result.candidates} candidates"
+    return Status(f"{node}: request", Level.OK if complete else Level.WARN, message, values)
+
+
+def read_request(status: Status, scenarios: tuple[Scenario, ...] = ()) -> ScenarioSet:
+    """Return the account of a request from its closing entry; `scenarios` are those of its digests.
+
+    Raises:
+        InputError: an entry is missing or no number.
+    """
+    values = status.values
+    try:
+        prefix = "refused."
+        refused = {Cause(key[len(prefix) :]): int(count) for key, count in values.items() if key.startswith(prefix)}
+        return ScenarioSet(
+            requested=int(values["requested"]),
+            scenarios=scenarios,
+            candidates=int(values["candidates"]),
+            refused=Counter(refused),
+            adaptations=tuple(text for key, text in values.items() if key.startswith("adaptation.")),
+        )
+    except (KeyError, ValueError) as error:
+        raise InputError(f"scenarios/info: {status.name!r} is no account of a request ({error})") from None
+
+
+def fit_statuses(fit: Fit, node: str) -> tuple[Status, ...]:
+    """Return what the fitting decided: one status per vehicle, one for the notes."""
+    per_vehicle = tuple(
+        Status(
+            f"{node}: fit of {vehicle.id}",
+            Level.OK if float(fitted.moved.max()) < 1.0 else Level.WARN,
+            f"{fitted.manoeuvre}, scale {fitted.scale:.3f}, moved by at most {float(fitted.moved.max()):.2f} m",
+            {
+                "manoeuvre": fitted.manoeuvre,
+                "scale": repr(fitted.scale),
+                "moved_m": json.dumps(fitted.moved.tolist()),
+                "stands": json.dumps([bool(value) for value in fitted.stands]),
+            },
+        )
+        for vehicle, fitted in zip(fit.vehicles, fit.fitted, strict=True)
+    )
+    notes = {f"note.{k}": note for k, note in enumerate(fit.notes)}
+    return (*per_vehicle, Status(f"{node}: fit", Level.OK, "template fitted to the road", notes))

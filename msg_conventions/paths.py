@@ -1,0 +1,102 @@
+"""Route ⇄ `vehicle_<id>/route`, and plain paths (nav_msgs/Path).
+
+Frame: the road's. `header.stamp`: the template's. A pose's stamp is the planned time: the template's stamp at every anchor
+(start, changepoints, end), between anchors in proportion to arc length. Equal consecutive poses are a dwell.
+QoS: reliable, transient_local, depth 1.
+Arc length does not travel; it is the sum of the chords, and `canonical_route` gives it to a route that stays in process.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from msg_conventions.cdr import NANOSECONDS, CdrReader, CdrWriter
+from msg_conventions.roads import pose_rows, poses_of
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.errors import InputError
+from scenario_gen.planning.route import Route
+
+TYPE = "nav_msgs/msg/Path"
+
+
+def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) -> bytes:
+    """Return (M, 3) x, y, yaw with their (M,) stamps as CDR bytes of a nav_msgs/Path."""
+    count = len(poses)
+    writer = CdrWriter().header(stamp_ns, frame_id).pack("I", count)
+    if not count:
+        return writer.finish()
+    if not np.isfinite(poses).all():
+        raise InputError("a path with a value that is not finite cannot be sent")
+    rows = pose_rows(poses)
+    writer.header(int(stamps_ns[0]), frame_id).align(8).raw(rows[0].tobytes())  # from here on at a multiple of 8
+    frame = frame_id.encode() + b"\x00"
+    padding = -(12 + len(frame)) % 8
+    kind = [("sec", "<i4"), ("nanosec", "<u4"), ("size", "<u4"), ("frame", f"V{len(frame) + padding}"), ("pose", "<f8", (7,))]
+    rest = np.zeros(count - 1, dtype=kind)
+    rest["sec"], rest["nanosec"] = np.divmod(stamps_ns[1:], NANOSECONDS)
+    rest["size"], rest["frame"] = len(frame), np.void(frame + bytes(padding))
+    rest["pose"] = rows[1:]
+    return writer.raw(rest.tobytes()).finish()
+
+
+def decode_path(data: bytes, what: str = "path") -> tuple[int, str, Floats, Ints]:
+    """Return stamp [ns], frame, poses (M, 3) and their stamps (M,) [ns].
+
+    Raises:
+        InputError: the message is damaged, or a pose is in another frame than the path.
+    """
+    reader = CdrReader(data, what)
+    stamp_ns, frame_id = reader.header()
+    count = reader.count(68)
+    rows, stamps = np.zeros((count, 7)), np.zeros(count, dtype=np.int64)
+    for k in range(count):
+        stamps[k], frame = reader.header()
+        rows[k] = reader.floats(7)
+        if frame not in (frame_id, ""):
+            raise InputError(f"{what}: pose {k} is in frame {frame!r}, the path in {frame_id!r}")
+    return stamp_ns, frame_id, poses_of(rows, what), stamps
+
+
+def chord_length(points: Floats) -> Floats:
+    """Return (M,) metres along (M, 2+) points."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+
+
+def canonical_route(route: Route) -> Route:
+    """Return the route as the other side of a message sees it."""
+    return Route(points=route.points, anchor=route.anchor, length=chord_length(route.points))
+
+
+def encode_route(route: Route, anchors_ns: Sequence[int], frame_id: str) -> bytes:
+    """Return the route as CDR bytes; `anchors_ns` (K + 2,) are the template's stamps at the anchors, the first its own."""
+    index, stamps = [int(route.anchor[0])], [anchors_ns[0]]
+    for k in range(1, len(route.anchor)):
+        first, last = int(route.anchor[k - 1]), int(route.anchor[k])
+        span = route.length[last] - route.length[first]
+        inner = np.arange(first + 1, last)
+        share = (route.length[inner] - route.length[first]) / span if span > 0.0 else np.zeros(len(inner))
+        duration = anchors_ns[k] - anchors_ns[k - 1]
+        planned = np.clip(np.rint(share * duration).astype(np.int64), 1, duration - 1) + anchors_ns[k - 1]
+        index += [*inner.tolist(), last]
+        stamps += [*planned.tolist(), anchors_ns[k]]
+    return encode_path(route.points[index], np.array(stamps, dtype=np.int64), frame_id, anchors_ns[0])
+
+
+def decode_route(data: bytes, anchors_ns: Sequence[int], what: str = "route") -> tuple[str, Route]:
+    """Return the frame and the route.
+
+    Raises:
+        InputError: the message is damaged, bears another stamp, or has no pose at an anchor's stamp.
+    """
+    stamp_ns, frame_id, poses, stamps = decode_path(data, what)
+    if stamp_ns != anchors_ns[0]:
+        raise InputError(f"{what}: stamp {stamp_ns} ns is not that of the template ({anchors_ns[0]} ns)")
+    if len(poses) == 0 or (np.diff(stamps) < 0).any():
+        raise InputError(f"{what}: no poses, or their stamps decrease")
+    moved = np.concatenate([[True], (np.diff(poses, axis=0) != 0.0).any(axis=1)])
+    at = np.searchsorted(stamps, anchors_ns)
+    missing = (at >= len(stamps)) | (stamps[np.minimum(at, len(stamps) - 1)] != anchors_ns)
+    if missing.any():
+        raise InputError(f"{what}: no pose bears the stamp of changepoint {int(np.argmax(missing))}; every changepoint needs one")
+    points = poses[moved]
+    return frame_id, Route(points=points, anchor=(np.cumsum(moved) - 1)[at], length=chord_length(points))

@@ -1,0 +1,103 @@
+"""Road ⇄ `map` (nav_msgs/OccupancyGrid) and `road/entries`, `road/exits` (geometry_msgs/PoseArray).
+
+Map: 0 free, 100 occupied, -1 unknown; a cell is drivable if it is known and below 65 (nav2's occupied threshold).
+`info.origin` is the lower-left corner of cell (0, 0), not rotated; row 0 is the lowest y. Entries head into the road, exits out
+of it. Stamp: that of the template the road was made for, or 0 for one that suits any. QoS: reliable, transient_local, depth 1.
+The road's name does not travel: nothing is computed from it.
+"""
+
+import numpy as np
+
+from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.yaw import quaternion, yaw
+from scenario_gen.arrays import Floats
+from scenario_gen.errors import InputError
+from scenario_gen.roads.road import Road
+
+MAP_TYPE = "nav_msgs/msg/OccupancyGrid"
+POSES_TYPE = "geometry_msgs/msg/PoseArray"
+OCCUPIED = 100
+OCCUPIED_FROM = 65
+
+
+def pose_rows(poses: Floats) -> Floats:
+    """Return (M, 7) position and quaternion, as geometry_msgs/Pose lays them out, of (M, 3) x, y, yaw."""
+    rows = np.zeros((len(poses), 7))
+    rows[:, :2] = poses[:, :2]
+    rows[:, 3:] = quaternion(poses[:, 2])
+    return rows
+
+
+def poses_of(rows: Floats, what: str) -> Floats:
+    """Return (M, 3) x, y, yaw of (M, 7) poses.
+
+    Raises:
+        InputError: naming `what`, a value is not finite.
+    """
+    if not np.isfinite(rows).all():
+        raise InputError(f"{what}: a pose holds a value that is not finite")
+    return np.column_stack([rows[:, :2], yaw(rows[:, 3:])])
+
+
+def encode_map(road: Road, stamp_ns: int) -> bytes:
+    """Return the grid as CDR bytes."""
+    height, width = road.drivable.shape
+    origin = [*road.origin, 0.0, 0.0, 0.0, 0.0, 1.0]
+    writer = CdrWriter().header(stamp_ns, road.frame_id).stamp(stamp_ns).pack("f", road.resolution).pack("I", width, height)
+    writer.pack("d", *origin).pack("I", road.drivable.size)
+    return writer.raw(np.where(road.drivable, 0, OCCUPIED).astype(np.int8).tobytes()).finish()
+
+
+def encode_poses(poses: Floats, frame_id: str, stamp_ns: int) -> bytes:
+    """Return entries or exits, (M, 3) x, y, yaw, as CDR bytes."""
+    writer = CdrWriter().header(stamp_ns, frame_id).pack("I", len(poses))
+    return (writer.align(8).raw(pose_rows(poses).tobytes()) if len(poses) else writer).finish()
+
+
+def decode_poses(data: bytes, what: str = "poses") -> tuple[int, str, Floats]:
+    """Return stamp [ns], frame and (M, 3) x, y, yaw.
+
+    Raises:
+        InputError: the message is damaged.
+    """
+    reader = CdrReader(data, what)
+    stamp_ns, frame_id = reader.header()
+    count = reader.count(56)
+    return stamp_ns, frame_id, poses_of(reader.floats(7 * count).reshape(count, 7), what)
+
+
+def decode_map(data: bytes, entries: bytes | None = None, exits: bytes | None = None, name: str = "map") -> tuple[int, Road]:
+    """Return the stamp [ns] and the road; without entries and exits it has none (a plain map server sends none).
+
+    Raises:
+        InputError: the message is damaged, the map is rotated or empty, or the frames disagree.
+    """
+    reader = CdrReader(data, name)
+    stamp_ns, frame_id = reader.header()
+    reader.stamp()
+    resolution, width, height = float(reader.one("f")), reader.number(), reader.number()
+    origin = reader.floats(7)
+    cells = reader.array(np.int8, reader.count(), 1)
+    if width * height != len(cells):
+        raise InputError(f"{name}: {width} x {height} cells are announced, {len(cells)} are there")
+    if not np.isfinite(origin).all() or abs(float(yaw(origin[3:]))) > 1e-9:
+        raise InputError(f"{name}: info.origin must be finite and not rotated")
+    ends: list[Floats] = []
+    for what, poses in (("road/entries", entries), ("road/exits", exits)):
+        if poses is None:
+            ends.append(np.zeros((0, 3)))
+            continue
+        _, frame, values = decode_poses(poses, what)
+        if frame != frame_id:
+            raise InputError(f"{what}: frame {frame!r} is not the map's ({frame_id!r})")
+        ends.append(values)
+    road = Road(
+        name=name,
+        drivable=((cells >= 0) & (cells < OCCUPIED_FROM)).reshape(height, width),
+        resolution=resolution,
+        origin=origin[:2],
+        entries=ends[0],
+        exits=ends[1],
+        frame_id=frame_id,
+    )
+    return stamp_ns, road

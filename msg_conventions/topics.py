@@ -1,0 +1,61 @@
+"""Every topic of the suite: its type and its quality of service, in one table (docs/interfaces.md says the same in words)."""
+
+import re
+from dataclasses import dataclass
+
+from msg_conventions import diagnostics, paths, pictures, roads, trajectory
+
+CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
+FIX_TYPE = "sensor_msgs/msg/NavSatFix"
+TWIST_TYPE = "geometry_msgs/msg/TwistStamped"
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Quality of service that a publisher offers; history is always keep_last."""
+
+    depth: int = 1
+    reliable: bool = True
+    transient_local: bool = True
+
+
+LATCHED = Quality()
+MANY = Quality(depth=1000)
+STREAM = Quality(depth=1000, transient_local=False)
+
+TOPICS: dict[str, tuple[str, Quality]] = {
+    "map": (roads.MAP_TYPE, LATCHED),
+    "road/entries": (roads.POSES_TYPE, LATCHED),
+    "road/exits": (roads.POSES_TYPE, LATCHED),
+    "tracks": (trajectory.TYPE, LATCHED),
+    "changepoints": (trajectory.TYPE, LATCHED),
+    "posterior": ("sensor_msgs/msg/PointCloud2", LATCHED),
+    "fit": (trajectory.TYPE, LATCHED),
+    "vehicle_*/route": (paths.TYPE, LATCHED),
+    "vehicle_*/path": (paths.TYPE, LATCHED),
+    "vehicle_*/footprint": (pictures.FOOTPRINT_TYPE, LATCHED),
+    "vehicle_*/fix": (FIX_TYPE, STREAM),
+    "vehicle_*/speed": (TWIST_TYPE, STREAM),
+    "scenarios": (trajectory.TYPE, MANY),
+    "scenarios/info": (diagnostics.TYPE, MANY),
+    "markers": (pictures.MARKERS_TYPE, LATCHED),
+    "report": (diagnostics.TYPE, LATCHED),
+    "diagnostics": (diagnostics.TYPE, Quality(depth=100)),
+}
+
+
+def vehicle_topic(token: str, name: str) -> str:
+    """Return the topic of one vehicle, e.g. `vehicle_7/route`."""
+    return f"vehicle_{token}/{name}"
+
+
+def topic_entry(topic: str) -> tuple[str, Quality]:
+    """Return type and quality of a topic of the suite, with or without namespace before it.
+
+    Raises:
+        KeyError: it is no topic of the suite.
+    """
+    for pattern, entry in TOPICS.items():
+        if re.search(rf"(^|/){re.escape(pattern).replace(re.escape('*'), '[0-9A-Za-z_]+')}$", topic):
+            return entry
+    raise KeyError(topic)

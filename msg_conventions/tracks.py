@@ -1,0 +1,54 @@
+"""Encounter ⇄ `tracks`: a whole template in one message (conventions: trajectory.py).
+
+Frame `local_enu`: metres east and north of the log's origin. QoS: reliable, transient_local, depth 1.
+Accelerations are the central differences of the speeds, for whoever wants them; they are not read back.
+The encounter's name and geodetic origin do not travel: nothing is computed from them.
+"""
+
+import numpy as np
+
+from msg_conventions import trajectory
+from msg_conventions.trajectory import TYPE, Trajectory
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+
+__all__ = ["FRAME", "TYPE", "decode_tracks", "encode_tracks"]
+
+FRAME = "local_enu"
+
+
+def encode_tracks(encounter: Encounter) -> bytes:
+    """Return the encounter as CDR bytes."""
+    return trajectory.encode(
+        Trajectory(
+            stamp_ns=encounter.start_ns,
+            frame_id=FRAME,
+            vehicles=encounter.vehicles,
+            time_ns=np.arange(encounter.speed.shape[1], dtype=np.int64) * encounter.dt_ns,
+            position=encounter.position,
+            heading=encounter.heading,
+            speed=encounter.speed,
+            acceleration=np.gradient(encounter.speed, encounter.dt, axis=1),
+        )
+    )
+
+
+def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
+    """Return the encounter.
+
+    Raises:
+        InputError: the message is damaged, its times are not evenly spaced from 0, or it is no encounter (one vehicle, …).
+    """
+    message = trajectory.decode(data, name)
+    steps = np.diff(message.time_ns)
+    if len(steps) == 0 or message.time_ns[0] != 0 or steps[0] <= 0 or (steps != steps[0]).any():
+        raise InputError(f"{name}: time_from_start must count from 0 in even steps; resample the tracks (10 Hz is usual)")
+    return Encounter(
+        name=name,
+        vehicles=message.vehicles,
+        start_ns=message.stamp_ns,
+        dt_ns=int(steps[0]),
+        position=message.position,
+        heading=message.heading,
+        speed=message.speed,
+    )

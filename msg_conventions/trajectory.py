@@ -1,0 +1,118 @@
+"""trajectory_msgs/MultiDOFJointTrajectory, the one message for tracks, changepoints, fits and scenarios.
+
+Frame: `header.frame_id`. `header.stamp`: the template's first sample; what derives from a template repeats it.
+`joint_names[i]`: `<id>:<length>x<width>`, metres (a bare `<id>` is read as a default car).
+`points[k].time_from_start`: time since `header.stamp`. `points[k].transforms[i]`: pose of the footprint's centre,
+z = 0, yaw as a quaternion. `velocities[i].linear.x`: speed along the heading, m/s. `accelerations[i].linear.x`: likewise,
+m/s². All other components are zero; nothing is NaN.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from msg_conventions.cdr import NANOSECONDS, CdrReader, CdrWriter
+from msg_conventions.names import joint_names, vehicle_of
+from msg_conventions.yaw import quaternion, yaw
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.encounter import Vehicle
+from scenario_gen.errors import InputError
+
+TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """What the message says: N vehicles at T instants.
+
+    Attributes:
+        stamp_ns: header stamp; frame_id: header frame.
+        vehicles: N identities and footprints.
+        time_ns: (T,) nanoseconds from start.
+        position: (N, T, 2) m; heading: (N, T) rad; speed: (N, T) m/s; acceleration: (N, T) m/s².
+    """
+
+    stamp_ns: int
+    frame_id: str
+    vehicles: tuple[Vehicle, ...]
+    time_ns: Ints
+    position: Floats
+    heading: Floats
+    speed: Floats
+    acceleration: Floats
+
+
+def _point_type(n: int) -> np.dtype[np.void]:
+    """Wire layout of a point of `n` vehicles that begins at a multiple of 8 bytes; it also ends at one."""
+    names = ("transforms", "velocities", "accelerations")
+    sequences = [
+        entry
+        for name, width in zip(names, (7, 6, 6), strict=True)
+        for entry in (("n_" + name, "<u4"), ("pad_" + name, "<u4"), (name, "<f8", (n, width)))
+    ]
+    return np.dtype([*sequences, ("sec", "<i4"), ("nanosec", "<u4")])
+
+
+def encode(trajectory: Trajectory) -> bytes:
+    """Return the message's CDR bytes.
+
+    Raises:
+        InputError: a value is not finite, an id cannot be a ROS name, or a time does not fit.
+    """
+    n, count = trajectory.speed.shape
+    values = (trajectory.position, trajectory.heading, trajectory.speed, trajectory.acceleration)
+    if not all(np.isfinite(value).all() for value in values):
+        raise InputError("a trajectory with a value that is not finite cannot be sent")
+    head = CdrWriter().header(trajectory.stamp_ns, trajectory.frame_id).pack("I", n)
+    for name in joint_names(trajectory.vehicles):
+        head.string(name)
+    head.pack("I", count)
+    points = np.zeros(count, dtype=_point_type(n))
+    for name in ("transforms", "velocities", "accelerations"):
+        points["n_" + name] = n
+    points["transforms"][..., :2] = trajectory.position.swapaxes(0, 1)
+    points["transforms"][..., 3:] = quaternion(trajectory.heading).swapaxes(0, 1)
+    points["velocities"][..., 0] = trajectory.speed.T
+    points["accelerations"][..., 0] = trajectory.acceleration.T
+    points["sec"], points["nanosec"] = np.divmod(trajectory.time_ns, NANOSECONDS)
+    body = points.tobytes()
+    # Behind an odd multiple of four the first point's length itself fills up to the boundary: no padding after it.
+    return head.raw(body if head.offset() % 8 == 0 else body[:4] + body[8:]).finish()
+
+
+def decode(data: bytes, what: str) -> Trajectory:
+    """Return what the message says; velocities or accelerations that were left out are read as zero.
+
+    Raises:
+        InputError: naming `what`, where the message is damaged, lacks poses, or holds a value that is not finite.
+    """
+    reader = CdrReader(data, what)
+    stamp_ns, frame_id = reader.header()
+    vehicles = tuple(vehicle_of(reader.string()) for _ in range(reader.count()))
+    n, count = len(vehicles), reader.count(20)
+    time_ns: list[int] = []
+    blocks: tuple[list[Floats], ...] = ([], [], [])
+    for k in range(count):
+        for block, width in zip(blocks, (7, 6, 6), strict=True):
+            length = reader.count()
+            if length != n and (length or width == 7):
+                raise InputError(f"{what}: point {k} has {length} entries for {n} joint names")
+            block.append(reader.floats(length * width).reshape(length, width) if length else np.zeros((n, width)))
+        time_ns.append(reader.stamp())
+    shape = (count, n, -1)
+    pose, velocity, acceleration = (
+        np.array(block).reshape(shape) if count else np.zeros((0, n, width))
+        for block, width in zip(blocks, (7, 6, 6), strict=True)
+    )
+    if not all(np.isfinite(value).all() for value in (pose, velocity, acceleration)):
+        raise InputError(f"{what}: the message holds a value that is not finite")
+    return Trajectory(
+        stamp_ns=stamp_ns,
+        frame_id=frame_id,
+        vehicles=vehicles,
+        time_ns=np.array(time_ns, dtype=np.int64),
+        position=pose[..., :2].swapaxes(0, 1),
+        heading=yaw(pose[..., 3:]).T,
+        speed=velocity[..., 0].T,
+        acceleration=acceleration[..., 0].T,
+    )

@@ -1,0 +1,234 @@
+"""Every convention gives back what went in, bit for bit, and refuses what is damaged with a reason."""
+
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from message_examples import NASTY_HEADINGS, assert_same, encounter, generator, route, scenario, seeds, segmentation
+
+from msg_conventions import changepoints, diagnostics, fits, names, paths, pictures, roads, scenarios, tracks, trajectory
+from scenario_gen.arrays import canonical_angle
+from scenario_gen.encounter import Vehicle
+from scenario_gen.errors import InputError
+from scenario_gen.fitting.result import Fit, FittedVehicle
+from scenario_gen.planning.route import Route
+from scenario_gen.roads.road import Road
+from scenario_gen.scenario import BoundaryStates, Cause, ScenarioSet
+
+
+@given(seeds, st.integers(2, 5), st.integers(2, 60))
+@settings(max_examples=40, deadline=None)
+def test_tracks(seed, n, t):
+    sent = encounter(seed, n, t)
+    assert_same(sent, tracks.decode_tracks(tracks.encode_tracks(sent)), *(f for f in sent.__dataclass_fields__))
+
+
+@given(seeds, st.integers(1, 5), st.integers(2, 60))
+@settings(max_examples=40, deadline=None)
+def test_scenario(seed, n, t):
+    sent = scenario(seed, n, t)
+    stamp, got = scenarios.decode_scenario(scenarios.encode_scenario(sent, 12_345_678_901), seed=sent.seed, index=sent.index)
+    assert stamp == 12_345_678_901
+    assert_same(sent, got, *(f for f in sent.__dataclass_fields__))
+
+
+@given(st.floats(-40.0, 40.0))
+@settings(max_examples=300, deadline=None)
+def test_every_canonical_heading_survives(angle):
+    for value in (angle, *NASTY_HEADINGS):
+        for turns in (0, 1, -3):
+            canonical = canonical_angle(value) + turns * 2.0 * math.pi
+            from msg_conventions.yaw import quaternion, yaw
+
+            back = canonical_angle(yaw(quaternion(np.array([canonical]))))
+            assert back[0] == canonical_angle(value)
+
+
+@given(seeds, st.integers(0, 3))
+@settings(max_examples=30, deadline=None)
+def test_changepoints_and_posterior(seed, k):
+    template, sent = encounter(seed), segmentation(seed, k=k)
+    got = changepoints.decode_changepoints(changepoints.encode_changepoints(template, sent), template)
+    assert_same(sent, got, "changepoints")
+    assert (np.flatnonzero(np.diff(got.labels)) + 1 == sent.changepoints).all()
+    whole = changepoints.decode_posterior(changepoints.encode_posterior(template, sent), sent.descriptions)
+    assert_same(sent, whole, "labels", "changepoints", "changepoint_probability", "descriptions")
+
+
+@given(seeds, st.integers(1, 30), st.integers(1, 30), st.integers(0, 4))
+@settings(max_examples=30, deadline=None)
+def test_road(seed, height, width, lanes):
+    rng = generator(seed)
+    drivable = rng.random((height, width)) < 0.5
+    drivable[0, 0] = True
+    ends = np.column_stack([rng.normal(0, 50, (lanes, 2)), rng.choice(NASTY_HEADINGS, lanes)])
+    sent = Road("map", drivable, 0.2, rng.normal(0, 50, 2), ends, ends[::-1], "a" * (seed % 5 + 1))
+    grid = roads.encode_map(sent, 99)
+    entries, exits = (roads.encode_poses(poses, sent.frame_id, 99) for poses in (sent.entries, sent.exits))
+    stamp, got = roads.decode_map(grid, entries, exits)
+    assert stamp == 99
+    assert_same(sent, got, *(f for f in sent.__dataclass_fields__))
+    assert len(roads.decode_map(grid)[1].entries) == 0
+
+
+def test_unknown_cells_are_not_drivable():
+    road = Road("map", np.ones((2, 2), dtype=bool), 0.5, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
+    grid = bytearray(roads.encode_map(road, 0))
+    grid[-4:] = np.array([-1, 64, 65, 100], dtype=np.int8).tobytes()
+    assert roads.decode_map(bytes(grid))[1].drivable.tolist() == [[False, True], [False, False]]
+
+
+@given(seeds, st.sampled_from(["map", "m", "longer_frame"]))
+@settings(max_examples=30, deadline=None)
+def test_route(seed, frame):
+    sent = route(seed)
+    anchors = [5_000_000_000, 6_100_000_000, 7_000_000_000, 7_000_000_001, 9_000_000_000]
+    got_frame, got = paths.decode_route(paths.encode_route(sent, anchors, frame), anchors)
+    assert got_frame == frame
+    assert_same(sent, got, "points", "anchor", "length")
+    assert_same(got, paths.canonical_route(sent), "points", "anchor", "length")
+
+
+def test_a_route_that_stands_throughout():
+    sent = Route(points=np.array([[1.0, 2.0, math.pi]]), anchor=np.zeros(3, dtype=int), length=np.zeros(1))
+    anchors = [0, 1_000_000_000, 2_000_000_000]
+    data = paths.encode_route(sent, anchors, "map")
+    assert_same(sent, paths.decode_route(data, anchors)[1], "points", "anchor", "length")
+    assert len(paths.decode_path(data)[2]) == 3  # equal consecutive poses are a dwell
+
+
+def test_a_route_without_a_pose_at_a_changepoint_is_refused():
+    anchors = [5_000_000_000, 6_100_000_000, 7_000_000_000, 8_000_000_000, 9_000_000_000]
+    data = paths.encode_route(route(1), anchors, "map")
+    with pytest.raises(InputError, match="changepoint 2"):
+        paths.decode_route(data, [*anchors[:2], 7_000_000_007, *anchors[3:]])
+    with pytest.raises(InputError, match="stamp"):
+        paths.decode_route(data, [4_000_000_000, *anchors[1:]])
+
+
+def _fit(template, at) -> Fit:
+    rng = generator(3)
+    n, k = len(template.vehicles), len(at)
+    anchors = np.concatenate([rng.normal(0, 30, (n, k, 2)), rng.choice(NASTY_HEADINGS, (n, k, 1))], axis=-1)
+    fitted = tuple(FittedVehicle(a, np.full(k, 0.2), np.zeros(k - 1, dtype=bool), 0.9, "left") for a in anchors)
+    start, end = (np.concatenate([anchors[:, j], rng.random((n, 1))], axis=1) for j in (0, -1))
+    return Fit(template.vehicles, fitted, at, BoundaryStates(start, end), ("an entry was chosen",))
+
+
+def test_fit():
+    template = encounter(3)
+    at = np.array([0, 7, 20, 39])
+    sent = _fit(template, at)
+    stamp, frame, asked, anchors = fits.decode_fit(fits.encode_fit(template, sent, "map"))
+    assert (stamp, frame) == (template.start_ns, "map")
+    assert_same(sent.asked, asked, "start", "end")
+    assert (canonical_angle(anchors[..., 2]) == np.stack([v.anchors for v in sent.fitted])[..., 2]).all()
+    assert fits.anchor_stamps(template, at[1:-1]) == [template.start_ns + int(k) * template.dt_ns for k in at]
+
+
+def test_reports():
+    sent = ScenarioSet(50, (scenario(1),), 70, Counter({Cause.OVERLAP: 15, Cause.OFF_ROAD: 5}), ("clock stretched by 5 %",))
+    template = encounter(3)
+    statuses = (
+        diagnostics.scenario_status(sent.scenarios[0], b"bytes", "r1", "/gp_sampler", road="straight"),
+        *diagnostics.fit_statuses(_fit(template, np.array([0, 7, 20, 39])), "/planner"),
+        diagnostics.request_status(sent, "r1", "/gp_sampler", 7),
+    )
+    stamp, got = diagnostics.decode_diagnostics(diagnostics.encode_diagnostics(statuses, 5))
+    assert stamp == 5
+    assert got == statuses
+    account = diagnostics.read_request(got[-1], sent.scenarios)
+    assert account == sent
+    assert got[-1].level is diagnostics.Level.WARN
+    with pytest.raises(InputError, match="no account"):
+        diagnostics.read_request(got[0])
+
+
+def test_footprint():
+    corners = pictures.decode_footprint(pictures.encode_footprint(Vehicle("a", 5.0, 2.0), 0, "vehicle_a"))
+    assert corners.tolist() == [[2.5, 1.0], [-2.5, 1.0], [-2.5, -1.0], [2.5, -1.0]]
+
+
+def test_ids_become_ros_tokens_and_collisions_are_refused():
+    assert names.tokens(["7", "car 1", "Ü-bus", "a__b"]) == ("7", "car_1", "bus", "a_b")
+    with pytest.raises(InputError, match=r"'car 1' and 'car_1'"):
+        names.tokens(["car 1", "car_1"])
+    with pytest.raises(InputError, match="no letter"):
+        names.token("--")
+
+
+@given(st.floats(0.1, 50.0), st.floats(0.1, 10.0))
+def test_footprints_travel_in_joint_names(length, width):
+    vehicle = Vehicle("car_1", length, width)
+    assert names.vehicle_of(names.joint_names([vehicle])[0]) == vehicle
+
+
+@pytest.mark.parametrize("name", ["a:4.8", "a:0x1", "a:nanx1", "a:4.8x-1", "a:1e999x1", "a:--x1"])
+def test_a_bad_footprint_is_refused(name):
+    with pytest.raises(InputError, match=r"length.*width"):
+        names.vehicle_of(name)
+
+
+def test_a_bare_joint_name_is_a_default_car():
+    assert names.vehicle_of("car") == Vehicle("car")
+
+
+@given(st.data())
+@settings(max_examples=150, deadline=None)
+def test_damaged_messages_are_refused_with_a_reason(data):
+    """Cut off or overwritten anywhere, a message is decoded or refused by name; it never crashes."""
+    template, parts = encounter(4, 2, 9), segmentation(4, 9, 2)
+    good, decode = data.draw(
+        st.sampled_from(
+            [
+                (tracks.encode_tracks(template), tracks.decode_tracks),
+                (scenarios.encode_scenario(scenario(1, 2, 9), 0), scenarios.decode_scenario),
+                (changepoints.encode_changepoints(template, parts), lambda d: changepoints.decode_changepoints(d, template)),
+                (changepoints.encode_posterior(template, parts), changepoints.decode_posterior),
+                (paths.encode_route(route(1), [0, 10**9, 2 * 10**9, 3 * 10**9, 4 * 10**9], "map"), paths.decode_path),
+                (roads.encode_poses(np.zeros((2, 3)), "map", 0), roads.decode_poses),
+            ]
+        )
+    )
+    decode(good)
+    cut = data.draw(st.integers(0, len(good) - 1))
+    with pytest.raises(InputError):
+        decode(good[:cut])
+    at = data.draw(st.integers(4, len(good) - 1))
+    broken = good[:at] + bytes([data.draw(st.integers(0, 255))]) + good[at + 1 :]
+    try:
+        decode(broken)
+    except InputError as error:
+        assert str(error)
+
+
+def test_what_is_not_finite_is_neither_sent_nor_read():
+    sent = trajectory.decode(tracks.encode_tracks(encounter(1, 2, 5)), "tracks")
+    from dataclasses import replace
+
+    bad = np.array(sent.speed)
+    bad[0, 0] = np.nan
+    with pytest.raises(InputError, match="not finite"):
+        trajectory.encode(replace(sent, speed=bad))
+    data = bytearray(tracks.encode_tracks(encounter(1, 2, 5)))
+    data[-24:-16] = np.array([np.nan]).tobytes()
+    with pytest.raises(InputError, match="not finite"):
+        tracks.decode_tracks(bytes(data))
+
+
+def test_uneven_tracks_are_refused():
+    sent = trajectory.decode(tracks.encode_tracks(encounter(1, 2, 5)), "tracks")
+    from dataclasses import replace
+
+    uneven = np.array(sent.time_ns)
+    uneven[2] += 1
+    with pytest.raises(InputError, match="even steps"):
+        tracks.decode_tracks(trajectory.encode(replace(sent, time_ns=uneven)))
+
+
+def test_stamps_beyond_2038_are_refused():
+    with pytest.raises(InputError, match="2038"):
+        scenarios.encode_scenario(scenario(1), 2**31 * 10**9)
