@@ -1,0 +1,40 @@
+"""Build rules for colcon (ament_python) and pip alike; tool settings are in pyproject.toml."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "scenario_gen"
+NODES = ("segmenter", "planner", "gp_sampler", "road_server", "log_player", "evaluator", "recorder", "player")
+
+# requirements.in names what is needed at run time first; ROS itself comes from a Jazzy installation, or from wheels as an extra.
+LISTED = Path("requirements.in").read_text(encoding="utf-8").partition("# to build and to test")[0].splitlines()
+NEEDED = [line for line in LISTED if line and not line.startswith("#")]
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="New multi-vehicle traffic encounters from recorded ones, as ROS 2 nodes and as one command",
+    license="Apache-2.0",
+    maintainer="The scenario_gen developers",
+    maintainer_email="scenario_gen@users.noreply.github.com",
+    python_requires=">=3.11",
+    packages=find_packages(include=["scenario_gen*", "msg_conventions*"]),
+    package_data={NAME: ["py.typed", "resources/*", "resources/**/*", "evaluation/assets/*"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/config", [str(path) for path in sorted(Path("config").glob("*.*"))]),
+        (f"share/{NAME}/launch", [str(path) for path in sorted(Path("launch").glob("*.launch.py"))]),
+    ],
+    install_requires=[line for line in NEEDED if not line.startswith("ros-jazzy")],
+    extras_require={"ros": [line for line in NEEDED if line.startswith("ros-jazzy")]},
+    tests_require=["pytest"],
+    zip_safe=False,
+    entry_points={
+        "console_scripts": [
+            "scenario-gen = scenario_gen.cli:main",
+            *(f"{node} = scenario_gen.nodes.{node}:main" for node in NODES),
+        ],
+    },
+)
