@@ -1,0 +1,88 @@
+"""Confidence intervals by the bootstrap: samples are drawn again with replacement, as weights.
+
+Every set metric is written as a function of weights (B, S) over its S samples, so that all resamples are computed at
+once, mostly as one matrix product.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from scenario_gen.arrays import Floats
+
+Statistic = Callable[[Floats], Floats]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An estimate and its confidence interval; NaN bounds mean that there is none (a single sample)."""
+
+    value: float
+    low: float = float("nan")
+    high: float = float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class Bootstrap:
+    """Resampling weights for sets of S samples.
+
+    Attributes:
+        weights: (B, S) how often each sample was drawn in each resample.
+        level: confidence level.
+    """
+
+    weights: Floats
+    level: float
+
+    @classmethod
+    def draw(cls, samples: int, resamples: int, level: float, seed: int) -> "Bootstrap":
+        """Draw the weights; the same seed gives the same weights."""
+        generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, samples, resamples])))
+        shares = np.full(samples, 1.0 / max(samples, 1))
+        return cls(generator.multinomial(samples, shares, size=resamples).astype(np.float64), level)
+
+    def interval(self, statistic: Statistic) -> Interval:
+        """Return the statistic of the whole set with its bias-corrected percentile interval (Efron 1981).
+
+        Args:
+            statistic: maps weights (B, S) to values (B,); NaN where a resample has no value.
+        """
+        samples = self.weights.shape[1]
+        value = float(statistic(np.ones((1, samples)))[0])
+        if samples < 2 or not np.isfinite(value):
+            return Interval(value)
+        values = statistic(self.weights)
+        values = values[np.isfinite(values)]
+        if values.size < 2:
+            return Interval(value)
+        below = (np.count_nonzero(values < value) + 0.5 * np.count_nonzero(values == value)) / values.size
+        half = 0.5 / values.size
+        bias = 2.0 * ndtri(np.clip(below, half, 1.0 - half))
+        tail = ndtri(0.5 + 0.5 * self.level)
+        low, high = np.quantile(values, ndtr([bias - tail, bias + tail]))
+        return Interval(value, float(low), float(high))
+
+    def mean(self, values: Floats) -> Interval:
+        """Return the mean of one value per sample (S,), leaving out NaN, with its interval."""
+        return self.interval(lambda weights: mean_of(values, weights))
+
+
+def mean_of(values: Floats, weights: Floats) -> Floats:
+    """Return the weighted means (B,) of values (S,) under weights (B, S), leaving out NaN."""
+    known = np.isfinite(values)
+    total = weights[:, known].sum(axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray((weights[:, known] @ values[known]) / total)
+
+
+def wilson(count: int, total: int, level: float) -> Interval:
+    """Return the share count / total with Wilson's interval (1927), which stays in [0, 1] and is not empty at 0 or 1."""
+    if total == 0:
+        return Interval(float("nan"))
+    z = float(ndtri(0.5 + 0.5 * level))
+    share = count / total
+    centre = (share + z * z / (2 * total)) / (1 + z * z / total)
+    half = z / (1 + z * z / total) * float(np.sqrt(share * (1 - share) / total + z * z / (4 * total * total)))
+    return Interval(share, max(0.0, centre - half), min(1.0, centre + half))

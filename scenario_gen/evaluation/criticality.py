@@ -1,0 +1,47 @@
+"""How close it gets, and who goes first: distances, time to collision, post-encroachment time, passing order."""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from scenario_gen.evaluation.geometry import footprint_distance, time_to_collision
+from scenario_gen.evaluation.motion import Motion
+from scenario_gen.interaction import find_conflicts
+
+
+@dataclass(frozen=True)
+class Criticality:
+    """What one motion came to.
+
+    Attributes:
+        min_distance: least distance between two footprints [m].
+        min_ttc: least time to collision [s], at most the horizon.
+        pet: least post-encroachment time [s] over crossing conflicts: from the first vehicle's exit of the shared area to
+            the second's entry; negative if both were inside; NaN without such a conflict.
+        order: (pair, which of them went first) of every conflict, by vehicle index.
+    """
+
+    min_distance: float
+    min_ttc: float
+    pet: float
+    order: tuple[tuple[tuple[int, int], int], ...]
+
+    def keeps_order_of(self, template: "Criticality") -> float:
+        """Return the share of the template's conflicts that exist here too and have the same first; NaN if none exists."""
+        mine = dict(self.order)
+        same = [mine[pair] == first for pair, first in template.order if pair in mine]
+        return float(np.mean(same)) if same else float("nan")
+
+
+def criticality(motion: Motion, horizon: float) -> Criticality:
+    """Measure one motion; a time to collision above `horizon` [s] counts as the horizon."""
+    pairs = list(combinations(range(len(motion.vehicles)), 2))
+    conflicts = find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading)
+    encroachments = [c.entry_second - c.exit_first for c in conflicts if not c.following]
+    return Criticality(
+        min_distance=min(float(footprint_distance(motion, a, b).min()) for a, b in pairs),
+        min_ttc=min(horizon, *(float(time_to_collision(motion, a, b).min()) for a, b in pairs)),
+        pet=min(encroachments, default=float("nan")),
+        order=tuple(((min(c.first, c.second), max(c.first, c.second)), c.first) for c in conflicts),
+    )

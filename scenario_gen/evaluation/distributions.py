@@ -1,0 +1,141 @@
+"""Distributions of what vehicles do, and how far two of them are apart."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.stats import wasserstein_distance
+
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.evaluation.geometry import footprint_distance
+from scenario_gen.evaluation.motion import Motion
+
+SMOOTHING = 0.5
+"""Seconds over which acceleration is averaged before it is differentiated to jerk."""
+
+ROUNDING = 1e-6
+"""Bins: a value this little below an edge belongs to the bin above, or rounding would move a cruise at 10 m/s."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity whose distribution is compared: id, label, unit, and the width of its histogram's bins."""
+
+    id: str
+    label: str
+    unit: str
+    bin_width: float
+
+
+QUANTITIES = (
+    Quantity("speed", "speed", "m/s", 0.5),
+    Quantity("acceleration", "acceleration", "m/s²", 0.25),
+    Quantity("jerk", "jerk", "m/s³", 0.5),
+    Quantity("yaw_rate", "yaw rate", "rad/s", 0.05),
+    Quantity("gap", "gap", "m", 1.0),
+)
+
+
+def values_of(motion: Motion) -> dict[str, Floats]:
+    """Return all values of every quantity in one motion, flat.
+
+    Acceleration, jerk and yaw rate are differentiated from speed and heading, for recorded and generated motion alike; the
+    gap is the distance between two footprints. A motion shorter than the smoothing has no jerk.
+    """
+    acceleration = np.gradient(motion.speed, motion.dt, axis=1)
+    width = max(1, round(SMOOTHING / motion.dt))
+    sums = np.concatenate([np.zeros((len(acceleration), 1)), np.cumsum(acceleration, axis=1)], axis=1)
+    smooth = (sums[:, width:] - sums[:, :-width]) / width
+    return {
+        "speed": motion.speed.ravel(),
+        "acceleration": acceleration.ravel(),
+        "jerk": (np.diff(smooth, axis=1) / motion.dt).ravel(),
+        "yaw_rate": np.gradient(motion.heading, motion.dt, axis=1).ravel(),
+        "gap": np.concatenate([footprint_distance(motion, a, b) for a, b in combinations(range(len(motion.vehicles)), 2)]),
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """One quantity in the template and in S samples, on common histogram bins.
+
+    Attributes:
+        template: (bins,) counts.
+        samples: (S, bins) counts.
+        grid: (G,) points at which distribution functions are compared.
+        template_cdf: (G,) the template's distribution function there.
+        sample_cdf: (S, G) values of each sample at or below each point (a count).
+        sizes: (S,) number of values of each sample.
+        wasserstein: distance of all samples' values taken together to the template's, exact.
+    """
+
+    template: Floats
+    samples: Floats
+    grid: Floats
+    template_cdf: Floats
+    sample_cdf: Floats
+    sizes: Floats
+    wasserstein: float
+
+    def jensen_shannon(self, weights: Floats) -> Floats:
+        """Return the Jensen-Shannon divergences (B,) in bits under weights (B, S), between 0 and 1."""
+        return jensen_shannon(weights @ self.samples, self.template)
+
+    def wasserstein_near(self, weights: Floats) -> Floats:
+        """Return Wasserstein distances (B,) under weights (B, S), integrated over the grid (for intervals)."""
+        with np.errstate(invalid="ignore"):
+            cdf = (weights @ self.sample_cdf) / (weights @ self.sizes)[:, None]
+        return np.asarray(np.abs(cdf[:, :-1] - self.template_cdf[:-1]) @ np.diff(self.grid))
+
+    def coverage(self, weights: Floats) -> Floats:
+        """Return the share (B,) of the template's values that lie in a bin which the set visits too."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(((weights @ self.samples) > 0.0) @ self.template / self.template.sum())
+
+
+def compare(quantity: Quantity, template: Floats, samples: Sequence[Floats], points: int = 513) -> Comparison:
+    """Compare the values of one quantity; bins are `quantity.bin_width` wide and aligned at zero."""
+    pooled = np.concatenate(list(samples))
+    everything = np.concatenate([template, pooled])
+    if template.size == 0 or pooled.size == 0:
+        empty = np.zeros((len(samples), 1))
+        return Comparison(np.zeros(1), empty, np.zeros(2), np.zeros(2), np.zeros((len(samples), 2)), empty[:, 0], float("nan"))
+
+    def bin_of(values: Floats) -> Ints:
+        return np.floor(values / quantity.bin_width + ROUNDING).astype(np.int64)
+
+    first, last = (int(bin_of(np.array(bound))) for bound in (everything.min(), everything.max()))
+
+    def counts(values: Floats) -> Floats:
+        return np.asarray(np.bincount(bin_of(values) - first, minlength=last - first + 1), dtype=np.float64)
+
+    grid = np.linspace(everything.min(), everything.max(), points)
+    middle = 0.5 * (grid[1:] + grid[:-1])  # the distribution function of an interval is taken in its middle
+
+    def below(values: Floats) -> Floats:
+        return np.append(np.searchsorted(np.sort(values), middle, side="right"), values.size).astype(np.float64)
+
+    return Comparison(
+        template=counts(template),
+        samples=np.stack([counts(values) for values in samples]),
+        grid=grid,
+        template_cdf=below(template) / template.size,
+        sample_cdf=np.stack([below(values) for values in samples]),
+        sizes=np.array([values.size for values in samples], dtype=np.float64),
+        wasserstein=float(wasserstein_distance(pooled, template)),
+    )
+
+
+def jensen_shannon(p: Floats, q: Floats) -> Floats:
+    """Return the Jensen-Shannon divergence in bits of histograms p (..., bins) and q (bins,), counts or shares."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        p = p / p.sum(axis=-1, keepdims=True)
+        q = q / q.sum()
+        middle = 0.5 * (p + q)
+
+        def divergence(x: Floats) -> Floats:
+            return np.where(x > 0.0, x * np.log2(np.where(x > 0.0, x, 1.0) / middle), 0.0).sum(axis=-1)
+
+        result = 0.5 * divergence(p) + 0.5 * divergence(np.broadcast_to(q, p.shape))
+    return np.where(np.isfinite(p.sum(axis=-1)), np.maximum(result, 0.0), np.nan)

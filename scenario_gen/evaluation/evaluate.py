@@ -1,0 +1,193 @@
+"""The evaluation of sets of scenarios against the encounter that they were generated from (paper V-B, method §7)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+from scenario_gen.evaluation import likeness, variety
+from scenario_gen.evaluation.bootstrap import Bootstrap, Interval, wilson
+from scenario_gen.evaluation.criticality import Criticality, criticality
+from scenario_gen.evaluation.distributions import QUANTITIES, compare, values_of
+from scenario_gen.evaluation.metrics import LIMIT_CAUSES, METRICS
+from scenario_gen.evaluation.motion import Motion, at_count, at_period, stacked
+from scenario_gen.evaluation.result import TEMPLATE, CheckCounts, Evaluation, Row
+from scenario_gen.parameters import check, parameter
+from scenario_gen.scenario import Cause, Scenario
+from scenario_gen.segmentation.result import Segmentation
+
+
+@dataclass(frozen=True)
+class EvaluationConfig:
+    """How a set of scenarios is measured."""
+
+    level: float = parameter(0.95, "confidence level of the intervals", low=0.5, high=0.999)
+    resamples: int = parameter(1000, "resamples of the bootstrap", low=10, high=100_000)
+    enough: int = parameter(50, "samples below which the figures are marked as few (the paper takes 50)", low=1)
+    max_steps: int = parameter(600, "most instants in a feature matrix; a longer template is resampled", low=10, high=5000)
+    period: float = parameter(0.1, "sampling period of distributions and criticality", unit="s", low=0.01, high=1.0)
+    ttc_horizon: float = parameter(10.0, "times to collision above this count as this", unit="s", low=1.0, high=100.0)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+@dataclass(frozen=True, eq=False)
+class _Reference:
+    """What every row is measured against, prepared once.
+
+    `motion` is the encounter on T even instants, `fitted` the fitted template on the same, if there is one.
+    """
+
+    motion: Motion
+    values: Mapping[str, Floats]
+    critical: Criticality
+    fitted: Motion | None
+    config: EvaluationConfig
+    seed: int
+
+
+def evaluate(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    rows: Mapping[str, Sequence[Scenario]],
+    *,
+    checks: Mapping[str, CheckCounts] | None = None,
+    oracle: str = "oracle",
+    road: str = "",
+    config: EvaluationConfig = EvaluationConfig(),
+    seed: int = 0,
+) -> Evaluation:
+    """Measure sets of scenarios against their template.
+
+    Args:
+        encounter: the recorded template.
+        segmentation: its primitives; only their number is used, since more changepoints always fit better.
+        rows: sets of scenarios by name, e.g. "with changepoints", "without changepoints", "oracle". An empty set gives an
+            empty row, with a note.
+        checks: the checker's account of the candidates of a row, where there is one.
+        oracle: the row whose first scenario is the fitted template, to which displacements are measured.
+        road: name of the road, for the heading.
+        config: how to measure.
+        seed: of the bootstrap.
+
+    Returns:
+        One row for the recorded template and one for each set.
+
+    Raises:
+        InputError: a scenario has another number of vehicles than the encounter.
+    """
+    steps = min(encounter.speed.shape[1], config.max_steps)
+    clocked = at_period(encounter, config.period)
+    for name, scenarios in rows.items():
+        for scenario in scenarios:
+            if len(scenario.vehicles) != len(encounter.vehicles):
+                raise InputError(
+                    f"row {name!r}: scenario {scenario.index} has {len(scenario.vehicles)} vehicles, "
+                    f"the encounter {encounter.name!r} has {len(encounter.vehicles)}"
+                )
+    fitted = at_count(rows[oracle][0], steps) if rows.get(oracle) else None
+    critical = criticality(clocked, config.ttc_horizon)
+    reference = _Reference(at_count(encounter, steps), values_of(clocked), critical, fitted, config, seed)
+    counts = checks or {}
+    measured = [_measure(name, scenarios, reference, counts.get(name)) for name, scenarios in rows.items()]
+    return Evaluation(
+        encounter=encounter.name,
+        road=road,
+        vehicles=tuple(vehicle.id for vehicle in encounter.vehicles),
+        duration=encounter.duration,
+        changepoints=len(segmentation.changepoints),
+        level=config.level,
+        resamples=config.resamples,
+        seed=seed,
+        metrics=METRICS,
+        rows=(_template_row(reference, steps < encounter.speed.shape[1], steps), *measured),
+    )
+
+
+def _template_row(reference: _Reference, resampled: bool, steps: int) -> Row:
+    critical = reference.critical
+    values = {"min_distance": critical.min_distance, "min_ttc": critical.min_ttc, "pet": critical.pet}
+    notes = (f"longer than max_steps: the feature matrices have {steps} instants",) if resampled else ()
+    return Row(TEMPLATE, 1, {key: Interval(value) for key, value in values.items()}, notes)
+
+
+def _measure(name: str, scenarios: Sequence[Scenario], reference: _Reference, counts: CheckCounts | None) -> Row:
+    config, fitted = reference.config, reference.fitted
+    values = _rates(counts, config.level) if counts else {}
+    if not scenarios:
+        return Row(name, 0, values, ("there is no scenario in this row",))
+    bootstrap = Bootstrap.draw(len(scenarios), config.resamples, config.level, reference.seed)
+    steps = reference.motion.speed.shape[1]
+    position, speed = stacked([at_count(scenario, steps) for scenario in scenarios])
+    clocked = [at_period(scenario, config.period) for scenario in scenarios]
+    values |= _likeness(reference, position, speed, bootstrap)
+    values |= _distributions(reference, clocked, bootstrap)
+    values |= _criticality(reference, clocked, bootstrap)
+    table = variety.displacements(position)
+    values["diversity"] = bootstrap.interval(lambda weights: variety.diversity(table, weights))
+    if fitted is not None:
+        error = variety.displacement_to(position, fitted.position)
+        values["min_ade"] = bootstrap.interval(lambda weights: variety.least(error, weights))
+    return Row(name, len(scenarios), values, _notes(len(scenarios), values, config))
+
+
+def _likeness(reference: _Reference, position: Floats, speed: Floats, bootstrap: Bootstrap) -> dict[str, Interval]:
+    """E and the correlation: Euclidean distance for position, Manhattan for speed, as in the paper."""
+    motion = reference.motion
+    places = likeness.likeness(motion.position, position, "euclidean")
+    paces = likeness.likeness(motion.speed[..., None], speed[..., None], "manhattan")
+    return {
+        "e_position": bootstrap.interval(lambda weights: likeness.mean_error(places, weights)),
+        "e_speed": bootstrap.interval(lambda weights: likeness.mean_error(paces, weights)),
+        "correlation_position": bootstrap.interval(lambda weights: likeness.mean_correlation(places, weights)),
+        "correlation_speed": bootstrap.interval(lambda weights: likeness.mean_correlation(paces, weights)),
+    }
+
+
+def _distributions(reference: _Reference, motions: Sequence[Motion], bootstrap: Bootstrap) -> dict[str, Interval]:
+    samples = [values_of(motion) for motion in motions]
+    result: dict[str, Interval] = {}
+    covered = []
+    for quantity in QUANTITIES:
+        compared = compare(quantity, reference.values[quantity.id], [values[quantity.id] for values in samples])
+        result[f"js_{quantity.id}"] = bootstrap.interval(compared.jensen_shannon)
+        near = bootstrap.interval(compared.wasserstein_near)
+        result[f"wasserstein_{quantity.id}"] = Interval(compared.wasserstein, near.low, near.high)
+        covered.append(compared)
+    result["coverage"] = bootstrap.interval(lambda weights: np.mean([one.coverage(weights) for one in covered], axis=0))
+    return result
+
+
+def _criticality(template: _Template, motions: Sequence[Motion], bootstrap: Bootstrap, horizon: float) -> dict[str, Interval]:
+    found = [criticality(motion, reference.config.ttc_horizon) for motion in motions]
+    return {
+        "min_distance": bootstrap.mean(np.array([one.min_distance for one in found])),
+        "min_ttc": bootstrap.mean(np.array([one.min_ttc for one in found])),
+        "pet": bootstrap.mean(np.array([one.pet for one in found])),
+        "order_kept": bootstrap.mean(np.array([one.keeps_order_of(reference.critical) for one in found])),
+    }
+
+
+def _rates(counts: CheckCounts, level: float) -> dict[str, Interval]:
+    """Shares of the candidates, by the first cause for which they were refused."""
+    accepted = counts.candidates - sum(counts.refused.values())
+    return {
+        "acceptance": wilson(accepted, counts.candidates, level),
+        "collision_rate": wilson(*counts.share_of([Cause.OVERLAP]), level),
+        "off_road_rate": wilson(*counts.share_of([Cause.OFF_ROAD]), level),
+        "limit_rate": wilson(*counts.share_of(LIMIT_CAUSES), level),
+    }
+
+
+def _notes(samples: int, values: Mapping[str, Interval], config: EvaluationConfig) -> tuple[str, ...]:
+    notes = []
+    if 1 < samples < config.enough:
+        notes.append(f"few samples: every figure, E included, comes from {samples}, not {config.enough}")
+    for key, what in (("e_position", "position"), ("e_speed", "speed")):
+        if not np.isfinite(values[key].value):
+            notes.append(f"E for {what} is undefined: the template's matrix is constant for every pair of vehicles")
+    return tuple(notes)

@@ -1,0 +1,55 @@
+"""The catalogue of metrics: what each figure is called, its unit, and what it means."""
+
+from scenario_gen.evaluation.distributions import QUANTITIES
+from scenario_gen.evaluation.result import Metric
+from scenario_gen.scenario import Cause
+
+LIMIT_CAUSES = (Cause.SPEED, Cause.LONGITUDINAL_ACCELERATION, Cause.LATERAL_ACCELERATION, Cause.CURVATURE)
+"""Causes that count as a violated limit."""
+
+_LIKENESS, _REALISM, _CRITICAL, _VALID, _VARIETY = (
+    "Likeness to the template",
+    "Distributions against the template",
+    "Criticality",
+    "Validity of the candidates",
+    "Variety",
+)
+
+METRICS: tuple[Metric, ...] = (
+    Metric("e_position", "E position", "", "lower", _LIKENESS, "‖mean feature matrix − template's‖ / ‖template's‖, of positions"),
+    Metric("e_speed", "E speed", "", "lower", _LIKENESS, "‖mean feature matrix − template's‖ / ‖template's‖, of speeds"),
+    Metric("correlation_position", "correlation position", "", "higher", _LIKENESS, "of the mean matrix with the template's"),
+    Metric("correlation_speed", "correlation speed", "", "higher", _LIKENESS, "of the mean matrix with the template's"),
+    *(
+        Metric(
+            f"js_{q.id}", f"JS {q.label}", "bit", "lower", _REALISM, f"Jensen–Shannon divergence, bins of {q.bin_width} {q.unit}"
+        )
+        for q in QUANTITIES
+    ),
+    *(
+        Metric(f"wasserstein_{q.id}", f"W {q.label}", q.unit, "lower", _REALISM, "Wasserstein distance of the values")
+        for q in QUANTITIES
+    ),
+    Metric("min_distance", "min distance", "m", "", _CRITICAL, "least distance of two footprints, mean over samples"),
+    Metric("min_ttc", "min TTC", "s", "", _CRITICAL, "least time to collision at constant velocity, capped, mean over samples"),
+    Metric("pet", "PET", "s", "", _CRITICAL, "from the first vehicle's exit of the shared area to the second's entry, mean"),
+    Metric(
+        "order_kept",
+        "passing order kept",
+        "%",
+        "higher",
+        _CRITICAL,
+        "conflicts of the template in which the same vehicle goes first",
+    ),
+    Metric("acceptance", "accepted", "%", "higher", _VALID, "share of candidates that the checker accepted"),
+    Metric("collision_rate", "overlap", "%", "lower", _VALID, "share of candidates refused because footprints overlap"),
+    Metric("off_road_rate", "off road", "%", "lower", _VALID, "share of candidates refused because a footprint leaves the road"),
+    Metric(
+        "limit_rate", "limit violated", "%", "lower", _VALID, "share of candidates refused for speed, acceleration or curvature"
+    ),
+    Metric("diversity", "diversity", "m", "", _VARIETY, "mean displacement between two samples"),
+    Metric(
+        "coverage", "coverage", "%", "higher", _VARIETY, "share of the template's values in histogram bins that the set visits"
+    ),
+    Metric("min_ade", "min ADE", "m", "lower", _VARIETY, "mean displacement of the nearest sample to the fitted template"),
+)

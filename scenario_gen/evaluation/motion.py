@@ -1,0 +1,65 @@
+"""Encounters and scenarios brought to one form, so that every metric treats the recorded and the generated alike."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, frozen
+from scenario_gen.encounter import Encounter, Vehicle
+from scenario_gen.scenario import Scenario
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """N vehicles on a uniform clock.
+
+    Attributes:
+        vehicles: N identities and footprints.
+        dt: sampling period [s].
+        position: (N, T, 2) metres.
+        heading: (N, T) rad, unwrapped.
+        speed: (N, T) m/s.
+    """
+
+    vehicles: tuple[Vehicle, ...]
+    dt: float
+    position: Floats
+    heading: Floats
+    speed: Floats
+
+    @property
+    def time(self) -> Floats:
+        """(T,) seconds from the start."""
+        return frozen(np.arange(self.speed.shape[1]) * self.dt)
+
+
+def at_period(source: Encounter | Scenario, dt: float) -> Motion:
+    """Bring an encounter or a scenario to the period dt [s] (a tail shorter than dt is left out).
+
+    What is on that clock already passes through untouched; the rest is interpolated linearly.
+    """
+    count = int(np.floor(source.time[-1] / dt + 1e-6)) + 1
+    return _motion(source, np.minimum(np.arange(count) * dt, source.time[-1]), dt)
+
+
+def at_count(source: Encounter | Scenario, count: int) -> Motion:
+    """Bring an encounter or a scenario to `count` instants spread evenly from its start to its end."""
+    duration = float(source.time[-1])
+    return _motion(source, np.linspace(0.0, duration, count), duration / (count - 1))
+
+
+def _motion(source: Encounter | Scenario, time: Floats, dt: float) -> Motion:
+    if time.shape == source.time.shape and np.allclose(time, source.time, rtol=0.0, atol=1e-9):
+        return Motion(source.vehicles, dt, source.position, source.heading, source.speed)
+
+    def interpolated(values: Floats) -> Floats:
+        return frozen([np.interp(time, source.time, row) for row in values])
+
+    position = np.stack([interpolated(source.position[..., axis]) for axis in (0, 1)], axis=-1)
+    return Motion(source.vehicles, dt, frozen(position), interpolated(source.heading), interpolated(source.speed))
+
+
+def stacked(motions: Sequence[Motion]) -> tuple[Floats, Floats]:
+    """Stack S motions of equal T: positions (S, N, T, 2) and speeds (S, N, T)."""
+    return np.stack([motion.position for motion in motions]), np.stack([motion.speed for motion in motions])

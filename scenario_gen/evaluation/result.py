@@ -1,0 +1,216 @@
+"""What the evaluation answers: rows of metrics with intervals, as JSON and as Markdown."""
+
+import json
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from scenario_gen.errors import InputError
+from scenario_gen.evaluation.bootstrap import Interval
+from scenario_gen.scenario import Cause, ScenarioSet, Verdict
+
+Better = Literal["lower", "higher", ""]
+TEMPLATE = "template"
+"""Name of the row that `evaluate` adds: the recorded encounter itself."""
+
+
+@dataclass(frozen=True)
+class CheckCounts:
+    """What the checker said about the candidates of one row: how many there were, and how many fell by their first cause."""
+
+    candidates: int
+    refused: Mapping[Cause, int] = field(default_factory=dict)
+
+    @classmethod
+    def of_set(cls, made: ScenarioSet) -> "CheckCounts":
+        """Take the account of a request."""
+        return cls(made.candidates, dict(made.refused))
+
+    @classmethod
+    def of_verdicts(cls, verdicts: Iterable[Verdict]) -> "CheckCounts":
+        """Count verdicts, one per scenario."""
+        verdicts = list(verdicts)
+        return cls(len(verdicts), Counter(verdict.violations[0].cause for verdict in verdicts if not verdict.valid))
+
+    def share_of(self, causes: Sequence[Cause]) -> tuple[int, int]:
+        """Return how many candidates fell by one of `causes`, and the number of candidates."""
+        return sum(self.refused.get(cause, 0) for cause in causes), self.candidates
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A kind of figure.
+
+    Attributes:
+        id: its key in JSON.
+        label: for people.
+        unit: of its values, "" for a plain number, "%" for shares (stored as 0 to 1).
+        better: which direction is better, "" where neither is.
+        group: heading under which it stands.
+        meaning: one sentence.
+    """
+
+    id: str
+    label: str
+    unit: str
+    better: Better
+    group: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Row:
+    """All figures of one set of scenarios.
+
+    Attributes:
+        name: e.g. "with changepoints".
+        samples: number of scenarios.
+        values: estimates by metric id; what could not be had is absent or NaN.
+        notes: what a reader must know, in sentences.
+    """
+
+    name: str
+    samples: int
+    values: Mapping[str, Interval]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Rows of metrics for one encounter on one road.
+
+    Attributes:
+        encounter: its name; road: its name.
+        vehicles: ids.
+        duration: of the template [s].
+        changepoints: K, which always stands beside E.
+        level: confidence level of the intervals; resamples: of the bootstrap; seed: of its draws.
+        metrics: what the rows hold, in order.
+        rows: the recorded template first, then in the order given.
+    """
+
+    encounter: str
+    road: str
+    vehicles: tuple[str, ...]
+    duration: float
+    changepoints: int
+    level: float
+    resamples: int
+    seed: int
+    metrics: tuple[Metric, ...]
+    rows: tuple[Row, ...]
+
+    def row(self, name: str) -> Row | None:
+        """Return the row of that name, or None."""
+        return next((row for row in self.rows if row.name == name), None)
+
+    def value(self, row: str, metric: str) -> float:
+        """Return one figure; NaN if there is none."""
+        found = self.row(row)
+        return found.values[metric].value if found and metric in found.values else math.nan
+
+    def to_json(self, indent: int | None = 2) -> str:
+        """Return JSON; what is not a number is null, figures have six significant digits."""
+        document = {
+            "encounter": self.encounter,
+            "road": self.road,
+            "vehicles": list(self.vehicles),
+            "duration_s": _number(self.duration),
+            "changepoints": self.changepoints,
+            "confidence_level": self.level,
+            "resamples": self.resamples,
+            "seed": self.seed,
+            "metrics": [vars(metric) for metric in self.metrics],
+            "rows": [
+                {
+                    "name": row.name,
+                    "samples": row.samples,
+                    "notes": list(row.notes),
+                    "values": {
+                        key: {"value": _number(e.value), "low": _number(e.low), "high": _number(e.high)}
+                        for key, e in row.values.items()
+                    },
+                }
+                for row in self.rows
+            ],
+        }
+        return json.dumps(document, indent=indent, ensure_ascii=False, allow_nan=False)
+
+    @classmethod
+    def from_json(cls, text: str) -> "Evaluation":
+        """Read what `to_json` wrote.
+
+        Raises:
+            InputError: the text is not such a document.
+        """
+        try:
+            document = json.loads(text)
+            return cls(
+                encounter=document["encounter"],
+                road=document["road"],
+                vehicles=tuple(document["vehicles"]),
+                duration=document["duration_s"],
+                changepoints=document["changepoints"],
+                level=document["confidence_level"],
+                resamples=document["resamples"],
+                seed=document["seed"],
+                metrics=tuple(Metric(**metric) for metric in document["metrics"]),
+                rows=tuple(_row(row) for row in document["rows"]),
+            )
+        except (ValueError, KeyError, TypeError) as error:
+            raise InputError(f"this is not an evaluation as scenario-gen writes it ({error!r})") from error
+
+    def to_markdown(self) -> str:
+        """Return a table: metrics down, rows across, each figure with its interval."""
+        lines = [
+            f"# {self.encounter} on {self.road}",
+            "",
+            f"{len(self.vehicles)} vehicles, {self.duration:.1f} s, K = {self.changepoints} changepoints; "
+            f"{self.level:.0%} bootstrap intervals in brackets ({self.resamples} resamples, seed {self.seed}).",
+            "",
+            "| metric | better | " + " | ".join(f"{row.name} ({row.samples})" for row in self.rows) + " |",
+            "|---|---|" + "---|" * len(self.rows),
+        ]
+        group = ""
+        for metric in self.metrics:
+            if metric.group != group:
+                group = metric.group
+                lines.append(f"| **{group}** | |" + " |" * len(self.rows))
+            unit = f" [{metric.unit}]" if metric.unit else ""
+            cells = [formatted(row.values.get(metric.id), metric.unit) for row in self.rows]
+            lines.append(f"| {metric.label}{unit} | {metric.better} | " + " | ".join(cells) + " |")
+        notes = [f"- {row.name}: {note}" for row in self.rows for note in row.notes]
+        return "\n".join([*lines, "", *notes]).rstrip() + "\n"
+
+
+def formatted(estimate: Interval | None, unit: str, *, bounds: bool = True) -> str:
+    """Lay out an estimate for people: three significant digits, the interval in brackets, a dash if there is none."""
+    if estimate is None or not math.isfinite(estimate.value):
+        return "–"
+    factor = 100.0 if unit == "%" else 1.0
+
+    def figure(value: float) -> str:
+        value *= factor
+        return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+    text = figure(estimate.value)
+    if bounds and math.isfinite(estimate.low) and math.isfinite(estimate.high):
+        text += f" [{figure(estimate.low)}, {figure(estimate.high)}]"
+    return text
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.6g}") if math.isfinite(value) else None
+
+
+def _row(document: Mapping[str, Any]) -> Row:
+    def number(value: float | None) -> float:
+        return math.nan if value is None else value
+
+    values = {
+        key: Interval(number(entry["value"]), number(entry["low"]), number(entry["high"]))
+        for key, entry in document["values"].items()
+    }
+    return Row(document["name"], document["samples"], values, tuple(document["notes"]))

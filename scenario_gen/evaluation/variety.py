@@ -1,0 +1,41 @@
+"""How much the samples of a set differ from each other, and how near the nearest comes to the fitted template."""
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+
+
+def displacements(position: Floats) -> Floats:
+    """Return (S, S): mean distance in metres between samples r and s, over vehicles and instants.
+
+    Args:
+        position: (S, N, T, 2) metres, at the same share of each sample's duration.
+    """
+    samples = position.shape[0]
+    table = np.zeros((samples, samples))
+    for s in range(samples - 1):
+        step = position[s + 1 :] - position[s]
+        table[s, s + 1 :] = np.hypot(step[..., 0], step[..., 1]).mean(axis=(1, 2))
+    return table + table.T
+
+
+def diversity(table: Floats, weights: Floats) -> Floats:
+    """Return the mean displacement (B,) of two different samples under weights (B, S); NaN for one sample.
+
+    A sample drawn twice makes no pair with itself, or resampling would shrink the diversity.
+    """
+    total = np.einsum("bs,bs->b", weights @ table, weights)
+    pairs = weights.sum(axis=1) ** 2 - (weights**2).sum(axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(total / pairs)
+
+
+def displacement_to(position: Floats, target: Floats) -> Floats:
+    """Return (S,): mean distance in metres of samples (S, N, T, 2) to a target (N, T, 2), over vehicles and instants (ADE)."""
+    step = position - target
+    return np.asarray(np.hypot(step[..., 0], step[..., 1]).mean(axis=(1, 2)))
+
+
+def least(values: Floats, weights: Floats) -> Floats:
+    """Return the least value (B,) among the samples (S,) that weights (B, S) contain."""
+    return np.asarray(np.where(weights > 0.0, values, np.inf).min(axis=1))

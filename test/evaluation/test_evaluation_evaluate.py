@@ -1,0 +1,141 @@
+"""The evaluation as a whole: rows, notes, determinism and its documents; the oracle."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from evaluation_worlds import CARS, crossing, replayed, samples
+
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+from scenario_gen.evaluation import CheckCounts, Evaluation, EvaluationConfig, evaluate, replay
+from scenario_gen.fitting.result import Fit, FittedVehicle
+from scenario_gen.scenario import BoundaryStates, Cause, ScenarioSet, Verdict, Violation
+from scenario_gen.segmentation.result import Segmentation
+
+T = 121
+SEGMENTATION = Segmentation(np.repeat([0, 1, 2], [40, 40, 41]), np.array([40, 80]), np.zeros(T), ("a", "b", "c"))
+QUICK = EvaluationConfig(resamples=100)
+
+
+def run(**extra):
+    encounter = crossing()
+    rows = {
+        "with changepoints": samples(encounter, 50),
+        "without changepoints": samples(encounter, 12, seed=4, pace=0.0),
+        "oracle": [replayed(encounter)],
+    }
+    return evaluate(encounter, SEGMENTATION, rows, config=QUICK, **extra)
+
+
+def test_rows_say_what_happened():
+    found = run(checks={"with changepoints": CheckCounts(60, {Cause.OVERLAP: 9, Cause.SPEED: 1})}, road="cross")
+    assert [row.name for row in found.rows] == ["template", "with changepoints", "without changepoints", "oracle"]
+    assert found.changepoints == 2 and found.vehicles == ("west", "south")
+    assert found.value("oracle", "e_position") < 1e-6 and found.value("oracle", "min_ade") < 1e-6
+    for key in ("e_position", "e_speed", "js_speed", "js_acceleration", "wasserstein_speed"):
+        assert found.value("with changepoints", key) < found.value("without changepoints", key)
+    assert found.value("with changepoints", "collision_rate") == pytest.approx(0.15)
+    assert found.value("with changepoints", "limit_rate") == pytest.approx(1 / 60)
+    assert found.value("with changepoints", "acceptance") == pytest.approx(50 / 60)
+    assert "from 12, not 50" in found.row("without changepoints").notes[0]
+    assert not found.row("with changepoints").notes
+    assert math.isnan(found.value("oracle", "diversity")) and math.isnan(found.value("nobody", "e_position"))
+
+
+def test_every_estimate_lies_in_its_interval_or_has_none():
+    for row in run().rows:
+        for key, estimate in row.values.items():
+            if math.isfinite(estimate.low) and not key.startswith("wasserstein"):
+                assert estimate.low - 1e-9 <= estimate.value <= estimate.high + 1e-9, (row.name, key)
+
+
+def test_the_seed_decides_every_byte():
+    assert run(seed=3).to_json() == run(seed=3).to_json()
+    assert run(seed=3).to_json() != run(seed=4).to_json()
+
+
+def test_json_round_trip_and_markdown():
+    found = run()
+    text = found.to_json()
+    assert "NaN" not in text and json.loads(text)["changepoints"] == 2
+    assert Evaluation.from_json(text).to_json() == text
+    page = found.to_markdown()
+    assert "K = 2 changepoints" in page and "| E position |" in page and "–" in page
+    with pytest.raises(InputError, match="not an evaluation"):
+        Evaluation.from_json('{"rows": 3}')
+
+
+def test_missing_and_empty_rows():
+    encounter = crossing()
+    found = evaluate(encounter, SEGMENTATION, {"with changepoints": []}, config=QUICK)
+    assert found.row("with changepoints").notes == ("there is no scenario in this row",)
+    assert math.isnan(found.value("with changepoints", "min_ade"))
+    assert found.to_markdown()
+
+
+def test_another_number_of_vehicles_is_refused():
+    encounter = crossing()
+    scenario = replayed(encounter)
+    trio = replace(
+        scenario,
+        vehicles=(*CARS, replace(CARS[0], id="third")),
+        position=scenario.position[[0, 1, 1]],
+        heading=scenario.heading[[0, 1, 1]],
+        speed=scenario.speed[[0, 1, 1]],
+        acceleration=scenario.acceleration[[0, 1, 1]],
+    )
+    with pytest.raises(InputError, match="3 vehicles"):
+        evaluate(encounter, SEGMENTATION, {"x": [trio]}, config=QUICK)
+
+
+def test_a_long_template_is_resampled_and_says_so():
+    encounter = crossing()
+    found = evaluate(encounter, SEGMENTATION, {"x": [replayed(encounter)]}, config=EvaluationConfig(max_steps=60))
+    assert "60 instants" in found.row("template").notes[0] and found.value("x", "e_position") < 1e-6
+
+
+def test_counts_from_sets_and_verdicts():
+    made = ScenarioSet(5, (), 8)
+    made.refused[Cause.OFF_ROAD] = 3
+    assert CheckCounts.of_set(made) == CheckCounts(8, {Cause.OFF_ROAD: 3})
+    bad = Verdict((Violation(Cause.OVERLAP, 1.0, (0, 1), ""), Violation(Cause.SPEED, 1.0, (0,), "")))
+    assert CheckCounts.of_verdicts([Verdict(), bad, bad]) == CheckCounts(3, {Cause.OVERLAP: 2})
+
+
+def test_the_oracle_goes_through_the_anchors():
+    encounter = crossing()
+    index = np.array([0, 40, 80, 120])
+    anchors = []
+    for n in range(2):
+        pose = np.column_stack([encounter.position[n, index], encounter.heading[n, index]])
+        turned = np.column_stack([-1.1 * pose[:, 1] + 5.0, 1.1 * pose[:, 0], pose[:, 2] + np.pi / 2])  # turned left, 10 % larger
+        anchors.append(turned)
+    ends = [np.stack([np.append(a[k], 0.0) for a in anchors]) for k in (0, -1)]
+    fitted = tuple(FittedVehicle(a, np.zeros(4), np.zeros(3, dtype=bool), 1.1, "straight") for a in anchors)
+    found = replay(encounter, Fit(CARS, fitted, index, BoundaryStates(*ends), ()))
+    expected = np.stack([-1.1 * encounter.position[..., 1] + 5.0, 1.1 * encounter.position[..., 0]], axis=-1)
+    np.testing.assert_allclose(found.position, expected, atol=1e-6)
+    np.testing.assert_allclose(found.speed, 1.1 * encounter.speed, atol=1e-9)
+    turn = found.heading - encounter.heading - np.pi / 2
+    np.testing.assert_allclose(np.cos(turn), 1.0, atol=1e-9)
+
+
+def test_the_oracle_keeps_a_dwell_and_a_short_chord():
+    time = np.arange(21) * 0.1
+    x = np.minimum(time, 1.0) * 4.0
+    position = np.stack([np.stack([x, 0 * x], -1), np.stack([0.1 * np.sin(time), 20 + 0 * x], -1)])
+    encounter = Encounter("stop", CARS, 0, 100_000_000, position, np.zeros((2, 21)), np.stack([np.gradient(x, 0.1), 0 * x]))
+    first = np.array([[0, 0, 0], [8, 0, 0], [8, 0, 0.0]])
+    second = np.array([[50, 0, np.pi / 2], [50, 0.2, np.pi / 2], [50, 0.2, np.pi / 2]])
+    fitted = (
+        FittedVehicle(first, np.zeros(3), np.array([False, True]), 2.0, "straight"),
+        FittedVehicle(second, np.zeros(3), np.array([False, True]), 1.0, "wait"),
+    )
+    states = BoundaryStates(np.zeros((2, 4)), np.zeros((2, 4)))
+    found = replay(encounter, Fit(CARS, fitted, np.array([0, 10, 20]), states, ()))
+    np.testing.assert_allclose(found.position[0, 5], [4.0, 0.0])
+    assert (found.position[0, 10:] == [8.0, 0.0]).all() and not found.speed[0, 10:].any()
+    np.testing.assert_allclose(found.position[1, [0, 10]], [[50, 0], [50, 0.2]], atol=1e-9)
