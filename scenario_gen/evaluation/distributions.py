@@ -103,7 +103,7 @@ def compare(quantity: Quantity, template: Floats, samples: Sequence[Floats], poi
         return Comparison(np.zeros(1), empty, np.zeros(2), np.zeros(2), np.zeros((len(samples), 2)), empty[:, 0], float("nan"))
 
     def bin_of(values: Floats) -> Ints:
-        return np.floor(values / quantity.bin_width + ROUNDING).astype(np.int64)
+        return np.asarray(np.floor(values / quantity.bin_width + ROUNDING), dtype=np.int64)
 
     first, last = (int(bin_of(np.array(bound))) for bound in (everything.min(), everything.max()))
 

@@ -162,7 +162,7 @@ def _distributions(reference: _Reference, motions: Sequence[Motion], bootstrap: 
     return result
 
 
-def _criticality(template: _Template, motions: Sequence[Motion], bootstrap: Bootstrap, horizon: float) -> dict[str, Interval]:
+def _criticality(reference: _Reference, motions: Sequence[Motion], bootstrap: Bootstrap) -> dict[str, Interval]:
     found = [criticality(motion, reference.config.ttc_horizon) for motion in motions]
     return {
         "min_distance": bootstrap.mean(np.array([one.min_distance for one in found])),
