@@ -1,0 +1,275 @@
+"""Cleaning: what cannot be true is dropped and counted; what is left is in order of time, in metres."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pyproj
+
+from scenario_gen.arrays import Bools, Floats, Ints
+from scenario_gen.errors import InputError
+from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.raw import Observations, RawLog
+
+FASTEST = 70.0  # m/s: no road vehicle's measured speed is above it (an SPMD unit sends 163.8 for "unknown")
+JUMP_SLACK = 3.0  # m that a fix may lie beyond what the speeds allow: GPS noise
+JUMP_SPEED = 10.0  # m/s by which a measured speed may be wrong before a fix counts as a jump
+RELOCATED = 5  # so many fixes in a row that agree with each other are a new place, not jumps
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One vehicle's clean observations, stamps strictly increasing; metres and m/s in the local frame.
+
+    Attributes:
+        id: the vehicle's name.
+        fix_ns: (F,) stamps.
+        fix: (F, 2) metres.
+        heading: (F,) rad, NaN where unknown.
+        speed_ns: (S,) stamps.
+        speed: (S,) m/s.
+        length: metres.
+        width: metres.
+    """
+
+    id: str
+    fix_ns: Ints
+    fix: Floats
+    heading: Floats
+    speed_ns: Ints
+    speed: Floats
+    length: float
+    width: float
+
+
+@dataclass
+class Drops:
+    """Counts of dropped rows by reason, with the first row of each."""
+
+    count: dict[str, int] = field(default_factory=dict)
+    first: dict[str, int] = field(default_factory=dict)
+
+    def add(self, reason: str, rows: Ints) -> None:
+        """Count `rows` as dropped for `reason`."""
+        if len(rows):
+            self.count[reason] = self.count.get(reason, 0) + len(rows)
+            self.first[reason] = min(self.first.get(reason, int(rows[0])), int(rows.min()))
+
+
+def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Track, ...], Drops, tuple[float, float] | None]:
+    """Drop what cannot be true and bring every vehicle into the local frame.
+
+    Returns:
+        One track per vehicle with at least two fixes; the drops; the frame's origin (latitude, longitude) or None.
+
+    Raises:
+        InputError: nothing usable is left, or `strict` and something had to be repaired.
+    """
+    drops = Drops()
+    for reason, row in log.dropped:
+        drops.add(reason, np.array([row]))
+    sound = [sound_observations(vehicle, log.geographic, drops) for vehicle in chosen(log, config)]
+    window = time_window(sound, log, drops, config)
+    sound = [within(vehicle, *window) for vehicle in sound]
+    if not any(len(vehicle.fix_ns) for vehicle in sound):
+        raise InputError(f"{log.name}: no position between {config.start:g} s and {config.end:g} s; parameters start and end")
+    origin, sound = to_metres(log, sound, config)
+    tracks = [without_jumps(in_order(vehicle, log, drops), drops, config) for vehicle in sound]
+    if config.strict and drops.count:
+        reason = next(iter(drops.count))
+        raise InputError(f"{log.where(drops.first[reason])}: {reason} ({drops.count[reason]} such rows), and strict is set")
+    return tuple(track for track in tracks if len(track.fix_ns) >= 2), drops, origin
+
+
+def chosen(log: RawLog, config: LogConfig) -> tuple[Observations, ...]:
+    """Return the vehicles that the parameter `vehicles` names, all by default."""
+    names = [name.strip() for name in config.vehicles.split(",") if name.strip()]
+    known = {vehicle.id: vehicle for vehicle in log.vehicles}
+    for name in names:
+        if name not in known:
+            raise InputError(f"parameter vehicles: {log.name} has no vehicle {name!r}; it has {', '.join(known)}")
+    return tuple(known[name] for name in dict.fromkeys(names)) if names else log.vehicles
+
+
+def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) -> Observations:
+    """Leave out values that are no position or no speed."""
+    fix, speed = vehicle.fix, vehicle.speed
+    checks: list[tuple[str, Bools]] = [("position is not a number", ~np.isfinite(fix).all(axis=1))]
+    if geographic:
+        checks.append(("position is (0, 0)", (np.abs(fix) < 1e-6).all(axis=1)))
+        checks.append(("position is off the globe", (np.abs(fix[:, 0]) > 90.0) | (np.abs(fix[:, 1]) > 180.0)))
+    keep = judge(checks, vehicle.fix_row, drops)
+    slow_checks: list[tuple[str, Bools]] = [
+        ("speed is not a number", ~np.isfinite(speed)),
+        ("speed is negative", speed < 0.0),
+        (f"speed is above {FASTEST:g} m/s", speed > FASTEST),
+    ]
+    keep_speed = judge(slow_checks, vehicle.speed_row, drops)
+    return select(vehicle, keep, keep_speed)
+
+
+def judge(checks: list[tuple[str, Bools]], rows: Ints, drops: Drops) -> Bools:
+    """Return the rows that fail no check; each that fails counts once, for the first reason."""
+    keep = np.ones(len(rows), dtype=bool)
+    for reason, bad in checks:
+        drops.add(reason, rows[keep & bad])
+        keep &= ~bad
+    return keep
+
+
+def select(vehicle: Observations, fixes: Bools | Ints, speeds: Bools | Ints) -> Observations:
+    """Return the vehicle with only the chosen observations, in the order given."""
+    return Observations(
+        id=vehicle.id,
+        fix_ns=vehicle.fix_ns[fixes],
+        fix=vehicle.fix[fixes],
+        fix_row=vehicle.fix_row[fixes],
+        heading=vehicle.heading[fixes],
+        speed_ns=vehicle.speed_ns[speeds],
+        speed=vehicle.speed[speeds],
+        speed_row=vehicle.speed_row[speeds],
+        length=vehicle.length,
+        width=vehicle.width,
+    )
+
+
+def time_window(sound: list[Observations], log: RawLog, drops: Drops, config: LogConfig) -> tuple[int, int]:
+    """Return the first and last stamp wanted [ns].
+
+    Raises:
+        InputError: there is no usable position at all.
+    """
+    stamps = [vehicle.fix_ns for vehicle in sound if len(vehicle.fix_ns)]
+    if not stamps:
+        causes = "; ".join(f"{reason}: {n}, first at {log.where(drops.first[reason])}" for reason, n in drops.count.items())
+        raise InputError(
+            f"{log.segments[0].label} holds no usable position among {log.rows} rows" + (f" ({causes})" if causes else "")
+        )
+    first, last = min(int(s.min()) for s in stamps), max(int(s.max()) for s in stamps)
+    if config.end and config.end <= config.start:
+        raise InputError(f"parameter end is {config.end:g} s; it must be after start ({config.start:g} s), or 0")
+    if config.start * 1e9 > last - first:
+        raise InputError(f"parameter start is {config.start:g} s, but {log.name} is only {(last - first) * 1e-9:.1f} s long")
+    return first + round(config.start * 1e9), first + round(config.end * 1e9) if config.end else last
+
+
+def within(vehicle: Observations, first: int, last: int) -> Observations:
+    """Return the vehicle's observations between two stamps."""
+    return select(
+        vehicle,
+        (vehicle.fix_ns >= first) & (vehicle.fix_ns <= last),
+        (vehicle.speed_ns >= first) & (vehicle.speed_ns <= last),
+    )
+
+
+def to_metres(
+    log: RawLog, vehicles: list[Observations], config: LogConfig
+) -> tuple[tuple[float, float] | None, list[Observations]]:
+    """Project latitude and longitude to east and north of an origin: azimuthal equidistant on the WGS 84 ellipsoid.
+
+    Distances and directions from the origin are exact; between two points 10 km away from it the scale is right to 1e-6.
+    """
+    if not log.geographic:
+        return None, vehicles
+    everything = np.concatenate([vehicle.fix for vehicle in vehicles])
+    if config.origin:
+        origin = parse_origin(config.origin)
+    else:
+        middle = np.round(np.median(everything, axis=0), 5)  # about a metre: the origin reads well and does not hang on one fix
+        origin = (float(middle[0]), float(middle[1]))
+    frame = pyproj.Proj(proj="aeqd", lat_0=origin[0], lon_0=origin[1], ellps="WGS84")
+    projected = []
+    for vehicle in vehicles:
+        east, north = frame(vehicle.fix[:, 1], vehicle.fix[:, 0])
+        fix = np.column_stack([east, north])
+        values = {name: getattr(vehicle, name) for name in vehicle.__dataclass_fields__}
+        projected.append(Observations(**(values | {"fix": fix})))
+    return origin, projected
+
+
+def parse_origin(text: str) -> tuple[float, float]:
+    """Read `latitude,longitude`."""
+    try:
+        latitude, longitude = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise InputError(f"parameter origin is {text!r}; write latitude,longitude in degrees") from error
+    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
+        raise InputError(f"parameter origin is {text!r}; that is not a place on the globe")
+    return latitude, longitude
+
+
+def in_order(vehicle: Observations, log: RawLog, drops: Drops) -> Observations:
+    """Sort by stamp and drop repeated stamps.
+
+    Raises:
+        InputError: the clock is no clock: it runs backwards half of the time, or stands.
+    """
+    fixes, speeds = np.diff(vehicle.fix_ns), np.diff(vehicle.speed_ns)
+    back = np.flatnonzero(fixes < 0) + 1
+    repeated = int((fixes == 0).sum())
+    if len(fixes) >= 4 and (len(back) > len(fixes) / 2 or repeated > 0.9 * len(fixes)):
+        row = vehicle.fix_row[back[0] if len(back) else 1]
+        what = f"runs backwards {len(back)} times" if len(back) else f"stands still {repeated} times"
+        raise InputError(
+            f"{log.where(int(row))}: the clock of vehicle {vehicle.id} {what} in {len(fixes)} rows; check the time column"
+        )
+    drops.add("stamp out of order (sorted)", vehicle.fix_row[back])
+    late = set(back.tolist())
+    same = [i + 1 for i in np.flatnonzero(speeds < 0) if i + 1 not in late and len(vehicle.speed_row) != len(vehicle.fix_row)]
+    drops.add("stamp out of order (sorted)", vehicle.speed_row[same])
+    keep, again = first_of_each(vehicle.fix_ns)
+    keep_speed, _ = first_of_each(vehicle.speed_ns)
+    drops.add("stamp repeated", vehicle.fix_row[again])
+    return select(vehicle, keep, keep_speed)
+
+
+def first_of_each(stamps: Ints) -> tuple[Ints, Ints]:
+    """Indices of the first row of each stamp in order of time, and of the rows that repeat one."""
+    order = np.argsort(stamps, kind="stable")
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = np.diff(stamps[order]) > 0
+    return order[new], order[~new]
+
+
+def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig) -> Track:
+    """Drop fixes that the vehicle cannot have reached at the speeds it measured; several in a row that agree are believed."""
+    limit = reach(vehicle)
+    step = np.hypot(*np.diff(vehicle.fix, axis=0).T)
+    seconds = np.diff(vehicle.fix_ns) * 1e-9
+    keep = np.ones(len(vehicle.fix_ns), dtype=bool)
+    if (step > JUMP_SLACK + limit[1:] * seconds).any():
+        keep = reachable(vehicle.fix_ns * 1e-9, vehicle.fix, limit)
+        drops.add("position jumps", vehicle.fix_row[~keep])
+    return Track(
+        id=vehicle.id,
+        fix_ns=vehicle.fix_ns[keep],
+        fix=vehicle.fix[keep],
+        heading=vehicle.heading[keep],
+        speed_ns=vehicle.speed_ns,
+        speed=vehicle.speed,
+        length=vehicle.length if np.isfinite(vehicle.length) else config.length,
+        width=vehicle.width if np.isfinite(vehicle.width) else config.width,
+    )
+
+
+def reach(vehicle: Observations) -> Floats:
+    """(F,) m/s: the fastest that the vehicle may have been at each fix."""
+    if len(vehicle.speed_ns) < 2:
+        return np.full(len(vehicle.fix_ns), FASTEST)
+    return 1.5 * np.interp(vehicle.fix_ns, vehicle.speed_ns, vehicle.speed) + JUMP_SPEED
+
+
+def reachable(seconds: Floats, fix: Floats, limit: Floats) -> Bools:
+    """Return which fixes can be reached from the last one believed."""
+    keep = np.ones(len(fix), dtype=bool)
+    last, doubted = 0, 0
+    for i in range(1, len(fix)):
+        if np.hypot(*(fix[i] - fix[last])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[last]):
+            last, doubted = i, 0
+            continue
+        agrees = doubted and np.hypot(*(fix[i] - fix[i - 1])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[i - 1])
+        doubted = doubted + 1 if agrees else 1
+        keep[i] = False
+        if doubted >= RELOCATED:
+            keep[i - doubted + 1 : i + 1] = True
+            last, doubted = i, 0
+    return keep

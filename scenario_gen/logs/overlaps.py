@@ -1,0 +1,32 @@
+"""Overlaps of recorded footprints: counted, never repaired."""
+
+from itertools import combinations
+
+import numpy as np
+import shapely
+
+from scenario_gen.arrays import Floats
+from scenario_gen.encounter import Encounter
+from scenario_gen.logs.quality import Overlap
+
+
+def footprints(encounter: Encounter, vehicle: int) -> Floats:
+    """(T, 4, 2) corners of a vehicle's footprint, counter-clockwise from the rear right."""
+    body = encounter.vehicles[vehicle]
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [body.length / 2.0, body.width / 2.0]
+    cos, sin = np.cos(encounter.heading[vehicle]), np.sin(encounter.heading[vehicle])
+    turn = np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=-2)
+    turned: Floats = np.einsum("tij,kj->tki", turn, corners) + encounter.position[vehicle][:, None, :]
+    return turned
+
+
+def find_overlaps(encounter: Encounter) -> tuple[Overlap, ...]:
+    """Return the pairs whose footprints overlap at some sample, with the share of samples and the largest area."""
+    polygons = [shapely.polygons(footprints(encounter, n)) for n in range(len(encounter.vehicles))]
+    found = []
+    for a, b in combinations(range(len(polygons)), 2):
+        area = shapely.area(shapely.intersection(polygons[a], polygons[b]))
+        share = float((area > 0.0).mean())
+        if share > 0.0:
+            found.append(Overlap(encounter.vehicles[a].id, encounter.vehicles[b].id, share, float(area.max())))
+    return tuple(found)

@@ -1,0 +1,82 @@
+"""Tracks cut at long gaps and brought onto the log's common clock."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen.arrays import Bools
+from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, Track
+from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.quality import VehicleQuality
+from scenario_gen.logs.smoothing import Smooth, smooth_piece
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A vehicle's smooth motion between two long gaps; `last` is the tick after the final sample."""
+
+    track: Track
+    smooth: Smooth
+    first: int
+    last: int
+
+
+def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Piece], VehicleQuality]:
+    """Cut a track at gaps and relocations, and smooth each piece.
+
+    A gap may always be two and a half of the source's own periods long, so that a source of 1 Hz is not cut to bits.
+    """
+    seconds = np.diff(track.fix_ns) * 1e-9
+    usual = float(np.median(seconds))
+    longest = max(config.longest_gap, 2.5 * usual) + 1e-6
+    step = np.hypot(*np.diff(track.fix, axis=0).T)
+    cuts = (seconds > longest) | (step > JUMP_SLACK + FASTEST * seconds)
+    bridged = (seconds > 1.5 * max(usual, config.period)) & ~cuts
+    pieces = []
+    for part in parts(track, cuts):
+        smooth = smooth_piece(part, origin_ns, config)
+        if smooth is not None:
+            pieces.append(Piece(part, smooth, smooth.first, smooth.first + len(smooth.speed)))
+    smooths = [piece.smooth for piece in pieces]
+
+    def rms(name: str) -> float:
+        values = np.concatenate([getattr(smooth, name) for smooth in smooths]) if smooths else np.zeros(0)
+        return float(np.sqrt((values**2).mean())) if len(values) else 0.0
+
+    quality = VehicleQuality(
+        id=track.id,
+        fixes=len(track.fix_ns),
+        seconds=sum(piece.last - piece.first - 1 for piece in pieces) * config.period,
+        pieces=len(pieces),
+        bridged=int(bridged.sum()),
+        longest_bridged=float(seconds[bridged].max(initial=0.0)),
+        cut=int(cuts.sum()),
+        longest_cut=float(seconds[cuts].max(initial=0.0)),
+        speed_before=rms("before"),
+        speed_after=rms("after"),
+        moved=rms("moved"),
+    )
+    return pieces, quality
+
+
+def parts(track: Track, cuts: Bools) -> list[Track]:
+    """Split a track after each True of `cuts` (F-1,); parts of one fix are left out."""
+    edges = [0, *(np.flatnonzero(cuts) + 1).tolist(), len(track.fix_ns)]
+    found = []
+    for begin, end in zip(edges[:-1], edges[1:], strict=True):
+        if end - begin < 2:
+            continue
+        during = (track.speed_ns >= track.fix_ns[begin]) & (track.speed_ns <= track.fix_ns[end - 1])
+        found.append(
+            Track(
+                id=track.id,
+                fix_ns=track.fix_ns[begin:end],
+                fix=track.fix[begin:end],
+                heading=track.heading[begin:end],
+                speed_ns=track.speed_ns[during],
+                speed=track.speed[during],
+                length=track.length,
+                width=track.width,
+            )
+        )
+    return found

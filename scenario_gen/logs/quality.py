@@ -1,0 +1,100 @@
+"""The data-quality summary of a log: what was read, dropped, bridged, reconciled, and what the record itself gets wrong."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """`count` rows left out (or sorted) for `reason`; `first` names the place of the first of them."""
+
+    reason: str
+    count: int
+    first: str
+
+
+@dataclass(frozen=True)
+class VehicleQuality:
+    """How well one vehicle was recorded.
+
+    Attributes:
+        id: the vehicle.
+        fixes: positions used.
+        seconds: time on the common clock.
+        pieces: uninterrupted pieces.
+        bridged: gaps that were bridged.
+        longest_bridged: the longest of them [s].
+        cut: gaps at which the track was cut.
+        longest_cut: the longest of them [s].
+        speed_before: RMS of measured speed less speed of the raw positions [m/s].
+        speed_after: RMS of measured speed less the published speed, which is that of the published positions [m/s].
+        moved: RMS distance between raw and published positions [m].
+    """
+
+    id: str
+    fixes: int
+    seconds: float
+    pieces: int
+    bridged: int
+    longest_bridged: float
+    cut: int
+    longest_cut: float
+    speed_before: float
+    speed_after: float
+    moved: float
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """The recorded footprints of two vehicles overlap during `share` of the encounter, at most by `area` m²."""
+
+    first: str
+    second: str
+    share: float
+    area: float
+
+
+@dataclass(frozen=True)
+class EncounterQuality:
+    """Facts of one encounter that are reported, not repaired."""
+
+    name: str
+    vehicles: tuple[str, ...]
+    seconds: float
+    overlaps: tuple[Overlap, ...]
+
+
+@dataclass(frozen=True)
+class Quality:
+    """The summary of a log; `rows` counts what was read."""
+
+    name: str
+    rows: int
+    dropped: tuple[Dropped, ...]
+    vehicles: tuple[VehicleQuality, ...]
+    encounters: tuple[EncounterQuality, ...]
+    notes: tuple[str, ...] = ()
+
+    def lines(self) -> tuple[str, ...]:
+        """Return the summary for people, one fact per line."""
+        out = [f"{self.name}: {self.rows} rows of {len(self.vehicles)} vehicles, {len(self.encounters)} encounter(s)"]
+        out += [f"  {drop.count} × {drop.reason}, first at {drop.first}" for drop in self.dropped]
+        out += [vehicle_line(vehicle) for vehicle in self.vehicles]
+        for encounter in self.encounters:
+            out.append(f"  encounter {encounter.name}: {encounter.seconds:.1f} s of {', '.join(encounter.vehicles)}")
+            out += [
+                f"    recorded footprints of {overlap.first} and {overlap.second} overlap {100 * overlap.share:.0f} % of the time"
+                f" (up to {overlap.area:.1f} m²)"
+                for overlap in encounter.overlaps
+            ]
+        return (*out, *(f"  {note}" for note in self.notes))
+
+
+def vehicle_line(vehicle: VehicleQuality) -> str:
+    """One vehicle in one line."""
+    gaps = f"{vehicle.bridged} gaps bridged (up to {vehicle.longest_bridged:.1f} s)" if vehicle.bridged else "no gaps bridged"
+    if vehicle.cut:
+        gaps += f", cut at {vehicle.cut} (up to {vehicle.longest_cut:.1f} s)"
+    return (
+        f"  vehicle {vehicle.id}: {vehicle.fixes} fixes, {vehicle.seconds:.1f} s; {gaps}; speed against position"
+        f" {vehicle.speed_before:.2f} → {vehicle.speed_after:.2f} m/s RMS, positions moved {vehicle.moved:.2f} m RMS"
+    )

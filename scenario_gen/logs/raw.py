@@ -1,0 +1,104 @@
+"""What every source of logs delivers: observations per vehicle, with the place each of them came from."""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.logs.config import LogConfig
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """What a log says about one vehicle, in the order of the log; values may still be NaN, stamps unordered.
+
+    Attributes:
+        id: the vehicle's name in the log.
+        fix_ns: (F,) stamps of the positions, nanoseconds.
+        fix: (F, 2) latitude and longitude in degrees, or x and y in metres (`RawLog.geographic` tells).
+        fix_row: (F,) rows of the log (`RawLog.where` names them).
+        heading: (F,) rad, counter-clockwise from east; NaN where the log does not say.
+        speed_ns: (S,) stamps of the speeds, nanoseconds.
+        speed: (S,) m/s.
+        speed_row: (S,) rows of the log.
+        length: metres, NaN if the log does not say.
+        width: metres, NaN if the log does not say.
+    """
+
+    id: str
+    fix_ns: Ints
+    fix: Floats
+    fix_row: Ints
+    heading: Floats
+    speed_ns: Ints
+    speed: Floats
+    speed_row: Ints
+    length: float = np.nan
+    width: float = np.nan
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Rows from `first` on come from `label`, where they are called `unit` `number`, `number` + 1, …"""
+
+    first: int
+    label: str
+    unit: str
+    number: int
+
+
+@dataclass(frozen=True, eq=False)
+class RawLog:
+    """A log as it was read, before any cleaning.
+
+    Attributes:
+        name: the log's name, for people.
+        geographic: positions are latitude and longitude, not metres.
+        vehicles: observations, one per vehicle, in the order of first appearance.
+        rows: number of rows read.
+        segments: where the rows come from, in order.
+        notes: what a person should know about how it was read.
+        dropped: rows that the reader itself had to leave out: (reason, row).
+    """
+
+    name: str
+    geographic: bool
+    vehicles: tuple[Observations, ...]
+    rows: int
+    segments: tuple[Segment, ...]
+    notes: tuple[str, ...] = ()
+    dropped: tuple[tuple[str, int], ...] = ()
+
+    def where(self, row: int) -> str:
+        """Name the file and line (or topic and message) of a row."""
+        segment = self.segments[bisect_right([s.first for s in self.segments], row) - 1]
+        return f"{segment.label}, {segment.unit} {segment.number + row - segment.first}"
+
+
+class LogSource(Protocol):
+    """A reader of one format."""
+
+    def accepts(self, path: Path) -> bool:
+        """Return whether the file or folder looks like this format."""
+        ...
+
+    def read(self, paths: Sequence[Path], config: LogConfig) -> RawLog:
+        """Read the files as one log.
+
+        Raises:
+            InputError: a file cannot be read; names the file and the place.
+        """
+        ...
+
+
+Strings = npt.NDArray[np.str_]
+
+
+def natural(name: str) -> tuple[int, int, str]:
+    """Sort key of names in which whole numbers sort by value, before the rest."""
+    return (0, int(name), name) if name.isascii() and name.isdigit() else (1, 0, name)

@@ -1,0 +1,136 @@
+"""From a path to encounters: choose the reader, clean, smooth, cut."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scenario_gen.encounter import Encounter, Vehicle
+from scenario_gen.errors import InputError
+from scenario_gen.logs.cleaning import Drops, clean
+from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.encounters import Group, find_groups
+from scenario_gen.logs.overlaps import find_overlaps
+from scenario_gen.logs.pieces import Piece, pieces_of
+from scenario_gen.logs.quality import Dropped, EncounterQuality, Quality
+from scenario_gen.logs.raw import RawLog, natural
+from scenario_gen.logs.sources import read_raw
+
+
+@dataclass(frozen=True)
+class LogResult:
+    """The encounters of a log, in order of time, and how good the record was."""
+
+    encounters: tuple[Encounter, ...]
+    quality: Quality
+
+
+def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogConfig()) -> LogResult:
+    """Read a log and cut it into encounters.
+
+    Args:
+        path: a file, a bag or a folder of files; or several files that share one clock.
+        config: how to read, clean and cut.
+
+    Returns:
+        At least one encounter, on a common clock in a local east-north frame, and the data-quality summary.
+
+    Raises:
+        InputError: the log cannot be used; the message names the file and the row or topic, and what to do.
+    """
+    log = read_raw([Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)], config)
+    tracks, drops, origin = clean(log, config)
+    if len(tracks) < 2:
+        raise InputError(too_few(log, [track.id for track in tracks], drops))
+    tracks = tuple(sorted(tracks, key=lambda track: natural(track.id)))
+    dt_ns = round(config.period * 1e9)
+    origin_ns = min(int(track.fix_ns[0]) for track in tracks) // dt_ns * dt_ns
+    pieces: list[Piece] = []
+    vehicles = []
+    for track in tracks:
+        own, quality = pieces_of(track, origin_ns, config)
+        pieces += own
+        vehicles.append(quality)
+    groups, notes = find_groups(pieces, config)
+    if not groups:
+        raise InputError(no_meeting(log, pieces, config))
+    encounters = []
+    for k, group in enumerate(groups):
+        name = log.name if len(groups) == 1 else f"{log.name}-{k + 1:0{len(str(len(groups)))}d}"
+        encounter, remarks = make_encounter(name, group, pieces, origin_ns, origin, config)
+        encounters.append(encounter)
+        notes += remarks
+    summary = Quality(
+        name=log.name,
+        rows=log.rows,
+        dropped=tuple(Dropped(reason, count, log.where(drops.first[reason])) for reason, count in drops.count.items()),
+        vehicles=tuple(vehicles),
+        encounters=tuple(
+            EncounterQuality(e.name, tuple(v.id for v in e.vehicles), e.duration, find_overlaps(e)) for e in encounters
+        ),
+        notes=(*log.notes, *dict.fromkeys(notes)),
+    )
+    return LogResult(tuple(encounters), summary)
+
+
+def make_encounter(
+    name: str,
+    group: Group,
+    pieces: Sequence[Piece],
+    origin_ns: int,
+    origin: tuple[float, float] | None,
+    config: LogConfig,
+) -> tuple[Encounter, tuple[str, ...]]:
+    """Cut a group out of its pieces; a vehicle whose heading nobody knows faces east, and the note says so."""
+    members = [pieces[m] for m in group.members]
+    notes = []
+    position, heading, speed = [], [], []
+    for piece in members:
+        span = slice(group.first - piece.first, group.last - piece.first)
+        position.append(piece.smooth.position[span])
+        speed.append(piece.smooth.speed[span])
+        facing = piece.smooth.heading[span]
+        if np.isnan(facing).any():
+            notes.append(f"vehicle {piece.track.id} never moves and its heading is not recorded: taken as east")
+            facing = np.zeros(len(facing))
+        heading.append(facing)
+    dt_ns = round(config.period * 1e9)
+    encounter = Encounter(
+        name=name,
+        vehicles=tuple(Vehicle(p.track.id, p.track.length, p.track.width) for p in members),
+        start_ns=origin_ns + group.first * dt_ns,
+        dt_ns=dt_ns,
+        position=np.array(position),
+        heading=np.array(heading),
+        speed=np.array(speed),
+        origin=origin,
+    )
+    return encounter, tuple(notes)
+
+
+def too_few(log: RawLog, names: list[str], drops: Drops) -> str:
+    """Say why there are fewer than two vehicles."""
+    causes = "; ".join(f"{count} × {reason}, first at {log.where(drops.first[reason])}" for reason, count in drops.count.items())
+    have = f"only vehicle {names[0]}" if names else "no vehicle"
+    return (
+        f"{log.segments[0].label}: {have} has usable positions; an encounter needs at least two vehicles on one clock "
+        f"(give their files together, or check the parameters columns and vehicles)" + (f". Left out: {causes}" if causes else "")
+    )
+
+
+def no_meeting(log: RawLog, pieces: Sequence[Piece], config: LogConfig) -> str:
+    """Say why no encounter was found."""
+    nearest, who = np.inf, "no two vehicles are there at the same time"
+    for i, a in enumerate(pieces):
+        for b in pieces[i + 1 :]:
+            first, last = max(a.first, b.first), min(a.last, b.last)
+            if a.track.id != b.track.id and last > first:
+                gap = a.smooth.position[first - a.first : last - a.first] - b.smooth.position[first - b.first : last - b.first]
+                least = float(np.hypot(gap[:, 0], gap[:, 1]).min())
+                if least < nearest:
+                    nearest, who = least, f"{a.track.id} and {b.track.id} come closest, to {least:.0f} m"
+    return (
+        f"{log.segments[0].label}: no two vehicles are within {config.proximity:g} m for {config.shortest:g} s while one of them drives "
+        f"{config.travel:g} m ({who}); see the parameters proximity, shortest, travel and longest_gap"
+    )

@@ -1,0 +1,102 @@
+"""The basic-safety-message files of the Safety Pilot Model Deployment: headerless, 19 columns."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from scenario_gen.errors import InputError
+from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.raw import RawLog, Segment
+from scenario_gen.logs.table import from_frame, vehicle_name
+
+COLUMNS = (
+    "RxDevice",
+    "FileId",
+    "TxDevice",
+    "Gentime",
+    "TxRandom",
+    "MsgCount",
+    "DSecond",
+    "Latitude",
+    "Longitude",
+    "Elevation",
+    "Speed",
+    "Heading",
+    "Ax",
+    "Ay",
+    "Az",
+    "Yawrate",
+    "PathCount",
+    "RadiusOfCurve",
+    "Confidence",
+)
+EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime counts microseconds from there
+
+
+class SpmdSource:
+    """One or several `TripStart_4####_p???.csv` or `TripStart_bsmrx_4####.csv` files."""
+
+    def accepts(self, path: Path) -> bool:
+        """Return whether the first line has 19 fields and all of them are numbers."""
+        if path.suffix.lower() not in (".csv", ".txt"):
+            return False
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            fields = file.readline().split(",")
+        return len(fields) == len(COLUMNS) and all(is_number(field) for field in fields)
+
+    def read(self, paths: Sequence[Path], config: LogConfig) -> RawLog:
+        """Read the files as one log; a vehicle is a TxDevice."""
+        frames, segments, row = [], [], 0
+        for path in paths:
+            frames.append(read_messages(path))
+            segments.append(Segment(row, str(path), "line", 1))
+            row += len(frames[-1])
+        return from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments))
+
+
+def is_number(field: str) -> bool:
+    """Return whether a field is empty or a number, as every field of a basic safety message is."""
+    try:
+        float(field.strip() or "nan")
+    except ValueError:
+        return False
+    return True
+
+
+def read_messages(path: Path) -> pd.DataFrame:
+    """Read one file into the columns of the table reader: time [ns], vehicle, lat, lon, speed, heading (ours).
+
+    Raises:
+        InputError: the file is empty or a line has not 19 fields.
+    """
+    try:
+        raw = pd.read_csv(path, header=None, dtype=str, skipinitialspace=True, skip_blank_lines=False, encoding="utf-8-sig")
+    except pd.errors.EmptyDataError as error:
+        raise InputError(f"{path} is empty; it should hold basic safety messages of 19 columns") from error
+    except (pd.errors.ParserError, UnicodeDecodeError, OSError) as error:
+        raise InputError(f"{path} is not a file of basic safety messages: {str(error).strip()}") from error
+    if raw.shape[1] != len(COLUMNS):
+        raise InputError(
+            f"{path} has {raw.shape[1]} columns on line 1; basic safety messages have {len(COLUMNS)}: {', '.join(COLUMNS)}"
+        )
+    raw.columns = pd.Index(COLUMNS)
+
+    def numbers(name: str) -> "pd.Series[float]":
+        return pd.to_numeric(raw[name], errors="coerce").astype(float)
+
+    stamps = numbers("Gentime")  # microseconds stay exact in float64 until the year 2289
+    known = stamps.notna() & (stamps.abs() < 8e15)
+    return pd.DataFrame(
+        {
+            "time": stamps.where(known, 0.0).round().astype(np.int64) * 1000 + EPOCH_NS,
+            "time_ok": known,
+            "vehicle": numbers("TxDevice").map(vehicle_name),
+            "lat": numbers("Latitude"),
+            "lon": numbers("Longitude"),
+            "speed": numbers("Speed"),
+            "heading": math.pi / 2.0 - np.radians(numbers("Heading")),
+        }
+    )
