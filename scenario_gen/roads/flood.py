@@ -16,6 +16,7 @@ from scenario_gen.roads.clearance import clearance_in_cells, segments_free, to_c
 from scenario_gen.roads.road import Road
 
 _labels: "WeakKeyDictionary[Road, dict[float, Ints]]" = WeakKeyDictionary()
+_cells: "WeakKeyDictionary[Road, dict[tuple[float, int], Ints]]" = WeakKeyDictionary()
 
 
 def components(road: Road, radius: float) -> Ints:
@@ -27,6 +28,16 @@ def components(road: Road, radius: float) -> Ints:
         labels.setflags(write=False)
         known[radius] = labels
     return known[radius]
+
+
+def component_cells(road: Road, radius: float, label: int) -> Ints:
+    """Flat indices (n,) of the cells of one component, in order; read-only, cached."""
+    known = _cells.setdefault(road, {})
+    if (radius, label) not in known:
+        cells = np.flatnonzero(components(road, radius) == label)
+        cells.setflags(write=False)
+        known[radius, label] = cells
+    return known[radius, label]
 
 
 def component_at(road: Road, xy: Floats, radius: float) -> int:

@@ -1,0 +1,108 @@
+"""What every geometric planner takes and gives: the Protocol, its budget and its answer."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, frozen
+from scenario_gen.errors import RefusedError
+from scenario_gen.roads.clearance import segments_free
+from scenario_gen.roads.flood import connected
+from scenario_gen.roads.road import Road
+
+
+class BlockedError(RefusedError):
+    """The start or the goal collides; `end` says which ("start" or "goal")."""
+
+    def __init__(self, end: str, message: str) -> None:
+        super().__init__(message)
+        self.end = end
+
+
+class NoWayError(RefusedError):
+    """A flood fill proves at once that no way leads from start to goal."""
+
+
+class BudgetSpentError(RefusedError):
+    """A way may exist, but none was found within the budget, or the search was cancelled."""
+
+
+@dataclass(frozen=True)
+class Query:
+    """From where to where, for a disc: start and goal (2,) [m] in the road's frame, radius [m]."""
+
+    start: Floats
+    goal: Floats
+    radius: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", frozen(np.reshape(self.start, 2)))
+        object.__setattr__(self, "goal", frozen(np.reshape(self.goal, 2)))
+
+
+@dataclass(frozen=True)
+class Budget:
+    """When a search stops: after `iterations`, after `seconds` of CPU time, or when `cancelled()` says so; what comes first.
+
+    Only iterations give the same answer every time. `first` stops at the first path.
+    """
+
+    iterations: int | None = 2000
+    seconds: float | None = None
+    first: bool = False
+    cancelled: Callable[[], bool] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A planner's answer.
+
+    Attributes:
+        path: (P, 2) metres, from start to goal.
+        cost: its Euclidean length [m].
+        iterations: how many were made (0 if the planner does not tell).
+        history: (h, 3) iteration, CPU seconds, cost [m] of each improvement.
+    """
+
+    path: Floats
+    cost: float
+    iterations: int
+    history: Floats
+
+
+class Planner(Protocol):
+    """Finds a short free path for a disc on a road."""
+
+    def plan(self, road: Road, query: Query, budget: Budget, seed: int) -> Plan:
+        """Return the best path found within the budget.
+
+        Raises:
+            BlockedError: start or goal collides.
+            NoWayError: there is no way.
+            BudgetSpentError: none was found in time.
+        """
+        ...
+
+
+def check_query(road: Road, query: Query) -> None:
+    """Raise BlockedError or NoWayError if no search could succeed."""
+    for end, xy in (("start", query.start), ("goal", query.goal)):
+        if not segments_free(road, xy[None], xy[None], query.radius)[0]:
+            x, y = xy
+            raise BlockedError(
+                end,
+                f"the {end} ({x:.2f}, {y:.2f}) m is not drivable on road {road.name!r} for a disc of radius {query.radius:.2f} m",
+            )
+    if not connected(road, query.start, query.goal, query.radius):
+        (x0, y0), (x1, y1) = query.start, query.goal
+        raise NoWayError(
+            f"no way leads from ({x0:.2f}, {y0:.2f}) m to ({x1:.2f}, {y1:.2f}) m on road {road.name!r} "
+            f"for a disc of radius {query.radius:.2f} m"
+        )
+
+
+def path_length(path: Floats) -> float:
+    """Length of a polyline (P, 2)."""
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
