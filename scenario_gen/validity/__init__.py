@@ -1,1 +1,6 @@
-"""The independent checker: proves a scenario valid in space and time, or says what is wrong."""
+"""The independent checker: valid at every instant, or refused with the cause (docs/validity.md)."""
+
+from scenario_gen.validity.checker import Checker
+from scenario_gen.validity.limits import Limits
+
+__all__ = ["Checker", "Limits"]

@@ -1,0 +1,247 @@
+"""The checker: proves a scenario valid at every instant, or says what is wrong with it, when and by how much."""
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.errors import InputError
+from scenario_gen.interaction import Conflict, Wait, pair_conflict, runs
+from scenario_gen.roads.clearance import clearance_in_cells
+from scenario_gen.roads.road import Road
+from scenario_gen.scenario import BoundaryStates, Cause, Scenario, Verdict, Violation
+from scenario_gen.validity import apart, dynamics, inside
+from scenario_gen.validity.limits import Limits
+from scenario_gen.validity.motion import control_points
+
+
+class Checker:
+    """Checks scenarios against a road, the states asked for, a template's conflicts and waits, and limits.
+
+    Proven at every instant of the motion that `Scenario` defines, not on a grid of instants: footprints do not overlap,
+    and each lies inside drivable cells. What cannot be proven at `limits.time_resolution` is refused. The other
+    guarantees are listed in docs/validity.md. Any of road, asked, conflicts and waits may be None: those checks are
+    left out, and `not_applicable` names them.
+    """
+
+    def __init__(
+        self,
+        road: Road | None,
+        asked: BoundaryStates | None,
+        conflicts: Sequence[Conflict] | None,
+        waits: Sequence[Wait] | None,
+        limits: Limits | None = None,
+    ) -> None:
+        """Prepare for many scenarios of one request.
+
+        Args:
+            road: the road they drive on.
+            asked: start and end states, one per vehicle.
+            conflicts: the template's conflicts, whose order must be kept.
+            waits: the template's waits; in every scenario the vehicle stands as often, one after the other.
+            limits: the limits; the default ones if None.
+        """
+        self.road, self.asked, self.conflicts, self.waits = road, asked, conflicts, waits
+        self.limits = limits or Limits()
+        one = self.limits
+        self._limits = np.array(
+            (
+                one.max_speed,
+                one.max_acceleration,
+                one.max_deceleration,
+                one.max_lateral_acceleration,
+                one.max_curvature,
+                one.slip,
+                one.slip_share,
+                one.acceleration_tolerance,
+            )
+        )
+        if road is not None:
+            self._clearance, self._blocked = clearance_in_cells(road), inside.blocked_before(road.drivable)
+            self._grid = np.array((*road.origin, road.resolution))
+
+    @property
+    def not_applicable(self) -> tuple[str, ...]:
+        """Sentences naming the checks that cannot be made, and why."""
+        missing = {
+            "off_road: no road is known": self.road,
+            "boundary_state: it is not known what was asked": self.asked,
+            "passing_order: no template's conflicts are known": self.conflicts,
+            "moving_wait: no template's waits are known": self.waits,
+        }
+        return tuple(sentence for sentence, given in missing.items() if given is None)
+
+    def check(self, scenarios: Sequence[Scenario]) -> list[Verdict]:
+        """Return one verdict per scenario.
+
+        Raises:
+            InputError: a scenario's arrays disagree in shape, or it does not suit the request (vehicles, frame).
+        """
+        return [self._check(scenario) for scenario in scenarios]
+
+    def _check(self, scenario: Scenario) -> Verdict:
+        self._refuse_misfits(scenario)
+        broken = _not_finite(scenario)
+        if broken is not None:
+            return Verdict((broken,), not_applicable=len(self.conflicts or ()))
+        time, heading = scenario.time, scenario.heading
+        n, t = heading.shape
+        half = np.array([(0.5 * vehicle.length, 0.5 * vehicle.width) for vehicle in scenario.vehicles])
+        control = np.empty((n, t - 1, 4, 2))
+        control_points(time, scenario.position, heading, scenario.speed, control)
+        violations = [
+            *self._boundary_states(scenario),
+            *self._dynamics(scenario),
+            *self._overlaps(scenario, control, half),
+            *self._exits(scenario, control, half),
+            *self._waits(scenario),
+        ]
+        wrong, present, absent = self._passing_orders(scenario)
+        return Verdict((*violations, *wrong), present, absent)
+
+    def _refuse_misfits(self, scenario: Scenario) -> None:
+        n, where = len(scenario.vehicles), f"scenario {scenario.index} of seed {scenario.seed}"
+        t = scenario.time.shape[0]
+        shapes = (scenario.heading.shape, scenario.speed.shape, scenario.acceleration.shape)
+        if scenario.position.shape != (n, t, 2) or any(shape != (n, t) for shape in shapes):
+            raise InputError(f"{where}: arrays disagree in shape with {n} vehicle(s) and {t} sample(s)")
+        if n == 0 or t < 2:
+            raise InputError(f"{where} has {n} vehicle(s) and {t} sample(s); at least 1 and 2 are needed")
+        if not all(vehicle.length > 0.0 and vehicle.width > 0.0 for vehicle in scenario.vehicles):
+            raise InputError(f"{where}: a vehicle's length or width is not positive")
+        if self.road is not None and scenario.frame_id != self.road.frame_id:
+            raise InputError(f"{where} is in frame {scenario.frame_id!r}, its road in {self.road.frame_id!r}")
+        if self.asked is not None and len(self.asked.start) != n:
+            raise InputError(f"{where} has {n} vehicle(s), but states were asked for {len(self.asked.start)}")
+        indices = [i for c in self.conflicts or () for i in (c.first, c.second)] + [w.vehicle for w in self.waits or ()]
+        if any(i >= n for i in indices):
+            raise InputError(f"{where} has {n} vehicle(s), but the template's waits and conflicts name vehicle {max(indices)}")
+
+    def _boundary_states(self, scenario: Scenario) -> Iterator[Violation]:
+        if self.asked is None:
+            return
+        for name, k, asked in (("start", 0, self.asked.start), ("end", -1, self.asked.end)):
+            off = scenario.position[:, k] - asked[:, :2]
+            distance, difference = np.hypot(off[:, 0], off[:, 1]), np.abs(scenario.speed[:, k] - asked[:, 3])
+            far = (distance > self.limits.position_tolerance + 1e-9) | (difference > self.limits.speed_tolerance + 1e-9)
+            for i in np.flatnonzero(far).tolist():
+                message = f"vehicle {i}: {name} is {distance[i]:.3f} m and {difference[i]:.3f} m/s from what was asked"
+                yield Violation(Cause.BOUNDARY_STATE, float(scenario.time[k]), (i,), message)
+
+    def _dynamics(self, scenario: Scenario) -> Iterator[Violation]:
+        out = np.empty((len(scenario.vehicles), len(dynamics.Check), 4))
+        dynamics.worst_excess(
+            scenario.time, scenario.position, scenario.heading, scenario.speed, scenario.acceleration, self._limits, out
+        )
+        for i, row in zip(*(index.tolist() for index in np.nonzero(out[..., 0] > 0.0)), strict=True):
+            _, value, limit, time = out[i, row].tolist()
+            cause, sentence = dynamics.MESSAGES[dynamics.Check(row)]
+            yield Violation(cause, time, (i,), f"vehicle {i}: {sentence.format(value=value, limit=limit)}")
+
+    def _overlaps(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
+        n, limits = len(half), self.limits
+        out = np.empty((n * (n - 1) // 2, 3))
+        apart.first_contacts(scenario.time, control, scenario.heading, half, limits.min_clearance, limits.time_resolution, out)
+        if not out[:, 0].any():
+            return
+        for pair, (status, time, gap) in zip(combinations(range(n), 2), out.tolist(), strict=True):
+            if status != apart.PROVEN:
+                if status == apart.UNPROVEN:
+                    what = f"cannot be proven more than {limits.min_clearance:g} m apart (gap {gap:.6f} m)"
+                elif gap <= 0.0:
+                    what = f"overlap by {-gap:.3f} m"
+                else:
+                    what = f"come within {gap:.3f} m; {limits.min_clearance:g} m must be exceeded"
+                yield Violation(Cause.OVERLAP, time, pair, f"vehicles {pair[0]} and {pair[1]}: footprints {what} at {time:.3f} s")
+
+    def _exits(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
+        if self.road is None:
+            return
+        out = np.empty((len(half), 2))
+        inside.first_exits(
+            scenario.time,
+            control,
+            scenario.heading,
+            half,
+            self._clearance,
+            self._blocked,
+            self._grid,
+            self.limits.time_resolution,
+            out,
+        )
+        for i, (status, time) in enumerate(out.tolist()):
+            if status != inside.PROVEN:
+                what = "leaves drivable space" if status == inside.FOUND else "cannot be proven inside drivable space"
+                x, y = (float(np.interp(time, scenario.time, scenario.position[i, :, axis])) for axis in range(2))
+                yield Violation(
+                    Cause.OFF_ROAD, time, (i,), f"vehicle {i}: footprint {what} at {time:.3f} s near ({x:.2f}, {y:.2f})"
+                )
+
+    def _passing_orders(self, scenario: Scenario) -> tuple[list[Violation], int, int]:
+        """Violations, and how many of the template's conflicts are present and absent in the scenario."""
+        wrong, present = [], 0
+        for asked in self.conflicts or ():
+            a, b = sorted((asked.first, asked.second))
+            found = pair_conflict(scenario.vehicles, scenario.time, scenario.position, scenario.heading, a, b)
+            present += found is not None
+            if found is not None and found.first != asked.first:
+                message = (
+                    f"vehicle {found.first} goes first ({found.entry_first:.2f} s, vehicle {found.second} {found.entry_second:.2f} s); "
+                    f"in the template vehicle {asked.first} does"
+                )
+                wrong.append(Violation(Cause.PASSING_ORDER, found.entry_first, (found.first, found.second), message))
+        return wrong, present, len(self.conflicts or ()) - present
+
+    def _waits(self, scenario: Scenario) -> Iterator[Violation]:
+        waits = self.waits or ()
+        for i in sorted({wait.vehicle for wait in waits}):
+            asked = [wait for wait in waits if wait.vehicle == i]
+            stands = self._stands(scenario, i)
+            if self._never_moves(i):
+                if stands != [(0, scenario.time.size - 1)]:
+                    k = int(np.argmax(scenario.speed[i]))
+                    message = f"vehicle {i}: waits throughout in the template, but reaches {scenario.speed[i, k]:.3f} m/s"
+                    yield Violation(Cause.MOVING_WAIT, float(scenario.time[k]), (i,), message)
+                continue
+            # a stand serves as many consecutive waits as it is long: the template's may be parted by a short twitch
+            lengths = [float(scenario.time[b] - scenario.time[a]) for a, b in stands]
+            served = sum(int((length + 1e-9) / self.limits.stand_duration) for length in lengths) if lengths else 0
+            if served < len(asked):
+                message = (
+                    f"vehicle {i}: waits {len(asked)} time(s) in the template; stands below {self.limits.stand_speed:g} m/s for "
+                    f"{', '.join(f'{length:.1f} s' for length in lengths) or 'less than two samples'}"
+                )
+                yield Violation(Cause.MOVING_WAIT, asked[min(served, len(asked) - 1)].start, (i,), message)
+
+    def _stands(self, scenario: Scenario, i: int) -> list[tuple[int, int]]:
+        """First and last sample of each stand: neither the published speed nor the displacement reaches the limit."""
+        slow = scenario.speed[i] < self.limits.stand_speed
+        moved = np.hypot(*np.diff(scenario.position[i], axis=0).T)
+        still = slow[:-1] & slow[1:] & (moved < self.limits.stand_speed * np.diff(scenario.time))
+        return [(a, b + 1) for a, b in runs(still)]
+
+    def _never_moves(self, i: int) -> bool:
+        """Whether vehicle i, which waits from the very start, was asked to end where it starts."""
+        if self.asked is None or not any(wait.vehicle == i and wait.start == 0.0 for wait in self.waits or ()):
+            return False
+        off = self.asked.end[i, :2] - self.asked.start[i, :2]
+        return bool(np.hypot(off[0], off[1]) <= self.limits.position_tolerance)
+
+
+def _not_finite(scenario: Scenario) -> Violation | None:
+    """A violation if a value is not finite, or time does not increase."""
+    for name in ("time", "position", "heading", "speed", "acceleration"):
+        values = getattr(scenario, name)
+        if not np.isfinite(values).all():
+            where = np.argwhere(~np.isfinite(values))[0]
+            vehicles = () if name == "time" else (int(where[0]),)
+            k = int(where[0]) if name == "time" else int(where[1])
+            return Violation(
+                Cause.NOT_FINITE, float(np.nan_to_num(scenario.time[k])), vehicles, f"{name} is not finite at sample {k}"
+            )
+    steps = np.diff(scenario.time)
+    if (steps <= 0.0).any():
+        k = int(np.argmax(steps <= 0.0))
+        return Violation(Cause.NOT_FINITE, float(scenario.time[k]), (), f"time does not increase after sample {k}")
+    return None

@@ -1,0 +1,126 @@
+"""Limits of the motion itself, and whether the published fields agree with each other.
+
+Speed, acceleration and heading are linear between samples, so an extreme of speed, of |acceleration| and of speed times
+yaw rate lies at a sample. The speed of the position's cubic is bounded by the control points of its derivative.
+"""
+
+from enum import IntEnum
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.kernels import F1, F2, F3, OUT3, kernel
+from scenario_gen.scenario import Cause
+
+TURN_ROUNDING = 1e-4  # rad, change of heading that a vehicle may show without having moved
+SLACK = 1e-6  # rounding of a value that keeps exactly to its limit
+
+
+class Check(IntEnum):
+    """Rows of what `worst_excess` fills in."""
+
+    NEGATIVE_SPEED = 0
+    MAX_SPEED = 1
+    ACCELERATION = 2
+    DECELERATION = 3
+    SPEED_CHANGE = 4
+    LATERAL = 5
+    CURVATURE = 6
+    DISPLACEMENT = 7
+    SLIP = 8
+
+
+MESSAGES: dict[Check, tuple[Cause, str]] = {
+    Check.NEGATIVE_SPEED: (Cause.SPEED, "speed falls to {value:.3f} m/s, below zero"),
+    Check.MAX_SPEED: (Cause.SPEED, "speed reaches {value:.3f} m/s, above the limit of {limit:.3f} m/s"),
+    Check.ACCELERATION: (
+        Cause.LONGITUDINAL_ACCELERATION,
+        "acceleration reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²",
+    ),
+    Check.DECELERATION: (
+        Cause.LONGITUDINAL_ACCELERATION,
+        "braking reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²",
+    ),
+    Check.SPEED_CHANGE: (
+        Cause.LONGITUDINAL_ACCELERATION,
+        "speed changes at a rate {value:.3f} m/s² outside the published accelerations; {limit:.3f} m/s² are tolerated",
+    ),
+    Check.LATERAL: (
+        Cause.LATERAL_ACCELERATION,
+        "lateral acceleration reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²",
+    ),
+    Check.CURVATURE: (Cause.CURVATURE, "curvature reaches {value:.3f} 1/m, above the limit of {limit:.3f} 1/m"),
+    Check.DISPLACEMENT: (
+        Cause.SPEED,
+        "position advances {value:.3f} m/s off the published speed; {limit:.3f} m/s are tolerated",
+    ),
+    Check.SLIP: (
+        Cause.CURVATURE,
+        "slides sideways at {value:.3f} m/s against the published heading; {limit:.3f} m/s are tolerated",
+    ),
+}
+
+
+@kernel(inline=True)
+def _note(out: Floats, row: int, excess: float, value: float, limit: float, time: float) -> None:
+    """Keep the worst excess of one check of one vehicle."""
+    if excess > out[row, 0]:
+        out[row, 0], out[row, 1], out[row, 2], out[row, 3] = excess, value, limit, time
+
+
+@kernel(F1, F3, F2, F2, F2, F1, OUT3)
+def worst_excess(
+    time: Floats, position: Floats, heading: Floats, speed: Floats, acceleration: Floats, limits: Floats, out: Floats
+) -> None:
+    """Fill `out` (N, len(Check), 4): how far the worst instant exceeds each limit (<= 0: kept), value, limit, time [s].
+
+    Args:
+        time: (T,) seconds.
+        position: (N, T, 2) metres.
+        heading: (N, T) rad.
+        speed: (N, T) m/s.
+        acceleration: (N, T) m/s².
+        limits: max_speed, max_acceleration, max_deceleration, max_lateral_acceleration, max_curvature, slip, slip_share,
+            acceleration_tolerance.
+        out: one row per `Check`.
+    """
+    top, speeding, braking, lateral, curvature = limits[0], limits[1], limits[2], limits[3], limits[4]
+    slip, share, tolerance = limits[5], limits[6], limits[7]
+    n, t = speed.shape
+    for i in range(n):
+        for row in range(out.shape[1]):
+            out[i, row, 0] = 0.0
+        for k in range(t):
+            v, a, now = speed[i, k], acceleration[i, k], time[k]
+            _note(out[i], 0, -v, v, 0.0, now)
+            _note(out[i], 1, v - top - SLACK, v, top, now)
+            _note(out[i], 2, a - speeding - SLACK, a, speeding, now)
+            _note(out[i], 3, -a - braking - SLACK, -a, braking, now)
+            if k == t - 1:
+                break
+            h, w, b = time[k + 1] - now, speed[i, k + 1], acceleration[i, k + 1]
+            rate = (w - v) / h
+            _note(out[i], 2, rate - speeding - SLACK, rate, speeding, now)
+            _note(out[i], 3, -rate - braking - SLACK, -rate, braking, now)
+            off = max(rate - max(a, b), min(a, b) - rate)
+            _note(out[i], 4, off - tolerance - SLACK, off, tolerance, now)
+            turn, fast = abs(heading[i, k + 1] - heading[i, k]), max(v, w)
+            _note(out[i], 5, fast * turn / h - lateral - SLACK, fast * turn / h, lateral, now)
+            dx, dy = position[i, k + 1, 0] - position[i, k, 0], position[i, k + 1, 1] - position[i, k, 1]
+            moved = np.sqrt(dx * dx + dy * dy)
+            if turn > TURN_ROUNDING + curvature * moved:
+                bend = turn / moved
+                _note(out[i], 6, bend - curvature, bend, curvature, now)
+            c0, s0, c1, s1 = np.cos(heading[i, k]), np.sin(heading[i, k]), np.cos(heading[i, k + 1]), np.sin(heading[i, k + 1])
+            vx, vy, wx, wy = v * c0, v * s0, w * c1, w * s1
+            # mean velocity of the displacement against that of the published speeds and headings, in the body's axes
+            ex, ey = dx / h - 0.5 * (vx + wx), dy / h - 0.5 * (vy + wy)
+            c, s = np.cos(0.5 * (heading[i, k] + heading[i, k + 1])), np.sin(0.5 * (heading[i, k] + heading[i, k + 1]))
+            allowed = slip + share * fast
+            ahead, aside = abs(c * ex + s * ey), abs(c * ey - s * ex)
+            _note(out[i], 7, ahead - allowed, ahead, allowed, now)
+            _note(out[i], 8, aside - allowed, aside, allowed, now)
+            # speed of the cubic: its derivative's middle control point is 3 displacement / h - v - w
+            qx, qy = 3.0 * dx / h - vx - wx, 3.0 * dy / h - vy - wy
+            between = fast + 0.5 * max(0.0, np.sqrt(qx * qx + qy * qy) - fast)
+            _note(out[i], 1, between - top - SLACK, between, top, now)

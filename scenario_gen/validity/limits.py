@@ -1,0 +1,39 @@
+"""What a valid scenario must keep to; every limit is a parameter."""
+
+from dataclasses import dataclass
+
+from scenario_gen.parameters import check, parameter
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of the checker. Speed and heading are linear between samples, position is the cubic of `Scenario`."""
+
+    max_speed: float = parameter(45.0, "highest speed", unit="m/s", low=0.0)
+    max_acceleration: float = parameter(5.0, "strongest speeding up", unit="m/s²", low=0.0)
+    max_deceleration: float = parameter(9.0, "strongest braking", unit="m/s²", low=0.0)
+    max_lateral_acceleration: float = parameter(6.0, "largest product of speed and yaw rate", unit="m/s²", low=0.0)
+    max_curvature: float = parameter(0.25, "largest change of heading per metre driven", unit="1/m", low=0.0)
+    position_tolerance: float = parameter(0.1, "start and end positions are this near to what was asked", unit="m", low=0.0)
+    speed_tolerance: float = parameter(0.1, "start and end speeds are this near to what was asked", unit="m/s", low=0.0)
+    stand_speed: float = parameter(0.1, "a vehicle that waits in the template is slower than this", unit="m/s", low=0.0)
+    stand_duration: float = parameter(1.0, "shortest stand that counts as a wait", unit="s", low=0.01)
+    min_clearance: float = parameter(
+        0.0,
+        "smallest gap between two footprints, by their best separating axis; a gap of 0 (touching) is an overlap",
+        unit="m",
+        low=0.0,
+    )
+    slip: float = parameter(
+        0.2, "displacement over time may differ from speed along heading by this, ahead and sideways", unit="m/s", low=0.0
+    )
+    slip_share: float = parameter(0.03, "and by this share of the speed", low=0.0)
+    acceleration_tolerance: float = parameter(
+        0.5, "change of speed over time may leave the range of the two samples' accelerations by this", unit="m/s²", low=0.0
+    )
+    time_resolution: float = parameter(
+        1e-4, "what cannot be proven over an interval this short is refused", unit="s", low=1e-9, high=1.0
+    )
+
+    def __post_init__(self) -> None:
+        check(self)

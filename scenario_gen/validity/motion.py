@@ -1,0 +1,45 @@
+"""The motion between samples as Bézier curves, whose control points bound it over any stretch of time.
+
+The cubic Hermite interpolant of positions p0, p1 and velocities m0, m1 over h seconds is the Bézier curve with control
+points p0, p0 + h m0 / 3, p1 - h m1 / 3, p1. A Bézier curve lies in the convex hull of its control points; so does the
+difference of two of them; and the part between u0 and u1 has control points given by the blossom (Ramshaw 1989).
+"""
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.kernels import F1, F2, F3, OUT4, kernel
+
+
+@kernel(F1, F3, F2, F2, OUT4)
+def control_points(time: Floats, position: Floats, heading: Floats, speed: Floats, out: Floats) -> None:
+    """Fill `out` (N, T - 1, 4, 2) with the control points [m] of every vehicle in every interval."""
+    n, t = heading.shape
+    for i in range(n):
+        vx, vy = speed[i, 0] * np.cos(heading[i, 0]), speed[i, 0] * np.sin(heading[i, 0])
+        for k in range(t - 1):
+            third = (time[k + 1] - time[k]) / 3.0
+            wx, wy = speed[i, k + 1] * np.cos(heading[i, k + 1]), speed[i, k + 1] * np.sin(heading[i, k + 1])
+            out[i, k, 0, 0], out[i, k, 0, 1] = position[i, k, 0], position[i, k, 1]
+            out[i, k, 1, 0], out[i, k, 1, 1] = position[i, k, 0] + third * vx, position[i, k, 1] + third * vy
+            out[i, k, 2, 0], out[i, k, 2, 1] = position[i, k + 1, 0] - third * wx, position[i, k + 1, 1] - third * wy
+            out[i, k, 3, 0], out[i, k, 3, 1] = position[i, k + 1, 0], position[i, k + 1, 1]
+            vx, vy = wx, wy
+
+
+@kernel(inline=True)
+def blossom(b: Floats, c: int, r: float, s: float, t: float) -> float:
+    """Blossom of the cubic with control points b (4, 2), coordinate c, at (r, s, t): de Casteljau with three parameters."""
+    d0, d1, d2 = b[0, c] + (b[1, c] - b[0, c]) * r, b[1, c] + (b[2, c] - b[1, c]) * r, b[2, c] + (b[3, c] - b[2, c]) * r
+    e0, e1 = d0 + (d1 - d0) * s, d1 + (d2 - d1) * s
+    return float(e0 + (e1 - e0) * t)
+
+
+@kernel(inline=True)
+def stretch(b: Floats, u0: float, u1: float, out: Floats) -> None:
+    """Write the control points of the part of `b` (4, 2) between u0 and u1 into `out` (4, 2)."""
+    for c in range(2):
+        out[0, c] = blossom(b, c, u0, u0, u0)
+        out[1, c] = blossom(b, c, u0, u0, u1)
+        out[2, c] = blossom(b, c, u0, u1, u1)
+        out[3, c] = blossom(b, c, u1, u1, u1)

@@ -1,0 +1,169 @@
+"""An independent re-check of scenarios, written differently from the checker: many instants, shapely polygons, splines.
+
+It proves nothing (an instant between two of its own goes unseen), but shares no line with what it checks.
+"""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import combinations
+
+import numpy as np
+import shapely
+from scipy.interpolate import CubicHermiteSpline
+
+from scenario_gen.arrays import Floats
+from scenario_gen.interaction import Conflict, Wait
+from scenario_gen.roads.road import Road
+from scenario_gen.scenario import BoundaryStates, Scenario
+from scenario_gen.validity import Limits
+
+EDGE = 1e-6  # m, a footprint is shrunk by this before it is compared with the road
+SLIVER = 1e-4  # m², a shared area smaller than this is no reliable conflict
+
+
+@lru_cache(maxsize=8)
+def drivable_area(road: Road) -> shapely.Geometry:
+    """Union of all drivable cells, each run of a row as one rectangle, prepared."""
+    boxes = []
+    for row, cells in enumerate(road.drivable):
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], cells.astype(int), [0]))))
+        for begin, end in zip(edges[::2], edges[1::2], strict=True):
+            x, y = (
+                road.origin + road.resolution * np.array((begin, row)),
+                road.origin + road.resolution * np.array((end, row + 1)),
+            )
+            boxes.append(shapely.box(*x, *y))
+    area = shapely.union_all(boxes)
+    shapely.prepare(area)
+    return area
+
+
+def footprints(position: Floats, heading: Floats, length: float, width: float) -> np.ndarray:
+    """(M,) polygons at positions (M, 2) and headings (M,)."""
+    ahead = np.stack((np.cos(heading), np.sin(heading)), axis=-1) * 0.5 * length
+    aside = np.stack((-np.sin(heading), np.cos(heading)), axis=-1) * 0.5 * width
+    corners = np.stack((ahead + aside, aside - ahead, -ahead - aside, ahead - aside), axis=1) + position[:, None]
+    return shapely.polygons(corners)
+
+
+def dense_motion(scenario: Scenario, dt: float) -> tuple[Floats, Floats, Floats, Floats]:
+    """Instants (M,), positions (N, M, 2), headings (N, M) and velocities (N, M, 2) of the motion that `Scenario` defines."""
+    count = int(np.ceil((scenario.time[-1] - scenario.time[0]) / dt)) + 1
+    instants = np.union1d(np.linspace(scenario.time[0], scenario.time[-1], count), scenario.time)
+    direction = np.stack((np.cos(scenario.heading), np.sin(scenario.heading)), axis=-1)
+    spline = CubicHermiteSpline(scenario.time, scenario.position, scenario.speed[..., None] * direction, axis=1)
+    heading = np.array([np.interp(instants, scenario.time, row) for row in scenario.heading])
+    return instants, spline(instants), heading, spline(instants, 1)
+
+
+def oracle_violations(
+    scenario: Scenario,
+    road: Road | None,
+    asked: BoundaryStates | None,
+    conflicts: Sequence[Conflict] | None,
+    waits: Sequence[Wait] | None,
+    limits: Limits | None = None,
+    dt: float = 0.005,
+) -> list[str]:
+    """Return a sentence for each thing wrong with `scenario` at instants at most `dt` [s] apart; None skips a check."""
+    limits = limits or Limits()
+    fields = (scenario.time, scenario.position, scenario.heading, scenario.speed, scenario.acceleration)
+    if not all(np.isfinite(values).all() for values in fields) or not (np.diff(scenario.time) > 0).all():
+        return ["not_finite: a value is not finite or time does not increase"]
+    instants, position, heading, velocity = dense_motion(scenario, dt)
+    boxes = [footprints(position[i], heading[i], vehicle.length, vehicle.width) for i, vehicle in enumerate(scenario.vehicles)]
+    return [
+        *_overlaps(instants, boxes, limits),
+        *(_off_road(instants, position, heading, scenario, road) if road is not None else ()),
+        *(_boundary(scenario, asked, limits) if asked is not None else ()),
+        *_kinematics(scenario, velocity, limits),
+        *_orders(instants, position, boxes, conflicts or ()),
+        *_stands(scenario, instants, velocity, asked, waits or (), limits),
+    ]
+
+
+def _overlaps(instants, boxes, limits):
+    for i, j in combinations(range(len(boxes)), 2):
+        if limits.min_clearance > 0:
+            bad = shapely.distance(boxes[i], boxes[j]) <= limits.min_clearance
+        else:
+            bad = shapely.intersects(boxes[i], boxes[j])
+        if bad.any():
+            k = int(np.argmax(bad))
+            yield f"overlap: vehicles {i} and {j} at {instants[k]:.3f} s, for {bad.sum()} instants"
+
+
+def _off_road(instants, position, heading, scenario, road):
+    area = drivable_area(road)
+    for i, vehicle in enumerate(scenario.vehicles):
+        inside = shapely.covers(area, footprints(position[i], heading[i], vehicle.length - 2 * EDGE, vehicle.width - 2 * EDGE))
+        if not inside.all():
+            k = int(np.argmin(inside))
+            yield f"off_road: vehicle {i} at {instants[k]:.3f} s, for {(~inside).sum()} instants"
+
+
+def _boundary(scenario, asked, limits):
+    for name, k, states in (("start", 0, asked.start), ("end", -1, asked.end)):
+        for i in range(len(scenario.vehicles)):
+            if np.linalg.norm(scenario.position[i, k] - states[i, :2]) > limits.position_tolerance + 1e-6:
+                yield f"boundary_state: vehicle {i} {name} position"
+            if abs(scenario.speed[i, k] - states[i, 3]) > limits.speed_tolerance + 1e-6:
+                yield f"boundary_state: vehicle {i} {name} speed"
+
+
+def _kinematics(scenario, velocity, limits):
+    h = np.diff(scenario.time)
+    for i in range(len(scenario.vehicles)):
+        speed, turn = scenario.speed[i], np.abs(np.diff(scenario.heading[i]))
+        rate = np.diff(speed) / h
+        if speed.min() < 0 or speed.max() > limits.max_speed + 1e-5:
+            yield f"speed: vehicle {i} from {speed.min():.3f} to {speed.max():.3f} m/s"
+        if np.linalg.norm(velocity[i], axis=-1).max() > limits.max_speed + 1e-5:
+            yield f"speed: vehicle {i} between samples"
+        for a in (scenario.acceleration[i], rate):
+            if a.max() > limits.max_acceleration + 1e-5 or a.min() < -limits.max_deceleration - 1e-5:
+                yield f"longitudinal_acceleration: vehicle {i} from {a.min():.3f} to {a.max():.3f} m/s²"
+        if (np.maximum(speed[1:], speed[:-1]) * turn / h).max() > limits.max_lateral_acceleration + 1e-5:
+            yield f"lateral_acceleration: vehicle {i}"
+        length = np.linalg.norm(np.diff(scenario.position[i], axis=0), axis=-1)
+        if (turn > limits.max_curvature * length + 1.1e-4).any():
+            yield f"curvature: vehicle {i}"
+
+
+def _orders(instants, position, boxes, conflicts):
+    for asked in conflicts:
+        a, b = asked.first, asked.second
+        step = max(1, instants.size // 800)
+        sweeps = [shapely.union_all(boxes[i][::step]) for i in (a, b)]
+        shared = shapely.intersection(*sweeps)
+        if shared.area < SLIVER:
+            continue
+        entry = []
+        for i, sweep in ((a, sweeps[1]), (b, sweeps[0])):
+            shapely.prepare(sweep)
+            entry.append(instants[int(np.argmax(shapely.intersection(boxes[i], sweep).area > 0.1 * SLIVER))])
+        late = entry[0] > entry[1] + 0.05
+        if late and not (asked.following and _leads(instants[::step], position[a, ::step], position[b, ::step])):
+            yield f"passing_order: vehicle {a} enters at {entry[0]:.2f} s, vehicle {b} at {entry[1]:.2f} s"
+
+
+def _leads(instants, first, second):
+    """Whether `first` passes most of the places that both pass before `second` does."""
+    distance = np.linalg.norm(first[:, None] - second[None], axis=-1)
+    nearest = distance.argmin(axis=1)
+    near = distance.min(axis=1) < 2.0
+    return bool(np.sum(np.sign(instants[nearest] - instants)[near]) >= 0)
+
+
+def _stands(scenario, instants, velocity, asked, waits, limits):
+    for i in sorted({wait.vehicle for wait in waits}):
+        slow = np.interp(instants, scenario.time, scenario.speed[i]) < limits.stand_speed
+        slow &= np.linalg.norm(velocity[i], axis=-1) < 2.0 * limits.stand_speed
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], slow, [False]))))
+        lengths = [instants[end - 1] - instants[begin] for begin, end in zip(edges[::2], edges[1::2], strict=True)]
+        wanted = sum(wait.vehicle == i for wait in waits)
+        if sum(int((length + 0.011) / limits.stand_duration) for length in lengths) < wanted:
+            yield f"moving_wait: vehicle {i} stands for {[round(float(length), 2) for length in lengths]} s, {wanted} wait(s) asked"
+        throughout = any(wait.vehicle == i and wait.start == 0 for wait in waits)
+        if throughout and asked is not None and np.linalg.norm(asked.end[i, :2] - asked.start[i, :2]) < 1e-3 and not slow.all():
+            yield f"moving_wait: vehicle {i} waits throughout but moves"
