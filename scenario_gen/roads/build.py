@@ -1,0 +1,44 @@
+"""One door to every road: built-in, drawn around the template, or read from a map."""
+
+from pathlib import Path
+
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+from scenario_gen.roads.builtin import BUILT_IN, draw, draw_paper
+from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.corridor import draw_corridor
+from scenario_gen.roads.layout import layout_for
+from scenario_gen.roads.nav2 import read_map
+from scenario_gen.roads.own_paths import own_paths
+from scenario_gen.roads.road import Road
+from scenario_gen.roads.tracks import clean_tracks
+
+
+def build_road(name_or_path: str, encounter: Encounter | None, config: RoadConfig = RoadConfig()) -> Road:  # noqa: B008 - frozen
+    """Return the road `name_or_path`.
+
+    Args:
+        name_or_path: `straight`, `t_intersection`, `four_way`, `corridor`, or the path of a nav2 map_server YAML.
+        encounter: the template, to which built-in roads are sized (None: plain sizes); `corridor` cannot do without.
+        config: how it is drawn.
+
+    Raises:
+        InputError: no such road, or a map that cannot be used.
+        RefusedError: `corridor`, and the recorded vehicles overlap so far that they cannot be told apart.
+    """
+    if name_or_path in BUILT_IN:
+        if config.paper:
+            if name_or_path == "four_way":
+                raise InputError("road four_way has no paper version; choose straight or t_intersection")
+            return draw_paper(name_or_path, config)
+        tracks = None if encounter is None else clean_tracks(encounter)
+        return draw(name_or_path, layout_for(name_or_path, tracks, config), config)
+    if name_or_path == "corridor":
+        if encounter is None:
+            raise InputError("road corridor is drawn around a template; give a log too")
+        return draw_corridor(own_paths(encounter).tracks, config)
+    path = Path(name_or_path)
+    if path.suffix.lower() not in (".yaml", ".yml"):
+        names = ", ".join((*BUILT_IN, "corridor"))
+        raise InputError(f"road {name_or_path!r} is neither one of {names} nor the path of a map_server YAML file")
+    return read_map(path, config)

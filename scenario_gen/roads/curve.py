@@ -1,0 +1,107 @@
+"""A planar curve with its arc length: the reference lines, lanes and paths of this package and of the fitting."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, frozen
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A polyline fine enough to pass for smooth, continued straight on beyond both ends.
+
+    Attributes:
+        points: (M, 3) x [m], y [m], yaw [rad, unwrapped], M >= 2, no two consecutive points equal.
+    """
+
+    points: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", frozen(self.points))
+
+    @classmethod
+    def through(cls, xy: Floats) -> "Curve":
+        """A curve through (M, 2) points; the yaw of each is the mean direction of its two neighbouring edges."""
+        step = np.diff(xy, axis=0)
+        keep = np.concatenate(([True], np.hypot(step[:, 0], step[:, 1]) > 1e-9))
+        xy = xy[keep]
+        edge = np.unwrap(np.arctan2(np.diff(xy[:, 1]), np.diff(xy[:, 0])))
+        yaw = np.concatenate((edge[:1], (edge[1:] + edge[:-1]) / 2.0, edge[-1:]))
+        return cls(np.column_stack((xy, yaw)))
+
+    @cached_property
+    def station(self) -> Floats:
+        """(M,) arc length [m] of each point."""
+        step = np.diff(self.points[:, :2], axis=0)
+        return frozen(np.concatenate(([0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1])))))
+
+    @property
+    def length(self) -> float:
+        """Arc length [m] from the first to the last point."""
+        return float(self.station[-1])
+
+    def at(self, station: Floats | float) -> Floats:
+        """Poses (..., 3) at arc lengths (...); beyond the ends straight on."""
+        s = np.asarray(station, dtype=np.float64)
+        pose = np.stack([np.interp(s, self.station, self.points[:, k]) for k in range(3)], axis=-1)
+        beyond = np.minimum(s, 0.0) + np.maximum(s - self.length, 0.0)
+        pose[..., 0] += beyond * np.cos(pose[..., 2])
+        pose[..., 1] += beyond * np.sin(pose[..., 2])
+        return pose
+
+    def beside(self, station: Floats, offset: Floats) -> Floats:
+        """Poses (..., 3) at arc lengths and offsets [m, left positive]; the yaw is the curve's own."""
+        pose = self.at(station)
+        pose[..., 0] -= offset * np.sin(pose[..., 2])
+        pose[..., 1] += offset * np.cos(pose[..., 2])
+        return pose
+
+    def project(self, xy: Floats) -> tuple[Floats, Floats]:
+        """Station and offset [m, left positive], (P,) each, of the nearest points of the curve to (P, 2) positions."""
+        reach = 1e4  # the straight continuations, far enough for any map
+        ends = self.at(np.array([-reach, self.length + reach]))
+        line = np.vstack((ends[:1], self.points, ends[1:]))[:, :2]
+        at = np.concatenate(([-reach], self.station, [self.length + reach]))
+        edge = np.diff(line, axis=0)
+        size = np.hypot(edge[:, 0], edge[:, 1])
+        along = edge / size[:, None]
+        rel = xy[:, None, :] - line[None, :-1, :]
+        t = np.clip(rel[..., 0] * along[:, 0] + rel[..., 1] * along[:, 1], 0.0, size)
+        gap = np.hypot(rel[..., 0] - t * along[:, 0], rel[..., 1] - t * along[:, 1])
+        best = np.argmin(gap, axis=1)
+        rows = np.arange(len(xy))
+        side = along[best, 0] * rel[rows, best, 1] - along[best, 1] * rel[rows, best, 0]
+        return at[best] + t[rows, best], np.sign(side) * gap[rows, best]
+
+    def reversed(self) -> "Curve":
+        """The same curve driven the other way."""
+        points = self.points[::-1].copy()
+        points[:, 2] += np.pi
+        return Curve(points)
+
+    def cut(self, start: float, end: float, step: float = 0.5) -> "Curve":
+        """The piece between two stations (continued straight where they lie beyond the ends), resampled."""
+        count = max(int(np.ceil((end - start) / step)), 1)
+        return Curve(self.at(np.linspace(start, end, count + 1)))
+
+
+def crossings(first: Curve, second: Curve, min_angle: float = 0.35) -> Floats:
+    """Stations (K, 2) at which `first` crosses `second` at an angle of at least `min_angle` [rad], in order along `first`."""
+    a, b = first.points[:, :2], second.points[:, :2]
+    u, v = np.diff(a, axis=0), np.diff(b, axis=0)
+    w = b[None, :-1] - a[:-1, None]
+    det = u[:, None, 0] * v[None, :, 1] - u[:, None, 1] * v[None, :, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (w[..., 0] * v[None, :, 1] - w[..., 1] * v[None, :, 0]) / det
+        q = (w[..., 0] * u[:, None, 1] - w[..., 1] * u[:, None, 0]) / det
+    sine = np.abs(det) / (np.hypot(u[:, 0], u[:, 1])[:, None] * np.hypot(v[:, 0], v[:, 1])[None, :])
+    hit = (t >= 0.0) & (t < 1.0) & (q >= 0.0) & (q < 1.0) & (sine >= np.sin(min_angle))
+    i, j = np.nonzero(hit)
+    return np.column_stack(
+        (
+            first.station[i] + t[i, j] * np.diff(first.station)[i],
+            second.station[j] + q[i, j] * np.diff(second.station)[j],
+        )
+    )

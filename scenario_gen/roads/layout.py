@@ -1,0 +1,85 @@
+"""How large a built-in road must be for a template."""
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, wrap_angle
+from scenario_gen.errors import RefusedError
+from scenario_gen.roads.builtin import Layout
+from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.meeting import meeting
+from scenario_gen.roads.tracks import Track
+from scenario_gen.roads.unrolled import Unrolled, unroll
+
+_ROOM = 6.0  # metres kept free behind the first and before the last footprint
+_SLACK = 12.0  # metres by which a junction's geometry may differ from the template's
+_SHORTEST = 30.0
+_PLAIN = 60.0  # metres: an arm when there is no template
+
+
+def layout_for(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -> Layout:
+    """Size the road `name` so that the template fits at its own scale."""
+    if tracks is None:
+        layout = Layout(_PLAIN, _PLAIN, 1)
+    else:
+        try:
+            layout = _along_a_road(tracks, unroll(tracks))
+        except RefusedError:  # turns or crossings: a junction's template
+            layout = _at_a_junction(tracks)
+    main, side = (config.arm_length, config.arm_length) if config.arm_length else (layout.main, layout.side)
+    lanes = config.lanes or layout.lanes
+    mouth = lanes * config.lane_width + config.corner_radius + 5.0 if name != "straight" else 5.0
+    return Layout(max(main, mouth), max(side, mouth), lanes)
+
+
+def _along_a_road(tracks: tuple[Track, ...], unrolled: Unrolled) -> Layout:
+    half = np.array([track.vehicle.length for track in tracks]) / 2.0
+    span = float((unrolled.station.max(axis=1) + half).max() - (unrolled.station.min(axis=1) - half).min())
+    return Layout(max(span / 2.0 + _ROOM, _SHORTEST), _SHORTEST, unrolled.lanes)
+
+
+def junction_centre(tracks: tuple[Track, ...]) -> Floats:
+    """(2,) the middle of where paths cross and where they turn; of where vehicles are nearest if they do neither."""
+    points = []
+    for i, a in enumerate(tracks):
+        for b in tracks[:i]:
+            met = meeting(a, b)
+            if met is not None:
+                points.append(a.curve.at(met.first)[:2])
+        if a.turns and not points:
+            yaw = a.curve.points[:, 2]
+            middle = int(np.argmin(np.abs(yaw - (yaw[0] + yaw[-1]) / 2.0)))
+            points.append(a.curve.points[middle, :2])
+    if not points:
+        points = [track.poses[:, :2].mean(axis=0) for track in tracks]
+    return np.asarray(np.mean(points, axis=0))
+
+
+def _at_a_junction(tracks: tuple[Track, ...]) -> Layout:
+    centre = junction_centre(tracks)
+    needs, yaws = [], []
+    for track in tracks:
+        for k in (0, -1):
+            pose = track.poses[k]
+            away = float(np.hypot(*(pose[:2] - centre)))
+            needs.append(away + track.vehicle.length / 2.0 + _ROOM + _SLACK)
+            yaws.append(float(pose[2]))
+    main_yaw = yaws[int(np.argmax(needs))]
+    across = np.abs(np.sin(wrap_angle(np.array(yaws) - main_yaw)))
+    need = np.array(needs)
+    main = float(need.max())
+    side = max(float(need[across > np.sin(np.radians(30.0))].max(initial=_SHORTEST)), _SHORTEST)
+    return Layout(max(main, _SHORTEST), side, _parallel_lanes(tracks))
+
+
+def _parallel_lanes(tracks: tuple[Track, ...]) -> int:
+    """The most vehicles side by side, heading the same way, at any instant."""
+    poses = np.stack([track.poses for track in tracks])
+    most = 1
+    for i in range(len(tracks)):
+        rel = poses[:, :, :2] - poses[i, :, :2]
+        cos, sin = np.cos(poses[i, :, 2]), np.sin(poses[i, :, 2])
+        ahead, left = rel[..., 0] * cos + rel[..., 1] * sin, rel[..., 1] * cos - rel[..., 0] * sin
+        same = np.cos(poses[:, :, 2] - poses[i, :, 2]) > np.cos(np.radians(30.0))
+        beside = same & (np.abs(ahead) < tracks[i].vehicle.length) & (np.abs(left) > 1.0) & (np.abs(left) < 12.0)
+        most = max(most, 1 + int(beside.sum(axis=0).max()))
+    return most

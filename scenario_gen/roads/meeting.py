@@ -1,0 +1,40 @@
+"""Where two tracks meet: the point at which their paths cross, also a little beyond their recorded ends."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.roads.curve import crossings
+from scenario_gen.roads.tracks import Track
+
+_BEYOND = 15.0  # metres by which a path is continued to look for a crossing
+_ANGLE = np.radians(25.0)
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """Arc lengths [m] on the first and on the second track at which they cross; below 0 or above the path's length if beyond."""
+
+    first: float
+    second: float
+
+
+def meeting(a: Track, b: Track) -> Meeting | None:
+    """The crossing that both come nearest to reaching (and, of several, in time), or None if the paths do not cross."""
+    one, two = (t.curve.cut(-_BEYOND, t.travelled + _BEYOND) for t in (a, b))
+    found = crossings(one, two, _ANGLE) - _BEYOND
+    if len(found) == 0:
+        return None
+    short = sum(_outside(found[:, k], t.travelled) for k, t in enumerate((a, b)))
+    apart = np.abs(_sample(a, found[:, 0]) - _sample(b, found[:, 1]))
+    best = int(np.argmin(short * 10.0 + apart * 0.1))
+    return Meeting(float(found[best, 0]), float(found[best, 1]))
+
+
+def _outside(station: Floats, length: float) -> Floats:
+    return np.asarray(np.maximum(-station, 0.0) + np.maximum(station - length, 0.0))
+
+
+def _sample(track: Track, station: Floats) -> Floats:
+    return np.asarray(np.searchsorted(track.progress, station), dtype=np.float64)

@@ -1,0 +1,48 @@
+"""Where traffic enters and leaves a map: the openings of drivable space at the border."""
+
+import numpy as np
+
+from scenario_gen.arrays import Bools, Floats
+from scenario_gen.roads.config import RoadConfig
+
+_MIN_WIDTH = 2.5  # metres: narrower gaps are no way in for a car
+
+
+def find_openings(drivable: Bools, resolution: float, origin: Floats, config: RoadConfig) -> tuple[Floats, Floats]:
+    """Return entries (E, 3) and exits (X, 3) of a grid.
+
+    Every run of drivable cells on the grid's edge that a car can pass is an opening. It is divided into lanes of about
+    `lane_width`: traffic keeps to its side, and a lane in the middle serves both ways.
+    """
+    height, width = drivable.shape
+    low, high = np.asarray(origin), np.asarray(origin) + np.array([width, height]) * resolution
+    entries: list[list[float]] = []
+    exits: list[list[float]] = []
+    edges = (
+        (drivable[0], 0, low[1], -np.pi / 2.0, -1),  # the last: is the right of who leaves the lower or the higher coordinate
+        (drivable[:, -1], 1, high[0], 0.0, -1),
+        (drivable[-1], 0, high[1], np.pi / 2.0, 1),
+        (drivable[:, 0], 1, low[0], np.pi, 1),
+    )
+    keep_right = 1 if config.traffic_side == "right" else -1
+    for cells, axis, fixed, outward, right in edges:
+        for first, last in _runs(cells):
+            size = (last - first) * resolution
+            if size < _MIN_WIDTH:
+                continue
+            lanes = max(round(size / config.lane_width), 1)
+            for k in range(lanes):
+                along = low[axis] + first * resolution + (k + 0.5) * size / lanes
+                at = [along, fixed] if axis == 0 else [fixed, along]
+                side = (2 * k + 1 - lanes) * right * keep_right
+                if side >= 0:
+                    exits.append([*at, outward])
+                if side <= 0:
+                    entries.append([*at, outward + np.pi])
+    return np.array(entries).reshape(-1, 3), np.array(exits).reshape(-1, 3)
+
+
+def _runs(cells: Bools) -> list[tuple[int, int]]:
+    """Half-open index ranges of consecutive True cells."""
+    edge = np.flatnonzero(np.diff(np.concatenate(([False], cells, [False])).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in edge.reshape(-1, 2)]

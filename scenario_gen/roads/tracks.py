@@ -1,0 +1,152 @@
+"""The template's own motion, cleaned: one smooth, drivable path per vehicle, and the progress along it.
+
+Positions carry noise (GPS staircases of a metre, kinks of a video tracker), speeds far less of it. So the position is
+smoothed as a function of the distance u = ∫ v dt that the speed claims: a penalised spline f(u) that minimises
+∫ |f(u) − p|² du + λ ∫ |f''|² du (Eilers & Marx 1996). The least λ is taken at which the path can be driven, or the one
+that weighs a path hard to drive least badly against one far from the record. Standing
+phases collapse to a point, time enters only through u(t), and no sample turns back.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solveh_banded
+
+from scenario_gen.arrays import Floats, frozen, wrap_angle
+from scenario_gen.encounter import Encounter, Vehicle
+from scenario_gen.roads.curve import Curve
+
+_WAVELENGTHS = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)  # metres at which the filter halves an oscillation
+_MAX_CURVATURE = 0.18  # 1/m
+_MAX_LATERAL = 4.0  # m/s²
+_MAX_DEVIATION = 0.6  # metres from the record
+_TURN = math.radians(45.0)
+_U_TURN = math.radians(140.0)
+_STILL = 0.5  # metres: less path than this in a whole log is no path
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One vehicle's cleaned motion.
+
+    Attributes:
+        vehicle: identity and footprint.
+        curve: its path; for a vehicle that stands throughout a metre of it, through its place.
+        progress: (T,) arc length [m] on the path at each of the template's samples, non-decreasing.
+        speed: (T,) m/s, as recorded.
+        still: True if it stands throughout.
+        deviation: largest distance [m] from a recorded position to the cleaned one.
+    """
+
+    vehicle: Vehicle
+    curve: Curve
+    progress: Floats
+    speed: Floats
+    still: bool
+    deviation: float
+
+    @property
+    def travelled(self) -> float:
+        """Metres driven in all."""
+        return float(self.progress[-1])
+
+    @property
+    def poses(self) -> Floats:
+        """(T, 3) cleaned poses at the template's samples."""
+        return self.curve.at(self.progress)
+
+    def turning(self, window: float) -> float:
+        """The largest change of heading [rad, signed] over `window` metres of path."""
+        s = np.arange(0.0, max(self.curve.length - 1.0, 0.0) + 1e-9, 0.5)
+        yaw = self.curve.at(s)[:, 2]
+        reach = int(window / 0.5)
+        best = 0.0
+        for lag in range(2, min(reach, len(s) - 1) + 1, 2):
+            change = yaw[lag:] - yaw[:-lag]
+            peak = float(change[np.argmax(np.abs(change))])
+            best = peak if abs(peak) > abs(best) else best
+        return best
+
+    @property
+    def makes_u_turn(self) -> bool:
+        """True if it turns round within 45 m of path."""
+        return abs(self.turning(45.0)) > _U_TURN
+
+    @property
+    def turns(self) -> bool:
+        """True if it turns as at a junction: by more than 45° within 30 m (a bend of the road is gentler)."""
+        return abs(self.turning(30.0)) > _TURN
+
+
+def clean_tracks(encounter: Encounter) -> tuple[Track, ...]:
+    """Return one cleaned track per vehicle."""
+    return tuple(_clean(encounter, i) for i in range(len(encounter.vehicles)))
+
+
+def _clean(encounter: Encounter, i: int) -> Track:
+    position, speed = encounter.position[i], encounter.speed[i]
+    claimed = np.concatenate(([0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 * encounter.dt)))
+    spread = float(np.hypot(*np.ptp(position, axis=0)))
+    if claimed[-1] < _STILL or spread < _STILL:
+        centre = position.mean(axis=0)
+        yaw = float(np.arctan2(np.sin(encounter.heading[i]).mean(), np.cos(encounter.heading[i]).mean()))
+        curve = Curve(np.array([[*centre, yaw], [centre[0] + np.cos(yaw), centre[1] + np.sin(yaw), yaw]]))
+        deviation = float(np.hypot(*(position - centre).T).max())
+        return Track(encounter.vehicles[i], curve, frozen(np.zeros(len(speed))), speed, True, deviation)
+    best: tuple[float, Curve, Floats, float] | None = None
+    for wavelength in _WAVELENGTHS:
+        grid, curve = _smooth(claimed, position, wavelength)
+        progress = np.interp(claimed, grid, curve.station)
+        deviation = float(np.hypot(*(curve.at(progress)[:, :2] - position).T).max())
+        curvature = np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)
+        lateral = curvature * np.interp((grid[1:] + grid[:-1]) / 2.0, *_increasing(claimed, speed)) ** 2
+        excess = (curvature.max() / _MAX_CURVATURE, lateral.max() / _MAX_LATERAL, deviation / _MAX_DEVIATION)
+        badness = float(sum(max(e - 1.0, 0.0) for e in excess))
+        if best is None or badness < best[0]:
+            best = (badness, curve, progress, deviation)
+        if badness == 0.0:
+            break
+    assert best is not None
+    _, curve, progress, deviation = best
+    return Track(
+        encounter.vehicles[i], _aligned(curve, encounter.heading[i], speed, progress), frozen(progress), speed, False, deviation
+    )
+
+
+def _aligned(curve: Curve, heading: Floats, speed: Floats, progress: Floats) -> Curve:
+    """Shift the yaw by whole turns so that it is near the recorded heading where the vehicle is fastest."""
+    fastest = int(np.argmax(speed))
+    off = float(heading[fastest] - curve.at(progress[fastest])[2])
+    turns = np.round((off - float(wrap_angle(np.array(off)))) / (2.0 * np.pi))
+    return Curve(curve.points + np.array([0.0, 0.0, 2.0 * np.pi * turns]))
+
+
+def _increasing(u: Floats, values: Floats) -> tuple[Floats, Floats]:
+    keep = np.concatenate(([True], np.diff(u) > 1e-9))
+    return u[keep], values[keep]
+
+
+def _smooth(u: Floats, position: Floats, wavelength: float) -> tuple[Floats, Curve]:
+    """The penalised spline f at equal steps of u, as (grid, curve through f(grid))."""
+    count = max(int(np.ceil(u[-1] / 0.5)), 6) + 1
+    grid = np.linspace(0.0, u[-1], count)
+    step = grid[1]
+    weight = np.gradient(u) + 1e-3 * step
+    cell = np.minimum((u / step).astype(np.int64), count - 2)
+    right = u / step - cell
+    left = 1.0 - right
+    bands = np.zeros((3, count))  # upper diagonals 2, 1, 0 of the normal matrix
+    rhs = np.zeros((count, 2))
+    np.add.at(bands[2], cell, weight * left**2)
+    np.add.at(bands[2], cell + 1, weight * right**2)
+    np.add.at(bands[1], cell + 1, weight * left * right)
+    np.add.at(rhs, cell, (weight * left)[:, None] * position)
+    np.add.at(rhs, cell + 1, (weight * right)[:, None] * position)
+    penalty = (wavelength / (2.0 * np.pi)) ** 4 / step**3
+    for k, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))):
+        factor = penalty * (1.0, 4.0, 1.0, -2.0, -2.0, 1.0)[k]
+        columns = np.arange(count - 2) + b
+        bands[2 - (b - a), columns] += factor
+    solution = solveh_banded(bands, rhs)
+    return grid, Curve.through(solution)

@@ -1,0 +1,146 @@
+"""A template along one road, in path coordinates: a reference line, and every vehicle's station, offset and lanes.
+
+Vehicles that follow, meet or pass each other on one road, however it winds, are compared on *one* line. So the gaps
+between them survive when the line is laid out straight.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, Ints, frozen, frozen_ints, wrap_angle
+from scenario_gen.errors import RefusedError
+from scenario_gen.roads.curve import Curve
+from scenario_gen.roads.tracks import Track
+
+_ALONG = np.radians(50.0)  # a vehicle along the road is never turned from it by more
+_SAME_LANE = 1.75  # metres of offset within which two vehicles may share a lane
+_LANE_CHANGE = 2.1  # metres of offset between start and end that make a lane change
+_BUMPER = 1.0  # metres kept between two footprints that share a lane
+
+
+@dataclass(frozen=True, eq=False)
+class Unrolled:
+    """N tracks in the coordinates of one reference line.
+
+    Attributes:
+        line: the reference line.
+        direction: (N,) +1 for vehicles that drive along it, -1 against it.
+        station: (N, T) metres along the line.
+        offset: (N, T) metres to the left of the line.
+        lane: (N, 2) lane at the start and at the end, counted per direction from the driver's left, 0 is the leftmost.
+        change: (N, T) how much of the lane change is done, 0 to 1; 0 for a vehicle that keeps its lane.
+        lanes: lanes per direction that the template needs.
+    """
+
+    line: Curve
+    direction: Ints
+    station: Floats
+    offset: Floats
+    lane: Ints
+    change: Floats
+    lanes: int
+
+
+def unroll(tracks: tuple[Track, ...]) -> Unrolled:
+    """Express tracks in path coordinates.
+
+    Raises:
+        RefusedError: a vehicle turns as at a junction, or crosses the others' road.
+    """
+    for track in tracks:
+        if track.makes_u_turn or track.turns:
+            turn = np.degrees(track.turning(30.0))
+            raise RefusedError(
+                f"vehicle {track.vehicle.id} turns {'left' if turn > 0 else 'right'} by {abs(turn):.0f}° within 30 m: "
+                f"that is a junction's manoeuvre, not one along a road"
+            )
+    line, direction = _reference_line(tracks)
+    station, offset = np.empty((len(tracks), len(tracks[0].progress))), np.empty((len(tracks), len(tracks[0].progress)))
+    for i, track in enumerate(tracks):
+        poses = track.poses
+        station[i], offset[i] = line.project(poses[:, :2])
+        station[i] = direction[i] * np.maximum.accumulate(direction[i] * station[i])
+        turned = np.abs(wrap_angle(poses[:, 2] - line.at(station[i])[:, 2] + (np.pi if direction[i] < 0 else 0.0)))
+        if turned.max() > _ALONG:
+            raise RefusedError(
+                f"vehicle {track.vehicle.id} lies across the others' road (turned from it by {np.degrees(turned.max()):.0f}°): "
+                f"this template needs a junction"
+            )
+    lane, change, lanes = _lanes(tracks, direction, station, offset)
+    return Unrolled(line, frozen_ints(direction), frozen(station), frozen(offset), frozen_ints(lane), frozen(change), lanes)
+
+
+def _reference_line(tracks: tuple[Track, ...]) -> tuple[Curve, Ints]:
+    """The longest path, extended at both ends by the parts of the others that reach beyond it."""
+    order = sorted(range(len(tracks)), key=lambda i: -tracks[i].travelled)
+    line = tracks[order[0]].curve
+    direction = np.ones(len(tracks), dtype=np.int64)
+    for i in order[1:]:
+        curve = tracks[i].curve
+        station, _ = line.project(curve.points[:, :2])
+        against = np.cos(curve.points[:, 2] - line.at(station)[:, 2]).mean() < 0.0
+        direction[i] = -1 if against else 1
+        if not tracks[i].still:
+            line = _extended(line, curve.reversed() if against else curve)
+    return line, direction
+
+
+def _extended(line: Curve, other: Curve) -> Curve:
+    """`line`, continued by what `other` (same direction) has beyond its ends, shifted sideways to fit on."""
+    station, offset = line.project(other.points[:, :2])
+    after = np.flatnonzero(station > line.length + 1.0)
+    before = np.flatnonzero(station < -1.0)
+    pieces = [line.points[:, :2]]
+    if len(after):
+        pieces.append(_shifted(other, after, float(offset[after[0]])))
+    if len(before):
+        pieces.insert(0, _shifted(other, before, float(offset[before[-1]])))
+    if len(pieces) == 1:
+        return line
+    joined = Curve.through(np.vstack(pieces))
+    return Curve.through(joined.cut(0.0, joined.length, 2.0).points[:, :2])
+
+
+def _shifted(curve: Curve, rows: Ints, offset: float) -> Floats:
+    shift = offset if abs(offset) < 10.0 else 0.0  # farther apart there is nothing to fit on to
+    normal = np.column_stack((np.sin(curve.points[rows, 2]), -np.cos(curve.points[rows, 2])))
+    return np.asarray(curve.points[rows, :2] + shift * normal)
+
+
+def _lanes(tracks: tuple[Track, ...], direction: Ints, station: Floats, offset: Floats) -> tuple[Ints, Floats, int]:
+    """Lanes of each direction by clustering offsets, from the driver's left to the right."""
+    right = -direction[:, None] * offset
+    span = max(offset.shape[1] // 10, 1)
+    ends = np.column_stack((right[:, :span].mean(axis=1), right[:, -span:].mean(axis=1)))
+    changes = np.abs(ends[:, 1] - ends[:, 0]) > _LANE_CHANGE
+    ends[~changes] = right[~changes].mean(axis=1)[:, None]
+    change = np.zeros_like(offset)
+    for i in np.flatnonzero(changes):
+        done = np.clip((right[i] - ends[i, 0]) / (ends[i, 1] - ends[i, 0]), 0.0, 1.0)
+        change[i] = np.maximum.accumulate(done)
+    lane = np.zeros((len(tracks), 2), dtype=np.int64)
+    for sign in (1, -1):
+        members = np.flatnonzero(direction == sign)
+        slots = sorted((float(ends[i, k]), int(i), k) for i in members for k in (0, 1) if k == 0 or changes[i])
+        current = 0
+        values: list[float] = []
+        held: list[int] = []
+        for value, j, k in slots:
+            apart = bool(values) and value - float(np.mean(values)) > _SAME_LANE
+            if apart or any(_beside(tracks, station, j, other) for other in held if other != j):
+                current += max(1, round((value - float(np.mean(values))) / (2.0 * _SAME_LANE)))
+                values, held = [], []
+            values.append(value)
+            held.append(j)
+            lane[j, k] = current
+            if not changes[j]:
+                lane[j, 1] = current
+    return lane, change, int(lane.max()) + 1
+
+
+def _beside(tracks: tuple[Track, ...], station: Floats, i: int, j: int) -> bool:
+    """True if the two are ever side by side, so that they cannot share a lane."""
+    reach = (tracks[i].vehicle.length + tracks[j].vehicle.length) / 2.0 + _BUMPER
+    ahead = station[i] - station[j]
+    return bool((np.abs(ahead) < reach).any() or np.sign(ahead[0]) != np.sign(ahead[-1]))
