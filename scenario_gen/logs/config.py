@@ -27,8 +27,10 @@ class LogConfig:
     position_noise: float = parameter(
         0.0, "standard deviation of a position; 0 estimates it per vehicle", unit="m", low=0.0, high=10.0
     )
-    speed_noise: float = parameter(0.5, "standard deviation of a measured speed", unit="m/s", low=0.01, high=5.0)
-    jerk: float = parameter(2.0, "typical change of acceleration within one second", unit="m/s²", low=0.1, high=20.0)
+    speed_noise: float = parameter(
+        0.0, "standard deviation of a measured speed; 0 estimates it per vehicle", unit="m/s", low=0.0, high=10.0
+    )
+    jerk: float = parameter(1.0, "typical change of acceleration within one second", unit="m/s²", low=0.1, high=20.0)
     acceleration_limit: float = parameter(
         5.0, "hardest acceleration a vehicle is believed to do", unit="m/s²", low=1.0, high=20.0
     )

@@ -1,10 +1,11 @@
 """Cutting a log into encounters: who is near whom, for how long, and who belongs to the group.
 
 A *meeting* is a pair of vehicles nearer than `proximity` for at least `shortest` seconds. Encounters grow from meetings: the
-strongest one first, joined by the vehicles that are near any member for most of the time, up to `most_vehicles`; the interval
-is the one in which all of them are present and near. Then the meetings inside the encounter are used up, and the next begins.
-In a log of few vehicles (as cut by a person) every meeting counts; in a longer one only those that interact: their places and
-times come close (`space_time_gap`), by crossing, following, merging or passing.
+strongest one first, joined by vehicles that are near for most of the time, up to `most_vehicles`; the interval is the one in
+which all of them are present and near. Then the meetings inside the encounter are used up, and the next begins.
+In a log of few vehicles (as cut by a person) every meeting counts, and a vehicle joins that meets any member. In a longer one
+only those meetings count in which somebody moves and the two interact (places and times come close, `space_time_gap`: they
+cross, follow, merge or pass), and a vehicle joins that so meets all the members.
 """
 
 from collections.abc import Sequence
@@ -50,7 +51,7 @@ def find_groups(pieces: Sequence[Piece], config: LogConfig) -> tuple[tuple[Group
     groups, notes = [], []
     while meetings:
         meetings.sort(key=lambda m: (m.gap, m.first - m.last, m.first, m.i, m.j))
-        group, remarks = grow(meetings, pieces, config)
+        group, remarks = grow(meetings, pieces, config, few=few)
         whole = split(group, pieces, config)
         groups += whole
         notes += remarks if whole else []
@@ -107,7 +108,13 @@ def runs(flags: Bools, bridge: int = 0) -> list[tuple[int, int]]:
 
 
 def space_time_gap(a: Piece, b: Piece, first: int, last: int, config: LogConfig) -> float:
-    """How close two vehicles come in place and time: min over t, t' of |a(t) - b(t')| + LAG |t - t'|, in metres."""
+    """How close two vehicles come in place and time: min over t, t' of |a(t) - b(t')| + LAG |t - t'|, in metres.
+
+    Two of whom neither drives `travel` metres have nothing to do with each other: infinite.
+    """
+    driven = max(p.smooth.speed[first - p.first : last - p.first].sum() * config.period for p in (a, b))
+    if driven < config.travel:
+        return float("inf")
     every = max(ticks(0.3, config), 1)
     time = np.arange(first, last, every) * config.period
     at_a = a.smooth.position[first - a.first : last - a.first : every]
@@ -116,23 +123,24 @@ def space_time_gap(a: Piece, b: Piece, first: int, last: int, config: LogConfig)
     return float((apart + LAG * np.abs(time[:, None] - time[None, :])).min())
 
 
-def grow(meetings: list[Meeting], pieces: Sequence[Piece], config: LogConfig) -> tuple[Group, list[str]]:
+def grow(meetings: list[Meeting], pieces: Sequence[Piece], config: LogConfig, *, few: bool) -> tuple[Group, list[str]]:
     """Grow an encounter from the strongest meeting."""
     seed = meetings[0]
     members, first, last = [seed.i, seed.j], seed.first, seed.last
     notes: list[str] = []
     refused: set[int] = set()
     while len(members) < config.most_vehicles:
-        candidates = {}
+        candidates: dict[int, list[float]] = {}
         here = {pieces[m].track.id for m in members}
         for meeting in meetings:
             for inside, other in ((meeting.i, meeting.j), (meeting.j, meeting.i)):
                 if inside in members and other not in refused and pieces[other].track.id not in here:
-                    candidates.setdefault(other, meeting.gap)
+                    candidates.setdefault(other, []).append(meeting.gap)
+        candidates = {other: gaps for other, gaps in candidates.items() if few or len(gaps) >= len(members)}
         if not candidates:
             break
         spans = {other: common_span(other, members, first, last, pieces, config) for other in candidates}
-        best = min(candidates, key=lambda other: (spans[other][0] - spans[other][1], candidates[other], other))
+        best = min(candidates, key=lambda other: (spans[other][0] - spans[other][1], min(candidates[other]), other))
         begin, end = spans[best]
         share, name = (end - begin) / (last - first), pieces[best].track.id
         if share < PRESENT or end - begin < ticks(config.shortest, config) + 1:

@@ -64,8 +64,6 @@ class Motion:
             weighted = rows.T * (1.0 / deviation**2)
             quadratic = quadratic + weighted @ rows
             linear = linear - weighted @ values
-        if all(speed for _, _, _, speed in observed):  # speeds alone leave the start open: it is 0
-            quadratic = quadratic + sparse.csc_array(([1.0], ([0], [0])), shape=quadratic.shape)
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere

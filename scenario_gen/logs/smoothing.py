@@ -21,6 +21,8 @@ from scenario_gen.logs.path import STRAIGHT, Path, fit_path, straight_path
 
 STANDS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
 CREEPS = 1.0  # m: fixes that move further than this while the speed is zero say that the speed is wrong
+DOUBTED = 3.0  # m/s: a speed that differs more from that of the fixes is not trusted with the first layout
+MOVED = 0.5  # m: who moves less has no direction of travel
 ROUNDS = 3  # of path and motion in turn
 
 
@@ -64,32 +66,40 @@ def smooth_piece(piece: Track, origin_ns: int, config: LogConfig) -> Smooth | No
     if not len(speed):
         speed_t, speed = fix_t, raw
     noise = config.position_noise or estimated_noise(piece.fix)
-    motion = Motion(standing((last - first + 1, dt), fix_t, piece.fix, speed_t, speed), config)
-    measured = (speed_t, speed, np.full(len(speed), config.speed_noise), True)
-    # The fixes' own speed has a small say in the first layout, in case the sensor lies.
-    drive = motion.solve([measured, (fix_t, raw, np.full(len(raw), 4.0 * config.speed_noise), True)])
+    ticks = dt * np.arange(last - first + 1)
+    stands = standing(ticks, fix_t, piece.fix, speed_t, speed)
+    motion = Motion(stands, config)
+    differs = speed - np.interp(speed_t, fix_t, raw)
+    deviation = config.speed_noise or float(np.clip(white_equivalent(differs), 0.3, 3.0))
+    measured = (speed_t, speed, np.full(len(speed), deviation), True)
+    guess = layout(ticks, stands, np.interp(ticks, speed_t, speed), np.interp(ticks, fix_t, raw), fix_t)
     weight = np.ones(len(fix_t))
     for _ in range(ROUNDS):
-        guess = motion.place(drive, fix_t)
         path = path_of(guess, piece, weight, noise)
         place, aside = path.project(guess, piece.fix)
         drive = motion.solve([measured, (fix_t, place, noise / np.sqrt(weight), False)])
-        error = np.hypot(aside, place - motion.place(drive, fix_t))
-        weight = np.minimum(1.0, 2.0 * noise / np.maximum(error, 1e-9))  # Huber's
+        guess = motion.place(drive, fix_t)
+        weight = np.minimum(1.0, 2.0 * noise / np.maximum(np.hypot(aside, place - guess), 1e-9))  # Huber's
     place, published = motion.at_ticks(drive)
     position, heading = path.pose(place)
-    if np.ptp(place) < STRAIGHT and not np.isfinite(piece.heading).any() and np.ptp(place) < 0.5:
+    if np.ptp(place) < MOVED and not np.isfinite(piece.heading).any():
         heading = np.full(len(place), np.nan)
-    ticks = dt * np.arange(len(place))
     return Smooth(
         first=first,
         position=position,
         heading=heading,
         speed=published,
-        before=speed - np.interp(speed_t, fix_t, raw),
+        before=differs,
         after=speed - np.interp(speed_t, ticks, published),
-        moved=np.hypot(*(piece.fix - path.pose(motion.place(drive, fix_t))[0]).T),
+        moved=np.hypot(*(piece.fix - path.pose(guess)[0]).T),
     )
+
+
+def layout(ticks: Floats, stands: Bools, speed: Floats, raw: Floats, seconds: Floats) -> Floats:
+    """A first guess of the distance driven at `seconds`: the integral of the speed, or of the fixes' own where that is far off."""
+    rate = np.where(stands, 0.0, np.where(np.abs(speed - raw) > DOUBTED, raw, speed))
+    driven = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(ticks))])
+    return np.interp(seconds, ticks, driven)
 
 
 def path_of(guess: Floats, piece: Track, weight: Floats, noise: float) -> Path:
@@ -119,27 +129,44 @@ def speed_of_fixes(seconds: Floats, fix: Floats, window: float = 0.5) -> Floats:
 
 
 def estimated_noise(fix: Floats) -> float:
-    """Standard deviation of the fixes [m] from their residuals about local parabolas, doubled because GPS noise is coloured."""
+    """Standard deviation of the fixes [m]: from their residuals about local parabolas."""
     window = min(31, len(fix) - 1 + len(fix) % 2)
     if window < 7:
         return 0.5
     residual = fix - savgol_filter(fix, window, 2, axis=0)
-    return float(np.clip(2.0 * 1.4826 * np.median(np.abs(residual - np.median(residual, axis=0))), 0.1, 1.5))
+    return float(np.clip(max(white_equivalent(residual[:, 0]), white_equivalent(residual[:, 1])), 0.1, 1.5))
 
 
-def standing(clock: tuple[int, float], fix_t: Floats, fix: Floats, speed_t: Floats, speed: Floats) -> Bools:
+def white_equivalent(noise: Floats) -> float:
+    """Standard deviation of the white noise that says as little about the mean as this coloured noise.
+
+    Values beyond three robust deviations are pulled in; the deviation is then scaled by the root of the autocorrelation
+    time, 1 + 2 Σ ρ_l over the lags before the first ρ_l below 0.1.
+    """
+    noise = noise - np.median(noise)
+    limit = 3.0 * 1.4826 * float(np.median(np.abs(noise))) + 1e-3
+    noise = np.clip(noise, -limit, limit)
+    power, time = float(noise @ noise), 1.0
+    for lag in range(1, min(20, len(noise) // 3)):
+        correlation = float(noise[:-lag] @ noise[lag:]) / max(power, 1e-12)
+        if correlation < 0.1:
+            break
+        time += 2.0 * correlation
+    return float(np.sqrt(power / len(noise) * time))
+
+
+def standing(ticks: Floats, fix_t: Floats, fix: Floats, speed_t: Floats, speed: Floats) -> Bools:
     """Return at which ticks the vehicle stands: slow for at least a second, with fixes that stay in place.
 
     Args:
-        clock: number of ticks and their period [s].
+        ticks: (T,) seconds.
         fix_t: (F,) seconds.
         fix: (F, 2) metres.
         speed_t: (S,) seconds.
         speed: (S,) m/s.
     """
-    count, dt = clock
-    ticks = dt * np.arange(count)
-    width = 2 * int(round(0.2 / dt)) + 1
+    count, dt = len(ticks), ticks[1] - ticks[0]
+    width = 2 * round(0.2 / dt) + 1
     slow = median_filter(np.interp(ticks, speed_t, speed), width, mode="nearest") < STANDS
     edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(int)))
     stands = np.zeros(count, dtype=bool)
