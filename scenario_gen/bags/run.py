@@ -1,0 +1,108 @@
+"""One run as messages and as a bag: the same bytes that the nodes publish, in an order and at stamps that need no clock."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from msg_conventions.changepoints import encode_changepoints, encode_posterior
+from msg_conventions.diagnostics import (
+    Level,
+    Status,
+    encode_diagnostics,
+    fit_statuses,
+    request_status,
+    scenario_status,
+)
+from msg_conventions.fits import anchor_stamps, encode_fit
+from msg_conventions.names import tokens
+from msg_conventions.paths import encode_route
+from msg_conventions.pictures import encode_footprint, scenario_markers
+from msg_conventions.roads import encode_map, encode_poses
+from msg_conventions.scenarios import encode_scenario
+from msg_conventions.topics import topic_entry, vehicle_topic
+from msg_conventions.tracks import encode_tracks
+from scenario_gen.bags.metadata import qos_yaml
+from scenario_gen.bags.writer import AtomicBag
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+from scenario_gen.fitting.result import Fit
+from scenario_gen.planning.route import Route
+from scenario_gen.roads.road import Road
+from scenario_gen.scenario import ScenarioSet
+from scenario_gen.segmentation.result import Segmentation
+
+SCENARIO_STEP_NS = 100_000_000  # scenarios are logged this far apart, so that a player shows one after the other
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """All that one request made of one template on one road; `namespace` stands before its topics, "" or e.g. "/case_a"."""
+
+    encounter: Encounter
+    road: Road
+    segmentation: Segmentation
+    fit: Fit
+    routes: tuple[Route, ...]
+    result: ScenarioSet
+    seed: int
+    request: str = "1"
+    namespace: str = ""
+
+
+def run_messages(run: Run) -> Iterator[tuple[str, bytes, int]]:
+    """Yield topic (without namespace), CDR bytes and log stamp [ns] of every message of the run, in order of the stamps."""
+    encounter, road, stamp = run.encounter, run.road, run.encounter.start_ns
+    yield "tracks", encode_tracks(encounter), stamp
+    yield "map", encode_map(road, stamp), stamp
+    yield "road/entries", encode_poses(road.entries, road.frame_id, stamp), stamp
+    yield "road/exits", encode_poses(road.exits, road.frame_id, stamp), stamp
+    yield "changepoints", encode_changepoints(encounter, run.segmentation), stamp
+    yield "posterior", encode_posterior(encounter, run.segmentation), stamp
+    yield "fit", encode_fit(encounter, run.fit, road.frame_id), stamp
+    anchors = anchor_stamps(encounter, run.segmentation.changepoints)
+    names = tokens(vehicle.id for vehicle in encounter.vehicles)
+    for name, vehicle, route in zip(names, encounter.vehicles, run.routes, strict=True):
+        yield vehicle_topic(name, "route"), encode_route(route, anchors, road.frame_id), stamp
+        yield vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}"), stamp
+    yield (
+        "diagnostics",
+        encode_diagnostics((segmentation_status(run.segmentation), *fit_statuses(run.fit, "/planner")), stamp),
+        stamp,
+    )
+    for k, scenario in enumerate(run.result.scenarios):
+        logged = stamp + k * SCENARIO_STEP_NS
+        data = encode_scenario(scenario, stamp)
+        status = scenario_status(scenario, data, run.request, "/gp_sampler", template=encounter.name, road=road.name)
+        yield "scenarios", data, logged
+        yield "scenarios/info", encode_diagnostics([status], stamp), logged
+        yield "markers", scenario_markers(scenario, stamp), logged
+    closing = request_status(run.result, run.request, "/gp_sampler", run.seed)
+    yield "scenarios/info", encode_diagnostics([closing], stamp), stamp + len(run.result.scenarios) * SCENARIO_STEP_NS
+
+
+def segmentation_status(segmentation: Segmentation, node: str = "/segmenter") -> Status:
+    """Return what the segmenter found, in words."""
+    values = {f"segment.{k}": text for k, text in enumerate(segmentation.descriptions)}
+    message = f"{len(segmentation.changepoints)} changepoints, {segmentation.n_primitives} primitives"
+    return Status(f"{node}: segmentation", Level.OK, message, values)
+
+
+def write_run(folder: Path, runs: Run | Sequence[Run]) -> Path:
+    """Write one or several runs (of different namespaces) to the bag `folder`, whole or not at all; return `folder`.
+
+    Same runs, same bytes. A bag already there is replaced.
+
+    Raises:
+        InputError: the folder is there and is no bag, cannot be written, or two runs share a namespace.
+    """
+    runs = (runs,) if isinstance(runs, Run) else tuple(runs)
+    if len({run.namespace for run in runs}) != len(runs):
+        raise InputError(f"{folder}: two runs share a namespace; give each its own")
+    with AtomicBag(folder) as bag:
+        for run in runs:
+            for topic, data, stamp_ns in run_messages(run):
+                kind, quality = topic_entry(topic)
+                name = f"{run.namespace}/{topic}"
+                bag.add_topic(name, kind, qos_yaml(quality))
+                bag.write(name, data, stamp_ns)
+    return folder

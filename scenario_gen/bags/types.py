@@ -1,0 +1,49 @@
+"""Message definitions and type hashes, from rosbags' Jazzy type store or from an installed package's .msg files."""
+
+import os
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from scenario_gen.errors import InputError
+
+
+@cache
+def _store() -> Any:
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def _register_installed(kind: str) -> None:
+    """Read `kind`, and what it is made of, from the share folders of AMENT_PREFIX_PATH."""
+    package, _, name = kind.partition("/msg/")
+    prefixes = [Path(p) for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
+    paths = [prefix / "share" / package / "msg" / f"{name}.msg" for prefix in prefixes]
+    found = next((path for path in paths if path.is_file()), None)
+    if found is None:
+        raise InputError(
+            f"message type {kind} is unknown: no {package}/msg/{name}.msg on AMENT_PREFIX_PATH; source its workspace"
+        )
+    store = _store()
+    types = get_types_from_msg(found.read_text(encoding="utf-8"), kind)
+    for _constants, fields in types.values():
+        for _field, (node, what) in fields:
+            inner = what[0][1] if node.name in ("ARRAY", "SEQUENCE") else what
+            if isinstance(inner, str) and inner not in store.fielddefs:
+                _register_installed(inner)
+    store.register(types)
+
+
+@cache
+def definition(kind: str) -> tuple[str, str]:
+    """Return the full ros2msg definition text of a type, nested types included, and its RIHS01 hash.
+
+    Raises:
+        InputError: the type is neither a standard one nor installed.
+    """
+    store = _store()
+    if kind not in store.fielddefs:
+        _register_installed(kind)
+    text, _ = store.generate_msgdef(kind, ros_version=2)
+    return text, store.hash_rihs01(kind)
