@@ -1,0 +1,203 @@
+"""The command line: `scenario-gen generate`, `scenario-gen demo`; a thin layer over the pipeline."""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+import yaml
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError, RefusedError, ScenarioGenError
+from scenario_gen.evaluation import Case, summary
+from scenario_gen.logs import read_log
+from scenario_gen.parameters import flatten, updated
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.pipeline import generate as run_pipeline
+from scenario_gen.results import check_folder, provenance_of, write_results
+
+app = typer.Typer(
+    help="Turn recorded vehicle encounters into new, valid ones on other roads.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+console = Console()
+
+LogArgument = Annotated[list[Path], typer.Argument(help="CSV, Parquet, SPMD files, or a rosbag2 bag (MCAP or SQLite)")]
+SetOption = Annotated[
+    list[str] | None, typer.Option("--set", help="one parameter, as name=value; `scenario-gen parameters` lists them")
+]
+ParametersOption = Annotated[Path | None, typer.Option("--params", help="a parameter file, e.g. config/default.yaml")]
+
+
+def configured(parameters: Path | None, assignments: list[str]) -> PipelineConfig:
+    """Return the pipeline's configuration: defaults, then the file, then each `name=value`.
+
+    Raises:
+        InputError: the file cannot be read, a name is unknown or a value does not suit; the message names it.
+    """
+    config = PipelineConfig()
+    if parameters is not None:
+        config = updated(config, read_parameter_file(parameters))
+    for assignment in assignments:
+        name, equals, text = assignment.partition("=")
+        if not equals:
+            raise InputError(f"--set {assignment}: write it as name=value")
+        known = flatten(config)
+        # what is declared as text stays text: vehicle "007" is no number
+        is_text = name in known and isinstance(known[name][0].default, str)
+        config = updated(config, {name: text if is_text else yaml.safe_load(text)})
+    return config
+
+
+def read_parameter_file(path: Path) -> dict[str, Any]:
+    """Return {dotted name: value} of a ROS 2 parameter file (`/**: ros__parameters: ...`).
+
+    Raises:
+        InputError: the file cannot be read or is not of that form.
+    """
+    try:
+        document = yaml.safe_load(path.read_text())
+        ((_, body),) = document.items()
+        nested = body["ros__parameters"]
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}") from error
+    except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: not a parameter file of the form '/**: ros__parameters: ...' ({error})") from error
+    return dict(_dotted(nested))
+
+
+def _dotted(nested: dict[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    """Flatten nested mappings to (dotted name, value) pairs."""
+    pairs: list[tuple[str, Any]] = []
+    for name, value in nested.items():
+        pairs += _dotted(value, f"{prefix}{name}.") if isinstance(value, dict) else [(prefix + name, value)]
+    return pairs
+
+
+@app.command()
+def parameters() -> None:
+    """List every parameter with its default, unit, range and meaning."""
+    for name, (entry, value) in flatten(PipelineConfig()).items():
+        meta = entry.metadata
+        bounds = [str(meta[end]) if meta[end] is not None else "" for end in ("low", "high")]
+        allowed = " | ".join(meta["choices"]) or ("…".join(bounds) if any(bounds) else "")
+        console.print(
+            f"[bold]{name}[/] = {value!r} {meta['unit']} {f'({allowed})' if allowed else ''}\n    {meta['meaning']}",
+            highlight=False,
+        )
+
+
+@app.command()
+def generate(
+    log: LogArgument,
+    road: Annotated[
+        list[str], typer.Option(help="straight, t_intersection, four_way, corridor, or a nav2 map's YAML; repeatable")
+    ],
+    count: Annotated[int, typer.Option(min=1, help="scenarios per encounter and road")] = 50,
+    seed: Annotated[int, typer.Option(min=0, help="same seed, same scenarios")] = 0,
+    out: Annotated[Path, typer.Option(help="folder of the results")] = Path("out/generated"),
+    encounter: Annotated[
+        list[str] | None, typer.Option(help="name of an encounter of the log (default: all); repeatable")
+    ] = None,
+    assignments: SetOption = None,
+    parameter_file: ParametersOption = None,
+) -> None:
+    """Generate new encounters from a log: bag, report and figures in one folder."""
+    config = configured(parameter_file, assignments or [])
+    check_folder(out)
+    found = read_log(log, config.log)
+    templates = chosen(found.encounters, encounter or [])
+    cases, refusals = run_all(templates, road, config, count=count, seed=seed)
+    if not cases:
+        raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
+    write_results(
+        out,
+        cases,
+        seed=seed,
+        title=", ".join(path.stem for path in log),
+        quality=(*found.quality.lines(), *refusals),
+        provenance=provenance_of(log, seed, count, road, config),
+    )
+    conclude(cases, refusals, out)
+
+
+def chosen(encounters: tuple[Encounter, ...], names: list[str]) -> list[Encounter]:
+    """Return the encounters of those names, or all.
+
+    Raises:
+        InputError: a name is unknown; the message lists the known ones.
+    """
+    known = {encounter.name: encounter for encounter in encounters}
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise InputError(f"no encounter named {unknown[0]!r} in the log; there are: {', '.join(known)}")
+    return [known[name] for name in names] or list(encounters)
+
+
+def run_all(
+    templates: list[Encounter], roads: list[str], config: PipelineConfig, *, count: int, seed: int
+) -> tuple[list[Case], list[str]]:
+    """Run every encounter on every road; return the cases, and a sentence for each that was refused."""
+    cases: list[Case] = []
+    refusals: list[str] = []
+    with progress_bar() as bar:
+        for template in templates:
+            for road in roads:
+                task = bar.add_task(f"{template.name} on {Path(road).stem}", total=count)
+
+                def advance(done: int, total: int, task: TaskID = task) -> None:
+                    bar.update(task, completed=done, total=total)
+
+                try:
+                    case = run_pipeline(template, road, config, count=count, seed=seed, progress=advance)
+                except RefusedError as error:
+                    refusals.append(f"{template.name} on {road}: {error}")
+                    continue
+                cases.append(case)
+                got = len(case.with_changepoints.scenarios)
+                if got < count:
+                    refusals.append(f"{template.name} on {road}: only {got} of {count} scenarios: {causes(case)}")
+    return cases, refusals
+
+
+def causes(case: Case) -> str:
+    """Say why candidates were refused."""
+    refused = case.with_changepoints.refused
+    return ", ".join(f"{number} × {cause}" for cause, number in refused.most_common()) or "no candidate was drawn"
+
+
+def conclude(cases: list[Case], refusals: list[str], out: Path) -> None:
+    """Print the summary; raise RefusedError if anything asked for is missing."""
+    console.print(summary(cases))
+    console.print(f"report: {out / 'report.html'}\nbag:    {out / 'bag'}", highlight=False, soft_wrap=True)
+    if refusals:
+        raise RefusedError("not everything that was asked for could be had:\n" + "\n".join(refusals))
+
+
+def progress_bar() -> Progress:
+    """Return the progress bar of long work (silent where nobody watches)."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+
+
+def main() -> None:
+    """Run the command line; an error of ours is one message and an exit code, never a traceback."""
+    try:
+        app()
+    except ScenarioGenError as error:
+        Console(stderr=True).print(f"[bold red]error:[/] {error}", highlight=False, soft_wrap=True)
+        sys.exit(error.exit_code)
+
+
+if __name__ == "__main__":
+    main()

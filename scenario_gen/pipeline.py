@@ -1,0 +1,164 @@
+"""The whole method on one screen: an encounter and a road in, valid new scenarios and their evaluation out."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import RefusedError
+from scenario_gen.evaluation import ORACLE, WITH, WITHOUT, Case, CheckCounts, EvaluationConfig, evaluate, replay
+from scenario_gen.fitting import Fit, FittingConfig, fit_template
+from scenario_gen.interaction import find_conflicts, find_waits
+from scenario_gen.logs import LogConfig
+from scenario_gen.planning import PlanningConfig, Route, plan_routes
+from scenario_gen.roads import Road, RoadConfig, build_road
+from scenario_gen.sampling import SamplingConfig, sample_scenarios
+from scenario_gen.scenario import BoundaryStates, ScenarioSet
+from scenario_gen.segmentation import Segmentation, SegmentationConfig, segment
+from scenario_gen.validity import Checker, Limits
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class PipelineConfig:
+    """The parameters of every stage."""
+
+    log: LogConfig = field(default_factory=LogConfig)
+    segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
+    road: RoadConfig = field(default_factory=RoadConfig)
+    fitting: FittingConfig = field(default_factory=FittingConfig)
+    planning: PlanningConfig = field(default_factory=PlanningConfig)
+    sampling: SamplingConfig = field(default_factory=SamplingConfig)
+    limits: Limits = field(default_factory=Limits)
+    evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """What the chain made of one set of changepoints."""
+
+    segmentation: Segmentation
+    fit: Fit
+    routes: tuple[Route, ...]
+    scenarios: ScenarioSet
+
+
+def generate(
+    encounter: Encounter,
+    road_name: str,
+    config: PipelineConfig,
+    *,
+    count: int,
+    seed: int,
+    progress: Progress | None = None,
+) -> Case:
+    """Segment, fit, plan, sample, check and evaluate.
+
+    Raises:
+        InputError: the road cannot be read.
+        RefusedError: the template does not fit the road, or there is no way; the message says why.
+    """
+    road = build_road(road_name, encounter, config.road)
+    segmentation = segment(encounter, config.segmentation, seed)
+    arm = run_arm(encounter, segmentation, road, config, count=count, seed=seed, progress=progress)
+    return with_ablation(encounter, road, arm, config, count=count, seed=seed)
+
+
+def run_arm(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    config: PipelineConfig,
+    *,
+    count: int,
+    seed: int,
+    progress: Progress | None = None,
+) -> Arm:
+    """Fit the changepoints to the road, plan between them, sample and check."""
+    fit = fit_template(encounter, segmentation, road, config.fitting)
+    routes = plan_routes(road, fit, config.planning, seed)
+    scenarios = sample_checked(
+        encounter, segmentation, road, routes, fit.asked, config, count=count, seed=seed, progress=progress
+    )
+    return Arm(segmentation, fit, routes, scenarios)
+
+
+def sample_checked(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    routes: tuple[Route, ...],
+    asked: BoundaryStates,
+    config: PipelineConfig,
+    *,
+    count: int,
+    seed: int,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> ScenarioSet:
+    """Sample candidates and publish those that the checker proves valid against the template's conflicts and waits.
+
+    A segmentation without changepoints has no dwell to hold, so its waits are not asked for (method: the ablation).
+    """
+    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
+    waits = find_waits(encounter) if segmentation.changepoints.size else ()
+    checker = Checker(road, asked, conflicts, waits, config.limits)
+    return sample_scenarios(
+        encounter,
+        segmentation,
+        road,
+        routes,
+        asked,
+        checker.check,
+        config.sampling,
+        count=count,
+        seed=seed,
+        waits=waits,
+        progress=progress,
+        cancelled=cancelled,
+    )
+
+
+def without_changepoints(segmentation: Segmentation) -> Segmentation:
+    """Return the ablation of paper V-B: the same encounter as one primitive."""
+    return replace(
+        segmentation,
+        labels=np.zeros_like(segmentation.labels),
+        changepoints=np.zeros(0),
+        descriptions=("the whole encounter as one primitive",),
+    )
+
+
+def with_ablation(encounter: Encounter, road: Road, arm: Arm, config: PipelineConfig, *, count: int, seed: int) -> Case:
+    """Run the chain once more without changepoints, and evaluate both arms beside the fitted template (the oracle row)."""
+    without, refused = None, ""
+    try:
+        without = run_arm(encounter, without_changepoints(arm.segmentation), road, config, count=count, seed=seed)
+    except RefusedError as error:
+        refused = str(error)
+    arms = {WITH: arm} | ({WITHOUT: without} if without else {})
+    oracle = replay(encounter, arm.fit, road.frame_id)
+    evaluation = evaluate(
+        encounter,
+        arm.segmentation,
+        {name: one.scenarios.scenarios for name, one in arms.items()} | {ORACLE: (oracle,)},
+        checks={name: CheckCounts.of_set(one.scenarios) for name, one in arms.items()},
+        oracle=ORACLE,
+        road=road.name,
+        config=config.evaluation,
+        seed=seed,
+    )
+    return Case(
+        encounter=encounter,
+        segmentation=arm.segmentation,
+        road=road,
+        fit=arm.fit,
+        routes=arm.routes,
+        with_changepoints=arm.scenarios,
+        without_changepoints=without.scenarios if without else None,
+        evaluation=evaluation,
+        oracle=oracle,
+        without_refused=refused,
+    )

@@ -1,0 +1,105 @@
+"""What a request leaves behind: a bag, a report and the figures, whole or not at all."""
+
+import hashlib
+import json
+import platform
+import shutil
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+
+import scenario_gen
+from scenario_gen.bags import Run, write_run
+from scenario_gen.errors import InputError
+from scenario_gen.evaluation import Case, ReportInput, write_report
+from scenario_gen.parameters import flatten
+from scenario_gen.pipeline import PipelineConfig
+
+BAG, REPORT, FIGURES = "bag", "report.html", "evaluation.json"
+
+
+def write_results(
+    folder: Path,
+    cases: Sequence[Case],
+    *,
+    seed: int,
+    title: str,
+    quality: Sequence[str],
+    provenance: Mapping[str, str],
+    bag: Path | None = None,
+) -> None:
+    """Write bag, report and figures of all cases to `folder`, replacing results that are there.
+
+    Args:
+        folder: where to; it is made, and nothing is left half-written if something fails.
+        cases: one per encounter and road; with several, each has its own namespace in the bag.
+        seed: of the request.
+        title: heading of the report.
+        quality: the log's data-quality summary, in lines.
+        provenance: what is needed to do it again.
+        bag: a bag that was recorded already, moved into place; without it one is written here.
+
+    Raises:
+        InputError: the folder holds something that is not an earlier result.
+    """
+    check_folder(folder)
+    partial = folder.with_name(f".{folder.name}.partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    partial.mkdir(parents=True)
+    try:
+        if bag is None:
+            write_run(
+                partial / BAG, [as_run(case, seed, namespace) for case, namespace in zip(cases, namespaces(cases), strict=True)]
+            )
+        else:
+            shutil.copytree(bag, partial / BAG)
+        write_report(partial / REPORT, ReportInput(cases, title, quality, provenance))
+        figures = [json.loads(case.evaluation.to_json()) for case in cases]
+        (partial / FIGURES).write_text(json.dumps({"provenance": dict(provenance), "cases": figures}, indent=2) + "\n")
+        shutil.rmtree(folder, ignore_errors=True)
+        partial.rename(folder)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def check_folder(folder: Path) -> None:
+    """Raise InputError if `folder` holds anything but an earlier result."""
+    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / REPORT).exists())):
+        raise InputError(f"{folder} exists and is not an earlier result; choose another --out")
+
+
+def as_run(case: Case, seed: int, namespace: str = "") -> Run:
+    """Return the case as the bag writer takes it."""
+    return Run(
+        encounter=case.encounter,
+        road=case.road,
+        segmentation=case.segmentation,
+        fit=case.fit,
+        routes=tuple(case.routes),
+        result=case.with_changepoints,
+        seed=seed,
+        namespace=namespace,
+    )
+
+
+def namespaces(cases: Sequence[Case]) -> list[str]:
+    """Return one ROS namespace per case; a single case needs none."""
+    return [""] if len(cases) == 1 else [f"/case_{k + 1}" for k in range(len(cases))]
+
+
+def provenance_of(logs: Sequence[Path], seed: int, count: int, roads: Sequence[str], config: PipelineConfig) -> dict[str, str]:
+    """Return everything needed to do it again: log hashes, seed, versions and all parameters."""
+    facts = {f"log {path.name}": f"sha256 {sha256_of(path)}" for path in logs}
+    facts |= {"roads": ", ".join(roads), "seed": str(seed), "count": str(count)}
+    facts |= {"scenario_gen": scenario_gen.__version__, "python": platform.python_version()}
+    facts |= {name: metadata.version(name) for name in ("numpy", "scipy", "numba")}
+    return facts | {name: str(value) for name, (_, value) in flatten(config).items()}
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file, or of a folder's files in order of their names."""
+    digest = hashlib.sha256()
+    for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+        if file.is_file():
+            digest.update(file.read_bytes())
+    return digest.hexdigest()
