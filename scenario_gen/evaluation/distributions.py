@@ -135,7 +135,7 @@ def jensen_shannon(p: Floats, q: Floats) -> Floats:
         middle = 0.5 * (p + q)
 
         def divergence(x: Floats) -> Floats:
-            return np.where(x > 0.0, x * np.log2(np.where(x > 0.0, x, 1.0) / middle), 0.0).sum(axis=-1)
+            return np.asarray(np.where(x > 0.0, x * np.log2(np.where(x > 0.0, x, 1.0) / middle), 0.0).sum(axis=-1))
 
         result = 0.5 * divergence(p) + 0.5 * divergence(np.broadcast_to(q, p.shape))
     return np.where(np.isfinite(p.sum(axis=-1)), np.maximum(result, 0.0), np.nan)

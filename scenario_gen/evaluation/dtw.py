@@ -56,7 +56,7 @@ def _extent(a: Floats, b: Floats, manhattan: bool, out: Floats) -> None:
 
 
 @kernel(F3, F3, F2, B, I, OUT2)
-def _feature_rows(a: Floats, b: Floats, extents: Floats, manhattan: bool, first: int, out: Floats) -> None:  # noqa: PLR0917
+def _feature_rows(a: Floats, b: Floats, extents: Floats, manhattan: bool, first: int, out: Floats) -> None:
     """Write rows first, first + 1, … of every sample's normalised matrix into out (S, rows·m)."""
     m = b.shape[2]
     for s in range(a.shape[0]):

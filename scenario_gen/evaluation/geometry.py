@@ -30,7 +30,7 @@ def time_to_collision(motion: Motion, a: int, b: int) -> Floats:
     and they touch when all four intervals have begun and none has ended.
     """
     offset, reach, closing = _separation(motion, a, b)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         one, two = (-reach - offset) / closing, (reach - offset) / closing
     still = closing == 0.0
     apart = np.abs(offset) >= reach

@@ -1,9 +1,17 @@
 """Small worlds with known answers: a crossing of two cars, and samples around it."""
 
+from collections import Counter
+from dataclasses import replace
+
 import numpy as np
 
 from scenario_gen.encounter import Encounter, Vehicle
-from scenario_gen.scenario import Scenario
+from scenario_gen.evaluation import Case, CheckCounts, EvaluationConfig, evaluate
+from scenario_gen.fitting.result import Fit, FittedVehicle
+from scenario_gen.planning.route import Route
+from scenario_gen.roads.road import Road
+from scenario_gen.scenario import BoundaryStates, Cause, Scenario, ScenarioSet
+from scenario_gen.segmentation.result import Segmentation
 
 CARS = (Vehicle("west", 4.0, 2.0), Vehicle("south", 4.0, 2.0))
 
@@ -39,3 +47,52 @@ def samples(encounter, count, seed=3, spread=0.5, pace=1.0):
     """`count` scenarios around the encounter, shifted at random."""
     rng = np.random.default_rng(seed)
     return [replayed(encounter, i, rng.normal(0.0, spread, 2), pace + rng.normal(0.0, 0.1)) for i in range(count)]
+
+
+def cross_road():
+    """A cross of two 10 m wide roads, 140 m long, in cells of 0.5 m."""
+    centre = (np.arange(280) + 0.5) * 0.5 - 70.0
+    drivable = (np.abs(centre)[:, None] < 5.0) | (np.abs(centre)[None, :] < 5.0)
+    entries = np.array([[-70.0, 0.0, 0.0], [0.0, -70.0, np.pi / 2]])
+    exits = np.array([[70.0, 0.0, 0.0], [0.0, 70.0, np.pi / 2]])
+    return Road("cross", drivable, 0.5, np.array([-70.0, -70.0]), entries, exits)
+
+
+def report_case(count=12, name="crossing", without=True):
+    """A whole case of the report, around the crossing."""
+    encounter = replace(crossing(), name=name)
+    steps = encounter.speed.shape[1]
+    labels = np.repeat([0, 1, 0], [40, 40, steps - 80])
+    time = np.arange(steps)
+    probability = np.exp(-((time - 40) ** 2) / 8.0) + 0.7 * np.exp(-((time - 80) ** 2) / 20.0)
+    told = ("west drives on, south brakes", "west drives on, south drives slowly", "both drive on")
+    segmentation = Segmentation(labels, np.array([40, 80]), probability, told)
+    index = np.array([0, 40, 80, steps - 1])
+    fitted, routes = [], []
+    for n in range(2):
+        poses = np.column_stack([encounter.position[n], encounter.heading[n]])
+        moved, stands = np.array([0.0, 0.12, 0.0, 0.0]), np.zeros(3, dtype=bool)
+        fitted.append(FittedVehicle(poses[index], moved, stands, 1.0, "straight"))
+        length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))])
+        routes.append(Route(poses, index, length))
+    ends = [np.column_stack([encounter.position[:, k], encounter.heading[:, k], encounter.speed[:, k]]) for k in (0, -1)]
+    notes = ("west enters at 1 and leaves at 1: straight, as in the template", "south: anchor 1 moved by 0.12 m")
+    fit = Fit(encounter.vehicles, tuple(fitted), index, BoundaryStates(*ends), notes)
+    oracle = replayed(encounter)
+    near = ScenarioSet(
+        count,
+        tuple(samples(encounter, count)),
+        count + 5,
+        Counter({Cause.OVERLAP: 3, Cause.LATERAL_ACCELERATION: 2}),
+        ("the clock was stretched by 3 %",),
+    )
+    far = ScenarioSet(
+        count, tuple(samples(encounter, count, seed=4, spread=1.0, pace=0.0)), count + 1, Counter({Cause.OFF_ROAD: 1})
+    )
+    rows = {"with changepoints": near.scenarios, "oracle": [oracle]}
+    if without:
+        rows["without changepoints"] = far.scenarios
+    checks = {"with changepoints": CheckCounts.of_set(near), "without changepoints": CheckCounts.of_set(far)}
+    evaluation = evaluate(encounter, segmentation, rows, checks=checks, road="cross", config=EvaluationConfig(resamples=50))
+    refused = "" if without else "no route exists"
+    return Case(encounter, segmentation, cross_road(), fit, routes, near, far if without else None, evaluation, oracle, refused)

@@ -1,0 +1,206 @@
+"use strict";
+// The page: which case is shown, and the player.
+
+const CASES = JSON.parse(document.getElementById("data").textContent);
+const ARM_NAMES = { oracle: "fitted template", with: "with changepoints", without: "without changepoints" };
+
+function option(value, text) {
+  const element = document.createElement("option");
+  element.value = value;
+  element.textContent = text;
+  return element;
+}
+
+/** The animation: play, pause, scrub, choose the set and the sample, or see all samples at once. */
+class Player {
+  constructor(section, data, sets, picture, box) {
+    this.data = data;
+    this.sets = sets;
+    this.picture = picture;
+    this.find = (role) => section.querySelector(`[data-role="${role}"]`);
+    this.view = new View(this.find("stage"), box, 8);
+    this.time = 0;
+    this.playing = false;
+    this.arm = sets.with ? "with" : Object.keys(sets)[0];
+    Object.keys(ARM_NAMES).filter((arm) => sets[arm]).forEach((arm) => this.find("arm").append(option(arm, ARM_NAMES[arm])));
+    this.find("arm").value = this.arm;
+    this.listSamples();
+    this.find("arm").addEventListener("change", (event) => { this.arm = event.target.value; this.listSamples(); this.draw(); });
+    this.find("sample").addEventListener("change", () => this.draw());
+    this.find("play").addEventListener("click", () => this.toggle());
+    this.find("scrub").addEventListener("input", (event) => { this.pause(); this.time = (event.target.value / 1000) * this.duration; this.draw(); });
+    this.find("ghosts").addEventListener("change", () => this.draw());
+    this.find("previous").addEventListener("click", () => this.step(-1));
+    this.find("next").addEventListener("click", () => this.step(1));
+    this.find("stage").addEventListener("click", () => this.toggle());
+    this.readouts = data.vehicles.map((vehicle, n) => {
+      const line = document.createElement("li");
+      const chip = document.createElement("i");
+      chip.style.background = vehicleColour(n);
+      const value = document.createElement("b");
+      line.append(chip, document.createTextNode(`${vehicle.id} `), value);
+      this.find("readout").append(line);
+      return value;
+    });
+  }
+
+  get set() { return this.sets[this.arm]; }
+  get sample() { return this.find("sample").selectedIndex; }
+  get duration() { return this.set.durations[this.sample]; }
+
+  listSamples() {
+    const list = this.find("sample");
+    const before = Math.max(0, list.selectedIndex);
+    list.replaceChildren(...this.set.index.map((index) => option(index, this.arm === "oracle" ? "the template" : `sample ${index}`)));
+    list.selectedIndex = Math.min(before, this.set.samples - 1);
+    this.time = Math.min(this.time, this.duration);
+  }
+
+  step(by) {
+    const list = this.find("sample");
+    list.selectedIndex = (list.selectedIndex + by + this.set.samples) % this.set.samples;
+    this.draw();
+  }
+
+  toggle() { if (this.playing) this.pause(); else this.play(); }
+
+  play() {
+    if (this.time >= this.duration - 1e-6) this.time = 0;
+    this.playing = true;
+    this.last = null;
+    this.find("play").textContent = "❚❚";
+    this.find("play").setAttribute("aria-label", "pause");
+    requestAnimationFrame((now) => this.tick(now));
+  }
+
+  pause() {
+    this.playing = false;
+    this.find("play").textContent = "▶";
+    this.find("play").setAttribute("aria-label", "play");
+  }
+
+  tick(now) {
+    if (!this.playing) return;
+    if (this.last !== null) this.time += ((now - this.last) / 1000) * Number(this.find("pace").value);
+    this.last = now;
+    if (this.time >= this.duration) {
+      this.time = this.duration;
+      this.pause();
+    } else {
+      requestAnimationFrame((next) => this.tick(next));
+    }
+    this.draw();
+  }
+
+  draw() {
+    const { data, set, sample, view } = this;
+    const share = this.time / this.duration;
+    const context = view.begin();
+    view.road(data.road, this.picture);
+    const ghosts = this.find("ghosts").checked;
+    data.vehicles.forEach((vehicle, n) => {
+      context.globalAlpha = 0.35;
+      context.lineWidth = 1.2;
+      context.strokeStyle = vehicleColour(n);
+      set.path(context, view, sample, n);
+      context.globalAlpha = 0.9;
+      context.lineWidth = 2.5;
+      set.path(context, view, sample, n, Math.max(0, share - 3 / this.duration), share);
+      if (ghosts) {
+        for (let s = 0; s < set.samples; s += 1) {
+          if (s !== sample) view.footprint(set.state(s, n, this.time / set.durations[s]), vehicle, vehicleColour(n), 0.08, false);
+        }
+      }
+    });
+    data.vehicles.forEach((vehicle, n) => {
+      const state = set.state(sample, n, share);
+      view.footprint(state, vehicle, vehicleColour(n), 1, true);
+      this.readouts[n].textContent = `${state.speed.toFixed(1)} m/s`;
+    });
+    view.ruler();
+    this.find("scrub").value = Math.round(1000 * share);
+    this.find("clock").textContent = `${this.time.toFixed(1)} / ${this.duration.toFixed(1)} s`;
+    this.sayPrimitive(share);
+  }
+
+  /** Samples share the template's clock, so the same share of the duration is the same primitive. */
+  sayPrimitive(share) {
+    const { bounds, labels, descriptions } = this.data.template;
+    const time = share * bounds[bounds.length - 1];
+    let k = 0;
+    while (k < labels.length - 1 && time >= bounds[k + 1]) k += 1;
+    this.find("primitive").textContent = `${k + 1} of ${labels.length}: ${descriptions[k]}`;
+    this.find("primitive").style.borderColor = primitiveColour(labels[k]);
+  }
+}
+
+/** Everything drawn for one case, made when it is first shown. */
+function open(section, data) {
+  const template = new Trajectories(data.template);
+  const sets = Object.fromEntries(Object.entries(data.arms).map(([arm, packed]) => [arm, new Trajectories(packed)]));
+  const picture = roadPicture(data.road);
+  const box = Object.values(sets).reduce((grown, set) => set.grow(grown), [Infinity, Infinity, -Infinity, -Infinity]);
+  data.fit.forEach((vehicle) => vehicle.route.forEach(([x, y]) => {
+    box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y);
+  }));
+  const find = (role) => section.querySelector(`[data-role="${role}"]`);
+  const player = Object.keys(sets).length ? new Player(section, data, sets, picture, box) : null;
+  const ground = template.grow([Infinity, Infinity, -Infinity, -Infinity]);
+  const maps = [
+    [new View(find("template-map"), ground, 6), (view) => drawTemplateMap(view, data, template)],
+    [new View(find("routes"), box, 8), (view) => drawRoutes(view, data, picture)],
+  ];
+  let top = 1;
+  [template, ...Object.values(sets)].forEach((set) => { for (let i = 3; i < set.values.length; i += 4) top = Math.max(top, set.values[i]); });
+  ["with", "without"].filter((arm) => sets[arm]).forEach((arm) => {
+    maps.push([new View(find(`samples-${arm}`), box, 8), (view) => drawSamples(view, data, picture, sets[arm])]);
+    drawSpeeds(find(`speeds-${arm}`), data, sets[arm], template, 1.08 * top);
+  });
+  drawTemplate(find("template-speed"), data, template);
+  const pairs = find("pair");
+  data.features.forEach((feature, i) => pairs.append(option(i, feature.pair.map((n) => data.vehicles[n].id).join(" and "))));
+  pairs.parentElement.hidden = data.features.length < 2;
+  const features = () => {
+    const feature = data.features[pairs.selectedIndex];
+    section.querySelectorAll("[data-feature]").forEach((place) => {
+      const [kind, arm] = place.dataset.feature.split(" ");
+      if (feature[kind][arm]) drawFeature(place, feature[kind][arm], template.durations[0], feature.pair.map((n) => data.vehicles[n].id));
+    });
+  };
+  pairs.addEventListener("change", features);
+  features();
+  return { player, draw: () => { maps.forEach(([view, draw]) => draw(view)); if (player) player.draw(); } };
+}
+
+const opened = new Map();
+let shown = -1;
+
+function show(index) {
+  if (shown >= 0 && opened.get(shown).player) opened.get(shown).player.pause();
+  document.querySelectorAll("[data-case]").forEach((section) => { section.hidden = Number(section.dataset.case) !== index; });
+  document.querySelectorAll("[data-show]").forEach((row) => row.setAttribute("aria-current", String(Number(row.dataset.show) === index)));
+  shown = index;
+  if (!opened.has(index)) opened.set(index, open(document.querySelector(`[data-case="${index}"]`), CASES[index]));
+  opened.get(index).draw();
+}
+
+document.querySelectorAll("[data-show]").forEach((row) => {
+  row.addEventListener("click", () => show(Number(row.dataset.show)));
+});
+
+/** Whatever changes the width of the page, canvases and charts follow. */
+new ResizeObserver(() => {
+  if (shown < 0) return;
+  opened.get(shown).draw();
+  document.querySelectorAll(`[data-case="${shown}"] .js-plotly-plot`).forEach((place) => Plotly.Plots.resize(place));
+}).observe(document.querySelector("main"));
+document.addEventListener("keydown", (event) => {
+  const player = shown >= 0 && opened.get(shown).player;
+  if (!player || /^(INPUT|SELECT|BUTTON)$/.test(document.activeElement.tagName)) return;
+  if (event.key === " ") { event.preventDefault(); player.toggle(); }
+  if (event.key === "ArrowRight") player.step(1);
+  if (event.key === "ArrowLeft") player.step(-1);
+});
+show(0);
+document.querySelectorAll("[data-primitive]").forEach((chip) => { chip.style.background = primitiveColour(Number(chip.dataset.primitive)); });
+document.querySelectorAll("[data-vehicle]").forEach((chip) => { chip.style.background = vehicleColour(Number(chip.dataset.vehicle)); });

@@ -1,0 +1,190 @@
+"use strict";
+// Trajectories, the road, and how they are drawn on a canvas.
+
+const VEHICLE_COLOURS = ["#2563eb", "#e2590c", "#0d9488", "#9333ea", "#c2185b", "#65780b", "#0e7490", "#7c4a21", "#4b5563"];
+const PRIMITIVE_COLOURS = ["#4e79a7", "#f28e2b", "#59a14f", "#e15759", "#b07aa1", "#edc948", "#76b7b2", "#ff9da7", "#9c755f", "#79706e"];
+const vehicleColour = (n) => VEHICLE_COLOURS[n % VEHICLE_COLOURS.length];
+const primitiveColour = (label) => PRIMITIVE_COLOURS[label % PRIMITIVE_COLOURS.length];
+
+function bytesOf(text) {
+  const raw = atob(text);
+  const bytes = new Uint8Array(raw.length);
+  for (let i = 0; i < raw.length; i += 1) bytes[i] = raw.charCodeAt(i);
+  return bytes;
+}
+
+/** A set of scenarios: S samples of N vehicles at F frames, channels x, y, yaw, speed. */
+class Trajectories {
+  constructor(packed) {
+    const { shape, low, step, data } = packed.states;
+    const whole = new Uint16Array(bytesOf(data).buffer);
+    this.values = Float32Array.from(whole, (value, i) => low[i % 4] + step[i % 4] * value);
+    [this.samples, this.vehicles, this.frames] = shape;
+    this.durations = packed.durations;
+    this.index = packed.index || [0];
+  }
+
+  offset(sample, vehicle, frame) {
+    return ((sample * this.vehicles + vehicle) * this.frames + frame) * 4;
+  }
+
+  /** The state of a vehicle at a share (0 to 1) of the sample's duration. */
+  state(sample, vehicle, share) {
+    const at = Math.min(Math.max(share, 0), 1) * (this.frames - 1);
+    const frame = Math.min(Math.floor(at), this.frames - 2);
+    const part = at - frame;
+    const a = this.offset(sample, vehicle, frame);
+    const mix = (c) => this.values[a + c] * (1 - part) + this.values[a + 4 + c] * part;
+    return { x: mix(0), y: mix(1), yaw: mix(2), speed: mix(3) };
+  }
+
+  /** Grow a box [x0, y0, x1, y1] to hold every position. */
+  grow(box) {
+    for (let i = 0; i < this.values.length; i += 4) {
+      box[0] = Math.min(box[0], this.values[i]);
+      box[1] = Math.min(box[1], this.values[i + 1]);
+      box[2] = Math.max(box[2], this.values[i]);
+      box[3] = Math.max(box[3], this.values[i + 1]);
+    }
+    return box;
+  }
+
+  path(context, view, sample, vehicle, from = 0, to = 1) {
+    const first = Math.ceil(from * (this.frames - 1));
+    const last = Math.floor(to * (this.frames - 1));
+    context.beginPath();
+    const start = this.state(sample, vehicle, from);
+    context.moveTo(view.x(start.x), view.y(start.y));
+    for (let frame = first; frame <= last; frame += 1) {
+      const i = this.offset(sample, vehicle, frame);
+      context.lineTo(view.x(this.values[i]), view.y(this.values[i + 1]));
+    }
+    const end = this.state(sample, vehicle, to);
+    context.lineTo(view.x(end.x), view.y(end.y));
+    context.stroke();
+  }
+}
+
+/** The road as a picture, one pixel per cell. */
+function roadPicture(road) {
+  const [width, height] = road.size;
+  const canvas = document.createElement("canvas");
+  canvas.width = width;
+  canvas.height = height;
+  const context = canvas.getContext("2d");
+  const image = context.createImageData(width, height);
+  let cell = 0;
+  road.runs.forEach((length, run) => {
+    for (const end = cell + length; cell < end; cell += 1) {
+      const pixel = 4 * ((height - 1 - Math.floor(cell / width)) * width + (cell % width));
+      image.data.set(run % 2 ? [212, 217, 226, 255] : [0, 0, 0, 0], pixel);
+    }
+  });
+  context.putImageData(image, 0, 0);
+  return canvas;
+}
+
+/** A canvas that keeps its sharpness and its proportions, and the map from metres to its pixels. */
+class View {
+  constructor(canvas, box, margin) {
+    this.canvas = canvas;
+    this.context = canvas.getContext("2d");
+    this.box = [box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin];
+  }
+
+  /** Fit the canvas to its place on the page and clear it. */
+  begin() {
+    const density = Math.min(window.devicePixelRatio || 1, 2);
+    const width = this.canvas.clientWidth;
+    const height = this.canvas.clientHeight;
+    if (this.canvas.width !== Math.round(width * density) || this.canvas.height !== Math.round(height * density)) {
+      this.canvas.width = Math.round(width * density);
+      this.canvas.height = Math.round(height * density);
+    }
+    const [x0, y0, x1, y1] = this.box;
+    this.scale = Math.min(width / (x1 - x0), height / (y1 - y0));
+    const left = (width - this.scale * (x1 - x0)) / 2 - this.scale * x0;
+    const bottom = (height + this.scale * (y1 - y0)) / 2 + this.scale * y0;
+    this.x = (x) => left + this.scale * x;
+    this.y = (y) => bottom - this.scale * y;
+    this.width = width;
+    this.height = height;
+    const context = this.context;
+    context.setTransform(density, 0, 0, density, 0, 0);
+    context.clearRect(0, 0, width, height);
+    context.lineJoin = "round";
+    context.lineCap = "round";
+    return context;
+  }
+
+  road(road, picture) {
+    const side = road.cell * this.scale;
+    const top = this.y(road.origin[1] + road.size[1] * road.cell);
+    this.context.imageSmoothingEnabled = true;
+    this.context.drawImage(picture, this.x(road.origin[0]), top, road.size[0] * side, road.size[1] * side);
+  }
+
+  /** A bar that says how long some metres are. */
+  ruler() {
+    const length = [1, 2, 5, 10, 20, 50, 100, 200, 500].find((l) => l * this.scale > 48) || 1000;
+    const context = this.context;
+    const y = this.height - 12;
+    context.globalAlpha = 1;
+    context.strokeStyle = context.fillStyle = "#475569";
+    context.lineWidth = 1.5;
+    context.beginPath();
+    context.moveTo(12, y - 4);
+    context.lineTo(12, y);
+    context.lineTo(12 + length * this.scale, y);
+    context.lineTo(12 + length * this.scale, y - 4);
+    context.stroke();
+    context.font = "11px system-ui, sans-serif";
+    context.fillText(`${length} m`, 16, y - 5);
+  }
+
+  footprint(state, vehicle, colour, alpha, front) {
+    const context = this.context;
+    context.save();
+    context.translate(this.x(state.x), this.y(state.y));
+    context.rotate(-state.yaw);
+    const length = vehicle.length * this.scale;
+    const width = vehicle.width * this.scale;
+    context.globalAlpha = alpha;
+    context.fillStyle = colour;
+    context.beginPath();
+    if (context.roundRect) context.roundRect(-length / 2, -width / 2, length, width, Math.min(width, length) * 0.22);
+    else context.rect(-length / 2, -width / 2, length, width);
+    context.fill();
+    if (front) {
+      context.fillStyle = "rgba(255,255,255,0.8)";
+      context.fillRect(length * 0.16, -width * 0.36, length * 0.14, width * 0.72);
+      context.lineWidth = 1;
+      context.strokeStyle = "rgba(15,23,42,0.7)";
+      context.stroke();
+    }
+    context.restore();
+  }
+
+  dot(x, y, colour, radius = 4) {
+    const context = this.context;
+    context.globalAlpha = 1;
+    context.beginPath();
+    context.arc(this.x(x), this.y(y), radius, 0, 2 * Math.PI);
+    context.fillStyle = colour;
+    context.fill();
+    context.lineWidth = 1.5;
+    context.strokeStyle = "#fff";
+    context.stroke();
+  }
+
+  label(x, y, text, colour) {
+    const context = this.context;
+    context.globalAlpha = 1;
+    context.font = "600 12px system-ui, sans-serif";
+    context.lineWidth = 3;
+    context.strokeStyle = "rgba(255,255,255,0.9)";
+    context.strokeText(text, this.x(x) + 8, this.y(y) - 8);
+    context.fillStyle = colour;
+    context.fillText(text, this.x(x) + 8, this.y(y) - 8);
+  }
+}

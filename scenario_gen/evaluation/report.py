@@ -1,0 +1,172 @@
+"""The report: one HTML page that holds everything, opens offline and is a pleasure to look at."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from scenario_gen.encounter import Encounter
+from scenario_gen.evaluation.bootstrap import Interval
+from scenario_gen.evaluation.report_data import case_data
+from scenario_gen.evaluation.result import Evaluation, formatted
+from scenario_gen.fitting.result import Fit
+from scenario_gen.planning.route import Route
+from scenario_gen.roads.road import Road
+from scenario_gen.scenario import Scenario, ScenarioSet
+from scenario_gen.segmentation.result import Segmentation
+
+WITH, WITHOUT, ORACLE = "with changepoints", "without changepoints", "oracle"
+"""Names of the rows that the report looks for in an evaluation."""
+MAX_SAMPLES = 50
+"""Scenarios of each arm that a page draws; the figures count all."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One encounter on one road.
+
+    Attributes:
+        encounter: the recorded template.
+        segmentation: its primitives.
+        road: the target road.
+        fit: the template on it.
+        routes: one for each vehicle.
+        with_changepoints: what was generated.
+        without_changepoints: the paper's ablation, None if it was refused.
+        evaluation: of these sets.
+        oracle: the fitted template replayed.
+        without_refused: why there is no ablation.
+    """
+
+    encounter: Encounter
+    segmentation: Segmentation
+    road: Road
+    fit: Fit
+    routes: Sequence[Route]
+    with_changepoints: ScenarioSet
+    without_changepoints: ScenarioSet | None
+    evaluation: Evaluation
+    oracle: Scenario | None = None
+    without_refused: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class ReportInput:
+    """A page.
+
+    Attributes:
+        cases: at least one.
+        title: heading and window title.
+        quality: the log's data quality, in lines.
+        provenance: log, its hash, seed, versions, parameters, by name.
+    """
+
+    cases: Sequence[Case]
+    title: str = "Generated encounters"
+    quality: Sequence[str] = ()
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+
+def write_report(path: Path, report: ReportInput) -> None:
+    """Write the page to `path`; the same input gives the same bytes."""
+    path.write_text(render(report), encoding="utf-8")
+
+
+def render(report: ReportInput) -> str:
+    """Return the page as text."""
+    assets = files("scenario_gen.evaluation") / "assets"
+
+    def asset(name: str) -> str:
+        return (assets / name).read_text(encoding="utf-8")
+
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(asset),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters["estimate"] = _estimate
+    views = [_view(index, case) for index, case in enumerate(report.cases)]
+    data = [case_data(case, MAX_SAMPLES) for case in report.cases]
+    return environment.get_template("report.html.j2").render(
+        report=report,
+        views=views,
+        verdict=_verdict(views),
+        css=Markup(asset("report.css")),
+        plotly=Markup(get_plotlyjs()),
+        scripts=[Markup(asset(name)) for name in ("scene.js", "charts.js", "page.js")],
+        data=Markup(json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")),
+    )
+
+
+def _view(index: int, case: Case) -> dict[str, Any]:
+    """Return what the page's tables say about one case."""
+    arms = [(WITH, case.with_changepoints), (WITHOUT, case.without_changepoints)]
+    evaluation = case.evaluation
+    duration = case.encounter.duration
+    bounds = [*(float(case.encounter.time[i]) for i in (0, *case.segmentation.changepoints)), duration]
+    vehicles = zip(case.encounter.vehicles, case.fit.fitted, strict=True)
+    return {
+        "index": index,
+        "case": case,
+        "title": f"{case.encounter.name} on {case.road.name}",
+        "arms": [(name, made, _causes(made)) for name, made in arms if made is not None],
+        "rows": evaluation.rows,
+        "metrics": evaluation.metrics,
+        "k": len(case.segmentation.changepoints),
+        "rate": len(case.segmentation.changepoints) / duration,
+        "errors": {
+            (arm, key): _found(evaluation, arm, key) for arm in (WITH, WITHOUT, ORACLE) for key in ("e_position", "e_speed")
+        },
+        "segments": [
+            {"from": bounds[k], "to": bounds[k + 1], "label": int(case.segmentation.labels[start]), "text": text}
+            for k, (start, text) in enumerate(
+                zip((0, *case.segmentation.changepoints), case.segmentation.descriptions, strict=True)
+            )
+        ],
+        "vehicles": [
+            {"id": v.id, "manoeuvre": f.manoeuvre, "scale": f.scale, "moved": float(f.moved.max()), "dwells": int(sum(f.stands))}
+            for v, f in vehicles
+        ],
+    }
+
+
+def _found(evaluation: Evaluation, row: str, metric: str) -> Interval | None:
+    found = evaluation.row(row)
+    return found.values.get(metric) if found else None
+
+
+def _causes(made: ScenarioSet) -> list[tuple[str, int]]:
+    """Return the causes of refusal, the most frequent first."""
+    return sorted(
+        ((cause.value.replace("_", " "), count) for cause, count in made.refused.items() if count), key=lambda c: (-c[1], c[0])
+    )
+
+
+def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the page's first sentence in figures: how many were accepted, and where changepoints brought E down."""
+    better: dict[str, list[bool]] = {"e_position": [], "e_speed": []}
+    for view in views:
+        for key, found in better.items():
+            one, other = view["errors"][WITH, key], view["errors"][WITHOUT, key]
+            if one is not None and other is not None and other.value >= 0.03:
+                found.append(one.value < other.value)
+    sets = [view["case"].with_changepoints for view in views]
+    return {
+        "published": sum(len(made.scenarios) for made in sets),
+        "requested": sum(made.requested for made in sets),
+        "candidates": sum(made.candidates for made in sets),
+        "position": (sum(better["e_position"]), len(better["e_position"])),
+        "speed": (sum(better["e_speed"]), len(better["e_speed"])),
+    }
+
+
+def _estimate(value: Interval | None, unit: str = "", bounds: bool = True) -> str:
+    return formatted(value, unit, bounds=bounds)
