@@ -78,6 +78,23 @@ def _first_contact(
     return PROVEN, 1.0, np.inf
 
 
+@kernel(inline=True)
+def _block_bounds(control: Floats) -> Floats:
+    """Bounding boxes (N, B, 4) low x, high x, low y, high y of the control points (N, K, 4, 2) of each BLOCK of intervals."""
+    n, intervals = control.shape[0], control.shape[1]
+    bounds = np.empty((n, (intervals + BLOCK - 1) // BLOCK, 4))
+    for i in range(n):
+        for k in range(intervals):
+            box = bounds[i, k // BLOCK]
+            if k % BLOCK == 0:
+                box[0] = box[2] = np.inf
+                box[1] = box[3] = -np.inf
+            for c in range(4):
+                box[0], box[1] = min(box[0], control[i, k, c, 0]), max(box[1], control[i, k, c, 0])
+                box[2], box[3] = min(box[2], control[i, k, c, 1]), max(box[3], control[i, k, c, 1])
+    return bounds
+
+
 @kernel(F1, F4, F2, F2, F, F, OUT2)
 def first_contacts(
     time: Floats, control: Floats, heading: Floats, half: Floats, clearance: float, resolution: float, out: Floats
@@ -94,16 +111,7 @@ def first_contacts(
         out: status PROVEN, FOUND or UNPROVEN; time and gap where not proven.
     """
     n, intervals = control.shape[0], control.shape[1]
-    blocks = (intervals + BLOCK - 1) // BLOCK
-    bounds = np.empty((n, blocks, 4))
-    for i in range(n):
-        for b in range(blocks):
-            low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
-            for k in range(b * BLOCK, min(intervals, (b + 1) * BLOCK)):
-                for c in range(4):
-                    low_x, high_x = min(low_x, control[i, k, c, 0]), max(high_x, control[i, k, c, 0])
-                    low_y, high_y = min(low_y, control[i, k, c, 1]), max(high_y, control[i, k, c, 1])
-            bounds[i, b, 0], bounds[i, b, 1], bounds[i, b, 2], bounds[i, b, 3] = low_x, high_x, low_y, high_y
+    bounds = _block_bounds(control)
     d, yaw_i, yaw_j = np.empty((4, 2)), np.empty(2), np.empty(2)
     pair = -1
     for i in range(n):
@@ -111,7 +119,7 @@ def first_contacts(
             pair += 1
             out[pair, 0] = PROVEN
             reach = np.hypot(half[i, 0], half[i, 1]) + np.hypot(half[j, 0], half[j, 1]) + clearance + ROUNDING
-            for b in range(blocks):
+            for b in range(bounds.shape[1]):
                 if out[pair, 0] != PROVEN:
                     break
                 p, q = bounds[i, b], bounds[j, b]

@@ -187,8 +187,8 @@ class Checker:
             present += found is not None
             if found is not None and found.first != asked.first:
                 message = (
-                    f"vehicle {found.first} goes first ({found.entry_first:.2f} s, vehicle {found.second} {found.entry_second:.2f} s); "
-                    f"in the template vehicle {asked.first} does"
+                    f"vehicle {found.first} goes first ({found.entry_first:.2f} s, vehicle {found.second} "
+                    f"{found.entry_second:.2f} s); in the template vehicle {asked.first} does"
                 )
                 wrong.append(Violation(Cause.PASSING_ORDER, found.entry_first, (found.first, found.second), message))
         return wrong, present, len(self.conflicts or ()) - present

@@ -28,6 +28,8 @@ class Check(IntEnum):
     CURVATURE = 6
     DISPLACEMENT = 7
     SLIP = 8
+    PATH_LONGITUDINAL = 9
+    PATH_LATERAL = 10
 
 
 MESSAGES: dict[Check, tuple[Cause, str]] = {
@@ -57,6 +59,14 @@ MESSAGES: dict[Check, tuple[Cause, str]] = {
     Check.SLIP: (
         Cause.CURVATURE,
         "slides sideways at {value:.3f} m/s against the published heading; {limit:.3f} m/s are tolerated",
+    ),
+    Check.PATH_LONGITUDINAL: (
+        Cause.LONGITUDINAL_ACCELERATION,
+        "positions speed up or brake at {value:.3f} m/s²; {limit:.3f} m/s² are allowed",
+    ),
+    Check.PATH_LATERAL: (
+        Cause.LATERAL_ACCELERATION,
+        "positions accelerate sideways at {value:.3f} m/s²; {limit:.3f} m/s² are allowed",
     ),
 }
 
@@ -99,6 +109,19 @@ def worst_excess(
             if k == t - 1:
                 break
             h, w, b = time[k + 1] - now, speed[i, k + 1], acceleration[i, k + 1]
+            if k > 0:  # the second difference of the positions, a mean of the acceleration over the two steps around k
+                before, half = now - time[k - 1], 0.5 * (time[k + 1] - time[k - 1])
+                ax = (
+                    (position[i, k + 1, 0] - position[i, k, 0]) / h - (position[i, k, 0] - position[i, k - 1, 0]) / before
+                ) / half
+                ay = (
+                    (position[i, k + 1, 1] - position[i, k, 1]) / h - (position[i, k, 1] - position[i, k - 1, 1]) / before
+                ) / half
+                c, s = np.cos(heading[i, k]), np.sin(heading[i, k])
+                ahead, aside = c * ax + s * ay, abs(c * ay - s * ax)
+                _note(out[i], 9, ahead - speeding - tolerance, ahead, speeding + tolerance, now)
+                _note(out[i], 9, -ahead - braking - tolerance, -ahead, braking + tolerance, now)
+                _note(out[i], 10, aside - lateral - tolerance, aside, lateral + tolerance, now)
             rate = (w - v) / h
             _note(out[i], 2, rate - speeding - SLACK, rate, speeding, now)
             _note(out[i], 3, -rate - braking - SLACK, -rate, braking, now)

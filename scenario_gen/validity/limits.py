@@ -29,10 +29,14 @@ class Limits:
     )
     slip_share: float = parameter(0.03, "and by this share of the speed", low=0.0)
     acceleration_tolerance: float = parameter(
-        0.5, "change of speed over time may leave the range of the two samples' accelerations by this", unit="m/s²", low=0.0
+        0.5,
+        "change of speed over time may leave the range of the two samples' accelerations by this, and accelerations taken from "
+        "the positions alone may exceed their limits by it",
+        unit="m/s²",
+        low=0.0,
     )
     time_resolution: float = parameter(
-        1e-4, "what cannot be proven over an interval this short is refused", unit="s", low=1e-9, high=1.0
+        1e-6, "what cannot be proven over an interval this short is refused", unit="s", low=1e-9, high=1.0
     )
 
     def __post_init__(self) -> None:

@@ -46,14 +46,18 @@ def footprints(position: Floats, heading: Floats, length: float, width: float) -
     return shapely.polygons(corners)
 
 
-def dense_motion(scenario: Scenario, dt: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Instants (M,), positions (N, M, 2), headings (N, M) and velocities (N, M, 2) of the motion that `Scenario` defines."""
-    count = int(np.ceil((scenario.time[-1] - scenario.time[0]) / dt)) + 1
-    instants = np.union1d(np.linspace(scenario.time[0], scenario.time[-1], count), scenario.time)
+def motion_at(scenario: Scenario, instants: Floats) -> tuple[Floats, Floats, Floats]:
+    """Positions (N, M, 2), headings (N, M) and velocities (N, M, 2) at instants (M,) of the motion that `Scenario` defines."""
     direction = np.stack((np.cos(scenario.heading), np.sin(scenario.heading)), axis=-1)
     spline = CubicHermiteSpline(scenario.time, scenario.position, scenario.speed[..., None] * direction, axis=1)
     heading = np.array([np.interp(instants, scenario.time, row) for row in scenario.heading])
-    return instants, spline(instants), heading, spline(instants, 1)
+    return spline(instants), heading, spline(instants, 1)
+
+
+def boxes_at(scenario: Scenario, instants: Floats) -> list[np.ndarray]:
+    """For each vehicle its footprints (M,) at the instants."""
+    position, heading, _ = motion_at(scenario, instants)
+    return [footprints(position[i], heading[i], vehicle.length, vehicle.width) for i, vehicle in enumerate(scenario.vehicles)]
 
 
 def oracle_violations(
@@ -70,8 +74,10 @@ def oracle_violations(
     fields = (scenario.time, scenario.position, scenario.heading, scenario.speed, scenario.acceleration)
     if not all(np.isfinite(values).all() for values in fields) or not (np.diff(scenario.time) > 0).all():
         return ["not_finite: a value is not finite or time does not increase"]
-    instants, position, heading, velocity = dense_motion(scenario, dt)
-    boxes = [footprints(position[i], heading[i], vehicle.length, vehicle.width) for i, vehicle in enumerate(scenario.vehicles)]
+    count = int(np.ceil((scenario.time[-1] - scenario.time[0]) / dt)) + 1
+    instants = np.union1d(np.linspace(scenario.time[0], scenario.time[-1], count), scenario.time)
+    position, heading, velocity = motion_at(scenario, instants)
+    boxes = boxes_at(scenario, instants)
     return [
         *_overlaps(instants, boxes, limits),
         *(_off_road(instants, position, heading, scenario, road) if road is not None else ()),
@@ -125,6 +131,14 @@ def _kinematics(scenario, velocity, limits):
                 yield f"longitudinal_acceleration: vehicle {i} from {a.min():.3f} to {a.max():.3f} m/s²"
         if (np.maximum(speed[1:], speed[:-1]) * turn / h).max() > limits.max_lateral_acceleration + 1e-5:
             yield f"lateral_acceleration: vehicle {i}"
+        chord = np.diff(np.diff(scenario.position[i], axis=0) / h[:, None], axis=0) / (0.5 * (h[1:] + h[:-1]))[:, None]
+        if (
+            np.abs(chord[:, 1] * np.cos(scenario.heading[i, 1:-1]) - chord[:, 0] * np.sin(scenario.heading[i, 1:-1])).max(
+                initial=0.0
+            )
+            > limits.max_lateral_acceleration + limits.acceleration_tolerance + 1e-5
+        ):
+            yield f"lateral_acceleration: vehicle {i} by its positions"
         length = np.linalg.norm(np.diff(scenario.position[i], axis=0), axis=-1)
         if (turn > limits.max_curvature * length + 1.1e-4).any():
             yield f"curvature: vehicle {i}"
@@ -141,7 +155,7 @@ def _orders(instants, position, boxes, conflicts):
         entry = []
         for i, sweep in ((a, sweeps[1]), (b, sweeps[0])):
             shapely.prepare(sweep)
-            entry.append(instants[int(np.argmax(shapely.intersection(boxes[i], sweep).area > 0.1 * SLIVER))])
+            entry.append(instants[int(np.argmax(shapely.area(shapely.intersection(boxes[i], sweep)) > 0.1 * SLIVER))])
         late = entry[0] > entry[1] + 0.05
         if late and not (asked.following and _leads(instants[::step], position[a, ::step], position[b, ::step])):
             yield f"passing_order: vehicle {a} enters at {entry[0]:.2f} s, vehicle {b} at {entry[1]:.2f} s"
@@ -163,7 +177,7 @@ def _stands(scenario, instants, velocity, asked, waits, limits):
         lengths = [instants[end - 1] - instants[begin] for begin, end in zip(edges[::2], edges[1::2], strict=True)]
         wanted = sum(wait.vehicle == i for wait in waits)
         if sum(int((length + 0.011) / limits.stand_duration) for length in lengths) < wanted:
-            yield f"moving_wait: vehicle {i} stands for {[round(float(length), 2) for length in lengths]} s, {wanted} wait(s) asked"
+            yield f"moving_wait: vehicle {i} stands {len(lengths)} time(s), {sum(lengths):.2f} s in all; {wanted} wait(s) asked"
         throughout = any(wait.vehicle == i and wait.start == 0 for wait in waits)
         if throughout and asked is not None and np.linalg.norm(asked.end[i, :2] - asked.start[i, :2]) < 1e-3 and not slow.all():
             yield f"moving_wait: vehicle {i} waits throughout but moves"
