@@ -13,6 +13,7 @@ class LogConfig:
 
     format: str = parameter("auto", "source format; auto looks at the file's name and content", choices=FORMATS)
     columns: str = parameter("", "columns of a table that its header does not name, e.g. vehicle=name,time=t_s,speed=v_kmh")
+    topics: str = parameter("", "topics of a bag to read, separated by commas; empty reads all that can be used")
     vehicles: str = parameter("", "vehicles to keep, separated by commas; empty keeps all")
     start: float = parameter(0.0, "start of the time window, counted from the log's first stamp", unit="s", low=0.0)
     end: float = parameter(
@@ -30,7 +31,7 @@ class LogConfig:
     speed_noise: float = parameter(
         0.0, "standard deviation of a measured speed; 0 estimates it per vehicle", unit="m/s", low=0.0, high=10.0
     )
-    jerk: float = parameter(1.0, "typical change of acceleration within one second", unit="m/s²", low=0.1, high=20.0)
+    jerk: float = parameter(0.5, "typical change of acceleration within one second", unit="m/s²", low=0.1, high=20.0)
     acceleration_limit: float = parameter(
         5.0, "hardest acceleration a vehicle is believed to do", unit="m/s²", low=1.0, high=20.0
     )

@@ -15,6 +15,7 @@ import numpy as np
 
 from scenario_gen.arrays import Bools
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.intervals import runs
 from scenario_gen.logs.pieces import Piece
 
 PRESENT = 0.6  # a vehicle that is there for less of the interval is left out; for more, it shortens the interval
@@ -93,18 +94,6 @@ def near(a: Piece, b: Piece, config: LogConfig) -> Bools:
         return np.zeros(0, dtype=bool)
     gap = a.smooth.position[first - a.first : last - a.first] - b.smooth.position[first - b.first : last - b.first]
     return np.hypot(gap[:, 0], gap[:, 1]) < config.proximity
-
-
-def runs(flags: Bools, bridge: int = 0) -> list[tuple[int, int]]:
-    """Begin and end (exclusive) of each run of True, joined over at most `bridge` False."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    joined: list[tuple[int, int]] = []
-    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        if joined and begin - joined[-1][1] <= bridge:
-            joined[-1] = (joined[-1][0], end)
-        else:
-            joined.append((begin, end))
-    return joined
 
 
 def space_time_gap(a: Piece, b: Piece, first: int, last: int, config: LogConfig) -> float:

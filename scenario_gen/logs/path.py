@@ -47,7 +47,7 @@ def fit_path(place: Floats, points: Floats, weight: Floats, noise: float) -> Pat
     step = (high - low) / spans
     knots = low + step * np.arange(-3, spans + 4)
     spread = np.gradient(place) if len(place) > 1 else np.ones(1)
-    weight = weight * np.clip(np.abs(spread) / CREEP, 0.02, 1.0) / noise**2
+    weight = weight * np.clip(np.abs(spread) / CREEP, 0.005, 1.0) / noise**2
     count = spans + 3
     band = np.zeros((4, count))
     right = np.zeros((count, 2))

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from scenario_gen.arrays import Floats, Ints
+from scenario_gen.encounter import Encounter
 from scenario_gen.logs.config import LogConfig
 
 
@@ -44,7 +44,7 @@ class Observations:
 
 @dataclass(frozen=True)
 class Segment:
-    """Rows from `first` on come from `label`, where they are called `unit` `number`, `number` + 1, …"""
+    """Rows from `first` on come from `label`, where they are called `unit` and numbered from `number` on."""
 
     first: int
     label: str
@@ -64,6 +64,7 @@ class RawLog:
         segments: where the rows come from, in order.
         notes: what a person should know about how it was read.
         dropped: rows that the reader itself had to leave out: (reason, row).
+        encounters: what a recorded `tracks` topic holds: encounters as they stand, and then no vehicles.
     """
 
     name: str
@@ -73,6 +74,7 @@ class RawLog:
     segments: tuple[Segment, ...]
     notes: tuple[str, ...] = ()
     dropped: tuple[tuple[str, int], ...] = ()
+    encounters: tuple[Encounter, ...] = ()
 
     def where(self, row: int) -> str:
         """Name the file and line (or topic and message) of a row."""
@@ -94,9 +96,6 @@ class LogSource(Protocol):
             InputError: a file cannot be read; names the file and the place.
         """
         ...
-
-
-Strings = npt.NDArray[np.str_]
 
 
 def natural(name: str) -> tuple[int, int, str]:

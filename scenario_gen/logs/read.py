@@ -8,6 +8,7 @@ import numpy as np
 
 from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import InputError
+from scenario_gen.logs.bag import between
 from scenario_gen.logs.cleaning import Drops, clean
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Group, find_groups
@@ -40,6 +41,8 @@ def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogCon
         InputError: the log cannot be used; the message names the file and the row or topic, and what to do.
     """
     log = read_raw([Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)], config)
+    if log.encounters:
+        return as_recorded(log, config)
     tracks, drops, origin = clean(log, config)
     if len(tracks) < 2:
         raise InputError(too_few(log, [track.id for track in tracks], drops))
@@ -66,12 +69,23 @@ def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogCon
         rows=log.rows,
         dropped=tuple(Dropped(reason, count, log.where(drops.first[reason])) for reason, count in drops.count.items()),
         vehicles=tuple(vehicles),
-        encounters=tuple(
-            EncounterQuality(e.name, tuple(v.id for v in e.vehicles), e.duration, find_overlaps(e)) for e in encounters
-        ),
+        encounters=tuple(encounter_quality(encounter) for encounter in encounters),
         notes=(*log.notes, *dict.fromkeys(notes)),
     )
     return LogResult(tuple(encounters), summary)
+
+
+def as_recorded(log: RawLog, config: LogConfig) -> LogResult:
+    """Encounters that were recorded as such stay as they are, bit for bit; only the window and the vehicles are chosen."""
+    encounters = tuple(between(encounter, config) for encounter in log.encounters)
+    summary = Quality(log.name, log.rows, (), (), tuple(map(encounter_quality, encounters)), log.notes)
+    return LogResult(encounters, summary)
+
+
+def encounter_quality(encounter: Encounter) -> EncounterQuality:
+    """The facts of an encounter."""
+    ids = tuple(vehicle.id for vehicle in encounter.vehicles)
+    return EncounterQuality(encounter.name, ids, encounter.duration, find_overlaps(encounter))
 
 
 def make_encounter(

@@ -16,10 +16,12 @@ from scipy.signal import savgol_filter
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.logs.cleaning import Track
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.intervals import runs
 from scenario_gen.logs.motion import Motion
 from scenario_gen.logs.path import STRAIGHT, Path, fit_path, straight_path
 
 STANDS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
+STILL = 0.1  # m/s: below this it is not on its way to or from standing
 CREEPS = 1.0  # m: fixes that move further than this while the speed is zero say that the speed is wrong
 DOUBTED = 3.0  # m/s: a speed that differs more from that of the fixes is not trusted with the first layout
 MOVED = 0.5  # m: who moves less has no direction of travel
@@ -165,16 +167,15 @@ def standing(ticks: Floats, fix_t: Floats, fix: Floats, speed_t: Floats, speed: 
         speed_t: (S,) seconds.
         speed: (S,) m/s.
     """
-    count, dt = len(ticks), ticks[1] - ticks[0]
-    width = 2 * round(0.2 / dt) + 1
-    slow = median_filter(np.interp(ticks, speed_t, speed), width, mode="nearest") < STANDS
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(int)))
-    stands = np.zeros(count, dtype=bool)
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    dt = ticks[1] - ticks[0]
+    smooth = median_filter(np.interp(ticks, speed_t, speed), 2 * round(0.2 / dt) + 1, mode="nearest")
+    stands = np.zeros(len(ticks), dtype=bool)
+    for begin, end in runs(smooth < STANDS):
+        still = begin + np.flatnonzero(smooth[begin:end] <= max(STILL, 1.5 * float(np.median(smooth[begin:end]))))
+        begin, end = int(still[0]), int(still[-1]) + 1  # noqa: PLW2901 - rolling to the stop and away from it is no standing
         inside = fix[(fix_t >= ticks[begin]) & (fix_t <= ticks[end - 1])]
-        if (end - begin) * dt < 1.0 - 1e-9:
-            continue
         k = max(len(inside) // 5, 1)
-        if len(inside) and np.hypot(*(np.median(inside[-k:], axis=0) - np.median(inside[:k], axis=0))) <= CREEPS:
-            stands[begin:end] = True
+        if (end - begin) * dt >= 1.0 and len(inside):
+            shift = np.median(inside[-k:], axis=0) - np.median(inside[:k], axis=0)
+            stands[begin:end] = np.hypot(*shift) <= CREEPS
     return stands

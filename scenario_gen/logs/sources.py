@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scenario_gen.errors import InputError
+from scenario_gen.logs.bag import BagSource, bag_files
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import LogSource, RawLog
 from scenario_gen.logs.spmd import SpmdSource
 from scenario_gen.logs.table import TableSource
 
-SOURCES: dict[str, LogSource] = {"spmd": SpmdSource(), "table": TableSource()}
+SOURCES: dict[str, LogSource] = {"bag": BagSource(), "spmd": SpmdSource(), "table": TableSource()}
 
 
 def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
@@ -17,13 +18,13 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
     for path in paths:
         if not path.exists():
             raise InputError(f"{path} does not exist")
+        if path.is_dir() and not any(path.iterdir()):
+            raise InputError(f"{path} is an empty folder")
         if path.is_file() and path.stat().st_size == 0:
             raise InputError(f"{path} is empty (0 bytes); record or copy it again")
     files = [file for path in paths for file in expand(path)]
-    if config.format != "auto":
-        return SOURCES[config.format].read(files, config)
-    for source in SOURCES.values():
-        if files and all(source.accepts(file) for file in files):
+    for name, source in SOURCES.items():
+        if name == config.format or (config.format == "auto" and all(source.accepts(file) for file in files)):
             return source.read(files, config)
     raise InputError(
         f"{paths[0]} is none of the known logs: {', '.join(TableSource.extensions)} tables and SPMD files, "
@@ -32,8 +33,8 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
 
 
 def expand(path: Path) -> list[Path]:
-    """Return the files of a folder of tables; a file and a bag folder stand for themselves."""
-    if path.is_file() or (path / "metadata.yaml").exists():
+    """Return the files of a folder of tables; a file and a bag's folder stand for themselves."""
+    if path.is_file() or bag_files(path):
         return [path]
     tables = sorted(file for file in path.iterdir() if file.suffix.lower() in TableSource.extensions and file.stat().st_size)
     return tables or [path]

@@ -1,0 +1,294 @@
+"""rosbag2 bags, MCAP and SQLite: per-vehicle fixes and speeds, odometry, or tracks that are encounters already."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_typestore
+
+from msg_conventions import trajectory
+from msg_conventions.tracks import decode_tracks
+from msg_conventions.yaw import yaw
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.raw import Observations, RawLog, Segment
+
+FIX = "sensor_msgs/msg/NavSatFix"
+TWIST = "geometry_msgs/msg/TwistStamped"
+ODOMETRY = "nav_msgs/msg/Odometry"
+USED = (FIX, TWIST, ODOMETRY, trajectory.TYPE)
+STORES = get_typestore(Stores.ROS2_JAZZY)  # the four types are standard, so bags without type definitions read as well
+EXTENSIONS = (".mcap", ".db3")
+
+
+@dataclass
+class Topic:
+    """The messages of one topic: log stamps and CDR bytes, in the order of the log."""
+
+    name: str
+    type: str
+    stamps: list[int] = field(default_factory=list)
+    data: list[bytes] = field(default_factory=list)
+
+
+@dataclass
+class Vehicle:
+    """Rows of one vehicle as they come: (stamp, row, values…)."""
+
+    fixes: list[tuple[int, int, float, float, float]] = field(default_factory=list)
+    speeds: list[tuple[int, int, float]] = field(default_factory=list)
+
+
+class BagSource:
+    """A bag's folder, or a bare .mcap or .db3 file."""
+
+    def accepts(self, path: Path) -> bool:
+        """Return whether it looks like a bag."""
+        return path.suffix.lower() in EXTENSIONS or bool(bag_files(path))
+
+    def read(self, paths: Sequence[Path], config: LogConfig) -> RawLog:
+        """Read the topics that this project knows; several bags are one log."""
+        topics = read_topics([file for path in paths for file in bag_files(path)], config)
+        label = str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
+        tracks = [topic for topic in topics if topic.type == trajectory.TYPE]
+        name = paths[0].stem if paths[0].is_file() else paths[0].name
+        if tracks:
+            return read_tracks(tracks, name, label, others=[topic.name for topic in topics if topic not in tracks])
+        return read_streams(topics, name, label)
+
+
+def bag_files(path: Path) -> list[Path]:
+    """Return the files of a bag in order: those that metadata.yaml lists, or else those in the folder.
+
+    The files are opened one by one: through the folder rosbags 0.11 passes over messages whose quality of service reads
+    differently in metadata.yaml and in the file. A compressed bag is opened through its folder.
+    """
+    if path.is_file():
+        return [path]
+    metadata = path / "metadata.yaml"
+    if not metadata.is_file():
+        return sorted((file for file in path.iterdir() if file.suffix.lower() in EXTENSIONS), key=lambda f: (len(f.name), f.name))
+    try:
+        info = yaml.safe_load(metadata.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
+        files = [path / Path(name).name for name in info["relative_file_paths"]]
+    except (yaml.YAMLError, KeyError, TypeError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"{metadata} is not the metadata of a bag ({error!r}); delete it to read the bag's files alone"
+        ) from error
+    if info.get("compression_mode"):
+        return [path]
+    for file in files:
+        if not file.is_file():
+            raise InputError(f"{metadata} lists {file.name}, which is not there")
+    return files
+
+
+def read_topics(files: Sequence[Path], config: LogConfig) -> list[Topic]:
+    """Read the messages of all topics that can be used, sorted by name.
+
+    Raises:
+        InputError: a file is damaged, or no topic can be used.
+    """
+    wanted = [name.strip() for name in config.topics.split(",") if name.strip()]
+    found: dict[str, Topic] = {}
+    seen: dict[str, str] = {}
+    for file in files:
+        if file.is_file() and file.stat().st_size == 0:
+            raise InputError(f"{file} is empty (0 bytes); record or copy it again")
+        try:
+            with Reader(file) as reader:
+                seen |= {connection.topic: connection.msgtype for connection in reader.connections}
+                used = [c for c in reader.connections if is_used(c.topic, c.msgtype, wanted)]
+                for connection, stamp, data in reader.messages(used) if used else ():
+                    topic = found.setdefault(connection.topic, Topic(connection.topic, connection.msgtype))
+                    topic.stamps.append(stamp)
+                    topic.data.append(bytes(data))
+        except Exception as error:  # a damaged file may fail anywhere inside the readers
+            size = f", {file.stat().st_size} bytes" if file.is_file() else ""
+            raise InputError(
+                f"{file}{size}: cannot be read as a bag, cut off or damaged ({error or type(error).__name__})"
+            ) from error
+    for name in wanted:
+        if name not in seen:
+            raise InputError(f"parameter topics: {files[0]} has no topic {name!r}; it has {listing(seen)}")
+        if seen[name] not in USED:
+            raise InputError(f"{files[0]}, topic {name}: type {seen[name]} is not one of {', '.join(USED)}")
+    if not found:
+        raise InputError(
+            f"{files[0]}: no topic to read. It has {listing(seen)}. Needed is {FIX} with {TWIST}, or {ODOMETRY}, one per vehicle, "
+            f"or a topic named tracks of {trajectory.TYPE}; the parameter topics chooses by name"
+        )
+    return [found[name] for name in sorted(found)]
+
+
+def is_used(topic: str, kind: str, wanted: list[str]) -> bool:
+    """Return whether a topic is read; of trajectories only those called tracks, unless asked for by name."""
+    if wanted:
+        return topic in wanted and kind in USED
+    return kind in USED and (kind != trajectory.TYPE or topic.rpartition("/")[2] == "tracks")
+
+
+def listing(seen: dict[str, str]) -> str:
+    """Topics and types for a message."""
+    return ", ".join(f"{name} ({kind})" for name, kind in sorted(seen.items())) or "no topics"
+
+
+def vehicle_id(topic: str) -> str:
+    """The vehicle a topic belongs to: its namespace, without the prefix `vehicle_` that this project writes."""
+    namespace = topic.strip("/").rpartition("/")[0]
+    return namespace.rpartition("/")[2].removeprefix("vehicle_") or topic.strip("/")
+
+
+def read_streams(topics: list[Topic], name: str, label: str) -> RawLog:
+    """Collect fixes, speeds and odometry per vehicle."""
+    if len({topic.type == ODOMETRY for topic in topics if topic.type != TWIST}) > 1:
+        mixed = listing({topic.name: topic.type for topic in topics})
+        raise InputError(f"{label} has both {FIX} and {ODOMETRY} ({mixed}); choose with the parameter topics")
+    vehicles: dict[str, Vehicle] = {}
+    segments: list[Segment] = []
+    unstamped: list[str] = []
+    owners = own(topics, label)
+    row = 0
+    for topic in topics:
+        segments.append(Segment(row, f"{label}, topic {topic.name}", "message", 1))
+        vehicle = vehicles.setdefault(owners[topic.name], Vehicle())
+        take = {FIX: take_fix, TWIST: take_twist, ODOMETRY: take_odometry}[topic.type]
+        if collect(topic, take, vehicle, row, label):
+            unstamped.append(topic.name)
+        row += len(topic.data)
+    notes = [f"{len(unstamped)} topic(s) bear no header stamps, so the time of reception is used: {', '.join(unstamped)}"]
+    silent = [owners[topic.name] for topic in topics if topic.type == TWIST and not vehicles[owners[topic.name]].fixes]
+    if silent:
+        raise InputError(f"{label}: speeds but no positions for {', '.join(silent)}; put {FIX} and {TWIST} in one namespace")
+    for vehicle_name, vehicle in vehicles.items():
+        if not vehicle.speeds:
+            notes.append(f"vehicle {vehicle_name} has no speeds: taken from its positions")
+    return RawLog(
+        name=name,
+        geographic=any(topic.type == FIX for topic in topics),
+        vehicles=tuple(as_observations(vehicle_name, vehicle) for vehicle_name, vehicle in vehicles.items()),
+        rows=row,
+        segments=tuple(segments),
+        notes=tuple(notes if unstamped else notes[1:]),
+    )
+
+
+def own(topics: list[Topic], label: str) -> dict[str, str]:
+    """Return the vehicle of each topic by its namespace.
+
+    Raises:
+        InputError: two topics of one type share a namespace.
+    """
+    owners = {topic.name: vehicle_id(topic.name) for topic in topics}
+    taken: dict[tuple[str, str], str] = {}
+    for topic in topics:
+        other = taken.setdefault((owners[topic.name], topic.type), topic.name)
+        if other != topic.name:
+            raise InputError(
+                f"{label}: {other} and {topic.name} are both {topic.type} of vehicle {owners[topic.name]}; choose one with the "
+                "parameter topics, or record each vehicle in a namespace of its own"
+            )
+    return owners
+
+
+def collect(topic: Topic, take: Callable[[Any, Vehicle, int, int], None], vehicle: Vehicle, row: int, label: str) -> bool:
+    """Decode the messages of a topic; return whether their headers bear no stamps."""
+    unstamped = False
+    for number, (received, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
+        try:
+            message: Any = STORES.deserialize_cdr(data, topic.type)
+        except Exception as error:  # damaged bytes may fail anywhere inside the decoder
+            where = f"{label}, topic {topic.name}, message {number + 1}"
+            raise InputError(f"{where}: not a {topic.type} ({error or type(error).__name__})") from error
+        stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        unstamped |= stamp == 0
+        take(message, vehicle, stamp or received, row + number)
+    return unstamped
+
+
+def take_fix(message: Any, vehicle: Vehicle, stamp: int, row: int) -> None:
+    """A NavSatFix; one without a fix (status below 0) has no position."""
+    known = message.status.status >= 0
+    position = (message.latitude, message.longitude) if known else (math.nan, math.nan)
+    vehicle.fixes.append((stamp, row, *position, math.nan))
+
+
+def take_twist(message: Any, vehicle: Vehicle, stamp: int, row: int) -> None:
+    """A TwistStamped: the speed is linear.x of the body frame, or the length of the horizontal vector."""
+    linear = message.twist.linear
+    vehicle.speeds.append((stamp, row, linear.x if linear.y == 0.0 else math.hypot(linear.x, linear.y)))
+
+
+def take_odometry(message: Any, vehicle: Vehicle, stamp: int, row: int) -> None:
+    """An Odometry: pose in its frame, speed in the body frame."""
+    pose, linear = message.pose.pose, message.twist.twist.linear
+    turn = pose.orientation
+    heading = float(yaw(np.array([turn.x, turn.y, turn.z, turn.w])))
+    vehicle.fixes.append((stamp, row, pose.position.x, pose.position.y, heading))
+    vehicle.speeds.append((stamp, row, math.hypot(linear.x, linear.y)))
+
+
+def as_observations(name: str, vehicle: Vehicle) -> Observations:
+    """Rows as arrays."""
+    fixes = np.array([values for _, _, *values in vehicle.fixes], dtype=float).reshape(-1, 3)
+    return Observations(
+        id=name,
+        fix_ns=np.array([stamp for stamp, *_ in vehicle.fixes], dtype=np.int64),
+        fix=fixes[:, :2],
+        fix_row=np.array([row for _, row, *_ in vehicle.fixes], dtype=np.int64),
+        heading=fixes[:, 2],
+        speed_ns=np.array([stamp for stamp, *_ in vehicle.speeds], dtype=np.int64),
+        speed=np.array([speed for _, _, speed in vehicle.speeds], dtype=float),
+        speed_row=np.array([row for _, row, _ in vehicle.speeds], dtype=np.int64),
+    )
+
+
+def read_tracks(topics: list[Topic], name: str, label: str, others: list[str]) -> RawLog:
+    """Read tracks: each message on an even clock is an encounter as it stands, without any cleaning; repeats count once."""
+    encounters: list[Encounter] = []
+    segments, notes, row = [], [], 0
+    whole = len({data for topic in topics for data in topic.data})
+    for topic in topics:
+        segments.append(Segment(row, f"{label}, topic {topic.name}", "message", 1))
+        row += len(topic.data)
+        for number, data in enumerate(dict.fromkeys(topic.data)):
+            where = f"{label}, topic {topic.name}, message {number + 1}"
+            found = decode_tracks(data, where)
+            values = {key: getattr(found, key) for key in found.__dataclass_fields__}
+            encounters.append(Encounter(**(values | {"name": name if whole == 1 else f"{name}-{len(encounters) + 1}"})))
+    if others:
+        notes.append(
+            f"read from {', '.join(topic.name for topic in topics)}; the parameter topics can choose {', '.join(others)}"
+        )
+    return RawLog(name, False, (), row, tuple(segments), tuple(notes), encounters=tuple(encounters))
+
+
+def between(encounter: Encounter, config: LogConfig) -> Encounter:
+    """Return the encounter in the asked time window and with the asked vehicles.
+
+    Raises:
+        InputError: a vehicle is unknown, or fewer than two vehicles or samples are left.
+    """
+    names = [name.strip() for name in config.vehicles.split(",") if name.strip()]
+    ids = [vehicle.id for vehicle in encounter.vehicles]
+    for unknown in (name for name in names if name not in ids):
+        raise InputError(f"parameter vehicles: {encounter.name} has no vehicle {unknown!r}; it has {', '.join(ids)}")
+    rows = [ids.index(name) for name in dict.fromkeys(names)] or list(range(len(ids)))
+    first = math.ceil(config.start / encounter.dt - 1e-9)
+    last = math.floor(config.end / encounter.dt + 1e-9) + 1 if config.end else len(encounter.time)
+    return Encounter(
+        name=encounter.name,
+        vehicles=tuple(encounter.vehicles[n] for n in rows),
+        start_ns=encounter.start_ns + first * encounter.dt_ns,
+        dt_ns=encounter.dt_ns,
+        position=encounter.position[rows, first:last],
+        heading=encounter.heading[rows, first:last],
+        speed=encounter.speed[rows, first:last],
+        origin=encounter.origin,
+    )
