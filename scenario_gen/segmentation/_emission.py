@@ -1,0 +1,152 @@
+"""Emissions of all states at once: y = A z + noise, (A, Σ) ~ MNIW(M, K, ν0, S0), in one form for Gaussian and AR.
+
+With the regressor z = 1 this is the Gaussian-NIW emission (A is the mean, K its κ0); with z = (1, past samples) it is
+the autoregressive one. A sample is v = (z, y), P + D numbers. All that a state knows is G = G0 + Σ v vᵀ with
+G0 = [[K, K Mᵀ], [M K, S0 + M K Mᵀ]]; its Cholesky factor [[Lz, 0], [Lyz, Ly]] holds the whole posterior:
+K' = Lz Lzᵀ, A' = Lyz Lz⁻¹, S' = Ly Lyᵀ. Plain loops: they compile fast, and vectorise over the last axis.
+"""
+
+import math
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.kernels import kernel
+from scenario_gen.segmentation._random import State, log_gamma_draw, normal
+
+BLOCK = 64
+
+
+@kernel(inline=True)
+def cholesky(matrix: Floats) -> bool:
+    """Overwrite the lower triangle of `matrix` with its Cholesky factor; False if it is not positive definite."""
+    n = matrix.shape[0]
+    for j in range(n):
+        for k in range(j):
+            c = matrix[j, k]
+            for i in range(j, n):
+                matrix[i, j] -= matrix[i, k] * c
+        if not matrix[j, j] > 0.0:
+            return False
+        pivot = math.sqrt(matrix[j, j])
+        for i in range(j, n):
+            matrix[i, j] /= pivot
+    return True
+
+
+@kernel(inline=True)
+def accumulate(v: Floats, labels: Ints, g0: Floats, weight: float, blur: Floats, g: Floats, counts: Ints) -> None:
+    """Fill g (L, M, M; lower triangles) and counts (L,) from samples v (T, M) and labels (T,).
+
+    `weight` is what a sample counts for (1: all of it; less where neighbouring samples repeat each other); `blur` (D,) the variance
+    to which a sample's channels are known at all.
+    """
+    m = v.shape[1]
+    d = len(blur)
+    for k in range(g.shape[0]):
+        counts[k] = 0
+        for i in range(m):
+            for j in range(i + 1):
+                g[k, i, j] = 0.0
+    for t in range(v.shape[0]):
+        k = labels[t]
+        counts[k] += 1
+        for i in range(m):
+            c = v[t, i]
+            for j in range(i + 1):
+                g[k, i, j] += c * v[t, j]
+    for k in range(g.shape[0]):
+        for i in range(m):
+            for j in range(i + 1):
+                g[k, i, j] = g0[i, j] + weight * g[k, i, j]
+            if i >= m - d:
+                g[k, i, i] += weight * counts[k] * blur[i - (m - d)]
+
+
+@kernel(inline=True)
+def log_marginal(factor: Floats, n: float, p: int, nu: float) -> float:
+    """Part of log p(samples) that depends on them, from the Cholesky factor of G; `nu` is the prior's ν0.
+
+    log p = c(factor, n) - c(prior factor, 0) with c = -nD/2 log π + log Γ_D(ν'/2) - ν'/2 log|S'| - D/2 log|K'|.
+    """
+    m = factor.shape[0]
+    d = m - p
+    value = -0.5 * n * d * math.log(math.pi)
+    for i in range(p):
+        value -= d * math.log(factor[i, i])
+    for i in range(d):
+        value += math.lgamma(0.5 * (nu + n - i)) - (nu + n) * math.log(factor[p + i, p + i])
+    return value
+
+
+@kernel(inline=True)
+def draw_emission(state: State, factor: Floats, n: float, p: int, nu: float, blur: Floats, coef: Floats) -> float:
+    """Draw (A, Σ) from the posterior; returns log|Σ|^(-1/2) - tr(Σ⁻¹ blur)/2.
+
+    `coef` (D, M) becomes the map of v to its whitened residual: W y - B z with WᵀW = Σ⁻¹ (W lower) and B = W A.
+    Σ⁻¹ = Ly⁻ᵀ U Uᵀ Ly⁻¹ with U upper triangular (Bartlett), so W = Uᵀ Ly⁻¹; A = (Lyz + W⁻¹ E) Lz⁻¹, E standard normal.
+    """
+    m = factor.shape[0]
+    d = m - p
+    logdet = 0.0
+    for i in range(d):
+        for j in range(i):
+            coef[i, p + j] = normal(state)
+        shape = 0.5 * (nu + n - (d - 1 - i))
+        coef[i, p + i] = math.exp(0.5 * (log_gamma_draw(state, shape) + math.log(2.0)))
+        for j in range(i + 1, d):
+            coef[i, p + j] = 0.0
+        for j in range(i, -1, -1):
+            c = coef[i, p + j] / factor[p + j, p + j]
+            coef[i, p + j] = c
+            for q in range(j):
+                coef[i, p + q] -= c * factor[p + j, p + q]
+        logdet += math.log(coef[i, p + i])
+        for j in range(i + 1):
+            logdet -= 0.5 * coef[i, p + j] ** 2 * blur[j]
+        for q in range(p):
+            coef[i, q] = -normal(state)
+        for j in range(i + 1):
+            c = coef[i, p + j]
+            for q in range(p):
+                coef[i, q] -= c * factor[p + j, q]
+        for j in range(p - 1, -1, -1):
+            c = coef[i, j] / factor[j, j]
+            coef[i, j] = c
+            for q in range(j):
+                coef[i, q] -= c * factor[j, q]
+    return logdet
+
+
+@kernel(inline=True)
+def block_log_likelihood(
+    vt: Floats, start: int, stop: int, coef: Floats, logdet: Floats, weight: float, out: Floats, work: Floats
+) -> None:
+    """Fill out (BLOCK, L) with log p(y_t | z_t, state) up to a constant, t in start..stop; vt is (M, T), work (2, BLOCK)."""
+    states, d, m = coef.shape
+    p = m - d
+    n = stop - start
+    total = work[0]
+    row = work[1]
+    for k in range(states):
+        for t in range(n):
+            total[t] = 0.0
+        for i in range(d):
+            c = coef[k, i, 0]
+            x = vt[0, start:stop]
+            for t in range(n):
+                row[t] = c * x[t]
+            for j in range(1, p + i + 1):
+                c = coef[k, i, j]
+                x = vt[j, start:stop]
+                for t in range(n):
+                    row[t] += c * x[t]
+            for t in range(n):
+                total[t] += row[t] * row[t]
+        for t in range(n):
+            out[t, k] = weight * (logdet[k] - 0.5 * total[t])
+
+
+def joint_prior(mean: Floats, precision: Floats, scale: Floats) -> Floats:
+    """Return G0 (P + D, P + D) of an MNIW prior with mean M (D, P), K (P, P) and S0 (D, D)."""
+    return np.block([[precision, precision @ mean.T], [mean @ precision, scale + mean @ precision @ mean.T]])

@@ -1,0 +1,42 @@
+"""What each vehicle does in each primitive, in plain language with figures."""
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.encounter import Encounter
+
+STANDING = 0.5
+STEADY = 0.25
+TURNING = np.deg2rad(15.0)
+
+
+def describe_motion(speed: Floats, heading: Floats, dt: float) -> str:
+    """Describe speed [m/s] and heading [rad], both (n,), of one vehicle in one primitive."""
+    n = len(speed)
+    slope, level = np.polyfit(np.arange(n) * dt, speed, 1) if n > 1 else (0.0, float(speed[0]))
+    first, last = max(level, 0.0), max(level + slope * (n - 1) * dt, 0.0)
+    if np.median(speed) < STANDING and max(first, last) < 2.0 * STANDING:
+        return "stands"
+    turn = float(heading[-1] - heading[0])
+    bend = ""
+    if abs(turn) >= TURNING:
+        bend = f", turning {'left' if turn > 0.0 else 'right'} by {abs(np.rad2deg(turn)):.0f}°"
+    if abs(last - first) < 0.5 or abs(slope) < STEADY:
+        return f"drives at {np.mean(speed):.1f} m/s{bend}"
+    if slope > 0.0:
+        verb = "pulls away" if first < STANDING else "accelerates"
+        return f"{verb} from {first:.1f} to {last:.1f} m/s{bend}"
+    verb = "brakes to a stop" if last < STANDING else "brakes"
+    return f"{verb} from {first:.1f} to {last:.1f} m/s{bend}"
+
+
+def describe_segments(encounter: Encounter, changepoints: Ints) -> tuple[str, ...]:
+    """One sentence per segment, naming every vehicle by its id."""
+    edges = [0, *(int(c) for c in changepoints), encounter.speed.shape[1]]
+    return tuple(
+        ", ".join(
+            f"vehicle {vehicle.id} {describe_motion(encounter.speed[i, a:b], encounter.heading[i, a:b], encounter.dt)}"
+            for i, vehicle in enumerate(encounter.vehicles)
+        )
+        for a, b in zip(edges[:-1], edges[1:], strict=True)
+    )

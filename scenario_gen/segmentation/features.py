@@ -1,0 +1,101 @@
+"""What the sampler looks at: per vehicle longitudinal and lateral acceleration, and whether it moves.
+
+Positions and speeds drift through a steady drive, and a Gaussian state chops the drift into pieces; accelerations stay put
+within a primitive (paper IV-B) and jump between primitives. They come from straight lines (speed) and parabolas
+(position) fitted over a window: of the windows that contain a sample the one that fits best decides, so that a window which
+straddles a changepoint does not blur it (the idea of Kuwahara's edge-preserving filter). Lateral acceleration rather than
+turn rate: it is in the same unit, and does not explode at walking pace. Speed itself enters as a soft switch between
+standing and moving only. The gap to other vehicles is left out: it is an integral of speeds and drifts like a position.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import uniform_filter1d
+
+from scenario_gen.arrays import Floats
+from scenario_gen.encounter import Encounter
+
+STAND_SPEED = 0.5
+STAND_BLUR = 0.2
+STAND_WINDOW = 0.9
+
+
+def _best_window(signals: Sequence[Floats], width: int, degree: int, value: Callable[[list[Floats]], Floats]) -> Floats:
+    """Fit polynomials over every window of `width` samples; per sample, `value` of the window around it with the least misfit.
+
+    Args:
+        signals: each (T,); they share the choice of window.
+        width: samples in a window.
+        degree: of the polynomials.
+        value: from one (W, degree + 1) array of coefficients per signal, powers of samples from the window's middle, to (W,).
+    """
+    samples = len(signals[0])
+    width = min(width, samples)
+    middle = (width - 1) / 2.0
+    powers = np.vander(np.arange(width) - middle, degree + 1, increasing=True)
+    fit = np.linalg.pinv(powers).T
+    coefficients, misfit = [], np.zeros(samples - width + 1)
+    for signal in signals:
+        windows = sliding_window_view(signal, width)
+        found = windows @ fit
+        misfit += ((windows - found @ powers.T) ** 2).sum(axis=1)
+        coefficients.append(found)
+    t = np.arange(samples)
+    offsets = [width - 1, (3 * width) // 4, width // 2, width // 4, 0]
+    around = np.clip(np.array([t - offset for offset in offsets]), 0, samples - width)
+    chosen = around[misfit[around].argmin(axis=0), t]
+    return value(coefficients)[chosen]
+
+
+def longitudinal_acceleration(speed: Floats, dt: float, window: float) -> Floats:
+    """(T,) m/s² from speed (T,) by lines over `window` seconds."""
+    width = max(3, round(window / dt))
+    return _best_window([speed], width, 1, lambda c: c[0][:, 1] / dt)
+
+
+def lateral_acceleration(position: Floats, dt: float, window: float) -> Floats:
+    """(T,) m/s², positive to the left, from position (T, 2) by parabolas over `window` seconds."""
+
+    def lateral(c: list[Floats]) -> Floats:
+        velocity = np.stack([c[0][:, 1], c[1][:, 1]]) / dt
+        acceleration = 2.0 * np.stack([c[0][:, 2], c[1][:, 2]]) / dt**2
+        cross = velocity[0] * acceleration[1] - velocity[1] * acceleration[0]
+        return np.asarray(cross / np.maximum(np.hypot(velocity[0], velocity[1]), 1.0))
+
+    if len(position) < 4:
+        return np.zeros(len(position))
+    return _best_window([position[:, 0], position[:, 1]], max(4, round(window / dt)), 2, lateral)
+
+
+def moving(speed: Floats, dt: float) -> Floats:
+    """(T,) 0 where the vehicle stands, 1 where it moves, a ramp of 0.5 m/s between, from speed (T,) averaged over 0.9 s."""
+    smooth = uniform_filter1d(speed, max(1, min(round(STAND_WINDOW / dt), len(speed))), mode="nearest")
+    return np.clip((smooth - 0.5 * STAND_SPEED) / STAND_SPEED, 0.0, 1.0)
+
+
+def driving_features(
+    encounter: Encounter, speed_window: float, turn_window: float, speed_noise: float, turn_noise: float
+) -> tuple[Floats, Floats]:
+    """Features (T, 3N) of an encounter, vehicle by vehicle, and the (3N,) spreads below which they mean nothing.
+
+    Args:
+        encounter: N vehicles, T samples.
+        speed_window: seconds, for the longitudinal acceleration.
+        turn_window: seconds, for the lateral one.
+        speed_noise: m/s², differences in longitudinal acceleration that are noise.
+        turn_noise: m/s², the same for the lateral one.
+    """
+    columns = []
+    for position, speed in zip(encounter.position, encounter.speed, strict=True):
+        moves = moving(speed, encounter.dt)
+        columns.append(longitudinal_acceleration(speed, encounter.dt, speed_window))
+        columns.append(lateral_acceleration(position, encounter.dt, turn_window) * moves)
+        columns.append(moves)
+    return np.column_stack(columns), np.tile([speed_noise, turn_noise, STAND_BLUR], len(encounter.vehicles))
+
+
+def paper_features(encounter: Encounter) -> Floats:
+    """(T, 3N) positions and speeds as the paper stacks them."""
+    return np.column_stack([np.column_stack([p, v]) for p, v in zip(encounter.position, encounter.speed, strict=True)])

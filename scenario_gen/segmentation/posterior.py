@@ -1,0 +1,150 @@
+"""The posterior over segmentations: a point estimate, changepoint probabilities, intervals, and whether to believe them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from scenario_gen.arrays import Bools, Floats, Ints, frozen, frozen_ints
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Sampled segmentations of T samples.
+
+    Attributes:
+        labels: (T,) the point estimate, 0 .. K - 1 in order of first appearance: the most probable label of every sample, which
+            minimises the expected Hamming distance to the samples once their labels are matched.
+        samples: (S, T) sampled labels of the chains that agree on where the mass is, matched to the estimate.
+        probability: (T,) posterior probability of a changepoint at each sample.
+        ends: index one past the last sample of each sequence.
+        chain: (S,) chain of each sample.
+        trace: per chain (S', 5), see `_chain.TRACE`.
+        kept: (chains,) which chains the samples are from; the others are stuck in a far less probable place.
+    """
+
+    labels: Ints
+    samples: Ints
+    probability: Floats
+    ends: Ints
+    chain: Ints
+    trace: tuple[Floats, ...]
+    kept: Bools
+
+    @classmethod
+    def constant(cls, samples: int) -> "Posterior":
+        """The posterior of a series that does not vary: one primitive, with certainty."""
+        zeros = np.zeros(samples, np.int64)
+        return cls(zeros, zeros[None], np.zeros(samples), np.array([samples]), np.zeros(1, np.int64), (), np.zeros(0, np.bool_))
+
+    @property
+    def changepoints(self) -> Ints:
+        """(K,) changepoints of the point estimate; the start of a further sequence is none."""
+        return changepoints_of(self.labels, self.ends)
+
+    def probability_within(self, radius: int) -> Floats:
+        """(T,) posterior probability of at least one changepoint within `radius` samples of each sample."""
+        total = np.zeros(self.samples.shape[1])
+        for row in self.samples:
+            marks = np.zeros(len(row) + 1)
+            for c in changepoints_of(row, self.ends):
+                marks[max(c - radius, 0)] += 1
+                marks[min(c + radius + 1, len(row))] -= 1
+            total += np.cumsum(marks[:-1]) > 0
+        return total / len(self.samples)
+
+    def intervals(self, low: float = 0.05, high: float = 0.95) -> Floats:
+        """(K, 2) credible interval of each changepoint's sample index, from the sampled changepoints nearest to it."""
+        centres = self.changepoints
+        found: list[list[int]] = [[] for _ in centres]
+        for row in self.samples if len(centres) else []:
+            sampled = changepoints_of(row, self.ends)
+            for k, centre in enumerate(centres):
+                if len(sampled):
+                    found[k].append(int(sampled[np.argmin(np.abs(sampled - centre))]))
+        return np.array(
+            [np.quantile(f, [low, high], method="inverted_cdf") if f else [c, c] for f, c in zip(found, centres, strict=True)]
+        ).reshape(-1, 2)
+
+    def primitives(self) -> Floats:
+        """(n,) posterior probability of 0, 1, 2, ... primitives in use."""
+        used = np.array([len(np.unique(row)) for row in self.samples])
+        return np.bincount(used) / len(used)
+
+    def r_hat(self) -> Floats:
+        """(5,) split R-hat (Gelman et al.) of each quantity in the trace, over the kept chains; 1 is converged."""
+        halves = [half for trace, kept in zip(self.trace, self.kept, strict=True) if kept for half in np.array_split(trace, 2)]
+        if not halves or min(len(h) for h in halves) < 2:
+            return np.ones(5)
+        n = min(len(h) for h in halves)
+        stack = np.array([h[-n:] for h in halves])
+        within = stack.var(axis=1, ddof=1).mean(axis=0)
+        between = stack.mean(axis=1).var(axis=0, ddof=1)
+        result: Floats = np.sqrt((n - 1) / n + np.divide(between, within, out=np.zeros(5), where=within > 0.0))
+        return result
+
+
+def changepoints_of(labels: Ints, ends: Ints) -> Ints:
+    """Return the samples whose label differs from the one before, within each sequence."""
+    found = np.flatnonzero(np.diff(labels)) + 1
+    return found[~np.isin(found, ends)].astype(np.int64)
+
+
+def in_order(labels: Ints) -> Ints:
+    """Renumber labels in order of first appearance."""
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[inverse].astype(np.int64).reshape(-1)
+
+
+def match(labels: Ints, reference: Ints) -> Ints:
+    """Rename labels to agree with `reference` in as many samples as possible (Hungarian method)."""
+    size = int(max(labels.max(), reference.max())) + 1
+    overlap = np.bincount(labels * size + reference, minlength=size * size).reshape(size, size)
+    return linear_sum_assignment(-overlap)[1][labels].astype(np.int64)
+
+
+def pool(samples: list[Ints], traces: list[Floats], ends: Ints, lead: int) -> Posterior:
+    """Put the chains together.
+
+    The score of a sample is log p(x, labels) with emissions and transitions integrated out: unlike p(x | parameters), it does
+    not grow with unneeded states. Chains whose mean score lies far below the best chain's are stuck and left out. All
+    others' samples are matched to the best-scored sample, then to the estimate itself, until that stands still.
+
+    Args:
+        samples: per chain (S', T') labels.
+        traces: per chain (S', 5).
+        ends: index one past the last sample of each sequence, in samples.
+        lead: samples missing at the head of each sequence; they get the label of the first row.
+    """
+    means = np.array([trace[:, 0].mean() for trace in traces])
+    best = int(np.argmax(means))
+    kept = means >= means[best] - max(10.0, 3.0 * float(traces[best][:, 0].std()))
+    stack = np.vstack([s for s, keep in zip(samples, kept, strict=True) if keep])
+    chain = np.concatenate([np.full(len(s), k) for k, (s, keep) in enumerate(zip(samples, kept, strict=True)) if keep])
+    scores = np.concatenate([t[:, 0] for t, keep in zip(traces, kept, strict=True) if keep])
+    estimate = stack[int(np.argmax(scores))]
+    for _ in range(3):
+        stack = np.array([match(row, estimate) for row in stack])
+        votes = np.array([(stack == k).sum(axis=0) for k in range(stack.max() + 1)])
+        update = votes.argmax(axis=0).astype(np.int64)
+        if np.array_equal(update, estimate):
+            break
+        estimate = update
+    order = in_order(np.concatenate([estimate, np.arange(stack.max() + 1)]))[len(estimate) :]
+    if lead:
+        starts = np.concatenate([[0], ends[:-1] - lead * np.arange(1, len(ends))])
+        repeats = np.ones(len(estimate), np.int64)
+        repeats[starts] += lead
+        estimate, stack = np.repeat(estimate, repeats), np.repeat(stack, repeats, axis=1)
+    changed = np.zeros(stack.shape[1])
+    changed[1:] = (np.diff(stack, axis=1) != 0).mean(axis=0)
+    changed[ends[:-1]] = 0.0
+    return Posterior(
+        frozen_ints(order[estimate]),
+        frozen_ints(order[stack]),
+        frozen(changed),
+        frozen_ints(ends),
+        frozen_ints(chain),
+        tuple(traces),
+        kept,
+    )

@@ -1,0 +1,104 @@
+"""Encounter -> Segmentation: features, sampler, and the few rules of the road."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen.arrays import Ints
+from scenario_gen.encounter import Encounter
+from scenario_gen.parameters import check, parameter
+from scenario_gen.segmentation.descriptions import describe_segments
+from scenario_gen.segmentation.features import driving_features, paper_features
+from scenario_gen.segmentation.posterior import Posterior, in_order
+from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.segmentation.series import SamplerConfig, segment_series
+from scenario_gen.segmentation.trends import SPEED_SCALE, settle, thin
+
+
+@dataclass(frozen=True)
+class SegmentationConfig:
+    """How an encounter is cut into primitives."""
+
+    preset: str = parameter(
+        "driving", "features: accelerations and standing, or the paper's positions and speeds", choices=("driving", "paper")
+    )
+    max_rate: float = parameter(
+        0.5, "most changepoints per second of duration, on average (the least useful are dropped)", unit="1/s", low=0.0, high=10.0
+    )
+    min_segment: float = parameter(0.2, "shorter segments join a neighbour", unit="s", low=0.0, high=10.0)
+    settle: float = parameter(
+        0.5, "a changepoint may move this far to where the speeds' trends change", unit="s", low=0.0, high=2.0
+    )
+    speed_window: float = parameter(1.0, "window of the longitudinal acceleration", unit="s", low=0.3, high=5.0)
+    turn_window: float = parameter(2.0, "window of the lateral acceleration", unit="s", low=0.4, high=10.0)
+    speed_noise: float = parameter(
+        0.2, "differences of longitudinal acceleration that mean nothing", unit="m/s²", low=0.0, high=5.0
+    )
+    turn_noise: float = parameter(0.4, "differences of lateral acceleration that mean nothing", unit="m/s²", low=0.0, high=5.0)
+    sampler: SamplerConfig = SamplerConfig(weight=0.5)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+def segment(encounter: Encounter, config: SegmentationConfig = SegmentationConfig(), seed: int = 0) -> Segmentation:
+    """Cut an encounter into joint primitives (paper II-B).
+
+    Args:
+        encounter: N vehicles, T samples.
+        config: `preset="paper"` looks at raw positions and speeds, takes what the sampler finds, and only merges what is too short.
+        seed: same seed, same answer.
+
+    Raises:
+        InputError: fewer than 4 samples.
+    """
+    if config.preset == "paper":
+        posterior = segment_series(paper_features(encounter), config.sampler, seed)
+        points = merge_short(posterior, config, encounter.dt)
+    else:
+        features, blur = driving_features(
+            encounter, config.speed_window, config.turn_window, config.speed_noise, config.turn_noise
+        )
+        posterior = segment_series(features, config.sampler, seed, blur=blur)
+        points = merge_short(posterior, config, encounter.dt)
+        signals = encounter.speed / SPEED_SCALE
+        points = thin(signals, points, int(encounter.duration * config.max_rate))
+        gap = max(1, int(np.ceil(config.min_segment / encounter.dt - 1e-9)))
+        points = settle(signals, points, round(config.settle / encounter.dt), gap)
+    labels = relabel(posterior.labels, points)
+    return Segmentation(labels, points, posterior.probability, describe_segments(encounter, points))
+
+
+def merge_short(posterior: Posterior, config: SegmentationConfig, dt: float) -> Ints:
+    """Return the estimate's changepoints without segments below `min_segment` or states with fewer than 2 samples.
+
+    Of the two changepoints around such a segment the less probable one goes (at either end, the inner one).
+    """
+    labels = posterior.labels
+    shortest = max(2, int(np.ceil(config.min_segment / dt - 1e-9)))
+    points = list(posterior.changepoints)
+    while points:
+        edges = np.array([0, *points, len(labels)])
+        lengths = np.diff(edges)
+        i = int(np.argmin(lengths))
+        if lengths[i] >= shortest:
+            break
+        around = [j for j in (i - 1, i) if 0 <= j < len(points)]
+        near = [posterior.probability[max(points[j] - 1, 0) : points[j] + 2].sum() for j in around]
+        del points[around[int(np.argmin(near))]]
+    return np.array(points, dtype=np.int64)
+
+
+def relabel(labels: Ints, points: Ints) -> Ints:
+    """Give every segment between `points` the label that most of its samples have, and neighbours different ones."""
+    edges = [0, *(int(c) for c in points), len(labels)]
+    result = np.empty_like(labels)
+    previous, fresh = -1, int(labels.max()) + 1
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        votes = np.bincount(labels[a:b])
+        if 0 <= previous < len(votes):
+            votes[previous] = 0
+        label = int(votes.argmax()) if votes.max() > 0 else fresh
+        fresh += label == fresh
+        result[a:b] = previous = label
+    return in_order(result)

@@ -1,0 +1,121 @@
+"""A plain (T, D) array -> posterior over its segmentations: the sticky HDP-HMM without any driving in it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.errors import InputError
+from scenario_gen.parameters import check, parameter
+from scenario_gen.segmentation._chain import run_chain
+from scenario_gen.segmentation._emission import joint_prior
+from scenario_gen.segmentation._start import Problem, find_start
+from scenario_gen.segmentation.posterior import Posterior, pool
+
+
+@dataclass(frozen=True)
+class SamplerConfig:
+    """The sticky HDP-HMM and its sampler; the defaults suit any series from D = 1 to D = 24."""
+
+    emission: str = parameter("gaussian", "what a state emits", choices=("gaussian", "autoregressive"))
+    order: int = parameter(1, "past samples an autoregressive emission looks at", low=1, high=5)
+    states: int = parameter(20, "weak-limit truncation L: states that exist, used or not", low=2, high=100)
+    chains: int = parameter(3, "independent chains, each from a start of its own", low=1, high=16)
+    sweeps: int = parameter(100, "Gibbs sweeps of each chain, those of its start included", low=10, high=100_000)
+    mean_weight: float = parameter(
+        0.05, "prior samples that the mean (or the regression) of a state is worth", low=1e-6, high=100.0
+    )
+    weight: float = parameter(
+        1.0, "what one sample counts for; below 1 where smoothing makes neighbours repeat each other", low=1e-3, high=1.0
+    )
+    gamma_shape: float = parameter(1.0, "shape of γ's Gamma prior", low=1e-3)
+    gamma_rate: float = parameter(0.1, "rate of γ's Gamma prior", low=1e-6)
+    alpha_kappa_shape: float = parameter(1.0, "shape of the Gamma prior of α+κ", low=1e-3)
+    alpha_kappa_rate: float = parameter(0.01, "rate of the Gamma prior of α+κ", low=1e-6)
+    rho_a: float = parameter(10.0, "first parameter of ρ's Beta prior, ρ = κ/(α+κ)", low=1e-3)
+    rho_b: float = parameter(1.0, "second parameter of ρ's Beta prior", low=1e-3)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    @property
+    def hyper(self) -> Floats:
+        """(6,) hyperpriors in the kernels' order."""
+        return np.array(
+            [self.gamma_shape, self.gamma_rate, self.alpha_kappa_shape, self.alpha_kappa_rate, self.rho_a, self.rho_b]
+        )
+
+
+def segment_series(
+    x: Floats,
+    config: SamplerConfig = SamplerConfig(),
+    seed: int = 0,
+    *,
+    ends: tuple[int, ...] | None = None,
+    blur: Floats | None = None,
+) -> Posterior:
+    """Sample the segmentations of a series under the sticky HDP-HMM (Fox et al. 2011; priors chosen from the data).
+
+    Args:
+        x: (T, D), any units: what does not vary is left out, the rest is scaled to unit variance.
+        config: model and sampler.
+        seed: same seed, same answer, bit for bit.
+        ends: where several sequences stand one after the other, the index one past the last sample of each.
+        blur: (D,) standard deviation, in x's units, below which differences in a channel mean nothing (None: 0).
+
+    Raises:
+        InputError: fewer than 4 samples, or a value that is not finite.
+    """
+    x = np.asarray(x, dtype=np.float64)
+    if x.ndim == 1:
+        x = x[:, None]
+    if x.ndim != 2 or x.shape[0] < 4:
+        raise InputError(f"a series to segment needs at least 4 samples in (T, D), not an array of shape {x.shape}")
+    if not np.isfinite(x).all():
+        row, column = np.argwhere(~np.isfinite(x))[0]
+        raise InputError(
+            f"the series to segment holds {x[row, column]} at sample {row}, channel {column}; fill or drop such samples"
+        )
+    stops = np.array([len(x)] if ends is None else ends, dtype=np.int64)
+    if stops[-1] != len(x) or (np.diff(np.concatenate([[0], stops])) < 1).any():
+        raise InputError(f"the ends of the sequences must rise to the number of samples, {len(x)}; they are {stops.tolist()}")
+    spread = x.std(axis=0)
+    varies = spread > 1e-9 * np.maximum(np.abs(x).max(axis=0), 1e-300)
+    if not varies.any():
+        return Posterior.constant(len(x))
+    unknown = np.zeros(varies.sum()) if blur is None else (np.asarray(blur)[varies] / spread[varies]) ** 2
+    problem = Problem.build((x[:, varies] - x[:, varies].mean(axis=0)) / spread[varies], stops, config, config.weight, unknown)
+    seeds = np.random.SeedSequence([seed]).spawn(config.chains)
+    results = [_run(problem, config, index, stream) for index, stream in enumerate(seeds)]
+    return pool([labels for labels, _ in results], [trace for _, trace in results], stops, problem.lead)
+
+
+def _run(problem: Problem, config: SamplerConfig, index: int, stream: np.random.SeedSequence) -> tuple[Ints, Floats]:
+    """Run chain number `index`; returns its kept labels (S, T) and its trace (S, 5)."""
+    rng = np.random.Generator(np.random.PCG64(stream))
+    start = find_start(problem, config, index, rng)
+    sweeps = max(config.sweeps - start.sweeps, 4)
+    burn = sweeps // 3
+    samples = np.empty((sweeps - burn, len(problem.v)), np.int64)
+    trace = np.empty((sweeps, 5))
+    emissions = np.empty((config.states, problem.dimensions, problem.v.shape[1]))
+    hyper = problem.hyper(config, start.nu)
+    top = np.array([1.0, 50.0, 0.9])
+    g0 = joint_prior(problem.mean, problem.precision, start.scale)
+    seed = int(rng.integers(2**62))
+    run_chain(
+        problem.v,
+        problem.vt,
+        problem.ends,
+        g0,
+        hyper,
+        start.labels,
+        top,
+        problem.regressors,
+        seed,
+        burn,
+        samples,
+        trace,
+        emissions,
+    )
+    return samples, trace[burn:]

@@ -1,0 +1,81 @@
+"""Encounters into primitives: waits, speed changes, the rules of the result."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scenario_gen.encounter import Encounter, Vehicle
+from scenario_gen.errors import InputError
+from scenario_gen.segmentation import SegmentationConfig, segment
+
+
+def encounter_of(speeds: np.ndarray, noise: float = 0.0, seed: int = 0) -> Encounter:
+    """Vehicles that drive straight east with the given speeds (N, T)."""
+    rng = np.random.default_rng(seed)
+    speeds = np.asarray(speeds, dtype=float)
+    x = np.cumsum(speeds, axis=1) * 0.1
+    position = np.stack([x, np.arange(len(speeds))[:, None] * 10.0 + np.zeros_like(x)], axis=2)
+    position += rng.normal(size=position.shape) * noise
+    measured = np.maximum(speeds + rng.normal(size=speeds.shape) * noise, 0.0)
+    vehicles = tuple(Vehicle(str(i)) for i in range(len(speeds)))
+    return Encounter("made", vehicles, 0, 100_000_000, position, np.zeros_like(speeds), measured)
+
+
+def wait_and_brake() -> Encounter:
+    """The paper's case (a): one stands; the other brakes for 7 s to a stop; both stand; the second pulls away."""
+    t = np.arange(200) * 0.1
+    other = np.interp(t, [0, 7, 11, 20], [10, 0, 0, 12])
+    return encounter_of(np.array([np.zeros(200), other]), noise=0.05)
+
+
+def test_paper_case_a():
+    found = segment(wait_and_brake(), seed=1)
+    assert len(found.changepoints) == 2
+    assert np.abs(found.changepoints - [70, 110]).max() <= 5
+    assert found.descriptions[0].startswith("vehicle 0 stands, vehicle 1 brakes to a stop from 10")
+    assert found.descriptions[1] == "vehicle 0 stands, vehicle 1 stands"
+    assert "vehicle 1 pulls away" in found.descriptions[2]
+
+
+def test_steady_drive_is_one_primitive():
+    found = segment(encounter_of(np.full((2, 200), 10.0), noise=0.1))
+    assert found.n_primitives == 1
+    assert "drives at 10.0 m/s" in found.descriptions[0]
+
+
+def test_deterministic():
+    encounter = wait_and_brake()
+    a, b = segment(encounter, seed=4), segment(encounter, seed=4)
+    assert a.labels.tobytes() == b.labels.tobytes()
+    assert a.changepoint_probability.tobytes() == b.changepoint_probability.tobytes()
+
+
+@pytest.mark.parametrize("preset", ["driving", "paper"])
+@pytest.mark.parametrize("samples", [4, 7, 30, 200])
+def test_short_encounters(preset, samples):
+    rng = np.random.default_rng(samples)
+    found = segment(encounter_of(np.abs(rng.normal(5.0, 2.0, (3, samples)))), SegmentationConfig(preset=preset))
+    assert found.labels.shape == (samples,)
+
+
+def test_too_short():
+    with pytest.raises(InputError, match="at least 4 samples"):
+        segment(encounter_of(np.ones((2, 3))))
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(10, 120), st.integers(2, 4), st.integers(0, 10_000), st.sampled_from([0.1, 0.5, 2.0]))
+def test_rules_of_the_result(samples, vehicles, seed, rate):
+    rng = np.random.default_rng(seed)
+    knots = np.linspace(0, samples, 6)
+    speeds = np.array([np.interp(np.arange(samples), knots, np.abs(rng.normal(4.0, 5.0, 6))) for _ in range(vehicles)])
+    encounter = encounter_of(speeds, noise=0.1, seed=seed)
+    found = segment(encounter, SegmentationConfig(max_rate=rate), seed=seed)
+    points = found.changepoints
+    assert len(points) <= encounter.duration * rate
+    assert len(found.descriptions) == len(points) + 1
+    np.testing.assert_array_equal(np.flatnonzero(np.diff(found.labels)) + 1, points)
+    assert (np.diff([0, *points, samples]) >= 2).all()
+    first = [int(np.flatnonzero(found.labels == k)[0]) for k in range(found.n_primitives)]
+    assert first == sorted(first)

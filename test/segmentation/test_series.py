@@ -1,0 +1,88 @@
+"""The sampler on series with known states, and on awkward ones."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scenario_gen.errors import InputError
+from scenario_gen.segmentation import SamplerConfig, segment_series
+
+
+def two_states(seed: int, dimensions: int = 2) -> tuple[np.ndarray, np.ndarray]:
+    """Four dwells of 60 samples, two states 4 standard deviations apart."""
+    rng = np.random.default_rng(seed)
+    labels = np.repeat([0, 1, 0, 1], 60)
+    return rng.normal(size=(240, dimensions)) + 4.0 * labels[:, None] / np.sqrt(dimensions), labels
+
+
+@pytest.mark.parametrize("dimensions", [1, 3, 24])
+def test_finds_states_and_shares_them(dimensions):
+    x, labels = two_states(5, dimensions)
+    posterior = segment_series(x, seed=1)
+    assert np.mean(posterior.labels != labels) <= 0.02
+    assert posterior.labels.max() == 1
+    assert np.abs(posterior.changepoints - [60, 120, 180]).max() <= 2
+
+
+def test_same_seed_same_bytes_and_scale_does_not_matter():
+    x, _ = two_states(6)
+    a = segment_series(x, seed=3)
+    b = segment_series(x, seed=3)
+    assert a.samples.tobytes() == b.samples.tobytes()
+    assert a.probability.tobytes() == b.probability.tobytes()
+    assert segment_series(x, seed=4).samples.tobytes() != a.samples.tobytes()
+    np.testing.assert_array_equal(segment_series(x * 1024.0 - 512.0, seed=3).labels, a.labels)
+
+
+def test_noise_is_one_state():
+    posterior = segment_series(np.random.default_rng(0).normal(size=(300, 4)), seed=0)
+    assert posterior.labels.max() == 0
+    assert posterior.probability.max() < 0.2
+
+
+def test_autoregressive_emission_tells_dynamics_apart():
+    rng = np.random.default_rng(2)
+    labels = np.repeat([0, 1, 0], 120)
+    x = np.zeros((360, 1))
+    for t in range(1, 360):
+        x[t] = (0.95 if labels[t] == 0 else -0.8) * x[t - 1] + rng.normal() * 0.5
+    posterior = segment_series(x, SamplerConfig(emission="autoregressive"), seed=0)
+    assert np.mean(posterior.labels != labels) <= 0.05
+
+
+def test_several_sequences_share_states_and_do_not_touch():
+    x, labels = two_states(7)
+    posterior = segment_series(np.vstack([x, x[::-1]]), seed=0, ends=(240, 480))
+    assert np.mean(posterior.labels != np.concatenate([labels, labels[::-1]])) <= 0.02
+    assert 240 not in posterior.changepoints
+    assert posterior.probability[240] == 0.0
+
+
+def test_constant_channel_and_constant_series():
+    x, labels = two_states(8)
+    posterior = segment_series(np.column_stack([x, np.full(240, 7.0)]), seed=0)
+    assert np.mean(posterior.labels != labels) <= 0.02
+    assert segment_series(np.ones((50, 3))).labels.max() == 0
+
+
+@pytest.mark.parametrize("bad", [np.zeros((3, 2)), np.full((10, 2), np.nan), np.zeros((0, 2))])
+def test_refuses_what_it_cannot_use(bad):
+    with pytest.raises(InputError):
+        segment_series(bad)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(4, 40), st.integers(1, 8), st.integers(0, 1000), st.sampled_from(["gaussian", "autoregressive"]))
+def test_never_nan_and_always_consistent(samples, dimensions, seed, emission):
+    rng = np.random.default_rng(seed)
+    x = rng.standard_t(2, size=(samples, dimensions)) * 10.0 ** rng.integers(-6, 6, dimensions)
+    posterior = segment_series(x, SamplerConfig(emission=emission, sweeps=20, chains=2), seed=seed)
+    assert posterior.labels.shape == (samples,)
+    assert np.isfinite(posterior.probability).all()
+    assert ((posterior.probability >= 0.0) & (posterior.probability <= 1.0)).all()
+    assert set(np.unique(posterior.labels)) == set(range(posterior.labels.max() + 1))
+    intervals = posterior.intervals()
+    assert intervals.shape == (len(posterior.changepoints), 2)
+    assert (intervals[:, 0] <= intervals[:, 1]).all()
+    assert posterior.primitives().sum() == pytest.approx(1.0)
