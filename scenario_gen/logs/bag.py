@@ -50,7 +50,7 @@ class BagSource:
 
     def accepts(self, path: Path) -> bool:
         """Return whether it looks like a bag."""
-        return path.suffix.lower() in EXTENSIONS or bool(bag_files(path))
+        return bool(bag_files(path))
 
     def read(self, paths: Sequence[Path], config: LogConfig) -> RawLog:
         """Read the topics that this project knows; several bags are one log."""
@@ -64,13 +64,13 @@ class BagSource:
 
 
 def bag_files(path: Path) -> list[Path]:
-    """Return the files of a bag in order: those that metadata.yaml lists, or else those in the folder.
+    """Return the files of a bag in order: those that metadata.yaml lists, or else those in the folder; none if it is no bag.
 
     The files are opened one by one: through the folder rosbags 0.11 passes over messages whose quality of service reads
     differently in metadata.yaml and in the file. A compressed bag is opened through its folder.
     """
     if path.is_file():
-        return [path]
+        return [path] if path.suffix.lower() in EXTENSIONS else []
     metadata = path / "metadata.yaml"
     if not metadata.is_file():
         return sorted((file for file in path.iterdir() if file.suffix.lower() in EXTENSIONS), key=lambda f: (len(f.name), f.name))
