@@ -1,1 +1,7 @@
-"""RRT*-Connect on the grid, and other planners behind the same Protocol (paper III-B, Algorithms 1-5)."""
+"""Planning: RRT*-Connect between fitted anchors, and routes that can be driven."""
+
+from scenario_gen.planning.config import PlanningConfig
+from scenario_gen.planning.plan import deviations, plan_routes
+from scenario_gen.planning.route import Route
+
+__all__ = ["PlanningConfig", "Route", "deviations", "plan_routes"]

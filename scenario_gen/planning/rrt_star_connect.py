@@ -24,7 +24,9 @@ class RrtStarConnectConfig:
 
     step: float = parameter(30.0, "longest new edge (the paper's preset: 5)", unit="cells", low=0.1, high=1e6)
     zeta: float = parameter(30.0, "largest near radius, zeta of eq 10; it decides quality", unit="cells", low=0.1, high=1e6)
-    gamma_factor: float = parameter(1.1, "gamma of eq 10 as a multiple of the least that is asymptotically optimal", low=1.0, high=10.0)
+    gamma_factor: float = parameter(
+        1.1, "gamma of eq 10 as a multiple of the least that is asymptotically optimal", low=1.0, high=10.0
+    )
     informed: bool = parameter(True, "sample only where a shorter path can lie, once there is one")
     pull: bool = parameter(True, "draw the path taut at the end")
 
@@ -52,7 +54,7 @@ class _Trees:
         self.counter = np.zeros(7, dtype=np.int64)
         self.counter[trees.MEETING] = -1
         self.history = np.empty((256, 2))
-        self.random = np.random.SeedSequence([seed]).generate_state(1, np.uint64)
+        self.random = np.random.SeedSequence([seed]).generate_state(1, np.uint64).astype(np.uint64)
         self._empty_pool(1024)
         trees.plant(self.ends, self.columns, self.node, self.link, self.chunk, self.head, self.counter, self.setting)
 

@@ -107,7 +107,7 @@ def _insert(
         counter[CHUNKS] += 1
         chunk[k, 0], chunk[k, 1] = head[tree, bucket], 0
         head[tree, bucket] = k
-    m = k * CHUNK + chunk[k, 1]
+    m = int(k * CHUNK + chunk[k, 1])
     chunk[k, 1] += 1
     counter[tree] += 1
     node[m, X], node[m, Y] = x, y
@@ -208,11 +208,12 @@ def _extend(
     _adopt(parent, new, edge, node, link)
     for k in range(count):  # Algorithm 5
         m = near[k]
-        if m >= 0 and m != parent and cost + gap[k] < node[m, COST] - 1e-9:
-            if segment_free(clearance, node[m, X], node[m, Y], x, y, radius):
-                _release(m, link)
-                _adopt(new, m, gap[k], node, link)
-                _propagate(m, node, link, counter, setting)
+        if m < 0 or m == parent or cost + gap[k] >= node[m, COST] - 1e-9:
+            continue
+        if segment_free(clearance, node[m, X], node[m, Y], x, y, radius):
+            _release(m, link)
+            _adopt(new, m, gap[k], node, link)
+            _propagate(m, node, link, counter, setting)
     return status, new
 
 
@@ -258,7 +259,12 @@ def grow(
         clearance: (H, W) cells.
         ends: (2, 2) start and goal, the trees' roots.
         free_cells: flat indices of the cells to sample from.
-        node, link, chunk, head, counter, setting: the trees (see the module's docstring), changed in place.
+        node: see the module's docstring; this and the next five are changed in place.
+        link: as above.
+        chunk: as above.
+        head: as above.
+        counter: as above.
+        setting: as above.
         history: (h, 2) iteration and cost of each improvement, written from counter[HISTORY] on.
         random: (1,) state of the generator.
     """
@@ -297,9 +303,7 @@ def grow(
 
 
 @kernel(F2, I, OUT2, OUTI2, OUTI2, OUTI2, OUTI1, OUT1)
-def plant(
-    ends: Floats, columns: int, node: Floats, link: Ints, chunk: Ints, head: Ints, counter: Ints, setting: Floats
-) -> None:
+def plant(ends: Floats, columns: int, node: Floats, link: Ints, chunk: Ints, head: Ints, counter: Ints, setting: Floats) -> None:
     """Put the two roots into an empty pool (head all -1, counters zero)."""
     for tree in range(2):
         root = _insert(tree, ends[tree, 0], ends[tree, 1], node, link, chunk, head, counter, setting[SIDE], columns)

@@ -1,0 +1,25 @@
+"""Settings of the planning stage."""
+
+from dataclasses import dataclass
+
+from scenario_gen.parameters import check, parameter
+
+
+@dataclass(frozen=True)
+class PlanningConfig:
+    """How routes are planned."""
+
+    planner: str = parameter(
+        "rrt_star_connect",
+        "geometric planner",
+        choices=("rrt_star_connect", "ompl_rrt_connect", "ompl_rrt_star", "ompl_informed_rrt_star", "ompl_bit_star"),
+    )
+    iterations: int = parameter(1000, "iterations of the planner between two anchors", low=1, high=10_000_000)
+    margin: float = parameter(0.3, "room to keep beside the footprint where the road has it", unit="m", low=0.0, high=5.0)
+    drivable: bool = parameter(True, "smooth routes that can be driven; false: the planner's bare polylines")
+    max_curvature: float = parameter(0.2, "largest curvature of a route", unit="1/m", low=0.01, high=2.0)
+    spacing: float = parameter(0.5, "largest distance between two points of a route", unit="m", low=0.05, high=0.5)
+    traffic_side: str = parameter("right", "the side of the road to keep to", choices=("right", "left"))
+
+    def __post_init__(self) -> None:
+        check(self)
