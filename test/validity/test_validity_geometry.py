@@ -194,7 +194,7 @@ def test_a_standing_footprint_is_compared_with_the_cells_exactly(seed):
         assert area.covers(smaller)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_two_turning_cars_agree_with_the_oracle_near_contact(seed):
     """Arcs that graze each other: the pair is shifted until the smallest gap the oracle sees is a centimetre."""
@@ -223,7 +223,7 @@ def test_two_turning_cars_agree_with_the_oracle_near_contact(seed):
         if overlaps:
             assert shapely.distance(*boxes_at(scenario, np.array(overlaps)))[0] < 1e-4
         else:
-            assert shapely.distance(*boxes_at(scenario, np.linspace(0, time[-1], 5000))).min() > 0.0
+            assert shapely.distance(*boxes_at(scenario, np.linspace(0, time[-1], 2000))).min() > 0.0
 
 
 def test_far_from_the_origin_nothing_changes():
