@@ -77,7 +77,7 @@ def _schedule(rng: np.random.Generator, samples: int) -> tuple[Floats, Floats, F
             length = int(rng.uniform(30, 60))
         elif last == "stop":
             a = -rng.uniform(1.0, 2.5)
-            length = max(int(round(v / -a / dt)), 1)
+            length = max(round(v / -a / dt), 1)
             a = -v / (length * dt)
         length = max(length, 10)
         for _ in range(min(length, samples - t)):
@@ -105,7 +105,7 @@ def driving(seed: int, samples: int = 1200) -> Labelled:
         xy[1:] = np.cumsum(np.column_stack([step * np.cos(middle), step * np.sin(middle)]), axis=0)
         speeds.append(speed)
         keys.append(np.column_stack([acceleration, turn]))
-        positions.append(xy + [0.0, 20.0 * vehicle])
+        positions.append(xy + np.array([0.0, 20.0 * vehicle]))
         headings.append(heading)
     changed = (np.diff(np.hstack(keys), axis=0) != 0.0).any(axis=1)
     labels = np.concatenate([[0], np.cumsum(changed)]).astype(np.int64)

@@ -38,8 +38,8 @@ def cholesky(matrix: Floats) -> bool:
 def accumulate(v: Floats, labels: Ints, g0: Floats, weight: float, blur: Floats, g: Floats, counts: Ints) -> None:
     """Fill g (L, M, M; lower triangles) and counts (L,) from samples v (T, M) and labels (T,).
 
-    `weight` is what a sample counts for (1: all of it; less where neighbouring samples repeat each other); `blur` (D,) the variance
-    to which a sample's channels are known at all.
+    `weight` is what a sample counts for (1: all of it; less where neighbouring samples repeat each other); `blur`
+    (D,) the variance to which a sample's channels are known at all.
     """
     m = v.shape[1]
     d = len(blur)
@@ -71,7 +71,7 @@ def log_marginal(factor: Floats, n: float, p: int, nu: float) -> float:
     """
     m = factor.shape[0]
     d = m - p
-    value = -0.5 * n * d * math.log(math.pi)
+    value: float = -0.5 * n * d * math.log(math.pi)
     for i in range(p):
         value -= d * math.log(factor[i, i])
     for i in range(d):

@@ -8,8 +8,9 @@ from scipy.cluster.vq import kmeans2
 from scipy.ndimage import uniform_filter1d
 
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.segmentation._chain import merge_states, run_chain
+from scenario_gen.segmentation._chain import run_chain
 from scenario_gen.segmentation._emission import joint_prior
+from scenario_gen.segmentation._merge import merge_states
 
 if TYPE_CHECKING:
     from scenario_gen.segmentation.series import SamplerConfig
@@ -52,7 +53,7 @@ class Problem:
     @property
     def dimensions(self) -> int:
         """D."""
-        return self.v.shape[1] - self.regressors
+        return int(self.v.shape[1]) - self.regressors
 
     @property
     def y(self) -> Floats:
@@ -94,7 +95,8 @@ class Problem:
             scatter += residual.T @ residual
         freedom = max(len(y) - self.regressors * (labels.max() + 1), len(y) // 2)
         scatter = scatter / freedom + np.diag(self.blur)
-        return scatter + np.eye(self.dimensions) * (1e-3 * np.trace(scatter) / self.dimensions + 1e-6)
+        result: Floats = scatter + np.eye(self.dimensions) * (1e-3 * np.trace(scatter) / self.dimensions + 1e-6)
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,10 +117,10 @@ def compact(labels: Ints) -> Ints:
 def find_start(problem: Problem, config: "SamplerConfig", index: int, rng: np.random.Generator) -> Start:
     """Find where chain number `index` starts.
 
-    k-means on the samples averaged over a window (another one in each chain) gives L labels; a few Gibbs sweeps clean them; states are
-    merged while the marginal likelihood grows; twice. S0 is (ν0 - D - 1) times the covariance within the states found,
-    so that the prior's mean is what is seen; ν0, how alike the states' covariances are, is the value of a grid that
-    gives the merged labels the highest marginal likelihood.
+    k-means on the samples averaged over a window (another one in each chain) gives L labels; a few Gibbs sweeps clean
+    them; states are merged while the marginal likelihood grows; twice. S0 is (ν0 - D - 1) times the covariance within
+    the states found, so that the prior's mean is what is seen; ν0, which says how alike the states' covariances are,
+    is the value of a grid that gives the merged labels the highest marginal likelihood.
     """
     d = problem.dimensions
     window = min(WINDOWS[index % len(WINDOWS)], max(len(problem.v) // 8, 1))
@@ -130,8 +132,8 @@ def find_start(problem: Problem, config: "SamplerConfig", index: int, rng: np.ra
     nu = float(d + EXTRA_DEGREES[-2])
     scale = problem.within(labels) * (nu - d - 1.0)
     spent = 0
-    for sweeps in STAGES:
-        sweeps = min(sweeps, config.sweeps // 4)
+    for stage in STAGES:
+        sweeps = min(stage, config.sweeps // 4)
         samples = np.empty((1, len(labels)), np.int64)
         emissions = np.empty((config.states, d, problem.v.shape[1]))
         hyper = problem.hyper(config, nu)

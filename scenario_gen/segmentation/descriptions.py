@@ -1,5 +1,7 @@
 """What each vehicle does in each primitive, in plain language with figures."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
@@ -38,5 +40,5 @@ def describe_segments(encounter: Encounter, changepoints: Ints) -> tuple[str, ..
             f"vehicle {vehicle.id} {describe_motion(encounter.speed[i, a:b], encounter.heading[i, a:b], encounter.dt)}"
             for i, vehicle in enumerate(encounter.vehicles)
         )
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
+        for a, b in pairwise(edges)
     )

@@ -46,7 +46,8 @@ def _best_window(signals: Sequence[Floats], width: int, degree: int, value: Call
     offsets = [width - 1, (3 * width) // 4, width // 2, width // 4, 0]
     around = np.clip(np.array([t - offset for offset in offsets]), 0, samples - width)
     chosen = around[misfit[around].argmin(axis=0), t]
-    return value(coefficients)[chosen]
+    result: Floats = value(coefficients)[chosen]
+    return result
 
 
 def longitudinal_acceleration(speed: Floats, dt: float, window: float) -> Floats:
@@ -72,7 +73,7 @@ def lateral_acceleration(position: Floats, dt: float, window: float) -> Floats:
 def moving(speed: Floats, dt: float) -> Floats:
     """(T,) 0 where the vehicle stands, 1 where it moves, a ramp of 0.5 m/s between, from speed (T,) averaged over 0.9 s."""
     smooth = uniform_filter1d(speed, max(1, min(round(STAND_WINDOW / dt), len(speed))), mode="nearest")
-    return np.clip((smooth - 0.5 * STAND_SPEED) / STAND_SPEED, 0.0, 1.0)
+    return np.asarray(np.clip((smooth - 0.5 * STAND_SPEED) / STAND_SPEED, 0.0, 1.0))
 
 
 def driving_features(

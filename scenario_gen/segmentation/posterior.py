@@ -100,7 +100,8 @@ def match(labels: Ints, reference: Ints) -> Ints:
     """Rename labels to agree with `reference` in as many samples as possible (Hungarian method)."""
     size = int(max(labels.max(), reference.max())) + 1
     overlap = np.bincount(labels * size + reference, minlength=size * size).reshape(size, size)
-    return linear_sum_assignment(-overlap)[1][labels].astype(np.int64)
+    names: Ints = linear_sum_assignment(-overlap)[1].astype(np.int64)
+    return names[labels]
 
 
 def pool(samples: list[Ints], traces: list[Floats], ends: Ints, lead: int) -> Posterior:

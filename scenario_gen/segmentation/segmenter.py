@@ -1,6 +1,7 @@
 """Encounter -> Segmentation: features, sampler, and the few rules of the road."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from scenario_gen.segmentation.posterior import Posterior, in_order
 from scenario_gen.segmentation.result import Segmentation
 from scenario_gen.segmentation.series import SamplerConfig, segment_series
 from scenario_gen.segmentation.trends import SPEED_SCALE, settle, thin
+
+DRIVING_SAMPLER = SamplerConfig(weight=0.5)
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,7 @@ class SegmentationConfig:
         0.2, "differences of longitudinal acceleration that mean nothing", unit="m/s²", low=0.0, high=5.0
     )
     turn_noise: float = parameter(0.4, "differences of lateral acceleration that mean nothing", unit="m/s²", low=0.0, high=5.0)
-    sampler: SamplerConfig = SamplerConfig(weight=0.5)
+    sampler: SamplerConfig = DRIVING_SAMPLER
 
     def __post_init__(self) -> None:
         check(self)
@@ -46,7 +49,7 @@ def segment(encounter: Encounter, config: SegmentationConfig = SegmentationConfi
 
     Args:
         encounter: N vehicles, T samples.
-        config: `preset="paper"` looks at raw positions and speeds, takes what the sampler finds, and only merges what is too short.
+        config: with `preset="paper"` the sampler sees raw positions and speeds, and only what is too short is merged.
         seed: same seed, same answer.
 
     Raises:
@@ -94,7 +97,7 @@ def relabel(labels: Ints, points: Ints) -> Ints:
     edges = [0, *(int(c) for c in points), len(labels)]
     result = np.empty_like(labels)
     previous, fresh = -1, int(labels.max()) + 1
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         votes = np.bincount(labels[a:b])
         if 0 <= previous < len(votes):
             votes[previous] = 0

@@ -8,7 +8,7 @@ SPEED_SCALE = 0.2
 
 
 def hats(length: int, knots: Ints) -> Floats:
-    """(length, len(knots)) basis of the continuous piecewise-linear functions with the given knots; 0 and length - 1 are knots."""
+    """(length, K) basis of the continuous piecewise-linear functions with the given K knots, the first 0, the last length - 1."""
     return np.column_stack([np.interp(np.arange(length), knots, row) for row in np.eye(len(knots))])
 
 
