@@ -1,0 +1,107 @@
+"""Greedy merging of states by marginal likelihood: what Gibbs sampling alone does with difficulty."""
+
+import math
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.kernels import F1, F2, I1, OUT1, OUTI1, F, I, kernel
+from scenario_gen.segmentation._chain import count_transitions
+from scenario_gen.segmentation._emission import accumulate, cholesky, log_marginal
+
+
+@kernel(inline=True)
+def merge_gain(n: Ints, i: int, j: int, stay: float, move: float) -> float:
+    """Gain in log p(labels) from making states i and j one; rows are Dirichlet with `stay` at home and `move` elsewhere."""
+    states = n.shape[1]
+    gain = 0.0
+    joint_row = 0
+    row_i, row_j = 0, 0
+    for k in range(states):
+        row_i += n[i, k]
+        row_j += n[j, k]
+        if k not in (i, j):
+            joint = n[i, k] + n[j, k]
+            joint_row += joint
+            gain += math.lgamma(move + joint) - math.lgamma(move + n[i, k]) - math.lgamma(move + n[j, k]) + math.lgamma(move)
+            joint = n[k, i] + n[k, j]
+            gain += math.lgamma(move + joint) - math.lgamma(move + n[k, i]) - math.lgamma(move + n[k, j]) + math.lgamma(move)
+    home = n[i, i] + n[i, j] + n[j, i] + n[j, j]
+    joint_row += home
+    gain += math.lgamma(stay + home) - math.lgamma(stay)
+    gain -= math.lgamma(stay + n[i, i]) - math.lgamma(stay) + math.lgamma(stay + n[j, j]) - math.lgamma(stay)
+    gain -= math.lgamma(move + n[i, j]) - math.lgamma(move) + math.lgamma(move + n[j, i]) - math.lgamma(move)
+    total = stay + states * move
+    gain += math.lgamma(total) - math.lgamma(total + joint_row)
+    return gain - 2.0 * math.lgamma(total) + math.lgamma(total + row_i) + math.lgamma(total + row_j)
+
+
+@kernel(inline=True)
+def best_merge(data: Floats, own: Floats, counts: Ints, n: Ints, stay: float, move: float) -> tuple[int, int]:
+    """Return the pair of states (i > j) whose merge gains most, or (-1, -1) if none gains anything."""
+    best, best_i, best_j = 0.0, -1, -1
+    for i in range(len(own)):
+        for j in range(i):
+            if counts[i] > 0 and counts[j] > 0:
+                gain = data[i, j] - own[i] - own[j] + merge_gain(n, i, j, stay, move)
+                if gain > best:
+                    best, best_i, best_j = gain, i, j
+    return best_i, best_j
+
+
+@kernel(F2, I1, F2, F1, I, F, F, OUT1, OUTI1)
+def merge_states(
+    v: Floats, ends: Ints, g0: Floats, hyper: Floats, regressors: int, stay: float, move: float, score: Floats, labels: Ints
+) -> None:
+    """Merge states greedily while the probability of the labels, emissions and transitions integrated out, grows.
+
+    Gibbs sampling alone splits easily and merges with difficulty; this is run on the labels that a chain starts from.
+
+    Args:
+        v: (T, M) samples.
+        ends: index one past the last sample of each sequence.
+        g0: (M, M) joint prior of the emissions.
+        hyper: as `run_chain` has it.
+        regressors: P.
+        stay: prior weight of the own state in a transition row.
+        move: prior weight of every other one.
+        score: (1,) output, log p(samples | labels).
+        labels: (T,) updated; `labels.max() + 1` states.
+    """
+    m = v.shape[1]
+    nu, weight, blur = hyper[6], hyper[7], hyper[8:]
+    states = labels.max() + 1
+    g = np.empty((states, m, m))
+    counts = np.empty(states, np.int64)
+    n = np.empty((states + 1, states), np.int64)
+    factor = g0.copy()
+    cholesky(factor)
+    base = log_marginal(factor, 0, regressors, nu)
+    own = np.zeros(states)
+    data = np.full((states, states), np.nan)
+    accumulate(v, labels, g0, weight, blur, g, counts)
+    for k in range(states):
+        factor[:] = g[k]
+        cholesky(factor)
+        own[k] = log_marginal(factor, weight * counts[k], regressors, nu) - base
+    while True:
+        count_transitions(labels, ends, n)
+        for i in range(states):
+            for j in range(i):
+                if counts[i] > 0 and counts[j] > 0 and np.isnan(data[i, j]):
+                    factor[:] = g[i] + g[j] - g0
+                    cholesky(factor)
+                    data[i, j] = log_marginal(factor, weight * (counts[i] + counts[j]), regressors, nu) - base
+        i, j = best_merge(data, own, counts, n, stay, move)
+        if i < 0:
+            break
+        own[j], own[i] = data[i, j], 0.0
+        g[j] += g[i] - g0
+        counts[j] += counts[i]
+        counts[i] = 0
+        for t in range(len(labels)):
+            if labels[t] == i:
+                labels[t] = j
+        data[j, :] = np.nan
+        data[:, j] = np.nan
+    score[0] = own.sum()
