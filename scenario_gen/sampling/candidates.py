@@ -1,0 +1,216 @@
+"""Candidate scenarios, many at a time, from standard normal numbers.
+
+A candidate varies the planned encounter in three ways: across the routes (a Gaussian process per vehicle), along them
+(where a changepoint's anchor lies), and in time (the clock that all vehicles share). The time law is solved on the
+displaced paths' own lengths, so the published speed is the rate of arc length and the acceleration is the law's.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from scenario_gen.arrays import Bools, Floats
+from scenario_gen.encounter import Vehicle
+from scenario_gen.sampling.clock import DT, Clock
+from scenario_gen.sampling.gp import combine
+from scenario_gen.sampling.path import BasePath, arc_lengths, states
+from scenario_gen.sampling.time_law import SpeedProfile, TimeLaw, TimeLayout
+from scenario_gen.scenario import Scenario
+
+_ANCHOR_SHARE = 0.3  # an anchor moves along the route by at most this share of the way to its neighbours
+DAMPING = (1.0, 0.5, 0.25, 0.0)  # of a candidate's deviations along and in time, until a speed profile exists
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Factors on the standard deviations of a candidate: across the route, along it, and in time."""
+
+    lateral: float = 1.0
+    longitudinal: float = 1.0
+    time: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class VehicleModel:
+    """All that is the same for every candidate of one vehicle.
+
+    Attributes:
+        vehicle: identity and footprint.
+        path: the route.
+        anchor: (K + 2,) arc length [m] of each anchor on it.
+        factor: (G, r) square root of the covariance of the lateral deviation.
+        law: the time law on the vehicle's knots.
+    """
+
+    vehicle: Vehicle
+    path: BasePath
+    anchor: Floats
+    factor: Floats
+    law: TimeLaw
+
+    @property
+    def size(self) -> int:
+        """Standard normal numbers needed per candidate."""
+        return int(self.factor.shape[1]) + len(self.anchor)
+
+    def deviations(self, z: Floats) -> Floats:
+        """Lateral deviations (S, G) [m]."""
+        return combine(z, self.factor)
+
+    def anchors(self, z: Floats, sigma: Floats) -> Floats:
+        """Arc lengths (S, K + 2) of the anchors, moved by sigma (S,) [m]; a dwell's two anchors move together."""
+        distinct, which = np.unique(self.anchor, return_inverse=True)
+        if len(distinct) < 3:
+            return np.broadcast_to(self.anchor, (len(z), len(self.anchor))).copy()
+        gap = np.diff(distinct)
+        most = _ANCHOR_SHARE * np.minimum(gap[:-1], gap[1:])
+        inner = distinct[1:-1] + np.clip(sigma[:, None] * z[:, 1 : len(distinct) - 1], -most, most)
+        ends = np.broadcast_to(distinct[[0, -1]], (len(z), 2))
+        return np.asarray(np.hstack([ends[:, :1], inner, ends[:, 1:]])[:, which])
+
+
+@dataclass(frozen=True, eq=False)
+class VehicleMotion:
+    """One vehicle's motion in one candidate: where it is at any time, in closed form.
+
+    Attributes:
+        curve: (G, 4) cubic spline x, y, dx/du, dy/du at its nodes.
+        arc: (G,) arc length [m] of the nodes.
+        spacing: step of u [m].
+        profile: speed over time.
+    """
+
+    curve: Floats
+    arc: Floats
+    spacing: float
+    profile: SpeedProfile
+
+    def state(self, time: Floats) -> Floats:
+        """States (T, 5) x, y [m], yaw [rad, unwrapped], speed [m/s], acceleration [m/s²] at ascending times (T,) [s]."""
+        out = np.empty((1, len(time), 5))
+        knot, speed = self.profile.time[None], self.profile.speed[None]
+        count = np.array([len(time)])
+        states(self.curve[None], self.arc[None], self.spacing, knot, speed, np.ascontiguousarray(time[None]), count, out)
+        out[0, :, 2] = np.unwrap(out[0, :, 2])
+        return np.asarray(out[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """S candidates of N vehicles.
+
+    Attributes:
+        vehicles: identities and footprints.
+        clock: (S, K + 2) seconds of start, changepoints and end.
+        curve, arc, knot, speed: per vehicle, (S, ...) arrays as in `VehicleMotion`.
+        spacing: per vehicle, metres.
+        feasible: (S,) False where no speed profile exists.
+        damping: (S,) factor that the deviations along the route and in time were multiplied by to get one.
+    """
+
+    vehicles: tuple[Vehicle, ...]
+    clock: Floats
+    curve: tuple[Floats, ...]
+    arc: tuple[Floats, ...]
+    knot: tuple[Floats, ...]
+    speed: tuple[Floats, ...]
+    spacing: tuple[float, ...]
+    feasible: Bools
+    damping: Floats
+
+    def motion(self, sample: int, vehicle: int) -> VehicleMotion:
+        """The motion of one vehicle in one candidate."""
+        profile = SpeedProfile(self.knot[vehicle][sample], self.speed[vehicle][sample])
+        return VehicleMotion(self.curve[vehicle][sample], self.arc[vehicle][sample], self.spacing[vehicle], profile)
+
+    def scenarios(self, seed: int, index: Sequence[int], frame_id: str) -> list[Scenario | None]:
+        """The candidates on the published grid; None where infeasible."""
+        samples, n = self.feasible.shape[0], len(self.vehicles)
+        count = np.round(self.clock[:, -1] / DT).astype(np.int64) + 1
+        time = np.round(np.arange(count.max()) * DT, 9)
+        out = np.empty((n, samples, len(time), 5))
+        times = np.broadcast_to(time, (samples, len(time))).copy()
+        for v in range(n):
+            states(self.curve[v], self.arc[v], self.spacing[v], self.knot[v], self.speed[v], times, count, out[v])
+        return [
+            _scenario(self.vehicles, time[: count[s]], out[:, s, : count[s]], seed, index[s], frame_id) if ok else None
+            for s, ok in enumerate(self.feasible)
+        ]
+
+
+def _scenario(vehicles: tuple[Vehicle, ...], time: Floats, state: Floats, seed: int, index: int, frame_id: str) -> Scenario:
+    """A scenario from states (N, T, 5)."""
+    return Scenario(vehicles, time, state[..., :2], state[..., 2], state[..., 3], state[..., 4], seed, index, frame_id)
+
+
+class CandidateModel:
+    """Draws candidates of one encounter on its routes."""
+
+    def __init__(self, vehicles: tuple[VehicleModel, ...], clock: Clock, longitudinal_sigma: float) -> None:
+        self.vehicles, self.clock, self.longitudinal_sigma = vehicles, clock, longitudinal_sigma
+
+    @property
+    def size(self) -> int:
+        """Standard normal numbers needed per candidate."""
+        return self.clock.size + sum(v.size for v in self.vehicles)
+
+    def draw(self, z: Floats, scale: Scale) -> Batch:
+        """Candidates from numbers z (S, size), their standard deviations multiplied by `scale`."""
+        samples = len(z)
+        parts = np.cumsum([self.clock.size] + [v.size for v in self.vehicles])
+        own = [z[:, a:b] for a, b in pairwise(parts)]
+        paths = []
+        for v, x in zip(self.vehicles, own, strict=True):
+            paths.append(v.path.displaced(v.deviations(scale.lateral * x[:, : v.factor.shape[1]])))
+        clock = np.zeros((samples, len(self.clock.times)))
+        knot = [np.zeros((samples, len(v.law.layout.knot))) for v in self.vehicles]
+        speed = [np.zeros_like(k) for k in knot]
+        damping = np.zeros(samples)
+        open_ = np.arange(samples)
+        for damp in DAMPING:
+            share = np.full(len(open_), damp)
+            clock[open_] = self.clock.sample(z[open_, : self.clock.size], share * scale.time)
+            feasible = np.ones(len(open_), dtype=np.bool_)
+            for n, v in enumerate(self.vehicles):
+                jitter = own[n][open_, v.factor.shape[1] :]
+                u = v.anchors(jitter, share * scale.longitudinal * self.longitudinal_sigma)
+                curve, arc = paths[n]
+                lengths = piece_lengths(v.law.layout, curve[open_], arc[open_], v.path.spacing, u)
+                knot[n][open_] = knots_on(clock[open_], self.clock.times, v.law.layout)
+                speed[n][open_], ok = v.law.solve(knot[n][open_], lengths)
+                feasible &= ok
+            damping[open_] = damp
+            open_ = open_[~feasible]
+            if len(open_) == 0:
+                break
+        feasible = np.ones(samples, dtype=np.bool_)
+        feasible[open_] = False
+        return Batch(
+            tuple(v.vehicle for v in self.vehicles),
+            clock,
+            tuple(curve for curve, _ in paths),
+            tuple(arc for _, arc in paths),
+            tuple(knot),
+            tuple(speed),
+            tuple(v.path.spacing for v in self.vehicles),
+            feasible,
+            damping,
+        )
+
+
+def knots_on(clock: Floats, times: Floats, lay: TimeLayout) -> Floats:
+    """Knots (S, M) of a vehicle on the clocks (S, K + 2), linear within each primitive."""
+    piece = np.append(lay.piece, lay.piece[-1])
+    share = (lay.knot - times[piece]) / (times[piece + 1] - times[piece])
+    return np.asarray(clock[:, piece] + share * (clock[:, piece + 1] - clock[:, piece]))
+
+
+def piece_lengths(lay: TimeLayout, curve: Floats, arc: Floats, spacing: float, anchor: Floats) -> Floats:
+    """Lengths (S, G) [m] of the time law's constraints on each sample's own path, for anchors (S, K + 2) on the route."""
+    if arc.shape[1] == 1:
+        return np.zeros((len(anchor), len(lay.bounds)))
+    at = np.empty(anchor.shape)
+    arc_lengths(np.ascontiguousarray(curve), np.ascontiguousarray(arc), spacing, np.ascontiguousarray(anchor), at)
+    return np.ascontiguousarray(at[:, lay.bounds[:, 1]] - at[:, lay.bounds[:, 0]])

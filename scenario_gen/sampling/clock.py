@@ -1,0 +1,71 @@
+"""The joint clock: when the changepoints come, for all vehicles alike, so that who goes first survives."""
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from scenario_gen.arrays import Floats
+from scenario_gen.sampling.config import SamplingConfig
+from scenario_gen.sampling.gp import Features, Observations, Regression, combine
+
+DT = 0.1  # s, the grid of published scenarios
+SLOWEST, FASTEST = 1.35, 0.75  # longest and shortest a primitive may become, as a share of its own duration
+_LENGTH_SHARE = 0.5  # length scale of the clock's deviation as a share of the encounter's duration
+
+
+class Clock:
+    """Samples monotone warps t + δ(t) of a clock, δ a Gaussian process over time with δ(0) = 0.
+
+    The end's deviation is drawn first, from its Gaussian truncated to the duration tolerance, the rest given the end.
+    """
+
+    def __init__(self, times: Floats, config: SamplingConfig) -> None:
+        """Prepare.
+
+        Args:
+            times: (K + 2,) seconds of start, changepoints and end, strictly increasing from 0.
+            config: σ_t and the tolerance of the duration.
+        """
+        self.times = times
+        end = float(times[-1])
+        self._shortest = np.ceil(end * (1.0 - config.duration_tolerance) / DT - 1e-6)
+        self._longest = np.floor(end * (1.0 + config.duration_tolerance) / DT + 1e-6)
+        if config.fixed_duration or self._shortest > self._longest:
+            self._shortest = self._longest = float(round(end / DT))
+        if config.time_sigma == 0.0:
+            self._end_sigma, self._share, self._factor = 0.0, times / end, np.zeros((len(times), 0))
+            return
+        features = Features(0.0, end, config.time_sigma, _LENGTH_SHARE * end)
+        ends, exact = np.array([0.0, end]), np.zeros(2)
+        free = Regression(features, Observations(ends[:1], exact[:1], exact[:1])).predict(ends[1:])
+        self._end_sigma = float(np.linalg.norm(free.factor))
+        given = Regression(features, Observations(ends, np.array([0.0, 1.0]), exact)).predict(times)
+        u, s, _ = np.linalg.svd(given.factor, full_matrices=False)
+        keep = s > 1e-9
+        self._share, self._factor = given.mean, u[:, keep] * s[keep]
+
+    @property
+    def size(self) -> int:
+        """Standard normal numbers needed per sample."""
+        return 1 + self._factor.shape[1]
+
+    def sample(self, z: Floats, scale: Floats) -> Floats:
+        """Clocks (S, K + 2) [s] from numbers z (S, size), deviations multiplied by scale (S,)."""
+        end = float(self.times[-1])
+        rest = combine(z[:, 1:], self._factor)
+        delta = (self._share * self._end(z[:, 0])[:, None] + rest) * scale[:, None]
+        steps = np.diff(self.times)
+        rate = np.diff(delta, axis=1) / steps
+        room = np.where(rate > 0.0, (SLOWEST - 1.0), (1.0 - FASTEST)) / np.maximum(np.abs(rate), 1e-12)
+        warped = self.times + delta * np.minimum(room.min(axis=1), 1.0)[:, None]
+        whole = np.clip(np.round(warped[:, -1] / DT), self._shortest, self._longest) * DT
+        warped += (self.times / end) * (whole - warped[:, -1])[:, None]
+        warped[:, -1] = whole
+        return np.asarray(warped)
+
+    def _end(self, z: Floats) -> Floats:
+        """Truncated Gaussian deviations of the end [s] from standard normal ones."""
+        low, high = self._shortest * DT - self.times[-1], self._longest * DT - self.times[-1]
+        if self._end_sigma < 1e-9 or high - low < 1e-9:
+            return np.zeros_like(z)
+        a, b = ndtr(low / self._end_sigma), ndtr(high / self._end_sigma)
+        return np.asarray(self._end_sigma * ndtri(a + (b - a) * ndtr(z)))

@@ -1,0 +1,37 @@
+"""Parameters of sampling."""
+
+from dataclasses import dataclass
+
+from scenario_gen.parameters import check, parameter
+
+
+@dataclass(frozen=True)
+class SamplingConfig:
+    """What varies from scenario to scenario, by how much, and within which limits of motion."""
+
+    lateral_sigma: float = parameter(
+        0.3, "σ_f: standard deviation across the route, between anchors", unit="m", low=0.0, high=10.0
+    )
+    lateral_length: float = parameter(15.0, "l: distance along the route over which it varies", unit="m", low=1.0, high=1000.0)
+    observation_sigma: float = parameter(
+        0.3, "σ_ω: standard deviation across the route at an interior anchor", unit="m", low=1e-3, high=10.0
+    )
+    longitudinal_sigma: float = parameter(
+        0.5, "σ_s: standard deviation of an interior anchor along the route", unit="m", low=0.0, high=10.0
+    )
+    time_sigma: float = parameter(
+        0.8, "σ_t: standard deviation of the changepoint clock that all vehicles share", unit="s", low=0.0, high=10.0
+    )
+    duration_tolerance: float = parameter(0.1, "share by which a sample may be longer or shorter", low=0.0, high=0.5)
+    fixed_duration: bool = parameter(False, "keep the template's duration")
+    max_speed: float = parameter(40.0, "highest speed", unit="m/s", low=0.1)
+    max_acceleration: float = parameter(4.0, "strongest speeding up", unit="m/s²", low=0.1)
+    max_deceleration: float = parameter(8.0, "strongest braking", unit="m/s²", low=0.1)
+    max_lateral_acceleration: float = parameter(5.0, "largest speed² times curvature", unit="m/s²", low=0.1)
+    max_stretch: float = parameter(
+        0.2, "share by which the clock may be stretched where no speed profile exists", low=0.0, high=1.0
+    )
+    attempts: int = parameter(20, "candidates drawn per scenario asked for, at most", low=1, high=10_000)
+
+    def __post_init__(self) -> None:
+        check(self)

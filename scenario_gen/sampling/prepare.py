@@ -1,0 +1,208 @@
+"""From an encounter and its routes to a model that draws candidates: knots, limits in curves, and a feasible clock."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+from scenario_gen.interaction import Wait
+from scenario_gen.planning.route import Route
+from scenario_gen.roads.road import Road
+from scenario_gen.sampling.candidates import CandidateModel, VehicleModel, knots_on, piece_lengths
+from scenario_gen.sampling.clock import Clock
+from scenario_gen.sampling.config import SamplingConfig
+from scenario_gen.sampling.lateral import lateral_factor, lateral_room
+from scenario_gen.sampling.path import BasePath
+from scenario_gen.sampling.time_law import STAND, SpeedBounds, SpeedProfile, TimeLaw, TimeLayout, layout
+from scenario_gen.scenario import BoundaryStates
+from scenario_gen.segmentation.result import Segmentation
+
+SLIDE_SIGMAS = 2.0  # an anchor that slides by so many σ_s is no farther from the template than a sample is anyway
+_SHORTEST_WAIT = 1.5  # s; shorter waits are lengthened to it, so that a fast clock cannot make them vanish
+_STRETCHES = 9
+_CURVE_REACH = 2.0  # m, around a position, in which the route's curvature is looked at
+_CURVE_MARGIN = 0.85  # share of the lateral limit that the route itself may use; the rest is the samples'
+_BOUND_ROUNDS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A model of candidates, or why there is none.
+
+    Attributes:
+        model: draws candidates; None if no speed profile exists even for the undisturbed routes.
+        adaptations: what was changed to get there, in sentences.
+        refusal: why there is no model, "" if there is one.
+    """
+
+    model: CandidateModel | None
+    adaptations: tuple[str, ...]
+    refusal: str = ""
+
+
+def prepare(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    routes: Sequence[Route],
+    asked: BoundaryStates,
+    waits: Sequence[Wait],
+    config: SamplingConfig,
+) -> Prepared:
+    """Build the model: first on the template's clock, then with anchors slid by little, then with the clock stretched.
+
+    Raises:
+        InputError: routes, segmentation and encounter disagree in their numbers.
+    """
+    times = encounter.time[np.concatenate([[0], segmentation.changepoints, [encounter.speed.shape[1] - 1]]).astype(np.int64)]
+    if len(routes) != len(encounter.vehicles) or any(len(route.anchor) != len(times) for route in routes):
+        raise InputError(f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each")
+    paths = [BasePath.of(route) for route in routes]
+    lays = [_layout(n, encounter, times, routes[n], asked, waits) for n in range(len(routes))]
+    slide = SLIDE_SIGMAS * config.longitudinal_sigma
+    stretches = np.linspace(1.0, 1.0 + config.max_stretch, _STRETCHES if config.max_stretch > 0.0 else 1)
+    reasons: list[str] = []
+    for most, factors in ((slide, stretches), (np.inf, stretches)):
+        for stretch in factors.tolist():
+            reasons = []
+            found = [
+                _feasible(paths[n], lays[n], times, stretch * times, most, config, encounter.vehicles[n].id, reasons)
+                for n in range(len(routes))
+            ]
+            if not reasons:
+                return _model(encounter, road, times, stretch, paths, [f for f in found if f is not None], config)
+    return Prepared(None, (), "; ".join(reasons))
+
+
+def _layout(
+    n: int, encounter: Encounter, times: Floats, route: Route, asked: BoundaryStates, waits: Sequence[Wait]
+) -> TimeLayout:
+    """The knots of vehicle n; a route without length stands throughout, whatever speed is asked."""
+    dwells = route.anchor[:-1] == route.anchor[1:]
+    own = []
+    for wait in waits:
+        if wait.vehicle == n:
+            pad = max(0.0, 0.5 * (_SHORTEST_WAIT - (wait.end - wait.start)))
+            own.append((wait.start - pad, wait.end + pad))
+    ends = (float(asked.start[n, 3]), float(asked.end[n, 3]))
+    if dwells.all():
+        ends = (0.0, 0.0)
+    lay = layout(times, dwells, own, encounter.time, encounter.speed[n], ends)
+    standing = [v if v > STAND or not still else 0.0 for v, still in zip(ends, lay.still[[0, -1]], strict=True)]
+    return layout(times, dwells, own, encounter.time, encounter.speed[n], (standing[0], standing[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Nominal:
+    """A vehicle that can be driven: its time law, its anchors after sliding, and by how much the farthest slid [m]."""
+
+    law: TimeLaw
+    anchor: Floats
+    slid: float
+
+
+def _feasible(
+    path: BasePath,
+    lay: TimeLayout,
+    times: Floats,
+    clock: Floats,
+    most: float,
+    config: SamplingConfig,
+    name: str,
+    reasons: list[str],
+) -> _Nominal | None:
+    """Anchors and speed bounds with which the undisturbed route can be driven on `clock`, or None and a reason."""
+    curve, arc = path.displaced(np.zeros((1, len(path.node))))
+    knot = knots_on(clock[None], times, lay)
+    lengths = piece_lengths(lay, curve, arc, path.spacing, path.anchor[None])
+    bounds, anchor, slid = SpeedBounds.none(), path.anchor, 0.0
+    law = TimeLaw(lay, config, bounds)
+    for _ in range(_BOUND_ROUNDS):
+        law = TimeLaw(lay, config, bounds)
+        speed, ok = law.solve(knot, lengths)
+        anchor, slid = path.anchor, 0.0
+        if not ok[0]:
+            moved = law.solve_sliding(knot[0], lengths[0])
+            if moved is None:
+                limit = "" if len(bounds.interval) == 0 else " through its curves"
+                reasons.append(f"vehicle {name} cannot drive {path.length:.1f} m{limit} in {clock[-1]:.1f} s within the limits")
+                return None
+            anchor, slid = _slide(path.anchor, lay, moved - lengths[0])
+            if slid > most:
+                reasons.append(f"vehicle {name} would have to pass a changepoint {slid:.1f} m from its place")
+                return None
+            speed, ok = law.solve(knot, piece_lengths(lay, curve, arc, path.spacing, anchor[None]))
+            if not ok[0]:
+                reasons.append(f"vehicle {name} has no speed profile within the limits")
+                return None
+        tighter = _curve_bounds(path, SpeedProfile(knot[0], speed[0]), lay, config)
+        if tighter is None:
+            break
+        bounds = tighter
+    return _Nominal(law, anchor, slid)
+
+
+def _slide(anchor: Floats, lay: TimeLayout, change: Floats) -> tuple[Floats, float]:
+    """Anchors moved so that the lengths of the constraints change by `change` (G,), and the largest movement."""
+    moved = anchor.copy()
+    offset = np.concatenate([[0.0], np.cumsum(change)])
+    for g, (first, last) in enumerate(lay.bounds):
+        moved[first + 1 : last + 1] += np.where(anchor[first + 1 : last + 1] > anchor[first], offset[g + 1], offset[g])
+    return moved, float(np.abs(moved - anchor).max())
+
+
+def _curve_bounds(path: BasePath, profile: SpeedProfile, lay: TimeLayout, config: SamplingConfig) -> SpeedBounds | None:
+    """Speed bounds where the route's curvature asks for them; None if the profile keeps to the lateral limit already."""
+    if len(path.node) == 1:
+        return None
+    bend = np.abs(path.curvature)
+    reach = int(np.ceil(_CURVE_REACH / path.spacing))
+    wide = np.array([bend[max(0, j - reach) : j + reach + 1].max() for j in range(len(bend))])
+    limit = _CURVE_MARGIN * config.max_lateral_acceleration
+    fine = np.linspace(profile.time[0], profile.time[-1], 20 * len(lay.knot))
+    s, v, _ = profile.state(fine)
+    if (v**2 * np.interp(s, path.arc, bend)).max() <= limit * 1.02:
+        return None
+    moving = np.flatnonzero(~lay.still)
+    interval, at = np.repeat(moving, 4), np.tile(np.arange(1, 5) / 4.0, len(moving))
+    t = profile.time[interval] + at * np.diff(profile.time)[interval]
+    most = np.sqrt(limit / np.maximum(np.interp(profile.state(t)[0], path.arc, wide), 1e-6))
+    given = ~((at == 1.0) & (lay.unknown[interval + 1] < 0))
+    return SpeedBounds(interval[given], at[given], most[given])
+
+
+def _model(
+    encounter: Encounter,
+    road: Road,
+    times: Floats,
+    stretch: float,
+    paths: list[BasePath],
+    found: list[_Nominal],
+    config: SamplingConfig,
+) -> Prepared:
+    """The model on the clock stretched by `stretch`."""
+    said = []
+    if stretch > 1.0:
+        said.append(f"clock stretched by {100.0 * (stretch - 1.0):.1f} % so that every vehicle can keep to its limits")
+    vehicles = []
+    for vehicle, path, nominal in zip(encounter.vehicles, paths, found, strict=True):
+        if nominal.slid > 1e-6:
+            said.append(f"vehicle {vehicle.id} passes changepoints up to {nominal.slid:.2f} m from their place")
+        room = lateral_room(path, vehicle, road)
+        narrow = room < 2.5 * config.lateral_sigma
+        if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
+            said.append(
+                f"vehicle {vehicle.id} varies less across {100.0 * narrow.mean():.0f} % of its route, where the road is narrow"
+            )
+        factor = lateral_factor(path, room, config)
+        law = TimeLaw(_rescaled(nominal.law.layout, stretch), config, nominal.law.bounds)
+        vehicles.append(VehicleModel(vehicle, path, nominal.anchor, factor, law))
+    return Prepared(CandidateModel(tuple(vehicles), Clock(stretch * times, config), config.longitudinal_sigma), tuple(said))
+
+
+def _rescaled(lay: TimeLayout, stretch: float) -> TimeLayout:
+    """The same knots on a clock stretched by `stretch`."""
+    return replace(lay, knot=lay.knot * stretch) if stretch != 1.0 else lay

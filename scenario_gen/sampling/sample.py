@@ -1,0 +1,202 @@
+"""The loop: draw candidates, have them checked, keep the valid ones, account for the others."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.encounter import Encounter
+from scenario_gen.interaction import Wait
+from scenario_gen.planning.route import Route
+from scenario_gen.roads.road import Road
+from scenario_gen.sampling.candidates import Batch, CandidateModel, Scale
+from scenario_gen.sampling.config import SamplingConfig
+from scenario_gen.sampling.prepare import prepare
+from scenario_gen.scenario import BoundaryStates, Cause, Scenario, ScenarioSet, Verdict
+from scenario_gen.segmentation.result import Segmentation
+
+Check = Callable[[Sequence[Scenario]], list[Verdict]]
+
+LEVELS = (
+    Scale(),
+    Scale(lateral=0.5),
+    Scale(lateral=0.5, longitudinal=0.5),
+    Scale(lateral=0.25, longitudinal=0.25, time=0.5),
+    Scale(lateral=0.1, longitudinal=0.1, time=0.25),
+)
+LEVEL_SIZE = 1 << 20  # a scenario's index is level * LEVEL_SIZE + the candidate's number at that level
+BLOCK = 32  # candidates whose random numbers are drawn together
+PILOT = 2 * BLOCK  # candidates by which a level is judged
+ENOUGH = 0.3  # share of valid candidates below which the next level is tried
+
+
+@dataclass(frozen=True, eq=False)
+class Sampler:
+    """Draws candidates by their index: the same seed and index give the same candidate, whatever was drawn before."""
+
+    model: CandidateModel
+    seed: int
+    frame_id: str
+
+    def block(self, level: int, number: int) -> tuple[Batch, list[int]]:
+        """Candidates number·BLOCK … of a level, and their indices."""
+        first = level * LEVEL_SIZE + number * BLOCK
+        return self.model.draw(self._normal(level, number), LEVELS[level]), list(range(first, first + BLOCK))
+
+    def scenario(self, index: int) -> Scenario | None:
+        """The candidate with this index, bit for bit as in a whole set; None if it has no speed profile."""
+        level, within = divmod(index, LEVEL_SIZE)
+        number, row = divmod(within, BLOCK)
+        batch = self.model.draw(self._normal(level, number)[row : row + 1], LEVELS[level])
+        return batch.scenarios(self.seed, [index], self.frame_id)[0]
+
+    def _normal(self, level: int, number: int) -> Floats:
+        """Standard normal numbers (BLOCK, size)."""
+        generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([self.seed, level, number])))
+        return generator.standard_normal((BLOCK, self.model.size))
+
+
+def sample_scenarios(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    routes: Sequence[Route],
+    asked: BoundaryStates,
+    check: Check,
+    config: SamplingConfig | None = None,
+    *,
+    count: int,
+    seed: int = 0,
+    waits: tuple[Wait, ...],
+    progress: Callable[[int, int], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> ScenarioSet:
+    """Draw candidates until `count` are valid or the budget is spent.
+
+    Args:
+        encounter: the template.
+        segmentation: its changepoints.
+        road: the target road, for the room it leaves.
+        routes: one per vehicle, with an anchor at start, changepoints and end.
+        asked: start and end states; their speeds are met exactly.
+        check: the validity checker; its verdicts decide.
+        config: the standard deviations and limits.
+        count: valid scenarios wanted.
+        seed: of all randomness; with a scenario's index it gives that scenario again.
+        waits: when a vehicle stands, on the template's clock.
+        progress: called with (valid so far, count).
+        cancelled: asked now and then; if True, the set so far is returned.
+
+    Returns:
+        At most `count` scenarios; fewer if the budget did not suffice, which the account (`refused`) explains.
+
+    Raises:
+        InputError: routes, segmentation and encounter disagree.
+    """
+    config = config or SamplingConfig()
+    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config)
+    if prepared.model is None:
+        return ScenarioSet(count, (), 1, Counter({Cause.TIME_LAW: 1}), (prepared.refusal,))
+    loop = _Loop(Sampler(prepared.model, seed, road.frame_id), check, count, progress, cancelled)
+    loop.run(config.attempts * count)
+    return ScenarioSet(count, tuple(loop.valid), loop.candidates, loop.refused, (*prepared.adaptations, *loop.adaptations))
+
+
+def regenerate(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    routes: Sequence[Route],
+    asked: BoundaryStates,
+    config: SamplingConfig | None = None,
+    *,
+    seed: int,
+    index: int,
+    waits: tuple[Wait, ...],
+) -> Scenario | None:
+    """The scenario with this seed and index again, bit for bit, without the others; arguments as in `sample_scenarios`."""
+    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config or SamplingConfig())
+    return None if prepared.model is None else Sampler(prepared.model, seed, road.frame_id).scenario(index)
+
+
+class _Loop:
+    """The account of one request."""
+
+    def __init__(
+        self,
+        sampler: Sampler,
+        check: Check,
+        count: int,
+        progress: Callable[[int, int], None] | None,
+        cancelled: Callable[[], bool] | None,
+    ) -> None:
+        self.sampler, self.check, self.count = sampler, check, count
+        self.progress, self.cancelled = progress, cancelled
+        self.valid: list[Scenario] = []
+        self.refused: Counter[Cause] = Counter()
+        self.candidates = 0
+        self.damped = 0
+        self.adaptations: list[str] = []
+
+    def run(self, budget: int) -> None:
+        """Judge the levels by their first candidates, then stay with the first that is good enough, or the best."""
+        blocks = [self._blocks(level) for level in range(len(LEVELS))]
+        share = []
+        for level in range(len(LEVELS)):
+            seen, good = self._spend(blocks[level], min(PILOT, budget - self.candidates))
+            share.append(good / seen if seen else 0.0)
+            if self._done(budget) or share[-1] >= ENOUGH:
+                break
+        best = int(np.argmax(share))
+        while not self._done(budget) and self._spend(blocks[best], budget - self.candidates)[0]:
+            pass
+        self._say(best, len(share))
+
+    def _done(self, budget: int) -> bool:
+        return len(self.valid) >= self.count or self.candidates >= budget or bool(self.cancelled and self.cancelled())
+
+    def _blocks(self, level: int) -> Iterator[tuple[Batch, list[int]]]:
+        for number in range(LEVEL_SIZE // BLOCK):
+            yield self.sampler.block(level, number)
+
+    def _spend(self, blocks: Iterator[tuple[Batch, list[int]]], most: int) -> tuple[int, int]:
+        """Check up to `most` candidates, whole blocks at a time; how many were seen, and how many of them were valid."""
+        seen = good = 0
+        while seen < most and len(self.valid) < self.count and not (self.cancelled and self.cancelled()):
+            batch, index = next(blocks, (None, []))
+            if batch is None:
+                break
+            drawn = batch.scenarios(self.sampler.seed, index, self.sampler.frame_id)
+            verdicts = iter(self.check([s for s in drawn if s is not None]))
+            for scenario, damping in zip(drawn, batch.damping, strict=True):
+                if seen == most or len(self.valid) == self.count:
+                    break
+                seen += 1
+                self.damped += damping < 1.0
+                verdict = None if scenario is None else next(verdicts)
+                if scenario is not None and verdict is not None and verdict.valid:
+                    good += 1
+                    self.valid.append(scenario)
+                else:
+                    self.refused[verdict.violations[0].cause if verdict else Cause.TIME_LAW] += 1
+            if self.progress:
+                self.progress(len(self.valid), self.count)
+        self.candidates += seen
+        return seen, good
+
+    def _say(self, best: int, tried: int) -> None:
+        """Put what was adapted into sentences."""
+        if tried > 1:
+            s = LEVELS[best]
+            self.adaptations.append(
+                f"few candidates were valid: standard deviations multiplied by {s.lateral:g} across the route, "
+                f"{s.longitudinal:g} along it, {s.time:g} in time"
+            )
+        if self.damped:
+            self.adaptations.append(
+                f"{self.damped} of {self.candidates} candidates damped along the route and in time for a speed profile"
+            )
+        if self.cancelled and self.cancelled():
+            self.adaptations.append("cancelled")

@@ -1,0 +1,282 @@
+"""Whole sets on hand-made routes: a straight crossed by a quarter turn, with a wait."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from scenario_gen.arrays import wrap_angle
+from scenario_gen.encounter import Encounter, Vehicle
+from scenario_gen.errors import InputError
+from scenario_gen.interaction import Wait
+from scenario_gen.planning.route import Route
+from scenario_gen.roads.road import Road
+from scenario_gen.sampling import SamplingConfig, regenerate, sample_scenarios
+from scenario_gen.sampling.candidates import Scale
+from scenario_gen.sampling.prepare import prepare
+from scenario_gen.sampling.sample import LEVEL_SIZE
+from scenario_gen.sampling.time_law import SpeedProfile
+from scenario_gen.scenario import BoundaryStates, Cause, Verdict, Violation
+from scenario_gen.segmentation.result import Segmentation
+
+TIME = np.arange(201) * 0.1
+CHANGES = (60, 90, 140)
+CLOCK = TIME[[0, *CHANGES, 200]]
+
+
+def straight(length):
+    s = np.linspace(0.0, length, int(length / 0.4) + 2)
+    return np.column_stack([s, np.zeros_like(s), np.zeros_like(s)]), s
+
+
+def turn(before, radius, after):
+    """South to north, then a quarter turn to the left."""
+    total = before + 0.5 * np.pi * radius + after
+    s = np.linspace(0.0, total, int(total / 0.4) + 2)
+    angle = np.clip((s - before) / radius, 0.0, 0.5 * np.pi)
+    rest = np.maximum(s - before - 0.5 * np.pi * radius, 0.0)
+    x = 60.0 - radius * (1.0 - np.cos(angle)) - rest
+    y = -30.0 + np.minimum(s, before) + radius * np.sin(angle)
+    return np.column_stack([x, y, 0.5 * np.pi + angle]), s
+
+
+def route(points, s, speed):
+    driven = SpeedProfile(TIME, speed).state(CLOCK)[0]
+    anchor = np.searchsorted(s, driven - 1e-9).clip(0, len(s) - 1)
+    anchor[-1] = anchor[-1] if driven[-1] - driven[-2] < 1e-9 else len(s) - 1
+    return Route(points, anchor, s)
+
+
+@cache
+def scene(width=60.0):
+    """Vehicle 0 drives on, vehicle 1 waits from 7.0 s to 13.0 s, then turns left; vehicle 2 stands throughout."""
+    steady = np.full(201, 6.0) + np.sin(TIME / 3.0)
+    stopping = np.interp(TIME, [0.0, 4.0, 7.0, 13.0, 17.0, 20.0], [6.0, 6.0, 0.0, 0.0, 6.0, 6.0])
+    parts = [straight(SpeedProfile(TIME, steady).travelled[-1])]
+    total = SpeedProfile(TIME, stopping).travelled[-1]
+    parts.append(turn(35.0, 9.0, total - 35.0 - 4.5 * np.pi))
+    routes = [route(*part, speed) for part, speed in zip(parts, (steady, stopping), strict=True)]
+    routes.append(Route(np.array([[30.0, 15.0, 0.3]]), np.zeros(5, dtype=int), [0.0]))
+    speed = np.array([steady, stopping, np.zeros(201)])
+    vehicles = (Vehicle("a"), Vehicle("b"), Vehicle("c"))
+    encounter = Encounter("scene", vehicles, 0, 100_000_000, np.zeros((3, 201, 2)), np.zeros((3, 201)), speed)
+    segmentation = Segmentation(np.searchsorted(CHANGES, np.arange(201), side="right"), CHANGES, np.zeros(201), ("",) * 4)
+    road = Road("open", np.ones((int(2 * width), 500), dtype=bool), 0.5, [-50.0, -0.5 * width], [], [])
+    asked = BoundaryStates(
+        *(np.array([[*r.points[r.anchor[k]], v[k]] for r, v in zip(routes, speed, strict=True)]) for k in (0, -1))
+    )
+    return encounter, segmentation, road, tuple(routes), asked, (Wait(1, 7.0, 13.0),)
+
+
+def all_valid(scenarios):
+    return [Verdict() for _ in scenarios]
+
+
+def drawn(count=50, check=all_valid, config=None, seed=5):
+    *head, waits = scene()
+    return sample_scenarios(*head, check, config or SamplingConfig(), count=count, seed=seed, waits=waits)
+
+
+def batch(samples=200, scale=None, **changes):
+    *head, waits = scene(120.0)
+    model = prepare(*head, waits, SamplingConfig(**changes)).model
+    return model, model.draw(np.random.default_rng(1).standard_normal((samples, model.size)), scale or Scale())
+
+
+@pytest.fixture(scope="module")
+def fifty():
+    return drawn()
+
+
+def test_a_full_set(fifty):
+    assert len(fifty.scenarios) == fifty.candidates == 50
+    assert not fifty.refused
+    assert len({s.position.tobytes() for s in fifty.scenarios}) == 50
+
+
+def test_grid_and_duration(fifty):
+    for s in fifty.scenarios:
+        assert np.array_equal(s.time, np.round(np.arange(len(s.time)) * 0.1, 9))
+        assert 18.0 - 1e-9 <= s.time[-1] <= 22.0 + 1e-9
+    assert len({len(s.time) for s in fifty.scenarios}) > 5
+    fixed = drawn(config=SamplingConfig(fixed_duration=True))
+    assert {s.time[-1] for s in fixed.scenarios} == {20.0}
+
+
+def test_asked_states(fifty):
+    asked = scene()[4]
+    for s in fifty.scenarios:
+        for k, state in ((0, asked.start), (-1, asked.end)):
+            assert s.position[:, k] == pytest.approx(state[:, :2], abs=1e-5)
+            assert s.speed[:, k] == pytest.approx(state[:, 3], abs=1e-9)
+            assert np.abs(wrap_angle(s.heading[:, k] - state[:, 2])).max() < 0.01
+
+
+def test_waits_stand_exactly_and_still_vehicles_too(fifty):
+    for s in fifty.scenarios:
+        standing = s.speed[1] < 0.1
+        assert standing.sum() * 0.1 > 4.0
+        exactly = s.speed[1] == 0.0
+        assert np.ptp(s.position[1][exactly], axis=0).max() == 0.0
+        assert np.ptp(s.heading[1][exactly]) == 0.0
+        assert np.ptp(s.position[2], axis=0).max() == 0.0
+        assert (s.speed[2] == 0.0).all()
+
+
+def test_speed_is_the_rate_of_position_and_acceleration_that_of_speed(fifty):
+    for s in fifty.scenarios[:10]:
+        step = np.diff(s.position, axis=1)
+        along = 0.5 * (s.heading[:, 1:] + s.heading[:, :-1])
+        ahead = step[..., 0] * np.cos(along) + step[..., 1] * np.sin(along)
+        aside = -step[..., 0] * np.sin(along) + step[..., 1] * np.cos(along)
+        assert np.abs(ahead / 0.1 - 0.5 * (s.speed[:, 1:] + s.speed[:, :-1])).max() < 0.05
+        assert np.abs(aside / 0.1).max() < 0.05
+        rate = np.diff(s.speed, axis=1) / 0.1
+        low = np.minimum(s.acceleration[:, 1:], s.acceleration[:, :-1])
+        high = np.maximum(s.acceleration[:, 1:], s.acceleration[:, :-1])
+        assert ((rate > low - 1e-6) & (rate < high + 1e-6)).all()
+
+
+def test_headings_are_smooth(fifty):
+    for s in fifty.scenarios:
+        turn_rate = np.abs(np.diff(s.heading, axis=1)) / np.maximum(0.05 * (s.speed[:, 1:] + s.speed[:, :-1]), 1e-3)
+        assert turn_rate[:2].max() < 0.2
+
+
+def test_same_seed_same_bytes_and_any_one_again(fifty):
+    again = drawn()
+    more = drawn(count=120)
+    *head, waits = scene()
+    for a, b, c in zip(fifty.scenarios, again.scenarios, more.scenarios, strict=False):
+        assert a.position.tobytes() == b.position.tobytes() == c.position.tobytes()
+        assert a.speed.tobytes() == b.speed.tobytes() == c.speed.tobytes()
+    last = more.scenarios[-1]
+    one = regenerate(*head, seed=5, index=last.index, waits=waits)
+    for name in ("time", "position", "heading", "speed", "acceleration"):
+        assert getattr(one, name).tobytes() == getattr(last, name).tobytes()
+    assert drawn(count=1, seed=6).scenarios[0].position.tobytes() != fifty.scenarios[0].position.tobytes()
+
+
+def test_state_at_any_time_agrees_with_the_published_samples():
+    _, some = batch(8)
+    published = some.scenarios(0, range(8), "map")
+    for k, s in enumerate(published):
+        for n in range(3):
+            state = some.motion(k, n).state(s.time)
+            assert np.array_equal(state[:, :2], s.position[n])
+            assert np.array_equal(state[:, 3], s.speed[n])
+            between = some.motion(k, n).state(np.linspace(0.0, s.time[-1], 5001))
+            travelled = np.hypot(*np.diff(between[:, :2], axis=0).T).sum()
+            assert travelled == pytest.approx(SpeedProfile(some.knot[n][k], some.speed[n][k]).travelled[-1], abs=1e-3)
+
+
+def spread_across(b):
+    """Mean standard deviation [m] of y on the straight."""
+    return float(b.curve[0][:, :, 1].std(axis=0).mean())
+
+
+def roughness(b):
+    """Mean standard deviation of the slope of the lateral deviation on the straight."""
+    return float((b.curve[0][:, :, 3] / b.curve[0][:, :, 2]).std(axis=0).mean())
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "measure", "sign"),
+    [
+        ("lateral_sigma", (0.1, 0.2, 0.4, 0.8), spread_across, 1),
+        ("observation_sigma", (0.05, 0.2, 0.6), spread_across, 1),
+        ("lateral_length", (8.0, 15.0, 30.0, 60.0), roughness, -1),
+        ("time_sigma", (0.1, 0.3, 0.6, 1.0), lambda b: float(b.clock[:, 2].std()), 1),
+        ("time_sigma", (0.1, 0.3, 0.6, 1.0), lambda b: float(b.clock[:, -1].std()), 1),
+        ("longitudinal_sigma", (0.0, 0.5, 1.0, 2.0), lambda b: float(stops(b).std()), 1),
+    ],
+)
+def test_each_parameter_has_its_monotone_effect(name, values, measure, sign):
+    found = [sign * measure(batch(**{name: value})[1]) for value in values]
+    assert (np.diff(found) > 0.0).all(), found
+
+
+def stops(b):
+    """Where vehicle 1 stands [m]."""
+    return np.array([b.motion(k, 1).state(np.array([0.5 * (b.clock[k, 2] + b.clock[k, 3])]))[0, 1] for k in range(len(b.clock))])
+
+
+def test_deviations_have_the_stated_standard_deviation():
+    model, some = batch(4000, lateral_sigma=0.4, observation_sigma=10.0)
+    middle = len(model.vehicles[0].path.node) // 2
+    assert some.curve[0][:, middle, 1].std() == pytest.approx(0.4, rel=0.05)
+    assert some.clock[:, 2].std() == pytest.approx(0.8 * np.sqrt(1.0 - np.exp(-((9.0 / 10.0) ** 2))), rel=0.1)
+
+
+def test_clocks_are_monotone_and_shared():
+    _, some = batch(500, time_sigma=3.0)
+    rate = np.diff(some.clock, axis=1) / np.diff(CLOCK)
+    assert rate.min() > 0.7
+    assert rate.max() < 1.4
+    assert np.abs(some.clock[:, -1] / 0.1 - np.round(some.clock[:, -1] / 0.1)).max() < 1e-9
+
+
+def test_lateral_deviation_leaves_room_on_a_narrow_road():
+    encounter, segmentation, road, routes, asked, waits = scene()
+    lane = np.zeros(road.drivable.shape, dtype=bool)
+    lane[57:63] = True  # 1.5 m to either side of y = 0
+    narrow = Road("lane", lane, 0.5, road.origin, [], [])
+    done = prepare(encounter, segmentation, narrow, routes, asked, waits, SamplingConfig())
+    some = done.model.draw(np.random.default_rng(0).standard_normal((500, done.model.size)), Scale())
+    assert np.abs(some.curve[0][..., 1]).max() < 1.5 - 0.5 * 1.9
+    assert any("narrow" in sentence for sentence in done.adaptations)
+
+
+def test_refusals_are_counted_by_cause_and_levels_are_tried():
+    def strict(scenarios):
+        wide = [np.abs(s.position[0, :, 1]).max() > 0.12 for s in scenarios]
+        return [Verdict((Violation(Cause.OFF_ROAD, 0.0, (0,), ""),)) if w else Verdict() for w in wide]
+
+    found = drawn(check=strict)
+    assert len(found.scenarios) == 50
+    assert found.candidates == 50 + found.refused.total()
+    assert set(found.refused) == {Cause.OFF_ROAD}
+    assert any("multiplied" in sentence for sentence in found.adaptations)
+    assert max(s.index for s in found.scenarios) >= LEVEL_SIZE
+    *head, waits = scene()
+    last = found.scenarios[-1]
+    assert regenerate(*head, seed=5, index=last.index, waits=waits).position.tobytes() == last.position.tobytes()
+
+
+def test_short_set_is_returned_with_its_account():
+    def never(scenarios):
+        return [Verdict((Violation(Cause.OVERLAP, 0.0, (0, 1), ""),)) for _ in scenarios]
+
+    found = drawn(count=10, check=never, config=SamplingConfig(attempts=5))
+    assert found.scenarios == ()
+    assert found.candidates == found.refused[Cause.OVERLAP] == 50
+
+
+def test_progress_and_cancellation():
+    *head, waits = scene()
+    seen = []
+    found = sample_scenarios(
+        *head, all_valid, count=500, waits=waits, progress=lambda *a: seen.append(a), cancelled=lambda: len(seen) > 2
+    )
+    assert 0 < len(found.scenarios) < 500
+    assert seen[-1] == (len(found.scenarios), 500)
+    assert "cancelled" in found.adaptations
+
+
+def test_stretched_clock_is_said():
+    encounter, segmentation, road, routes, asked, waits = scene()
+    slow = SamplingConfig(max_speed=6.6)
+    done = prepare(encounter, segmentation, road, routes, asked, waits, slow)
+    assert done.model is not None
+    assert any("stretched" in sentence for sentence in done.adaptations)
+    impossible = sample_scenarios(
+        encounter, segmentation, road, routes, asked, all_valid, SamplingConfig(max_speed=3.0), count=5, waits=waits
+    )
+    assert impossible.refused[Cause.TIME_LAW] == 1
+    assert "cannot drive" in impossible.adaptations[0]
+
+
+def test_routes_that_do_not_suit():
+    encounter, segmentation, road, routes, asked, waits = scene()
+    with pytest.raises(InputError, match="routes do not suit"):
+        sample_scenarios(encounter, segmentation, road, routes[:2], asked, all_valid, count=5, waits=waits)

@@ -1,0 +1,146 @@
+"""The time law: exact lengths, given end speeds, limits kept, waits still, no ringing."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import LinearConstraint, minimize
+
+from scenario_gen.sampling.config import SamplingConfig
+from scenario_gen.sampling.time_law import SpeedBounds, SpeedProfile, TimeLaw, best_knot, layout
+
+TIME = np.arange(201) * 0.1
+CLOCK = np.array([0.0, 6.0, 9.0, 14.0, 20.0])
+NO_DWELL = np.zeros(4, dtype=bool)
+
+
+def dip(depth=6.0):
+    return 10.0 - depth * np.exp(-(((TIME - 10.0) / 3.0) ** 2))
+
+
+def driven(speed, clock=CLOCK):
+    profile = SpeedProfile(TIME, speed)
+    return np.diff(profile.state(clock)[0])
+
+
+def test_own_lengths_give_the_template_back():
+    lay = layout(CLOCK, NO_DWELL, [], TIME, dip(), (dip()[0], dip()[-1]))
+    speed, ok = TimeLaw(lay, SamplingConfig()).solve(lay.knot[None], driven(dip())[None])
+    assert ok[0]
+    profile = SpeedProfile(lay.knot, speed[0])
+    assert np.diff(profile.state(CLOCK)[0]) == pytest.approx(driven(dip()), abs=1e-6)
+    assert np.abs(profile.state(TIME)[1] - dip()).max() < 0.8
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.floats(0.85, 1.15), min_size=4, max_size=4), st.floats(0.0, 9.0), st.floats(8.0, 11.0))
+def test_lengths_ends_and_limits_hold(factors, depth, first):
+    template, config = dip(depth), SamplingConfig()
+    lay = layout(CLOCK, NO_DWELL, [], TIME, template, (first, 10.0))
+    lengths = driven(template) * np.array(factors)
+    speed, ok = TimeLaw(lay, config).solve(lay.knot[None], lengths[None])
+    if not ok[0]:
+        return
+    profile = SpeedProfile(lay.knot, speed[0])
+    assert np.diff(profile.state(CLOCK)[0]) == pytest.approx(lengths, abs=1e-5)
+    assert (speed[0][[0, -1]] == [first, 10.0]).all()
+    acceleration = np.diff(speed[0]) / np.diff(lay.knot)
+    assert (speed[0] >= 0.0).all()
+    assert acceleration.max() <= config.max_acceleration + 1e-5
+    assert acceleration.min() >= -config.max_deceleration - 1e-5
+
+
+def test_is_the_minimum_of_the_stated_cost():
+    template = dip()
+    lay = layout(CLOCK, NO_DWELL, [], TIME, template, (10.0, 10.0))
+    lengths = driven(template) * np.array([1.05, 0.9, 1.1, 0.97])
+    speed, _ = TimeLaw(lay, SamplingConfig()).solve(lay.knot[None], lengths[None])
+    fine = np.linspace(0.0, 20.0, 4001)
+    scale = (lengths / driven(template))[np.clip(np.searchsorted(CLOCK, fine, side="right") - 1, 0, 3)]
+    wanted = np.interp(fine, TIME, template) * scale
+
+    def cost(inner):
+        v = np.interp(fine, lay.knot, np.r_[10.0, inner, 10.0])
+        return ((v - wanted) ** 2)[:-1].sum() * (fine[1] - fine[0])
+
+    rows = np.zeros((4, len(lay.knot)))
+    for i, g in enumerate(lay.group):
+        rows[g, i : i + 2] += 0.5 * (lay.knot[i + 1] - lay.knot[i])
+    right = lengths - rows[:, 0] * 10.0 - rows[:, -1] * 10.0
+    start = np.linalg.lstsq(rows[:, 1:-1], right, rcond=None)[0]
+    best = minimize(
+        cost,
+        start,
+        constraints=LinearConstraint(rows[:, 1:-1], right, right),
+        method="SLSQP",
+        options={"ftol": 1e-12, "maxiter": 500},
+    )
+    assert cost(speed[0][1:-1]) <= best.fun * (1.0 + 1e-4) + 1e-6
+
+
+def test_chained_law_would_ring_and_this_does_not():
+    template = np.full(201, 10.0)
+    lengths = driven(template) * np.array([1.02, 0.98, 1.02, 0.98])
+    chained = [10.0]
+    for length, duration in zip(lengths, np.diff(CLOCK), strict=True):
+        chained.append(2.0 * length / duration - chained[-1])
+    lay = layout(CLOCK, NO_DWELL, [], TIME, template, (10.0, 10.0))
+    speed, ok = TimeLaw(lay, SamplingConfig()).solve(lay.knot[None], lengths[None])
+    assert ok[0]
+    assert np.abs(speed[0] - 10.0).max() < 0.5 < np.abs(np.array(chained) - 10.0).max() + 0.1
+
+
+def test_wait_inside_a_primitive_stands_exactly():
+    template = np.interp(TIME, [0.0, 5.0, 7.4, 15.3, 18.0, 20.0], [6.0, 6.0, 0.0, 0.0, 6.0, 6.0])
+    lay = layout(CLOCK, np.array([False, False, True, False]), [(7.4, 15.3)], TIME, template, (6.0, 6.0))
+    lengths = np.array([[35.0, 3.0, 20.5]])
+    speed, ok = TimeLaw(lay, SamplingConfig()).solve(lay.knot[None], lengths)
+    assert ok[0]
+    profile = SpeedProfile(lay.knot, speed[0])
+    at, v, _ = profile.state(np.linspace(7.4, 15.3, 80))
+    assert (v == 0.0).all()
+    assert np.ptp(at) == 0.0
+    assert profile.state(CLOCK)[0] == pytest.approx([0.0, 35.0, 38.0, 38.0, 58.5], abs=1e-5)
+
+
+def test_a_vehicle_asked_to_roll_where_the_template_stands_comes_to_rest_first():
+    template = np.where(TIME < 6.0, 0.2, 5.0)
+    lay = layout(CLOCK, np.array([True, False, False, False]), [(0.0, 6.0)], TIME, template, (0.3, 5.0))
+    speed, ok = TimeLaw(lay, SamplingConfig()).solve(lay.knot[None], np.array([[12.0, 25.0, 30.0]]))
+    assert ok[0]
+    assert speed[0][0] == 0.3
+    profile = SpeedProfile(lay.knot, speed[0])
+    assert (profile.state(np.linspace(0.5, 6.0, 50))[1] == 0.0).all()
+    assert profile.state(CLOCK)[0][2:] == pytest.approx([12.0, 37.0, 67.0], abs=1e-5)
+
+
+def test_impossible_lengths_are_refused_and_slid():
+    lay = layout(CLOCK, NO_DWELL, [], TIME, dip(), (10.0, 10.0))
+    law = TimeLaw(lay, SamplingConfig())
+    wrong = driven(dip()) + np.array([70.0, -20.0, -50.0, 0.0])
+    assert not law.solve(lay.knot[None], wrong[None])[1][0]
+    slid = law.solve_sliding(lay.knot, wrong)
+    assert slid.sum() == pytest.approx(wrong.sum(), abs=1e-6)
+    assert law.solve(lay.knot[None], slid[None])[1][0]
+    assert law.solve_sliding(lay.knot, wrong * 10.0) is None
+
+
+def test_speed_bounds_hold():
+    lay = layout(CLOCK, NO_DWELL, [], TIME, np.full(201, 10.0), (10.0, 10.0))
+    bounds = SpeedBounds(np.array([3]), np.array([0.5]), np.array([9.5]))
+    speed, ok = TimeLaw(lay, SamplingConfig(), bounds).solve(lay.knot[None], driven(np.full(201, 10.0))[None])
+    assert ok[0]
+    assert 0.5 * (speed[0][3] + speed[0][4]) <= 9.5 + 1e-6
+
+
+def test_knot_is_where_the_template_bends():
+    speed = np.where(TIME < 4.3, 10.0, 10.0 - 2.0 * (TIME - 4.3))
+    assert best_knot(TIME, speed, 2.0, 8.0) == pytest.approx(4.3, abs=0.11)
+
+
+def test_state_is_the_law():
+    profile = SpeedProfile(np.array([0.0, 2.0, 5.0]), np.array([0.0, 4.0, 1.0]))
+    s, v, a = profile.state(np.array([1.0, 2.0, 3.0, 5.0]))
+    assert s == pytest.approx([1.0, 4.0, 7.5, 11.5])
+    assert v == pytest.approx([2.0, 4.0, 3.0, 1.0])
+    assert a == pytest.approx([2.0, -1.0, -1.0, -1.0])
