@@ -110,10 +110,8 @@ def read_topics(files: Sequence[Path], config: LogConfig) -> list[Topic]:
                     topic.stamps.append(stamp)
                     topic.data.append(bytes(data))
         except Exception as error:  # a damaged file may fail anywhere inside the readers
-            size = f", {file.stat().st_size} bytes" if file.is_file() else ""
-            raise InputError(
-                f"{file}{size}: cannot be read as a bag, cut off or damaged ({error or type(error).__name__})"
-            ) from error
+            what = f"{file}, {file.stat().st_size} bytes" if file.is_file() else str(file)
+            raise InputError(f"{what}: cut off or damaged, no bag ({error or type(error).__name__})") from error
     for name in wanted:
         if name not in seen:
             raise InputError(f"parameter topics: {files[0]} has no topic {name!r}; it has {listing(seen)}")
@@ -121,8 +119,8 @@ def read_topics(files: Sequence[Path], config: LogConfig) -> list[Topic]:
             raise InputError(f"{files[0]}, topic {name}: type {seen[name]} is not one of {', '.join(USED)}")
     if not found:
         raise InputError(
-            f"{files[0]}: no topic to read. It has {listing(seen)}. Needed is {FIX} with {TWIST}, or {ODOMETRY}, one per vehicle, "
-            f"or a topic named tracks of {trajectory.TYPE}; the parameter topics chooses by name"
+            f"{files[0]}: no topic to read. It has {listing(seen)}. Needed is {FIX} with {TWIST}, or {ODOMETRY}, one per "
+            f"vehicle, or a topic named tracks of {trajectory.TYPE}; the parameter topics chooses by name"
         )
     return [found[name] for name in sorted(found)]
 

@@ -1,6 +1,7 @@
 """Cleaning: what cannot be true is dropped and counted; what is left is in order of time, in metres."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pyproj
@@ -93,12 +94,12 @@ def chosen(log: RawLog, config: LogConfig) -> tuple[Observations, ...]:
 def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) -> Observations:
     """Leave out values that are no position or no speed."""
     fix, speed = vehicle.fix, vehicle.speed
-    checks: list[tuple[str, Bools]] = [("position is not a number", ~np.isfinite(fix).all(axis=1))]
+    checks: list[tuple[str, Any]] = [("position is not a number", ~np.isfinite(fix).all(axis=1))]
     if geographic:
         checks.append(("position is (0, 0)", (np.abs(fix) < 1e-6).all(axis=1)))
         checks.append(("position is off the globe", (np.abs(fix[:, 0]) > 90.0) | (np.abs(fix[:, 1]) > 180.0)))
     keep = judge(checks, vehicle.fix_row, drops)
-    slow_checks: list[tuple[str, Bools]] = [
+    slow_checks: list[tuple[str, Any]] = [
         ("speed is not a number", ~np.isfinite(speed)),
         ("speed is negative", speed < 0.0),
         (f"speed is above {FASTEST:g} m/s", speed > FASTEST),
@@ -107,7 +108,7 @@ def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) ->
     return select(vehicle, keep, keep_speed)
 
 
-def judge(checks: list[tuple[str, Bools]], rows: Ints, drops: Drops) -> Bools:
+def judge(checks: list[tuple[str, Any]], rows: Ints, drops: Drops) -> Bools:
     """Return the rows that fail no check; each that fails counts once, for the first reason."""
     keep = np.ones(len(rows), dtype=bool)
     for reason, bad in checks:
@@ -237,7 +238,7 @@ def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig) -> Tra
     seconds = np.diff(vehicle.fix_ns) * 1e-9
     keep = np.ones(len(vehicle.fix_ns), dtype=bool)
     if (step > JUMP_SLACK + limit[1:] * seconds).any():
-        keep = reachable(vehicle.fix_ns * 1e-9, vehicle.fix, limit)
+        keep = reachable(vehicle.fix_ns.astype(np.float64) * 1e-9, vehicle.fix, limit)
         drops.add("position jumps", vehicle.fix_row[~keep])
     return Track(
         id=vehicle.id,

@@ -10,6 +10,7 @@ cross, follow, merge or pass), and a vehicle joins that so meets all the members
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -182,7 +183,7 @@ def split(group: Group, pieces: Sequence[Piece], config: LogConfig) -> list[Grou
     for begin, end in runs(busy):
         parts = max(int(np.ceil((end - begin - 1) * config.period / config.longest - 1e-9)), 1)
         edges = np.linspace(begin, end - 1, parts + 1).round().astype(int)
-        for low, high in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        for low, high in pairwise(edges.tolist()):
             part = Group(group.members, group.first + low, group.first + high + 1)
             driven = [p.smooth.speed[part.first - p.first : part.last - p.first].sum() * config.period for p in members]
             if part.last - part.first > ticks(config.shortest, config) and max(driven) >= config.travel:

@@ -5,7 +5,9 @@ acceleration between two ticks is constant. Second and third differences of c ar
 and acceleration are sparse linear inequalities, and where a vehicle stands its coefficients are one variable: v = 0 exactly.
 """
 
-import clarabel
+from collections.abc import Sequence
+
+import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
 from scipy import sparse
 
@@ -52,7 +54,7 @@ class Motion:
         entries = (np.concatenate(weights), (np.tile(row, 3), np.concatenate([tick, tick + 1, tick + 2])))
         return sparse.csr_array(entries, shape=(len(seconds), self.ticks + 1)) @ self.merge
 
-    def solve(self, observed: list[tuple[Floats, Floats, Floats, bool]]) -> Floats:
+    def solve(self, observed: Sequence[tuple[Floats, Floats, Floats, bool]]) -> Floats:
         """Return the coefficients (T+1,) that fit best.
 
         Args:
@@ -73,14 +75,16 @@ class Motion:
         if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
             raise InputError(f"speeds and positions cannot be reconciled ({solution.status}); check their units")
         merged = np.maximum.accumulate(np.asarray(solution.x))  # the solver's tolerance must not drive backwards
-        return self.merge @ merged
+        coefficients: Floats = self.merge @ merged
+        return coefficients
 
     def place(self, coefficients: Floats, seconds: Floats) -> Floats:
         """Distance driven [m] at any times."""
         tick = np.clip(np.floor(seconds / self.dt).astype(int), 0, max(self.ticks - 2, 0))
         u = seconds / self.dt - tick
         c0, c1, c2 = (coefficients[tick + k] for k in range(3))
-        return c0 * (1.0 - u) ** 2 / 2.0 + c1 * (0.5 + u - u**2) + c2 * u**2 / 2.0
+        place: Floats = c0 * (1.0 - u) ** 2 / 2.0 + c1 * (0.5 + u - u**2) + c2 * u**2 / 2.0
+        return place
 
     def at_ticks(self, coefficients: Floats) -> tuple[Floats, Floats]:
         """Distance driven [m] and speed [m/s] at the T ticks."""

@@ -1,6 +1,7 @@
 """Tracks cut at long gaps and brought onto the log's common clock."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Pie
     smooths = [piece.smooth for piece in pieces]
 
     def rms(name: str) -> float:
-        values = np.concatenate([getattr(smooth, name) for smooth in smooths]) if smooths else np.zeros(0)
+        values = np.concatenate([np.zeros(0), *(getattr(smooth, name) for smooth in smooths)])
         return float(np.sqrt((values**2).mean())) if len(values) else 0.0
 
     quality = VehicleQuality(
@@ -63,7 +64,7 @@ def parts(track: Track, cuts: Bools) -> list[Track]:
     """Split a track after each True of `cuts` (F-1,); parts of one fix are left out."""
     edges = [0, *(np.flatnonzero(cuts) + 1).tolist(), len(track.fix_ns)]
     found = []
-    for begin, end in zip(edges[:-1], edges[1:], strict=True):
+    for begin, end in pairwise(edges):
         if end - begin < 2:
             continue
         during = (track.speed_ns >= track.fix_ns[begin]) & (track.speed_ns <= track.fix_ns[end - 1])

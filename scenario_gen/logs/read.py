@@ -27,7 +27,7 @@ class LogResult:
     quality: Quality
 
 
-def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogConfig()) -> LogResult:
+def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogConfig()) -> LogResult:  # noqa: B008 - frozen
     """Read a log and cut it into encounters.
 
     Args:
@@ -145,6 +145,6 @@ def no_meeting(log: RawLog, pieces: Sequence[Piece], config: LogConfig) -> str:
                 if least < nearest:
                     nearest, who = least, f"{a.track.id} and {b.track.id} come closest, to {least:.0f} m"
     return (
-        f"{log.segments[0].label}: no two vehicles are within {config.proximity:g} m for {config.shortest:g} s while one of them drives "
-        f"{config.travel:g} m ({who}); see the parameters proximity, shortest, travel and longest_gap"
+        f"{log.segments[0].label}: no two vehicles are within {config.proximity:g} m for {config.shortest:g} s while one "
+        f"drives {config.travel:g} m ({who}); see the parameters proximity, shortest, travel and longest_gap"
     )

@@ -58,7 +58,8 @@ def smooth_piece(piece: Track, origin_ns: int, config: LogConfig) -> Smooth | No
         The piece on the clock, or None if fewer than three ticks lie in it.
     """
     dt = config.period
-    fix_t, speed_t = (piece.fix_ns - origin_ns) * 1e-9, (piece.speed_ns - origin_ns) * 1e-9
+    fix_t = (piece.fix_ns - origin_ns).astype(np.float64) * 1e-9
+    speed_t = (piece.speed_ns - origin_ns).astype(np.float64) * 1e-9
     first, last = int(np.ceil(fix_t[0] / dt - 1e-6)), int(np.floor(fix_t[-1] / dt + 1e-6))
     if last - first < 2:
         return None
@@ -68,12 +69,12 @@ def smooth_piece(piece: Track, origin_ns: int, config: LogConfig) -> Smooth | No
     if not len(speed):
         speed_t, speed = fix_t, raw
     noise = config.position_noise or estimated_noise(piece.fix)
-    ticks = dt * np.arange(last - first + 1)
+    ticks = dt * np.arange(last - first + 1, dtype=np.float64)
     stands = standing(ticks, fix_t, piece.fix, speed_t, speed)
     motion = Motion(stands, config)
     differs = speed - np.interp(speed_t, fix_t, raw)
     deviation = config.speed_noise or float(np.clip(white_equivalent(differs), 0.3, 3.0))
-    measured = (speed_t, speed, np.full(len(speed), deviation), True)
+    measured = (speed_t, speed, deviation * np.ones(len(speed)), True)
     guess = layout(ticks, stands, np.interp(ticks, speed_t, speed), np.interp(ticks, fix_t, raw), fix_t)
     weight = np.ones(len(fix_t))
     for _ in range(ROUNDS):
@@ -98,10 +99,11 @@ def smooth_piece(piece: Track, origin_ns: int, config: LogConfig) -> Smooth | No
 
 
 def layout(ticks: Floats, stands: Bools, speed: Floats, raw: Floats, seconds: Floats) -> Floats:
-    """A first guess of the distance driven at `seconds`: the integral of the speed, or of the fixes' own where that is far off."""
+    """A first guess of the distance driven at `seconds`: its speed integrated, or that of the fixes where it is far off."""
     rate = np.where(stands, 0.0, np.where(np.abs(speed - raw) > DOUBTED, raw, speed))
     driven = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(ticks))])
-    return np.interp(seconds, ticks, driven)
+    guess: Floats = np.interp(seconds, ticks, driven)
+    return guess
 
 
 def path_of(guess: Floats, piece: Track, weight: Floats, noise: float) -> Path:
@@ -127,7 +129,8 @@ def speed_of_fixes(seconds: Floats, fix: Floats, window: float = 0.5) -> Floats:
         np.where(late > early, early, np.maximum(early - 1, 0)),
         np.where(late > early, late, np.minimum(late + 1, len(fix) - 1)),
     )
-    return np.hypot(*(fix[late] - fix[early]).T) / (seconds[late] - seconds[early])
+    rate: Floats = np.hypot(*(fix[late] - fix[early]).T) / (seconds[late] - seconds[early])
+    return rate
 
 
 def estimated_noise(fix: Floats) -> float:

@@ -123,9 +123,8 @@ def find_columns(frame: pd.DataFrame, path: Path, option: str) -> dict[str, Colu
             continue
         name, _, unit = (name, "", "") if name.lower() in names else name.rpartition(":")
         if name.lower() not in names:
-            raise InputError(
-                f"{path} has no column {part.partition('=')[2].strip()!r} (asked for as {quantity}); it has {', '.join(names.values())}"
-            )
+            asked = part.partition("=")[2].strip()
+            raise InputError(f"{path} has no column {asked!r} (asked for as {quantity}); it has {', '.join(names.values())}")
         if unit and unit not in UNITS[quantity]:
             raise InputError(f"parameter columns: {quantity} has no unit {unit!r}; choose one of {', '.join(UNITS[quantity])}")
         found[quantity] = as_column(quantity, names[name.lower()], unit)
