@@ -1,0 +1,150 @@
+"""The report in headless Chromium: no errors, no requests, it plays, scrubs and switches; nothing is wider than a phone."""
+
+import io
+import shutil
+from base64 import b64decode
+
+import pytest
+from evaluation_worlds import report_case
+from PIL import Image
+
+from scenario_gen.evaluation import ReportInput, write_report
+
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (pip install playwright)")
+DESKTOP, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
+FLAGS = ["--disable-gpu", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    found = shutil.which("chromium") or shutil.which("chromium-browser")
+    if not found:
+        pytest.skip("chromium is not installed (apt-get install chromium)")
+    with playwright.sync_playwright() as driver:
+        instance = driver.chromium.launch(executable_path=found, args=FLAGS, chromium_sandbox=False)
+        yield instance
+        instance.close()
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    write_report(path, ReportInput([report_case(6), report_case(4, "second", without=False)], provenance={"log": "a" * 64}))
+    return path
+
+
+class Tab:
+    """A page with a record of what went wrong and what was asked of the network."""
+
+    def __init__(self, browser, report, size):
+        self.page = browser.new_page(viewport=size)
+        self.troubles, self.requests = [], []
+        self.page.on(
+            "console", lambda message: self.troubles.append(message.text) if message.type in ("error", "warning") else None
+        )
+        self.page.on("pageerror", lambda error: self.troubles.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(report.as_uri())
+
+    def part(self, role, case=0):
+        return self.page.locator(f'[data-case="{case}"] [data-role="{role}"]')
+
+    def time(self, case=0):
+        return float(self.part("clock", case).inner_text().split("/")[0])
+
+    def picture(self, role, case=0):
+        """The canvas as text: two pictures are equal if and only if their texts are."""
+        return self.part(role, case).evaluate("canvas => canvas.toDataURL()")
+
+
+@pytest.fixture
+def tab(browser, report):
+    tab = Tab(browser, report, DESKTOP)
+    yield tab
+    tab.page.close()
+
+
+def test_it_loads_without_errors_or_requests(tab, report):
+    tab.page.wait_for_timeout(300)
+    assert tab.troubles == []
+    own = [url for url in tab.requests if not url.startswith(("data:", "blob:"))]
+    assert own == [report.as_uri()]
+    assert tab.page.locator('[data-case="0"] .js-plotly-plot').count() == 9  # template, two arms, six matrices
+    for role in ("stage", "template-map", "routes", "samples-with", "samples-without"):
+        pixels = Image.open(io.BytesIO(b64decode(tab.picture(role).partition(",")[2])))
+        assert len(pixels.getcolors(1_000_000)) > 10, role
+
+
+def test_it_plays_pauses_and_stops_at_the_end(tab):
+    assert tab.time() == 0.0
+    tab.part("play").click()
+    tab.page.wait_for_timeout(600)
+    tab.part("play").click()
+    paused = tab.time()
+    assert 0.2 < paused < 3.0
+    tab.page.wait_for_timeout(200)
+    assert tab.time() == paused
+    tab.part("pace").select_option("4")
+    tab.part("scrub").fill("970")
+    tab.part("play").click()
+    tab.page.wait_for_timeout(600)
+    assert tab.time() == 12.0 and tab.part("play").get_attribute("aria-label") == "play"
+
+
+def test_scrubbing_moves_the_cars_and_names_the_primitive(tab):
+    before = tab.picture("stage")
+    tab.part("scrub").fill("500")
+    assert tab.time() == 6.0
+    assert tab.picture("stage") != before
+    assert tab.part("primitive").inner_text() == "2 of 3: west drives on, south drives slowly"
+    assert "10.0 m/s" in tab.part("readout").inner_text()
+
+
+def test_samples_and_sets_can_be_chosen(tab):
+    assert tab.part("sample").locator("option").count() == 6
+    before = tab.picture("stage")
+    tab.part("next").click()
+    assert tab.part("sample").evaluate("s => s.selectedIndex") == 1
+    assert tab.picture("stage") != before
+    tab.part("previous").click()
+    tab.part("previous").click()
+    assert tab.part("sample").evaluate("s => s.selectedIndex") == 5
+    tab.part("arm").select_option("oracle")
+    assert tab.part("sample").locator("option").count() == 1
+    alone = tab.picture("stage")
+    tab.part("arm").select_option("without")
+    assert tab.picture("stage") != alone
+    crowd = tab.picture("stage")
+    tab.part("ghosts").uncheck()
+    assert tab.picture("stage") != crowd
+    assert tab.troubles == []
+
+
+def test_another_case_opens(tab):
+    tab.page.locator('[data-show="1"] button').click()
+    assert tab.page.locator('[data-case="1"]').is_visible() and not tab.page.locator('[data-case="0"]').is_visible()
+    assert "There is no such set" in tab.page.locator('[data-case="1"]').inner_text()
+    tab.part("scrub", 1).fill("250")
+    assert tab.time(1) == 3.0 and tab.troubles == []
+
+
+def test_the_keyboard_drives_it(tab):
+    tab.page.keyboard.press("ArrowRight")
+    assert tab.part("sample").evaluate("s => s.selectedIndex") == 1
+    tab.page.keyboard.press("Space")
+    tab.page.wait_for_timeout(400)
+    tab.page.keyboard.press("Space")
+    assert 0.1 < tab.time() < 3.0
+
+
+def test_a_phone_shows_all_of_it(browser, report):
+    tab = Tab(browser, report, PHONE)
+    tab.page.wait_for_timeout(300)
+    assert tab.troubles == []
+    assert tab.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    wide = "all => all.filter(e => e.getBoundingClientRect().right > innerWidth + 1).map(e => e.outerHTML.slice(0, 90))"
+    assert tab.page.locator('[data-case="0"] canvas, [data-case="0"] .chart svg, button').evaluate_all(wide) == []
+    tab.page.set_viewport_size({"width": 800, "height": 600})  # turned
+    tab.page.wait_for_timeout(300)
+    assert tab.part("stage").evaluate("c => c.width / c.clientWidth") == pytest.approx(1.0, abs=0.02)
+    tab.page.close()
