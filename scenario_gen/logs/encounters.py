@@ -1,8 +1,9 @@
 """Cutting a log into encounters: who is near whom, for how long, and who belongs to the group.
 
-A *meeting* is a pair of vehicles nearer than `proximity` for at least `shortest` seconds. Encounters grow from meetings: the
-strongest one first, joined by vehicles that are near for most of the time, up to `most_vehicles`; the interval is the one in
-which all of them are present and near. Then the meetings inside the encounter are used up, and the next begins.
+A *meeting* is a pair of vehicles nearer than `proximity` for at least `shortest` seconds; those longer than `longest` are cut.
+Encounters grow from meetings: the strongest one first, joined by vehicles that are near for most of the time, up to
+`most_vehicles`; the interval is the one in which all of them are present and near. Then the meetings inside the encounter are
+used up, and the next begins.
 In a log of few vehicles (as cut by a person) every meeting counts, and a vehicle joins that meets any member. In a longer one
 only those meetings count in which somebody moves and the two interact (places and times come close, `space_time_gap`: they
 cross, follow, merge or pass), and a vehicle joins that so meets all the members.
@@ -20,7 +21,7 @@ from scenario_gen.logs.intervals import runs
 from scenario_gen.logs.pieces import Piece
 
 PRESENT = 0.6  # a vehicle that is there for less of the interval is left out; for more, it shortens the interval
-INTERACTS = 10.0  # m: the space-time gap below which two vehicles have to do with each other
+INTERACTS = 6.0  # m: the space-time gap below which two vehicles have to do with each other
 LAG = 2.0  # m/s: what a second between two vehicles at the same place is worth in metres
 APART = 1.0  # s that a pair may be out of range within one meeting
 REST = 2.0  # s of a long standstill that stay with the encounter before or after it
@@ -73,14 +74,22 @@ def find_meetings(pieces: Sequence[Piece], config: LogConfig, *, few: bool) -> l
                 break
             if pieces[i].track.id == pieces[j].track.id:
                 continue
-            for first, last in runs(near(pieces[i], pieces[j], config), ticks(APART, config)):
-                begin = max(pieces[i].first, pieces[j].first)
-                if last - first < least:
-                    continue
-                gap = 0.0 if few else space_time_gap(pieces[i], pieces[j], begin + first, begin + last, config)
-                if gap <= INTERACTS:
-                    found.append(Meeting(min(i, j), max(i, j), begin + first, begin + last, gap))
+            begin = max(pieces[i].first, pieces[j].first)
+            for low, high in runs(near(pieces[i], pieces[j], config), ticks(APART, config)):
+                for first, last in windows(begin + low, begin + high, config):
+                    gap = 0.0 if few else space_time_gap(pieces[i], pieces[j], first, last, config)
+                    if last - first >= least and gap <= INTERACTS:
+                        found.append(Meeting(min(i, j), max(i, j), first, last, gap))
     return found
+
+
+def windows(first: int, last: int, config: LogConfig) -> list[tuple[int, int]]:
+    """Cut a long meeting at whole multiples of `longest` on the common clock, so that all who meet are cut alike."""
+    longest, least = ticks(config.longest, config), ticks(config.shortest, config) + 1
+    if last - first <= longest:
+        return [(first, last)]
+    inside = [edge for edge in range(longest, last, longest) if first + least <= edge <= last - least]
+    return list(pairwise([first, *inside, last]))
 
 
 def ticks(seconds: float, config: LogConfig) -> int:

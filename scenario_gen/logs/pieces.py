@@ -5,11 +5,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.arrays import Bools
+from scenario_gen.arrays import Bools, Floats
 from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, Track
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.intervals import runs
 from scenario_gen.logs.quality import VehicleQuality
-from scenario_gen.logs.smoothing import Smooth, smooth_piece
+from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing
+
+TURNED = np.radians(120.0)  # who drives off from a stop this far from where it came from has reversed, or turned on the spot
+LEVER = 3.0  # m over which that direction is measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +27,7 @@ class Piece:
 
 
 def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Piece], VehicleQuality]:
-    """Cut a track at gaps and relocations, and smooth each piece.
+    """Cut a track at gaps, relocations and reversals, and smooth each piece.
 
     A gap may always be two and a half of the source's own periods long, so that a source of 1 Hz is not cut to bits.
     """
@@ -31,8 +35,10 @@ def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Pie
     usual = float(np.median(seconds))
     longest = max(config.longest_gap, 2.5 * usual) + 1e-6
     step = np.hypot(*np.diff(track.fix, axis=0).T)
-    cuts = (seconds > longest) | (step > JUMP_SLACK + FASTEST * seconds)
-    bridged = (seconds > 1.5 * max(usual, config.period)) & ~cuts
+    gaps = (seconds > longest) | (step > JUMP_SLACK + FASTEST * seconds)
+    back = reversals(track, config)
+    cuts = gaps | back
+    bridged = (seconds > 1.5 * max(usual, config.period)) & ~gaps
     pieces = []
     for part in parts(track, cuts):
         smooth = smooth_piece(part, origin_ns, config)
@@ -51,13 +57,42 @@ def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Pie
         pieces=len(pieces),
         bridged=int(bridged.sum()),
         longest_bridged=float(seconds[bridged].max(initial=0.0)),
-        cut=int(cuts.sum()),
-        longest_cut=float(seconds[cuts].max(initial=0.0)),
+        cut=int(gaps.sum()),
+        longest_cut=float(seconds[gaps].max(initial=0.0)),
+        reversals=int((back & ~gaps).sum()),
         speed_before=rms("before"),
         speed_after=rms("after"),
+        changed=rms("changed"),
         moved=rms("moved"),
+        moved_most=max((float(smooth.moved.max()) for smooth in smooths), default=0.0),
     )
     return pieces, quality
+
+
+def reversals(track: Track, config: LogConfig) -> Bools:
+    """(F-1,) where to cut because the vehicle drives back where it came from after a stop: a heading cannot follow that."""
+    seconds = (track.fix_ns - track.fix_ns[0]).astype(np.float64) * 1e-9
+    speed_t = (track.speed_ns - track.fix_ns[0]).astype(np.float64) * 1e-9
+    speed = track.speed
+    if not len(speed):
+        speed_t, speed = seconds, speed_of_fixes(seconds, track.fix)
+    ticks = config.period * np.arange(max(int(seconds[-1] / config.period), 1) + 1, dtype=np.float64)
+    cuts = np.zeros(len(seconds) - 1, dtype=bool)
+    for begin, end in runs(standing(ticks, seconds, track.fix, speed_t, speed)):
+        first, last = np.searchsorted(seconds, (ticks[begin], ticks[end - 1])).tolist()
+        before = departure(track.fix[first::-1])
+        after = departure(track.fix[last:])
+        if before is not None and after is not None and float(before @ after) > -np.cos(TURNED):
+            cuts[min((first + last) // 2, len(cuts) - 1)] = True
+    return cuts
+
+
+def departure(fix: Floats) -> Floats | None:
+    """Unit vector from the first fix to the first one that is `LEVER` away; None if there is none."""
+    offset = fix - fix[0]
+    away = np.hypot(offset[:, 0], offset[:, 1])
+    far = np.flatnonzero(away > LEVER)
+    return offset[far[0]] / away[far[0]] if len(far) else None
 
 
 def parts(track: Track, cuts: Bools) -> list[Track]:

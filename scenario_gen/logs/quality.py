@@ -25,9 +25,12 @@ class VehicleQuality:
         longest_bridged: the longest of them [s].
         cut: gaps at which the track was cut.
         longest_cut: the longest of them [s].
+        reversals: stops at which the track was cut because the vehicle drove back where it came from.
         speed_before: RMS of measured speed less speed of the raw positions [m/s].
-        speed_after: RMS of measured speed less the published speed, which is that of the published positions [m/s].
+        speed_after: RMS of published speed less speed of the published positions [m/s].
+        changed: RMS of measured less published speed [m/s].
         moved: RMS distance between raw and published positions [m].
+        moved_most: the largest such distance [m].
     """
 
     id: str
@@ -38,9 +41,12 @@ class VehicleQuality:
     longest_bridged: float
     cut: int
     longest_cut: float
+    reversals: int
     speed_before: float
     speed_after: float
+    changed: float
     moved: float
+    moved_most: float
 
 
 @dataclass(frozen=True)
@@ -94,7 +100,10 @@ def vehicle_line(vehicle: VehicleQuality) -> str:
     gaps = f"{vehicle.bridged} gaps bridged (up to {vehicle.longest_bridged:.1f} s)" if vehicle.bridged else "no gaps bridged"
     if vehicle.cut:
         gaps += f", cut at {vehicle.cut} (up to {vehicle.longest_cut:.1f} s)"
+    if vehicle.reversals:
+        gaps += f", cut at {vehicle.reversals} reversals"
     return (
-        f"  vehicle {vehicle.id}: {vehicle.fixes} fixes, {vehicle.seconds:.1f} s; {gaps}; speed against position"
-        f" {vehicle.speed_before:.2f} → {vehicle.speed_after:.2f} m/s RMS, positions moved {vehicle.moved:.2f} m RMS"
+        f"  vehicle {vehicle.id}: {vehicle.fixes} fixes, {vehicle.seconds:.1f} s; {gaps}; speed against position "
+        f"{vehicle.speed_before:.2f} → {vehicle.speed_after:.2f} m/s RMS, speeds changed by {vehicle.changed:.2f} m/s, "
+        f"positions by {vehicle.moved:.2f} m RMS (at most {vehicle.moved_most:.1f} m)"
     )

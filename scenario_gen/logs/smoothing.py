@@ -38,7 +38,8 @@ class Smooth:
         heading: (T,) rad, unwrapped; NaN if the vehicle never moved and its log does not say.
         speed: (T,) m/s.
         before: (S,) measured speed less the speed of the raw fixes [m/s].
-        after: (S,) measured speed less the published speed [m/s].
+        after: (T,) published speed less the speed of the published positions [m/s].
+        changed: (S,) measured speed less the published speed [m/s].
         moved: (F,) distance of the raw fixes from the published positions at their stamps [m].
     """
 
@@ -48,6 +49,7 @@ class Smooth:
     speed: Floats
     before: Floats
     after: Floats
+    changed: Floats
     moved: Floats
 
 
@@ -74,13 +76,13 @@ def smooth_piece(piece: Track, origin_ns: int, config: LogConfig) -> Smooth | No
     motion = Motion(stands, config)
     differs = speed - np.interp(speed_t, fix_t, raw)
     deviation = config.speed_noise or float(np.clip(white_equivalent(differs), 0.3, 3.0))
-    measured = (speed_t, speed, deviation * np.ones(len(speed)), True)
+    measured = [(speed_t, speed, deviation * np.ones(len(speed)), True)] if len(piece.speed) else []
     guess = layout(ticks, stands, np.interp(ticks, speed_t, speed), np.interp(ticks, fix_t, raw), fix_t)
     weight = np.ones(len(fix_t))
     for _ in range(ROUNDS):
         path = path_of(guess, piece, weight, noise)
         place, aside = path.project(guess, piece.fix)
-        drive = motion.solve([measured, (fix_t, place, noise / np.sqrt(weight), False)])
+        drive = motion.solve([*measured, (fix_t, place, noise / np.sqrt(weight), False)])
         guess = motion.place(drive, fix_t)
         weight = np.minimum(1.0, 2.0 * noise / np.maximum(np.hypot(aside, place - guess), 1e-9))  # Huber's
     place, published = motion.at_ticks(drive)
@@ -93,7 +95,8 @@ def smooth_piece(piece: Track, origin_ns: int, config: LogConfig) -> Smooth | No
         heading=heading,
         speed=published,
         before=differs,
-        after=speed - np.interp(speed_t, ticks, published),
+        after=published - speed_of_fixes(ticks, position),
+        changed=piece.speed - np.interp(speed_t, ticks, published)[: len(piece.speed)],
         moved=np.hypot(*(piece.fix - path.pose(guess)[0]).T),
     )
 
