@@ -49,7 +49,8 @@ def _gap(d: Floats, yaw_a: float, yaw_b: float, half_a: Floats, half_b: Floats, 
 @kernel(inline=True)
 def _box_distance(low_x: float, high_x: float, low_y: float, high_y: float) -> float:
     """Distance of the origin from an axis-parallel box."""
-    return float(np.hypot(max(low_x, -high_x, 0.0), max(low_y, -high_y, 0.0)))
+    x, y = max(low_x, -high_x, 0.0), max(low_y, -high_y, 0.0)
+    return float(np.sqrt(x * x + y * y))
 
 
 @kernel(inline=True)

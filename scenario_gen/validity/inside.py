@@ -25,9 +25,9 @@ def blocked_before(drivable: Bools) -> Ints:
 
 
 @kernel(inline=True)
-def _rectangle_drivable(blocked: Ints, x: float, y: float, yaw: float, length: float, width: float) -> bool:
+def _rectangle_drivable(blocked: Ints, x: float, y: float, c: float, s: float, length: float, width: float) -> bool:
     """Whether the rectangle centred at (x, y), half sizes length and width, all in cells, covers drivable cells only."""
-    a, b, c, s = length, width, np.cos(yaw), np.sin(yaw)
+    a, b = length, width
     if c < 0.0:  # half a turn changes nothing
         c, s = -c, -s
     if s < 0.0:  # a quarter turn exchanges length and width
@@ -57,20 +57,20 @@ def _rectangle_drivable(blocked: Ints, x: float, y: float, yaw: float, length: f
 
 
 @kernel(inline=True)
-def _discs_drivable(clearance: Floats, x: float, y: float, yaw: float, length: float, width: float, moved: float) -> bool:
+def _discs_drivable(clearance: Floats, x: float, y: float, c: float, s: float, length: float, width: float, moved: float) -> bool:
     """Whether covering discs prove a footprint that moves by at most `moved` drivable; all in cells."""
     rows, columns = clearance.shape
     count = max(1, int(np.ceil(1.5 * length / width)))
     spacing = 2.0 * length / count
-    radius = np.hypot(0.5 * spacing, width) + moved
-    c, s = np.cos(yaw), np.sin(yaw)
+    radius = np.sqrt(0.25 * spacing * spacing + width * width) + moved
     for i in range(count):
         ahead = (i + 0.5) * spacing - length
         px, py = x + ahead * c, y + ahead * s
         column, row = int(np.floor(px)), int(np.floor(py))
         if row < 0 or column < 0 or row >= rows or column >= columns:
             return False
-        if clearance[row, column] - np.hypot(px - column - 0.5, py - row - 0.5) < radius:
+        dx, dy, spare = px - column - 0.5, py - row - 0.5, clearance[row, column] - radius
+        if spare < 0.0 or spare * spare < dx * dx + dy * dy:
             return False
     return True
 
@@ -93,13 +93,13 @@ def _first_exit(
         for i in range(4):
             dx, dy = part[i, 0] - x, part[i, 1] - y
             ahead, aside = max(ahead, abs(c * dx + s * dy)), max(aside, abs(c * dy - s * dx))
-        if _discs_drivable(clearance, x, y, at, length, width, np.hypot(ahead, aside) + length * turn) or _rectangle_drivable(
-            blocked, x, y, at, length + ahead + width * turn, width + aside + length * turn
-        ):
+        if _discs_drivable(
+            clearance, x, y, c, s, length, width, np.sqrt(ahead * ahead + aside * aside) + length * turn
+        ) or _rectangle_drivable(blocked, x, y, c, s, length + ahead + width * turn, width + aside + length * turn):
             u += step
             step = min(2.0 * step, 1.0 - u)
             continue
-        if not _rectangle_drivable(blocked, x, y, at, length, width):
+        if not _rectangle_drivable(blocked, x, y, c, s, length, width):
             return FOUND, middle
         step *= 0.5
         if step * h < resolution:
