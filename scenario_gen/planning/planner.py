@@ -88,12 +88,13 @@ class Planner(Protocol):
 
 def check_query(road: Road, query: Query) -> None:
     """Raise BlockedError or NoWayError if no search could succeed."""
-    for end, xy in (("start", query.start), ("goal", query.goal)):
-        if not segments_free(road, xy[None], xy[None], query.radius)[0]:
-            x, y = xy
+    ends = np.stack((query.start, query.goal))
+    for end, xy, free in zip(("start", "goal"), ends, segments_free(road, ends, ends, query.radius), strict=True):
+        if not free:
             raise BlockedError(
                 end,
-                f"the {end} ({x:.2f}, {y:.2f}) m is not drivable on road {road.name!r} for a disc of radius {query.radius:.2f} m",
+                f"the {end} ({xy[0]:.2f}, {xy[1]:.2f}) m is not drivable on road {road.name!r} for a disc of radius "
+                f"{query.radius:.2f} m",
             )
     if not connected(road, query.start, query.goal, query.radius):
         (x0, y0), (x1, y1) = query.start, query.goal

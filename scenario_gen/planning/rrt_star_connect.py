@@ -27,6 +27,7 @@ class RrtStarConnectConfig:
     gamma_factor: float = parameter(
         1.1, "gamma of eq 10 as a multiple of the least that is asymptotically optimal", low=1.0, high=10.0
     )
+    greedy: bool = parameter(True, "extend as far as possible until the first path is found (the paper: one step)")
     informed: bool = parameter(True, "sample only where a shorter path can lie, once there is one")
     pull: bool = parameter(True, "draw the path taut at the end")
 
@@ -34,7 +35,7 @@ class RrtStarConnectConfig:
         check(self)
 
 
-PAPER = RrtStarConnectConfig(step=5.0, informed=False, pull=False)
+PAPER = RrtStarConnectConfig(step=5.0, greedy=False, informed=False, pull=False)
 
 
 class _Trees:
@@ -50,7 +51,8 @@ class _Trees:
         least_gamma = 2.0 * 1.5**0.5 * (area / np.pi) ** 0.5  # Karaman & Frazzoli 2011, d = 2
         side = max(max(self.clearance.shape) / 12.0, 1.0)
         radius = query.radius / road.resolution
-        self.setting = np.array([radius, config.step, config.gamma_factor * least_gamma, config.zeta, side, np.inf, np.inf])
+        gamma = config.gamma_factor * least_gamma
+        self.setting = np.array([radius, config.step, gamma, config.zeta, side, np.inf, np.inf, float(config.greedy)])
         self.counter = np.zeros(7, dtype=np.int64)
         self.counter[trees.MEETING] = -1
         self.history = np.empty((256, 2))
@@ -111,11 +113,10 @@ class _Trees:
         return np.concatenate((self.node[halves[0][::-1], :2], self.node[halves[1][1:], :2]))
 
     def _branch(self, m: int) -> Ints:
-        ids = []
-        while m >= 0:
-            ids.append(m)
-            m = int(self.link[m, trees.PARENT])
-        return np.array(ids, dtype=np.int64)
+        branch = np.empty(1024, dtype=np.int64)
+        while (count := trees.trace(self.link, m, branch)) > len(branch):
+            branch = np.empty(count, dtype=np.int64)
+        return branch[:count]
 
 
 class RrtStarConnect:

@@ -23,8 +23,8 @@ PARENT, CHILD, NEXT, PREVIOUS, PARTNER = 0, 1, 2, 3, 4
 # `counter`, whole numbers that change: nodes per tree, chunks, the tree to extend next, iterations, history, meeting node
 NODES_A, NODES_B, CHUNKS, ACTIVE, ITERATION, HISTORY, MEETING = 0, 1, 2, 3, 4, 5, 6
 # `setting`, what steers the search: disc radius, step, gamma and zeta of eq 10, bucket side, length of the best path known
-# from elsewhere (it bounds the informed set), length of the trees' own best path
-RADIUS, STEP, GAMMA, ZETA, SIDE, BOUND, BEST = 0, 1, 2, 3, 4, 5, 6
+# from elsewhere (it bounds the informed set), length of the trees' own best path, 1 to extend greedily before the first path
+RADIUS, STEP, GAMMA, ZETA, SIDE, BOUND, BEST, GREEDY = 0, 1, 2, 3, 4, 5, 6, 7
 TRAPPED, ADVANCED, REACHED = 0, 1, 2
 
 RandomState = types.Array(types.uint64, 1, "C")
@@ -283,6 +283,14 @@ def grow(
         status, new = _extend(
             tree, x, y, ends, clearance, node, link, chunk, head, counter, setting, columns, near, gap
         )  # fmt: skip
+        while setting[GREEDY] > 0.0 and status == ADVANCED and known == np.inf and counter[CHUNKS] + 8 < chunk.shape[0]:
+            last = new
+            status, new = _extend(
+                tree, x, y, ends, clearance, node, link, chunk, head, counter, setting, columns, near, gap
+            )  # fmt: skip
+            if status == TRAPPED:
+                status, new = ADVANCED, last
+                break
         if status != TRAPPED:
             x, y = node[new, X], node[new, Y]
             status = ADVANCED
@@ -308,6 +316,18 @@ def plant(ends: Floats, columns: int, node: Floats, link: Ints, chunk: Ints, hea
     for tree in range(2):
         root = _insert(tree, ends[tree, 0], ends[tree, 1], node, link, chunk, head, counter, setting[SIDE], columns)
         node[root, COST], node[root, EDGE] = 0.0, 0.0
+
+
+@kernel(I2, I, OUTI1)
+def trace(link: Ints, m: int, branch: Ints) -> int:
+    """Write node m and its ancestors into `branch`; returns how many there are (only as many as fit are written)."""
+    count = 0
+    while m >= 0:
+        if count < branch.size:
+            branch[count] = m
+        count += 1
+        m = link[m, PARENT]
+    return count
 
 
 @kernel(F2, I2, I2, I2, I, OUT2, OUTI2, OUTI2, OUTI2, OUTI1, OUT1)

@@ -5,6 +5,7 @@ the clearance is nowhere less than at one of them (a square's profile is flat fo
 middle), so every step is a move that the disc can really make: where the flood says there is a way, there is one.
 """
 
+import math
 from collections.abc import Iterator
 from weakref import WeakKeyDictionary
 
@@ -48,6 +49,9 @@ def component_at(road: Road, xy: Floats, radius: float) -> int:
 def connected(road: Road, start_xy: Floats, goal_xy: Floats, radius: float) -> bool:
     """Whether a disc of `radius` [m] can move from start (2,) [m] to goal (2,) [m]."""
     start, goal = np.asarray(start_xy, dtype=np.float64), np.asarray(goal_xy, dtype=np.float64)
+    first = component_at(road, start, radius)
+    if first > 0 and first == component_at(road, goal, radius):
+        return True
     if segments_free(road, start[None], goal[None], radius)[0]:
         return True
     return not set(_reachable(road, start, radius)).isdisjoint(_reachable(road, goal, radius))
@@ -57,14 +61,19 @@ def _reachable(road: Road, xy: Floats, radius: float) -> Iterator[int]:
     """Labels of the cell centres near `xy` that a straight move leads to, nearest first."""
     labels = components(road, radius)
     height, width = labels.shape
-    column, row = np.floor(to_cells(road, xy)).astype(int)
-    i, j = np.mgrid[max(row - 2, 0) : min(row + 3, height), max(column - 2, 0) : min(column + 3, width)].reshape(2, -1)
-    i, j = i[labels[i, j] > 0], j[labels[i, j] > 0]
-    centres = to_metres(road, np.stack((j + 0.5, i + 0.5), axis=-1))
-    order = np.argsort(np.hypot(*(centres - xy).T), kind="stable")
-    for k in order:
-        if segments_free(road, xy[None], centres[k : k + 1], radius)[0]:
-            yield int(labels[i[k], j[k]])
+    column, row = (math.floor((xy[axis] - road.origin[axis]) / road.resolution) for axis in range(2))
+    i, j = np.array([row]), np.array([column])
+    for reach in (0, 2):  # nearly always the cell's own centre will do
+        if reach:
+            i, j = np.mgrid[row - reach : row + reach + 1, column - reach : column + reach + 1].reshape(2, -1)
+        inside = (i >= 0) & (j >= 0) & (i < height) & (j < width)
+        i, j = i[inside], j[inside]
+        i, j = i[labels[i, j] > 0], j[labels[i, j] > 0]
+        centres = to_metres(road, np.stack((j + 0.5, i + 0.5), axis=-1))
+        free = segments_free(road, np.broadcast_to(xy, centres.shape), centres, radius)
+        for k in np.argsort(np.hypot(*(centres - xy).T), kind="stable"):
+            if free[k]:
+                yield int(labels[i[k], j[k]])
 
 
 @kernel(B2, OUTI2)
