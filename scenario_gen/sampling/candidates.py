@@ -15,12 +15,13 @@ from scenario_gen.arrays import Bools, Floats
 from scenario_gen.encounter import Vehicle
 from scenario_gen.sampling.clock import DT, Clock
 from scenario_gen.sampling.gp import combine
+from scenario_gen.sampling.lateral import kept_within
 from scenario_gen.sampling.path import BasePath, arc_lengths, states
 from scenario_gen.sampling.time_law import SpeedProfile, TimeLaw, TimeLayout
 from scenario_gen.scenario import Scenario
 
 _ANCHOR_SHARE = 0.3  # an anchor moves along the route by at most this share of the way to its neighbours
-DAMPING = (1.0, 0.5, 0.25, 0.0)  # of a candidate's deviations along and in time, until a speed profile exists
+DAMPING = (1.0, 0.5, 0.25, 0.0)  # of a candidate's clock, until a speed profile exists
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class VehicleModel:
         path: the route.
         anchor: (K + 2,) arc length [m] of each anchor on it.
         factor: (G, r) square root of the covariance of the lateral deviation.
+        room: (G,) metres that the road leaves to either side.
         law: the time law on the vehicle's knots.
     """
 
@@ -48,6 +50,7 @@ class VehicleModel:
     path: BasePath
     anchor: Floats
     factor: Floats
+    room: Floats
     law: TimeLaw
 
     @property
@@ -57,16 +60,16 @@ class VehicleModel:
 
     def deviations(self, z: Floats) -> Floats:
         """Lateral deviations (S, G) [m]."""
-        return combine(z, self.factor)
+        return kept_within(combine(z, self.factor), self.room)
 
-    def anchors(self, z: Floats, sigma: Floats) -> Floats:
-        """Arc lengths (S, K + 2) of the anchors, moved by sigma (S,) [m]; a dwell's two anchors move together."""
+    def anchors(self, z: Floats, sigma: float) -> Floats:
+        """Arc lengths (S, K + 2) of the anchors, moved by sigma [m]; a dwell's two anchors move together."""
         distinct, which = np.unique(self.anchor, return_inverse=True)
         if len(distinct) < 3:
             return np.broadcast_to(self.anchor, (len(z), len(self.anchor))).copy()
         gap = np.diff(distinct)
         most = _ANCHOR_SHARE * np.minimum(gap[:-1], gap[1:])
-        inner = distinct[1:-1] + np.clip(sigma[:, None] * z[:, 1 : len(distinct) - 1], -most, most)
+        inner = distinct[1:-1] + np.clip(sigma * z[:, 1 : len(distinct) - 1], -most, most)
         ends = np.broadcast_to(distinct[[0, -1]], (len(z), 2))
         return np.asarray(np.hstack([ends[:, :1], inner, ends[:, 1:]])[:, which])
 
@@ -107,7 +110,7 @@ class Batch:
         curve, arc, knot, speed: per vehicle, (S, ...) arrays as in `VehicleMotion`.
         spacing: per vehicle, metres.
         feasible: (S,) False where no speed profile exists.
-        damping: (S,) factor that the deviations along the route and in time were multiplied by to get one.
+        damping: (S,) factor that the clock's deviations were multiplied by to get one.
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -148,13 +151,23 @@ def _scenario(vehicles: tuple[Vehicle, ...], time: Floats, state: Floats, seed: 
 class CandidateModel:
     """Draws candidates of one encounter on its routes."""
 
-    def __init__(self, vehicles: tuple[VehicleModel, ...], clock: Clock, longitudinal_sigma: float) -> None:
-        self.vehicles, self.clock, self.longitudinal_sigma = vehicles, clock, longitudinal_sigma
+    def __init__(self, vehicles: tuple[VehicleModel, ...], clock: Clock, longitudinal_sigma: float, most_slide: float) -> None:
+        self.vehicles, self.clock = vehicles, clock
+        self.longitudinal_sigma, self.most_slide = longitudinal_sigma, most_slide
 
     @property
     def size(self) -> int:
         """Standard normal numbers needed per candidate."""
         return self.clock.size + sum(v.size for v in self.vehicles)
+
+    def _speeds(self, v: VehicleModel, knot: Floats, lengths: Floats) -> tuple[Floats, Bools]:
+        """Speeds (S, M) and feasible (S,); where the drawn anchors cannot be reached in time, they slide a little."""
+        speed, ok = v.law.solve(knot, lengths)
+        if not ok.all():
+            bad = np.flatnonzero(~ok)
+            speed[bad], ok[bad], slid = v.law.slide(knot[bad], lengths[bad])
+            ok[bad] &= np.abs(slid).max(axis=1) <= self.most_slide
+        return speed, ok
 
     def draw(self, z: Floats, scale: Scale) -> Batch:
         """Candidates from numbers z (S, size), their standard deviations multiplied by `scale`."""
@@ -170,16 +183,13 @@ class CandidateModel:
         damping = np.zeros(samples)
         open_ = np.arange(samples)
         for damp in DAMPING:
-            share = np.full(len(open_), damp)
-            clock[open_] = self.clock.sample(z[open_, : self.clock.size], share * scale.time)
+            clock[open_] = self.clock.sample(z[open_, : self.clock.size], np.full(len(open_), damp * scale.time))
             feasible = np.ones(len(open_), dtype=np.bool_)
             for n, v in enumerate(self.vehicles):
-                jitter = own[n][open_, v.factor.shape[1] :]
-                u = v.anchors(jitter, share * scale.longitudinal * self.longitudinal_sigma)
-                curve, arc = paths[n]
-                lengths = piece_lengths(v.law.layout, curve[open_], arc[open_], v.path.spacing, u)
+                u = v.anchors(own[n][open_, v.factor.shape[1] :], scale.longitudinal * self.longitudinal_sigma)
                 knot[n][open_] = knots_on(clock[open_], self.clock.times, v.law.layout)
-                speed[n][open_], ok = v.law.solve(knot[n][open_], lengths)
+                lengths = piece_lengths(v.law.layout, paths[n][0][open_], paths[n][1][open_], v.path.spacing, u)
+                speed[n][open_], ok = self._speeds(v, knot[n][open_], lengths)
                 feasible &= ok
             damping[open_] = damp
             open_ = open_[~feasible]

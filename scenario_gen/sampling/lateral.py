@@ -1,7 +1,7 @@
 """The lateral deviation of a vehicle from its route: a Gaussian process over arc length that leaves room for the road."""
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, minimum_filter1d
+from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Vehicle
@@ -12,7 +12,10 @@ from scenario_gen.sampling.gp import Features, Observations, Regression
 from scenario_gen.sampling.path import BasePath
 
 SHORTEST_ROUTE = 3.0  # m; a shorter one is driven as planned
-ROOM_SIGMAS = 2.5  # a deviation of so many standard deviations still leaves the footprint on the road
+ROOM_SIGMAS = 2.0  # a deviation of so many standard deviations still leaves the footprint on the road
+SOFT = 0.6  # share of the room from which on a deviation is bent back
+_OUTLINE_STEP = 0.4  # m
+_SMOOTHING = 5.0  # m along the route
 
 
 def lateral_factor(path: BasePath, room: Floats, config: SamplingConfig) -> Floats:
@@ -44,20 +47,32 @@ def lateral_factor(path: BasePath, room: Floats, config: SamplingConfig) -> Floa
 def lateral_room(path: BasePath, vehicle: Vehicle, road: Road) -> Floats:
     """Metres (G,) by which the vehicle may leave its route to either side and stay on the road, smooth along the route.
 
-    Discs as wide as the vehicle cover it; each may move by its clearance less its radius. Conservative: the field is
-    that of the nearest cell, and clearance ahead is not told from clearance aside.
+    Every point of the footprint's outline may move as far as the nearest cell that is not drivable. Conservative: the
+    field is that of the point's own cell, less what the point may be off its centre, and ahead is not told from aside.
     """
-    half = 0.5 * vehicle.width
-    reach = max(0.5 * vehicle.length - half, 0.0)
-    offsets = np.linspace(-reach, reach, 2 * int(np.ceil(reach / half)) + 1)
-    heading = np.stack([np.cos(path.node[:, 2]), np.sin(path.node[:, 2])], axis=-1)
-    centre = path.node[:, None, :2] + offsets[:, None] * heading[:, None, :]
+    x, y = 0.5 * vehicle.length, 0.5 * vehicle.width
+    along, across = (np.linspace(-half, half, int(np.ceil(2.0 * half / _OUTLINE_STEP)) + 1) for half in (x, y))
+    outline = [np.column_stack([along, np.full_like(along, side)]) for side in (-y, y)]
+    outline += [np.column_stack([np.full_like(across, end), across]) for end in (-x, x)]
+    ahead, left = np.concatenate(outline).T
+    cos, sin = np.cos(path.node[:, 2, None]), np.sin(path.node[:, 2, None])
+    points = np.stack(
+        [path.node[:, 0, None] + ahead * cos - left * sin, path.node[:, 1, None] + ahead * sin + left * cos], axis=-1
+    )
     field = clearance_field(road)
-    cell = np.floor((centre - road.origin) / road.resolution).astype(np.int64)
+    cell = np.floor((points - road.origin) / road.resolution).astype(np.int64)
     row, column = np.clip(cell[..., 1], 0, field.shape[0] - 1), np.clip(cell[..., 0], 0, field.shape[1] - 1)
     inside = (row == cell[..., 1]) & (column == cell[..., 0])
-    room = np.maximum(np.where(inside, field[row, column], 0.0).min(axis=1) - half, 0.0)
-    width = 5
-    return np.asarray(
-        gaussian_filter1d(minimum_filter1d(room, 2 * width + 1, mode="nearest"), width / 2.5, mode="nearest", truncate=2.5)
-    )
+    room = np.where(inside, field[row, column], 0.0).min(axis=1) - road.resolution / np.sqrt(2.0)
+    reach = int(np.ceil(_SMOOTHING / max(path.spacing, 1e-9))) if len(room) > 1 else 0
+    lowest = minimum_filter1d(np.maximum(room, 0.0), 2 * reach + 1, mode="nearest")
+    return np.asarray(uniform_filter1d(lowest, 2 * reach + 1, mode="nearest"))
+
+
+def kept_within(deviation: Floats, room: Floats) -> Floats:
+    """Deviations (S, G) as they are up to `SOFT` of the room (G,), and bent smoothly (C2) to stay inside it beyond."""
+    share = np.abs(deviation) / np.maximum(room, 1e-9)
+    if (share <= SOFT).all():
+        return deviation
+    bent = SOFT + (1.0 - SOFT) * np.tanh((share - SOFT) / (1.0 - SOFT))
+    return np.asarray(np.where(share <= SOFT, deviation, np.sign(deviation) * bent * room))

@@ -14,7 +14,7 @@ from scenario_gen.roads.road import Road
 from scenario_gen.sampling.candidates import CandidateModel, VehicleModel, knots_on, piece_lengths
 from scenario_gen.sampling.clock import Clock
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.lateral import lateral_factor, lateral_room
+from scenario_gen.sampling.lateral import ROOM_SIGMAS, lateral_factor, lateral_room
 from scenario_gen.sampling.path import BasePath
 from scenario_gen.sampling.time_law import STAND, SpeedBounds, SpeedProfile, TimeLaw, TimeLayout, layout
 from scenario_gen.scenario import BoundaryStates
@@ -125,18 +125,14 @@ def _feasible(
         speed, ok = law.solve(knot, lengths)
         anchor, slid = path.anchor, 0.0
         if not ok[0]:
-            moved = law.solve_sliding(knot[0], lengths[0])
-            if moved is None:
+            speed, ok, moved = law.slide(knot, lengths)
+            if not ok[0]:
                 limit = "" if len(bounds.interval) == 0 else " through its curves"
                 reasons.append(f"vehicle {name} cannot drive {path.length:.1f} m{limit} in {clock[-1]:.1f} s within the limits")
                 return None
-            anchor, slid = _slide(path.anchor, lay, moved - lengths[0])
+            anchor, slid = _slide(path.anchor, lay, moved[0])
             if slid > most:
                 reasons.append(f"vehicle {name} would have to pass a changepoint {slid:.1f} m from its place")
-                return None
-            speed, ok = law.solve(knot, piece_lengths(lay, curve, arc, path.spacing, anchor[None]))
-            if not ok[0]:
-                reasons.append(f"vehicle {name} has no speed profile within the limits")
                 return None
         tighter = _curve_bounds(path, SpeedProfile(knot[0], speed[0]), lay, config)
         if tighter is None:
@@ -145,13 +141,15 @@ def _feasible(
     return _Nominal(law, anchor, slid)
 
 
-def _slide(anchor: Floats, lay: TimeLayout, change: Floats) -> tuple[Floats, float]:
-    """Anchors moved so that the lengths of the constraints change by `change` (G,), and the largest movement."""
-    moved = anchor.copy()
-    offset = np.concatenate([[0.0], np.cumsum(change)])
-    for g, (first, last) in enumerate(lay.bounds):
-        moved[first + 1 : last + 1] += np.where(anchor[first + 1 : last + 1] > anchor[first], offset[g + 1], offset[g])
-    return moved, float(np.abs(moved - anchor).max())
+def _slide(anchor: Floats, lay: TimeLayout, moved: Floats) -> tuple[Floats, float]:
+    """Anchors moved so that constraint g ends `moved[g]` farther along, and the largest movement [m]."""
+    slid = anchor.copy()
+    before = 0.0
+    for (first, last), after in zip(lay.bounds, moved, strict=True):
+        inside = slice(first + 1, last + 1)
+        slid[inside] += np.where(anchor[inside] > anchor[first], after, before)
+        before = after
+    return slid, float(np.abs(slid - anchor).max())
 
 
 def _curve_bounds(path: BasePath, profile: SpeedProfile, lay: TimeLayout, config: SamplingConfig) -> SpeedBounds | None:
@@ -185,6 +183,7 @@ def _model(
 ) -> Prepared:
     """The model on the clock stretched by `stretch`."""
     said = []
+    slide = max(SLIDE_SIGMAS * config.longitudinal_sigma, *(nominal.slid for nominal in found))
     if stretch > 1.0:
         said.append(f"clock stretched by {100.0 * (stretch - 1.0):.1f} % so that every vehicle can keep to its limits")
     vehicles = []
@@ -192,15 +191,17 @@ def _model(
         if nominal.slid > 1e-6:
             said.append(f"vehicle {vehicle.id} passes changepoints up to {nominal.slid:.2f} m from their place")
         room = lateral_room(path, vehicle, road)
-        narrow = room < 2.5 * config.lateral_sigma
+        narrow = room < ROOM_SIGMAS * config.lateral_sigma
         if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
             said.append(
                 f"vehicle {vehicle.id} varies less across {100.0 * narrow.mean():.0f} % of its route, where the road is narrow"
             )
         factor = lateral_factor(path, room, config)
         law = TimeLaw(_rescaled(nominal.law.layout, stretch), config, nominal.law.bounds)
-        vehicles.append(VehicleModel(vehicle, path, nominal.anchor, factor, law))
-    return Prepared(CandidateModel(tuple(vehicles), Clock(stretch * times, config), config.longitudinal_sigma), tuple(said))
+        vehicles.append(VehicleModel(vehicle, path, nominal.anchor, factor, room, law))
+    return Prepared(
+        CandidateModel(tuple(vehicles), Clock(stretch * times, config), config.longitudinal_sigma, slide), tuple(said)
+    )
 
 
 def _rescaled(lay: TimeLayout, stretch: float) -> TimeLayout:

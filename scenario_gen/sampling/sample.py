@@ -196,7 +196,7 @@ class _Loop:
             )
         if self.damped:
             self.adaptations.append(
-                f"{self.damped} of {self.candidates} candidates damped along the route and in time for a speed profile"
+                f"{self.damped} of {self.candidates} candidates have a clock nearer to the template's, to be drivable"
             )
         if self.cancelled and self.cancelled():
             self.adaptations.append("cancelled")

@@ -16,15 +16,20 @@ from itertools import pairwise
 
 import daqp
 import numpy as np
+import numpy.typing as npt
 
 from scenario_gen.arrays import Bools, Floats, Ints, frozen
 from scenario_gen.kernels import F1, F2, I1, OUT2, OUT3, kernel
 from scenario_gen.sampling.config import SamplingConfig
 
+Marks = npt.NDArray[np.intc]
+
 STAND = 0.05  # m/s; an asked speed below this is met by standing
 SHORTEST = 0.2  # s, between two knots in the template
 _RAMP = 1.5  # m/s², by which a vehicle that is asked to roll comes to a stand
 _TARGET_SCALE = 4.0  # a template speed is scaled at most so much; beyond it, lengths alone decide
+_STIFFNESS = 100.0  # 1/s, cost of sliding an anchor: strong, so that it happens only where it must
+_LENGTH_TOLERANCE = 1e-6  # m
 _EQUALITY = 5  # DAQP's mark
 
 
@@ -218,7 +223,7 @@ class TimeLaw:
         self._sense[n : n + groups] = _EQUALITY
 
     def solve(self, knot: Floats, lengths: Floats) -> tuple[Floats, Bools]:
-        """Speeds at the knots.
+        """Speeds at the knots, lengths kept exactly.
 
         Args:
             knot: (S, M) times [s] of the knots on each sample's clock.
@@ -227,58 +232,59 @@ class TimeLaw:
         Returns:
             speeds (S, M) in m/s and feasible (S,); speeds of infeasible samples are zero.
         """
-        lay = self.layout
-        samples, n = knot.shape[0], lay.size
-        speeds = np.broadcast_to(lay.given, knot.shape).copy()
-        if n == 0:
-            return speeds, np.abs(lengths).sum(axis=1) < 1e-6
-        h, f = np.zeros((samples, n, n)), np.zeros((samples, n))
-        a = np.zeros((samples, self._rows, n))
-        low, high = np.zeros((samples, n + self._rows)), np.zeros((samples, n + self._rows))
-        low[:, :n], high[:, :n] = 0.0, self.config.max_speed
-        limits = np.array([self.config.max_deceleration, self.config.max_acceleration])
-        _assemble(
-            knot, lengths, lay.group, lay.moments, lay.unknown, lay.given, self._rated, limits,
-            self.bounds.interval, self.bounds.at, self.bounds.most, h, f, a, low, high,
-        )  # fmt: skip
-        feasible = np.zeros(samples, dtype=np.bool_)
-        free = lay.unknown >= 0
-        for s in range(samples):
-            x, _, flag, _ = daqp.solve(h[s], f[s], a[s], high[s], low[s], self._sense)
-            feasible[s] = flag > 0
-            if feasible[s]:
-                speeds[s, free] = np.maximum(x, 0.0)
-        speeds[~feasible] = 0.0
-        return speeds, feasible
+        if self.layout.size == 0:
+            return self._speeds(len(knot)), np.abs(lengths).sum(axis=1) < _LENGTH_TOLERANCE
+        return self._optimise(*self._programmes(knot, lengths), self._sense)
 
-    def solve_sliding(self, knot: Floats, lengths: Floats, stiffness: float = 100.0) -> Floats | None:
-        """Lengths (G,) nearest to `lengths` (G,) that can be driven on the clock `knot` (M,), their sum kept; None if none can.
+    def slide(self, knot: Floats, lengths: Floats) -> tuple[Floats, Bools, Floats]:
+        """Speeds at the knots where interior anchors may slide along the route, as little as possible.
 
-        Interior anchors slide along the route as little as possible: their squared displacements are added to the cost.
+        The total length is kept exactly; the squared displacements of the anchors are added to the cost.
+
+        Returns:
+            speeds (S, M), feasible (S,), and by how many metres (S, G) each constraint's end slid.
         """
-        lay, n, groups = self.layout, self.layout.size, len(self.layout.bounds)
-        if n == 0:
-            return lengths if np.abs(lengths).sum() < 1e-6 else None
-        h, f, a = np.zeros((1, n, n)), np.zeros((1, n)), np.zeros((1, self._rows, n))
-        low, high = np.zeros((1, n + self._rows)), np.zeros((1, n + self._rows))
-        low[:, :n], high[:, :n] = 0.0, self.config.max_speed
+        n, groups = self.layout.size, len(self.layout.bounds)
+        if n == 0 or groups < 2:
+            return *self.solve(knot, lengths), np.zeros(lengths.shape)
+        h, f, a, low, high = self._programmes(knot, lengths)
+        reached, wanted = np.cumsum(a[:, :groups], axis=1), np.cumsum(low[:, n : n + groups], axis=1)
+        inner = reached[:, :-1]
+        h += 2.0 * _STIFFNESS * inner.transpose(0, 2, 1) @ inner
+        f -= 2.0 * _STIFFNESS * (wanted[:, None, :-1] @ inner)[:, 0]
+        a[:, groups - 1] = reached[:, -1]
+        low[:, n + groups - 1] = high[:, n + groups - 1] = wanted[:, -1]
+        bounded = np.r_[0:n, n + groups - 1 : n + self._rows]
+        a, low, high = np.ascontiguousarray(a[:, groups - 1 :]), low[:, bounded].copy(), high[:, bounded].copy()
+        speeds, feasible = self._optimise(h, f, a, low, high, self._sense[bounded].copy())
+        slid = (reached @ speeds[:, self.layout.unknown >= 0, None])[..., 0] - wanted
+        return speeds, feasible, slid
+
+    def _speeds(self, samples: int) -> Floats:
+        """The given speeds, (samples, M)."""
+        return np.broadcast_to(self.layout.given, (samples, len(self.layout.knot))).copy()
+
+    def _programmes(self, knot: Floats, lengths: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """The quadratic programmes of S samples."""
+        lay, samples, n = self.layout, len(knot), self.layout.size
+        h, f, a = np.zeros((samples, n, n)), np.zeros((samples, n)), np.zeros((samples, self._rows, n))
+        low, high = np.zeros((samples, n + self._rows)), np.zeros((samples, n + self._rows))
+        high[:, :n] = self.config.max_speed
         limits = np.array([self.config.max_deceleration, self.config.max_acceleration])
-        _assemble(
-            knot[None], lengths[None], lay.group, lay.moments, lay.unknown, lay.given, self._rated, limits,
-            self.bounds.interval, self.bounds.at, self.bounds.most, h, f, a, low, high,
-        )  # fmt: skip
-        rows, wanted = np.cumsum(a[0, :groups], axis=0), np.cumsum(low[0, n : n + groups])
-        own = a[0, :groups].copy()
-        h[0] += 2.0 * stiffness * rows[:-1].T @ rows[:-1]
-        f[0] -= 2.0 * stiffness * rows[:-1].T @ wanted[:-1]
-        a[0, :groups], fixed = 0.0, lengths - low[0, n : n + groups]
-        a[0, 0], low[0, n], high[0, n] = rows[-1], wanted[-1], wanted[-1]
-        keep = np.r_[0, groups : self._rows]
-        pick = np.r_[np.arange(n), n + keep]
-        x, _, flag, _ = daqp.solve(
-            h[0], f[0], np.ascontiguousarray(a[0][keep]), high[0][pick].copy(), low[0][pick].copy(), self._sense[pick].copy()
-        )
-        return own @ x + fixed if flag > 0 else None
+        bounds = self.bounds
+        given = (lay.group, lay.moments, lay.unknown, lay.given, self._rated, limits, bounds.interval, bounds.at, bounds.most)
+        _assemble(knot, lengths, *given, h, f, a, low, high)
+        return h, f, a, low, high
+
+    def _optimise(self, h: Floats, f: Floats, a: Floats, low: Floats, high: Floats, sense: Marks) -> tuple[Floats, Bools]:
+        """Solve S programmes one after the other; speeds (S, M) and feasible (S,)."""
+        speeds, feasible = self._speeds(len(f)), np.zeros(len(f), dtype=np.bool_)
+        free = self.layout.unknown >= 0
+        for s in range(len(f)):
+            x, _, flag, _ = daqp.solve(h[s], f[s], a[s], high[s], low[s], sense)
+            feasible[s] = flag > 0
+            speeds[s, free] = np.maximum(x, 0.0) if flag > 0 else 0.0
+        return speeds, feasible
 
 
 @kernel(inline=True)

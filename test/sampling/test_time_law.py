@@ -119,10 +119,13 @@ def test_impossible_lengths_are_refused_and_slid():
     law = TimeLaw(lay, SamplingConfig())
     wrong = driven(dip()) + np.array([70.0, -20.0, -50.0, 0.0])
     assert not law.solve(lay.knot[None], wrong[None])[1][0]
-    slid = law.solve_sliding(lay.knot, wrong)
-    assert slid.sum() == pytest.approx(wrong.sum(), abs=1e-6)
-    assert law.solve(lay.knot[None], slid[None])[1][0]
-    assert law.solve_sliding(lay.knot, wrong * 10.0) is None
+    speed, ok, slid = law.slide(lay.knot[None], wrong[None])
+    assert ok[0]
+    reached = SpeedProfile(lay.knot, speed[0]).state(CLOCK)[0][1:]
+    assert reached == pytest.approx(np.cumsum(wrong) + slid[0], abs=1e-5)
+    assert slid[0][-1] == pytest.approx(0.0, abs=1e-5)
+    assert 1.0 < np.abs(slid).max() < 100.0
+    assert not law.slide(lay.knot[None], 10.0 * wrong[None])[1][0]
 
 
 def test_speed_bounds_hold():
