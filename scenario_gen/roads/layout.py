@@ -13,6 +13,7 @@ from scenario_gen.roads.unrolled import Unrolled, unroll
 _ROOM = 6.0  # metres kept free behind the first and before the last footprint
 _SLACK = 12.0  # metres by which a junction's geometry may differ from the template's
 _SHORTEST = 30.0
+_U_TURN = 9.3  # metres between the lanes of a U-turn
 _PLAIN = 60.0  # metres: an arm when there is no template
 
 
@@ -24,7 +25,7 @@ def layout_for(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) 
         try:
             layout = _along_a_road(tracks, unroll(tracks))
         except RefusedError:  # turns or crossings: a junction's template
-            layout = _at_a_junction(tracks)
+            layout = _at_a_junction(tracks, config)
     main, side = (config.arm_length, config.arm_length) if config.arm_length else (layout.main, layout.side)
     lanes = config.lanes or layout.lanes
     mouth = lanes * config.lane_width + config.corner_radius + 5.0 if name != "straight" else 5.0
@@ -54,7 +55,7 @@ def junction_centre(tracks: tuple[Track, ...]) -> Floats:
     return np.asarray(np.mean(points, axis=0))
 
 
-def _at_a_junction(tracks: tuple[Track, ...]) -> Layout:
+def _at_a_junction(tracks: tuple[Track, ...], config: RoadConfig) -> Layout:
     centre = junction_centre(tracks)
     needs, yaws = [], []
     for track in tracks:
@@ -68,7 +69,10 @@ def _at_a_junction(tracks: tuple[Track, ...]) -> Layout:
     need = np.array(needs)
     main = float(need.max())
     side = max(float(need[across > np.sin(np.radians(30.0))].max(initial=_SHORTEST)), _SHORTEST)
-    return Layout(max(main, _SHORTEST), side, _parallel_lanes(tracks))
+    lanes = _parallel_lanes(tracks)
+    if any(track.makes_u_turn for track in tracks):  # from one outermost lane to the other in a half circle
+        lanes = max(lanes, int(np.ceil((_U_TURN / config.lane_width + 1.0) / 2.0)))
+    return Layout(max(main, _SHORTEST), side, lanes)
 
 
 def _parallel_lanes(tracks: tuple[Track, ...]) -> int:

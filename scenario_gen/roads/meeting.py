@@ -10,6 +10,7 @@ from scenario_gen.roads.tracks import Track
 
 _BEYOND = 15.0  # metres by which a path is continued to look for a crossing
 _ANGLE = np.radians(25.0)
+_HEAD_ON = np.radians(30.0)  # nearer to head-on than this, a crossing is a matter of lateral offset (or of GPS)
 
 
 @dataclass(frozen=True)
@@ -21,14 +22,16 @@ class Meeting:
 
 
 def meeting(a: Track, b: Track) -> Meeting | None:
-    """The crossing that both come nearest to reaching (and, of several, in time), or None if the paths do not cross."""
+    """The crossing that both come nearest to reaching (of several, the squarest and nearest in time), or None."""
     one, two = (t.curve.cut(-_BEYOND, t.travelled + _BEYOND) for t in (a, b))
     found = crossings(one, two, _ANGLE) - _BEYOND
+    angle = a.curve.at(found[:, 0])[:, 2] - b.curve.at(found[:, 1])[:, 2]
+    found, angle = found[np.cos(angle) > -np.cos(_HEAD_ON)], angle[np.cos(angle) > -np.cos(_HEAD_ON)]
     if len(found) == 0:
         return None
     short = sum(_outside(found[:, k], t.travelled) for k, t in enumerate((a, b)))
     apart = np.abs(_sample(a, found[:, 0]) - _sample(b, found[:, 1]))
-    best = int(np.argmin(short * 10.0 + apart * 0.1))
+    best = int(np.argmin(short * 10.0 + apart * 0.05 + 25.0 * (1.0 - np.abs(np.sin(angle)))))
     return Meeting(float(found[best, 0]), float(found[best, 1]))
 
 

@@ -1,0 +1,103 @@
+"""From a placement to a fit: anchors at the changepoints, repaired where they have no room, and the states asked for."""
+
+import numpy as np
+
+from scenario_gen.arrays import Bools, Floats, Ints, frozen_ints
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import RefusedError
+from scenario_gen.fitting.config import FittingConfig
+from scenario_gen.fitting.placement import Placement
+from scenario_gen.fitting.result import Fit, FittedVehicle
+from scenario_gen.roads.repair import nearest_pose_with_room
+from scenario_gen.roads.road import Road
+from scenario_gen.roads.tracks import Track
+from scenario_gen.scenario import BoundaryStates
+from scenario_gen.segmentation.result import Segmentation
+
+_STAND_LENGTH = 0.5  # metres
+_STAND_SPEED = 0.3  # m/s: slower is standing
+
+
+def finish(encounter: Encounter, segmentation: Segmentation, road: Road, placement: Placement, config: FittingConfig) -> Fit:
+    """Read the anchors off a placement.
+
+    Raises:
+        RefusedError: an anchor is farther than `max_move` from the nearest pose with room.
+    """
+    last = encounter.speed.shape[1] - 1
+    index = frozen_ints(np.concatenate(([0], segmentation.changepoints, [last])))
+    notes = list(placement.notes)
+    fitted, states = [], []
+    for i, track in enumerate(placement.tracks):
+        stands = _stands(track, index)
+        anchors, moved, said = _anchors(road, track, _snapped(track, index, stands), index, encounter.dt, config)
+        notes += said
+        fitted.append(
+            FittedVehicle(
+                anchors=anchors,
+                moved=moved + placement.moved[i],
+                stands=stands,
+                scale=float(placement.scale[i]),
+                manoeuvre=placement.manoeuvre[i],
+            )
+        )
+        ends = encounter.speed[i, [0, last]] * placement.scale[i]
+        ends = np.where((encounter.speed[i, [0, last]] < _STAND_SPEED) | track.still, 0.0, ends)
+        states.append(np.column_stack((anchors[[0, -1]], ends)))
+    asked = BoundaryStates(start=np.stack([s[0] for s in states]), end=np.stack([s[1] for s in states]))
+    return Fit(encounter.vehicles, tuple(fitted), index, asked, tuple(notes))
+
+
+def _stands(track: Track, index: Ints) -> Bools:
+    """(K + 1,) primitives in which the vehicle stands: slow throughout, and hardly any path."""
+    if track.still:
+        return np.ones(len(index) - 1, dtype=np.bool_)
+    pieces = list(zip(index[:-1], index[1:], strict=True))
+    driven = np.array([track.progress[b] - track.progress[a] for a, b in pieces])
+    fastest = np.array([track.speed[a : b + 1].max() for a, b in pieces])
+    stands = (driven < _STAND_LENGTH) & (fastest < _STAND_SPEED) | (driven < 1e-3)
+    if stands.all():  # it does move, if only little by little
+        stands[int(np.argmax(driven))] = False
+    return np.asarray(stands)
+
+
+def _snapped(track: Track, index: Ints, stands: Bools) -> Floats:
+    """(K + 2,) progress at the anchors; the two ends of a dwell are one place, and start and end stay where they are."""
+    progress = track.progress[index].copy()
+    k = 0
+    while k < len(stands):
+        if not stands[k]:
+            k += 1
+            continue
+        stop = k
+        while stop < len(stands) and stands[stop]:
+            stop += 1
+        progress[k : stop + 1] = progress[stop] if stop == len(stands) and k > 0 else progress[k]
+        k = stop
+    return progress
+
+
+def _anchors(
+    road: Road, track: Track, progress: Floats, index: Ints, dt: float, config: FittingConfig
+) -> tuple[Floats, Floats, list[str]]:
+    """Anchors (K + 2, 3), how far each was moved (K + 2,), and sentences about it."""
+    anchors = track.curve.at(progress)
+    moved = np.zeros(len(anchors))
+    said = []
+    for k in range(len(anchors)):
+        if k and progress[k] == progress[k - 1]:
+            anchors[k], moved[k] = anchors[k - 1], moved[k - 1]
+            continue
+        vehicle = track.vehicle
+        what = "start" if k == 0 else "end" if k == len(anchors) - 1 else f"changepoint at {index[k] * dt:.1f} s"
+        answer = nearest_pose_with_room(road, anchors[k], vehicle.length, vehicle.width, config.max_move)
+        if answer is None:
+            x, y = anchors[k, :2]
+            raise RefusedError(
+                f"vehicle {vehicle.id}: its {what} (x {x:.1f}, y {y:.1f}) is more than {config.max_move:g} m from the nearest "
+                f"pose with room on road {road.name}"
+            )
+        anchors[k], moved[k] = answer
+        if moved[k] > 0.0:
+            said.append(f"vehicle {vehicle.id}: its {what} had no room and was moved by {moved[k]:.2f} m")
+    return anchors, moved, said

@@ -1,0 +1,79 @@
+"""One door to the fitting: which way of placing a template is tried on which road."""
+
+from collections.abc import Callable
+
+from scenario_gen.arrays import Floats
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import RefusedError
+from scenario_gen.fitting.config import FittingConfig
+from scenario_gen.fitting.finish import finish
+from scenario_gen.fitting.identity import place_in_own_frame
+from scenario_gen.fitting.junction import place_at_junction
+from scenario_gen.fitting.lanes import place_along_lanes
+from scenario_gen.fitting.placement import Placement
+from scenario_gen.fitting.result import Fit
+from scenario_gen.fitting.search import place_by_search
+from scenario_gen.roads.road import Road
+from scenario_gen.roads.tracks import Track, clean_tracks
+from scenario_gen.segmentation.result import Segmentation
+
+_AT_HOME = 0.98  # share of footprints with room at which a road is taken for the template's own
+
+
+def fit_template(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    config: FittingConfig = FittingConfig(),  # noqa: B008 - frozen
+    *,
+    starts: Floats | None = None,
+    goals: Floats | None = None,
+) -> Fit:
+    """Place a template on a road (paper III-A, eqs 7-9 put right).
+
+    Args:
+        encounter: the template.
+        segmentation: its changepoints; they decide which anchors are reported, never where start and end are.
+        road: the target.
+        config: which way, and how far things may be scaled and moved.
+        starts: (N, 3) or (N, 4) given start poses x [m], y [m], yaw [rad], and speeds [m/s]; with `goals`.
+        goals: likewise the end.
+
+    Raises:
+        RefusedError: it does not fit; the message says why, with figures.
+        InputError: `starts` and `goals` disagree with the encounter.
+    """
+    if starts is not None or goals is not None:
+        from scenario_gen.fitting.given import fit_given
+
+        return fit_given(encounter, segmentation, road, config, starts, goals)
+    return finish(encounter, segmentation, road, _place(encounter, road, config), config)
+
+
+def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement:
+    tracks = clean_tracks(encounter)
+    ways: dict[str, Callable[[tuple[Track, ...], Road, FittingConfig], Placement]] = {
+        "lanes": place_along_lanes,
+        "junction": place_at_junction,
+        "search": place_by_search,
+    }
+    if config.placement == "identity":
+        return place_in_own_frame(encounter, road, config)[0]
+    if config.placement != "auto":
+        return ways[config.placement](tracks, road, config)
+    own: Placement | None = None
+    reasons = []
+    try:
+        own, share = place_in_own_frame(encounter, road, config)
+        if share >= _AT_HOME:
+            return own
+    except RefusedError as error:
+        reasons.append(str(error))
+    for place in ways.values():
+        try:
+            return place(tracks, road, config)
+        except RefusedError as error:
+            reasons.append(str(error))
+    if own is not None:
+        return own
+    raise RefusedError(f"the template does not fit road {road.name}: " + "; ".join(reasons))

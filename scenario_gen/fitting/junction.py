@@ -1,0 +1,294 @@
+"""Placing a template through a junction: which entry and which exit for whom, and how far along.
+
+A search over assignments with a cost, deterministic: vehicles are assigned in turn (those with most relations first) and
+the best partial assignments kept. Each is solved for the distances along its routes and compared with the template after
+the best rigid motion: headings and relative positions at sampled instants, weighted by how near the vehicles are.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, frozen, wrap_angle
+from scenario_gen.errors import RefusedError
+from scenario_gen.fitting.config import FittingConfig
+from scenario_gen.fitting.placement import Placement, check_scale, kept_apart
+from scenario_gen.fitting.relations import Equation, Relation, equations, find_relations
+from scenario_gen.fitting.routes import draw_route, draw_u_turn
+from scenario_gen.roads.clearance import footprint_fits
+from scenario_gen.roads.curve import Curve
+from scenario_gen.roads.road import Road
+from scenario_gen.roads.tracks import Track
+
+_BEAM = 40
+_INSTANTS = 15
+_SCALES = (1.0, 0.95, 1.05, 0.9, 1.1, 0.85, 1.15, 0.8, 1.2, 1.25)
+_LOST = 400.0  # cost [m²] of a relation that the routes do not have
+_FAR = 20.0  # metres: a mismatch of position counts no more than this
+_HEADING = 100.0  # m² per unit of 1 − cos
+_OWN_TURN = 40.0  # m² per rad²: how much more or less a vehicle turns than in the template
+_WHOLE_TURN = 15.0  # the same for the whole way, driven or not
+_ARM = 30.0  # m² per rad²: how differently two vehicles' entries are turned from each other
+_OWN_SLACK = np.radians(15.0)  # a road's corner may turn by this much more or less, beyond the limit below
+_OFF = 50.0  # cost per metre beyond the road's end
+_TURN_TOLERANCE = np.radians(50.0)
+_HEADING_LIMIT = np.radians(50.0)  # a fitted vehicle may be turned from the template (after the rigid motion) by this on average
+_APEXES = np.arange(0.2, 0.81, 0.05)  # places along a road at which a U-turn is tried
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """A route that a vehicle could take."""
+
+    entry: int
+    leave: int
+    curve: Curve
+    turn: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Choice:
+    """Ways for the vehicles assigned so far, with the arc lengths A at which they start."""
+
+    ways: dict[int, _Way]
+    start: dict[int, float]
+    cost: float
+    lost: int
+    beyond: float
+    turned: float
+
+
+def place_at_junction(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> Placement:
+    """Match the template's manoeuvres and relative geometry to the road's entries and exits.
+
+    Raises:
+        RefusedError: no assignment keeps who crosses whom, the turns and the distances.
+    """
+    ways = _ways(tracks, road)
+    for track, own in zip(tracks, ways, strict=True):
+        if not own:
+            raise RefusedError(
+                f"vehicle {track.vehicle.id} {_doing(track)}: road {road.name} has no way for that "
+                f"({len(road.entries)} entries, {len(road.exits)} exits)"
+            )
+    relations = find_relations(tracks)
+    reasons = []
+    for scale in _SCALES:
+        if not config.scale_low <= scale <= config.scale_high:
+            continue
+        choice = _search(tracks, ways, relations, scale)
+        if choice.lost == 0 and choice.turned <= _HEADING_LIMIT and choice.beyond <= 0.0:
+            return _placed(tracks, road, choice, scale, relations, config)
+        reasons.append(_why_not(choice, scale))
+        if choice.lost or choice.turned > _HEADING_LIMIT:
+            break  # no scale mends that
+    if not reasons:
+        check_scale(1.0, "the template", config)
+    raise RefusedError(f"the template does not fit the ways of road {road.name}: {reasons[0]}")
+
+
+def _doing(track: Track) -> str:
+    if track.makes_u_turn:
+        return "makes a U-turn"
+    turn = float(np.degrees(track.curve.points[-1, 2] - track.curve.points[0, 2]))
+    if abs(turn) < 30.0 or track.still:
+        return "goes straight on"
+    return f"turns {'left' if turn > 0 else 'right'} by {abs(turn):.0f}°"
+
+
+def _why_not(choice: _Choice, scale: float) -> str:
+    if choice.lost:
+        return f"the best assignment loses {choice.lost} of the template's crossings or shared lanes"
+    if choice.turned > _HEADING_LIMIT:
+        return f"in the best assignment a vehicle is turned from the template by {np.degrees(choice.turned):.0f}°"
+    return f"in the best assignment a vehicle starts or ends {choice.beyond:.1f} m beyond the road's end (scale {scale:g})"
+
+
+def _ways(tracks: tuple[Track, ...], road: Road) -> list[list[_Way]]:
+    """The drawn routes that suit each vehicle's turning."""
+    length, width = max(t.vehicle.length for t in tracks), max(t.vehicle.width for t in tracks)
+
+    def fits(poses: Floats) -> bool:
+        return bool(footprint_fits(road, poses, length, width).all())
+
+    everything: list[_Way] = []
+    u_turns = any(track.makes_u_turn for track in tracks)
+    for e, entry in enumerate(road.entries):
+        for x, leave in enumerate(road.exits):
+            curve = draw_route(entry, leave, fits)
+            if curve is not None:
+                everything.append(_Way(e, x, curve, float(curve.points[-1, 2] - curve.points[0, 2])))
+            elif u_turns:
+                reach = max(float(np.hypot(*(other[:2] - entry[:2]))) for other in road.exits)
+                for apex in _APEXES * reach:
+                    curve = draw_u_turn(entry, leave, float(apex), fits)
+                    if curve is not None:
+                        everything.append(_Way(e, x, curve, float(curve.points[-1, 2] - curve.points[0, 2])))
+    return [[way for way in everything if _suits(track, way)] for track in tracks]
+
+
+def _suits(track: Track, way: _Way) -> bool:
+    """A vehicle may have driven only part of a turn, but not more than the way turns, nor to the other side."""
+    turn = float(track.curve.points[-1, 2] - track.curve.points[0, 2])
+    if track.makes_u_turn or abs(way.turn) > np.radians(150.0):
+        return track.makes_u_turn and abs(way.turn) > np.radians(150.0) and way.turn * turn > 0.0
+    low, high = min(way.turn, 0.0) - _TURN_TOLERANCE, max(way.turn, 0.0) + _TURN_TOLERANCE
+    return low <= turn <= high
+
+
+def _search(tracks: tuple[Track, ...], ways: list[list[_Way]], relations: tuple[Relation, ...], scale: float) -> _Choice:
+    degree = [sum(i in (r.a, r.b) for r in relations) for i in range(len(tracks))]
+    order = sorted(range(len(tracks)), key=lambda i: (-degree[i], -tracks[i].travelled))
+    solver = _Solver(tracks, relations, scale)
+    beam = [_Choice({}, {}, 0.0, 0, 0.0, 0.0)]
+    for i in order:
+        grown = [solver.solve({**choice.ways, i: way}) for choice in beam for way in ways[i]]
+        grown.sort(key=lambda choice: round(choice.cost, 6))  # stable: ties keep the order of entries and exits
+        beam = grown[:_BEAM]
+    return beam[0]
+
+
+class _Solver:
+    """Distances along given ways, and how well the result resembles the template."""
+
+    def __init__(self, tracks: tuple[Track, ...], relations: tuple[Relation, ...], scale: float) -> None:
+        self.tracks, self.relations, self.scale = tracks, relations, scale
+        instants = np.unique(np.linspace(0, len(tracks[0].progress) - 1, _INSTANTS).astype(np.int64))
+        self.poses = np.stack([track.poses[instants] for track in tracks])
+        self.driven = scale * np.stack([track.progress[instants] for track in tracks])
+        self.cache: dict[tuple[int, int, int], tuple[Equation, ...] | None] = {}
+
+    def solve(self, ways: dict[int, _Way]) -> _Choice:
+        members = sorted(ways)
+        system: list[Equation] = []
+        lost = 0
+        for k, relation in enumerate(self.relations):
+            if relation.a in ways and relation.b in ways:
+                found = self._equations(k, relation, ways[relation.a], ways[relation.b])
+                lost += found is None
+                system.extend(found or ())
+        start = _least_squares(members, system)
+        for _ in range(2):  # who has no equation is placed by its relative position, then all are compared
+            rotation, shift, yaw = self._align(ways, start, members)
+            for i in members:
+                if i not in start:
+                    target = self.poses[i][:, :2] @ rotation.T + shift
+                    station, _ = ways[i].curve.project(target)
+                    start[i] = float(np.median(station - self.driven[i]))
+        return self._judged(ways, start, members, lost, rotation, shift, yaw)
+
+    def _equations(self, k: int, relation: Relation, one: _Way, two: _Way) -> tuple[Equation, ...] | None:
+        key = (k, id(one), id(two))
+        if key not in self.cache:
+            self.cache[key] = equations(relation, one.curve, two.curve, self.scale)
+        return self.cache[key]
+
+    def _align(self, ways: dict[int, _Way], start: dict[int, float], members: list[int]) -> tuple[Floats, Floats, float]:
+        """The rigid motion (Umeyama 1991, det R = +1, scale fixed) from the template to the vehicles placed so far."""
+        known = [i for i in members if i in start]
+        if not known:  # nobody is tied down: turn the first one's heading onto its way, at the way's middle
+            i = members[0]
+            middle = ways[i].curve.at(ways[i].curve.length / 2.0)
+            yaw = float(middle[2] - self.poses[i][_INSTANTS // 2, 2])
+            rotation = _rotation(yaw)
+            return rotation, middle[:2] - rotation @ (self.scale * self.poses[i][_INSTANTS // 2, :2]), yaw
+        source = np.concatenate([self.poses[i] for i in known])
+        target = np.concatenate([ways[i].curve.at(start[i] + self.driven[i]) for i in known])
+        a, b = self.scale * source[:, :2], target[:, :2]
+        ca, cb = a.mean(axis=0), b.mean(axis=0)
+        u, v = a - ca, b - cb
+        sine = float((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum()) + 10.0 * float(np.sin(target[:, 2] - source[:, 2]).sum())
+        cosine = float((u * v).sum()) + 10.0 * float(np.cos(target[:, 2] - source[:, 2]).sum())
+        yaw = float(np.arctan2(sine, cosine))
+        rotation = _rotation(yaw)
+        return self.scale * rotation, cb - rotation @ ca, yaw
+
+    def _judged(
+        self,
+        ways: dict[int, _Way],
+        start: dict[int, float],
+        members: list[int],
+        lost: int,
+        rotation: Floats,
+        shift: Floats,
+        yaw: float,
+    ) -> _Choice:
+        cost, beyond, turned = _LOST * lost, 0.0, 0.0
+        came = [float(ways[i].curve.points[0, 2] - self.poses[i][0, 2]) for i in members]
+        for k in range(1, len(members)):
+            apart = wrap_angle(np.array([came[k] - other for other in came[:k]]))
+            cost += _ARM * float((apart**2).sum()) / len(members)
+        for i in members:
+            curve = ways[i].curve
+            fitted = curve.at(start[i] + self.driven[i])
+            miss = np.hypot(*(fitted[:, :2] - self.poses[i][:, :2] @ rotation.T - shift).T)
+            off = np.abs(wrap_angle(fitted[:, 2] - self.poses[i][:, 2] - yaw))
+            own = float((fitted[-1, 2] - fitted[0, 2]) - (self.poses[i][-1, 2] - self.poses[i][0, 2]))
+            whole = float(ways[i].turn - (self.poses[i][-1, 2] - self.poses[i][0, 2]))
+            alike = np.mean(np.minimum(miss, _FAR) ** 2) + _HEADING * np.mean(1.0 - np.cos(off))
+            alike += _OWN_TURN * own**2 + _WHOLE_TURN * whole**2
+            cost += float(alike) / len(members)
+            turned = max(turned, float(off.mean()), abs(own) - _OWN_SLACK)
+            half = self.tracks[i].vehicle.length / 2.0 + 0.5
+            short = max(half - start[i], start[i] + float(self.driven[i][-1]) + half - curve.length, 0.0)
+            beyond = max(beyond, short)
+            cost += _OFF * short
+        return _Choice(ways, start, cost, lost, beyond, turned)
+
+
+def _rotation(yaw: float) -> Floats:
+    return np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+
+
+def _least_squares(members: list[int], system: list[Equation]) -> dict[int, float]:
+    """A for the vehicles that equations tie to the road (those tied only to each other are left out)."""
+    absolute = {term[0] for e in system if len(e.terms) == 1 for term in e.terms}
+    while True:  # who shares a lane with one that is tied down is tied down too
+        more = {i for e in system if len(e.terms) == 2 and any(t[0] in absolute for t in e.terms) for i, _ in e.terms}
+        if more <= absolute:
+            break
+        absolute |= more
+    tied = [i for i in members if i in absolute]
+    used = [e for e in system if all(i in absolute for i, _ in e.terms)]
+    if not tied:
+        return {}
+    matrix, value = np.zeros((len(used), len(tied))), np.zeros(len(used))
+    for row, equation in enumerate(used):
+        for i, factor in equation.terms:
+            matrix[row, tied.index(i)] = equation.weight * factor
+        value[row] = equation.weight * equation.value
+    solution = np.linalg.lstsq(matrix, value, rcond=None)[0]
+    return {i: float(a) for i, a in zip(tied, solution, strict=True)}
+
+
+def _placed(
+    tracks: tuple[Track, ...], road: Road, choice: _Choice, scale: float, relations: tuple[Relation, ...], config: FittingConfig
+) -> Placement:
+    placed, manoeuvres = [], []
+    notes = [f"scaled by {scale:g} to fit the road"] if scale != 1.0 else []
+    for i, track in enumerate(tracks):
+        way, begin = choice.ways[i], choice.start[i]
+        end = begin + scale * track.travelled
+        curve = way.curve.cut(begin, max(end, begin + 1.0), 0.25)
+        progress = scale * track.progress * (curve.length / max(end - begin, 1.0))
+        placed.append(replace(track, curve=curve, progress=frozen(np.minimum(progress, curve.length))))
+        manoeuvres.append("wait" if track.still else _name(way.turn))
+        notes.append(
+            f"vehicle {track.vehicle.id} takes entry {way.entry} and exit {way.leave} ({_name(way.turn)}), "
+            f"{begin:.1f} m to {end:.1f} m of {way.curve.length:.1f} m; {_doing(track)} in the template"
+        )
+    for r in relations:
+        a, b = tracks[r.a].vehicle.id, tracks[r.b].vehicle.id
+        notes.append(f"vehicle {a} {r.kind.value} vehicle {b}, as in the template")
+    notes.append(f"assignment chosen at a cost of {choice.cost:.1f} m²")
+    n = len(tracks)
+    placement = Placement(tuple(placed), frozen(np.full(n, scale)), tuple(manoeuvres), frozen(np.zeros(n)), tuple(notes))
+    return kept_apart(placement, config, sideways=0.0)
+
+
+def _name(turn: float) -> str:
+    if abs(turn) < np.radians(20.0):
+        return "straight"
+    if abs(turn) > np.radians(150.0):
+        return "U-turn"
+    return "left" if turn > 0.0 else "right"
