@@ -99,11 +99,18 @@ def render(report: ReportInput) -> str:
         report=report,
         views=views,
         verdict=_verdict(views),
+        facts=[fact for fact in report.provenance.items() if not _is_parameter(fact[0])],
+        parameters=[fact for fact in report.provenance.items() if _is_parameter(fact[0])],
         css=Markup(asset("report.css")),
         plotly=Markup(get_plotlyjs()),
         scripts=[Markup(asset(name)) for name in ("scene.js", "charts.js", "page.js")],
         data=Markup(json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")),
     )
+
+
+def _is_parameter(name: str) -> bool:
+    """Parameters have dotted names ("sampling.sigma_f"); they are many, and folded away."""
+    return "." in name and " " not in name
 
 
 def _view(index: int, case: Case) -> dict[str, Any]:
@@ -118,7 +125,7 @@ def _view(index: int, case: Case) -> dict[str, Any]:
         "case": case,
         "title": f"{case.encounter.name} on {case.road.name}",
         "arms": [(name, made, _causes(made)) for name, made in arms if made is not None],
-        "rows": evaluation.rows,
+        "rows": [*evaluation.rows[1:], evaluation.rows[0]],
         "metrics": evaluation.metrics,
         "k": len(case.segmentation.changepoints),
         "rate": len(case.segmentation.changepoints) / duration,

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 FRAME_PERIOD = 0.2
 """Seconds between the frames that are stored; the page interpolates between them."""
-MAX_FRAMES, MAX_CELLS, MATRIX_SIZE, MAX_PAIRS, MAX_ROUTE_POINTS = 240, 500, 72, 10, 200
+MAX_FRAMES, MAX_CELLS, MATRIX_SIZE, MAX_PAIRS, MAX_ROUTE_POINTS = 240, 900, 72, 10, 200
 
 
 def case_data(case: "Case", samples: int) -> dict[str, Any]:

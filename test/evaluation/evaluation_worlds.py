@@ -60,7 +60,8 @@ def cross_road():
 
 def report_case(count=12, name="crossing", without=True):
     """A whole case of the report, around the crossing."""
-    encounter = replace(crossing(), name=name)
+    cars = (CARS[0], replace(CARS[1], id="south" if name == "crossing" else "A_VEHICLE_WITH_A_LONG_NAME"))
+    encounter = replace(crossing(), name=name, vehicles=cars)
     steps = encounter.speed.shape[1]
     labels = np.repeat([0, 1, 0], [40, 40, steps - 80])
     time = np.arange(steps)

@@ -7,7 +7,7 @@ const LAYOUT = {
   paper_bgcolor: "rgba(0,0,0,0)",
   plot_bgcolor: "rgba(0,0,0,0)",
   font: { family: "system-ui, sans-serif", size: 12, color: "#334155" },
-  legend: { orientation: "h", y: 1.12, x: 0 },
+  showlegend: false,
   hovermode: "closest",
 };
 const HEAT = ["#313695", "#4575b4", "#74add1", "#abd9e9", "#ffffbf", "#fdae61", "#f46d43", "#d73027", "#a50026"].map((c, i) => [i / 8, c]);
@@ -34,7 +34,7 @@ function drawTemplate(place, data, template) {
     line: { color: vehicleColour(n), width: 2.5 }, hovertemplate: "%{y:.1f} m/s at %{x:.1f} s<extra>" + vehicle.id.replace(/[<>&]/g, "") + "</extra>",
   }));
   traces.push({
-    x: probability.map((_, i) => +(i * step).toFixed(2)), y: probability, yaxis: "y2", name: "changepoint probability", showlegend: false,
+    x: probability.map((_, i) => +(i * step).toFixed(2)), y: probability, yaxis: "y2", name: "changepoint probability",
     mode: "lines", fill: "tozeroy", line: { color: "#475569", width: 1, shape: "hvh" }, hovertemplate: "p = %{y:.2f} at %{x:.1f} s<extra></extra>",
   });
   const shapes = labels.map((label, k) => ({
@@ -45,7 +45,7 @@ function drawTemplate(place, data, template) {
     type: "line", xref: "x", yref: "paper", x0: time, x1: time, y0: 0, y1: 1, line: { color: "#334155", width: 1, dash: "dot" },
   }));
   traces.push({
-    x: labels.map((_, k) => (bounds[k] + bounds[k + 1]) / 2), y: labels.map(() => 0), mode: "markers", showlegend: false,
+    x: labels.map((_, k) => (bounds[k] + bounds[k + 1]) / 2), y: labels.map(() => 0), mode: "markers",
     marker: { size: 14, opacity: 0 }, text: descriptions, hovertemplate: "%{text}<extra></extra>",
   });
   plot(place, traces, {
@@ -59,7 +59,7 @@ function drawTemplate(place, data, template) {
 /** Figure 4, lower half: the speeds of all samples, the template's dashed. */
 function drawSpeeds(place, data, set, template, top) {
   const traces = [];
-  data.vehicles.forEach((vehicle, n) => {
+  data.vehicles.forEach((_, n) => {
     const x = [];
     const y = [];
     for (let s = 0; s < set.samples; s += 1) {
@@ -67,11 +67,10 @@ function drawSpeeds(place, data, set, template, top) {
       y.push(...speeds(set, s, n), null);
     }
     const line = { color: vehicleColour(n), width: 1 };
-    traces.push({ x, y, mode: "lines", line, opacity: Math.max(0.3, 1 - set.samples / 30), showlegend: false, hoverinfo: "skip" });
-    traces.push({ x: [null], y: [null], mode: "lines", name: vehicle.id, line: { ...line, width: 2.5 } });
+    traces.push({ x, y, mode: "lines", line, opacity: Math.max(0.3, 1 - set.samples / 30), hoverinfo: "skip" });
   });
-  data.vehicles.forEach((vehicle, n) => traces.push({
-    x: clock(template, 0), y: speeds(template, 0, n), mode: "lines", showlegend: n === 0, name: "template",
+  data.vehicles.forEach((_, n) => traces.push({
+    x: clock(template, 0), y: speeds(template, 0, n), mode: "lines",
     line: { color: "#0f172a", width: 1.5, dash: "dash" }, hoverinfo: "skip",
   }));
   plot(place, traces, {
@@ -90,11 +89,12 @@ function drawFeature(place, text, duration, vehicles) {
     type: "heatmap", x: time, y: time, z, zmin: 0, zmax: 1, colorscale: HEAT, showscale: false,
     hovertemplate: "%{y:.1f} s, %{x:.1f} s: %{z:.2f}<extra></extra>",
   };
+  const short = (name) => (name.length > 9 ? `${name.slice(0, 8)}…` : name);
   const axis = { ticks: "", showgrid: false, zeroline: false, nticks: 4, tickfont: { size: 10 } };
   plot(place, [trace], {
     margin: { l: 34, r: 4, t: 4, b: 32 },
-    xaxis: { ...axis, title: { text: `${vehicles[1]} [s]`, font: { size: 10 }, standoff: 2 } },
-    yaxis: { ...axis, title: { text: `${vehicles[0]} [s]`, font: { size: 10 }, standoff: 2 }, scaleanchor: "x", constrain: "domain" },
+    xaxis: { ...axis, title: { text: `${short(vehicles[1])} [s]`, font: { size: 10 }, standoff: 2 } },
+    yaxis: { ...axis, title: { text: `${short(vehicles[0])} [s]`, font: { size: 10 }, standoff: 2 }, scaleanchor: "x", constrain: "domain" },
   });
 }
 
@@ -148,7 +148,7 @@ function drawRoutes(view, data, picture) {
 }
 
 /** Figure 4, upper half: all samples of one arm on the road. */
-function drawSamples(view, data, picture, set) {
+function drawSamples(view, data, picture, set, arm) {
   const context = view.begin();
   view.road(data.road, picture);
   data.vehicles.forEach((_, n) => {
@@ -157,6 +157,9 @@ function drawSamples(view, data, picture, set) {
     context.globalAlpha = Math.max(0.18, Math.min(1, 8 / set.samples));
     for (let s = 0; s < set.samples; s += 1) set.path(context, view, s, n);
   });
-  data.fit.forEach((vehicle, n) => vehicle.anchors.forEach(([x, y]) => view.dot(x, y, vehicleColour(n), 3)));
+  data.fit.forEach((vehicle, n) => {
+    const last = vehicle.anchors.length - 1;
+    vehicle.anchors.forEach(([x, y], k) => { if (arm === "with" || k === 0 || k === last) view.dot(x, y, vehicleColour(n), 3); });
+  });
   view.ruler();
 }

@@ -11,6 +11,15 @@ function option(value, text) {
   return element;
 }
 
+/** A list entry with a vehicle's colour and name. */
+function chipLine(vehicle, n, ...rest) {
+  const line = document.createElement("li");
+  const chip = document.createElement("i");
+  chip.style.background = vehicleColour(n);
+  line.append(chip, document.createTextNode(`${vehicle.id} `), ...rest);
+  return line;
+}
+
 /** The animation: play, pause, scrub, choose the set and the sample, or see all samples at once. */
 class Player {
   constructor(section, data, sets, picture, box) {
@@ -19,6 +28,7 @@ class Player {
     this.picture = picture;
     this.find = (role) => section.querySelector(`[data-role="${role}"]`);
     this.view = new View(this.find("stage"), box, 8);
+    this.whole = this.view.box;
     this.time = 0;
     this.playing = false;
     this.arm = sets.with ? "with" : Object.keys(sets)[0];
@@ -30,16 +40,13 @@ class Player {
     this.find("play").addEventListener("click", () => this.toggle());
     this.find("scrub").addEventListener("input", (event) => { this.pause(); this.time = (event.target.value / 1000) * this.duration; this.draw(); });
     this.find("ghosts").addEventListener("change", () => this.draw());
+    this.find("follow").addEventListener("change", () => this.draw());
     this.find("previous").addEventListener("click", () => this.step(-1));
     this.find("next").addEventListener("click", () => this.step(1));
     this.find("stage").addEventListener("click", () => this.toggle());
     this.readouts = data.vehicles.map((vehicle, n) => {
-      const line = document.createElement("li");
-      const chip = document.createElement("i");
-      chip.style.background = vehicleColour(n);
       const value = document.createElement("b");
-      line.append(chip, document.createTextNode(`${vehicle.id} `), value);
-      this.find("readout").append(line);
+      this.find("readout").append(chipLine(vehicle, n, value));
       return value;
     });
   }
@@ -92,9 +99,20 @@ class Player {
     this.draw();
   }
 
+  /** The part of the road that is shown: all of it, or the vehicles with some room around them. */
+  frame(states) {
+    if (!this.find("follow").checked) return this.whole;
+    const xs = states.map((state) => state.x);
+    const ys = states.map((state) => state.y);
+    const room = 18;
+    return [Math.min(...xs) - room, Math.min(...ys) - room, Math.max(...xs) + room, Math.max(...ys) + room];
+  }
+
   draw() {
     const { data, set, sample, view } = this;
     const share = this.time / this.duration;
+    const states = data.vehicles.map((_, n) => set.state(sample, n, share));
+    view.box = this.frame(states);
     const context = view.begin();
     view.road(data.road, this.picture);
     const ghosts = this.find("ghosts").checked;
@@ -113,9 +131,8 @@ class Player {
       }
     });
     data.vehicles.forEach((vehicle, n) => {
-      const state = set.state(sample, n, share);
-      view.footprint(state, vehicle, vehicleColour(n), 1, true);
-      this.readouts[n].textContent = `${state.speed.toFixed(1)} m/s`;
+      view.footprint(states[n], vehicle, vehicleColour(n), 1, true);
+      this.readouts[n].textContent = `${states[n].speed.toFixed(1)} m/s`;
     });
     view.ruler();
     this.find("scrub").value = Math.round(1000 * share);
@@ -153,10 +170,11 @@ function open(section, data) {
   let top = 1;
   [template, ...Object.values(sets)].forEach((set) => { for (let i = 3; i < set.values.length; i += 4) top = Math.max(top, set.values[i]); });
   ["with", "without"].filter((arm) => sets[arm]).forEach((arm) => {
-    maps.push([new View(find(`samples-${arm}`), box, 8), (view) => drawSamples(view, data, picture, sets[arm])]);
+    maps.push([new View(find(`samples-${arm}`), box, 8), (view) => drawSamples(view, data, picture, sets[arm], arm)]);
     drawSpeeds(find(`speeds-${arm}`), data, sets[arm], template, 1.08 * top);
   });
   drawTemplate(find("template-speed"), data, template);
+  section.querySelectorAll('[data-role="legend"]').forEach((list) => list.append(...data.vehicles.map((vehicle, n) => chipLine(vehicle, n))));
   const pairs = find("pair");
   data.features.forEach((feature, i) => pairs.append(option(i, feature.pair.map((n) => data.vehicles[n].id).join(" and "))));
   pairs.parentElement.hidden = data.features.length < 2;
