@@ -13,7 +13,7 @@ from scenario_gen.segmentation.features import driving_features, paper_features
 from scenario_gen.segmentation.posterior import Posterior, in_order
 from scenario_gen.segmentation.result import Segmentation
 from scenario_gen.segmentation.series import SamplerConfig, segment_series
-from scenario_gen.segmentation.trends import SPEED_SCALE, settle, thin
+from scenario_gen.segmentation.trends import Trends
 
 DRIVING_SAMPLER = SamplerConfig(weight=0.5)
 
@@ -30,8 +30,12 @@ class SegmentationConfig:
     )
     min_segment: float = parameter(0.2, "shorter segments join a neighbour", unit="s", low=0.0, high=10.0)
     settle: float = parameter(
-        0.5, "a changepoint may move this far to where the speeds' trends change", unit="s", low=0.0, high=2.0
+        0.8, "a changepoint may move this far to where trends of speed or course change", unit="s", low=0.0, high=2.0
     )
+    least_gain: float = parameter(
+        20.0, "what a changepoint must improve the description of speeds and courses by, in squared standard deviations", low=0.0
+    )
+    least_chance: float = parameter(0.05, "posterior probability above which a changepoint may be added", low=0.0, high=1.0)
     speed_window: float = parameter(1.0, "window of the longitudinal acceleration", unit="s", low=0.3, high=5.0)
     turn_window: float = parameter(2.0, "window of the lateral acceleration", unit="s", low=0.4, high=10.0)
     speed_noise: float = parameter(
@@ -63,13 +67,24 @@ def segment(encounter: Encounter, config: SegmentationConfig = SegmentationConfi
             encounter, config.speed_window, config.turn_window, config.speed_noise, config.turn_noise
         )
         posterior = segment_series(features, config.sampler, seed, blur=blur)
-        points = merge_short(posterior, config, encounter.dt)
-        signals = encounter.speed / SPEED_SCALE
-        points = thin(signals, points, int(encounter.duration * config.max_rate))
-        gap = max(1, int(np.ceil(config.min_segment / encounter.dt - 1e-9)))
-        points = settle(signals, points, round(config.settle / encounter.dt), gap)
+        points = on_trends(encounter, posterior, merge_short(posterior, config, encounter.dt), config)
     labels = relabel(posterior.labels, points)
     return Segmentation(labels, points, posterior.probability, describe_segments(encounter, points))
+
+
+def on_trends(encounter: Encounter, posterior: Posterior, points: Ints, config: SegmentationConfig) -> Ints:
+    """Put changepoints where trends change, see `trends`, and keep the most useful ones up to `max_rate`."""
+    trends = Trends.of(encounter)
+    reach = round(config.settle / encounter.dt)
+    gap = max(2, int(np.ceil(config.min_segment / encounter.dt - 1e-9)))
+    most = int(encounter.duration * config.max_rate)
+    everything = encounter.speed.shape[1]
+    candidates = np.flatnonzero(posterior.probability_within(round(0.5 / encounter.dt)) > config.least_chance)
+    found = trends.settle([int(c) for c in points], reach, gap)
+    found = trends.settle(trends.drop(found, config.least_gain, everything), reach, gap)
+    found = trends.settle(trends.add(found, candidates, config.least_gain, gap), reach, gap)
+    found = trends.settle(trends.drop(found, config.least_gain, most), reach, gap)
+    return np.array(found, dtype=np.int64)
 
 
 def merge_short(posterior: Posterior, config: SegmentationConfig, dt: float) -> Ints:

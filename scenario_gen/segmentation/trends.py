@@ -1,74 +1,186 @@
-"""Changepoints as knots of a constant-acceleration time law: shift them to where the trends change, drop the least useful."""
+"""Changepoints as knots of a constant-acceleration, constant-turn-rate law: put them where the trends change.
+
+Within a primitive each vehicle's speed and course are nearly linear in time (paper IV-B). The sampler says how many
+primitives there are and about where they change; features taken over windows of a second or two cannot say exactly
+where. So its changepoints are shifted, by less than a second, to where continuous piecewise-linear functions with knots
+at the changepoints describe speed and course best; changepoints that this description does not miss are dropped, and
+places where the posterior sees some chance of one, and which it does miss, are added.
+"""
+
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import uniform_filter1d
 
 from scenario_gen.arrays import Floats, Ints
+from scenario_gen.encounter import Encounter
+from scenario_gen.kernels import F2, I1, OUT1, I, kernel
 
-SPEED_SCALE = 0.2
-
-
-def hats(length: int, knots: Ints) -> Floats:
-    """(length, K) basis of the continuous piecewise-linear functions with the given K knots, the first 0, the last length - 1."""
-    return np.column_stack([np.interp(np.arange(length), knots, row) for row in np.eye(len(knots))])
-
-
-def misfit(signals: Floats, start: int, stop: int, inside: Ints) -> float:
-    """Squared misfit of signals (n, T) in start..stop to continuous piecewise-linear functions with knots `inside`."""
-    knots = np.concatenate([[0], np.asarray(inside) - start, [stop - 1 - start]])
-    basis = hats(stop - start, knots)
-    wanted = signals[:, start:stop].T
-    gram = basis.T @ basis + 1e-9 * np.eye(len(knots))
-    rest = wanted - basis @ np.linalg.solve(gram, basis.T @ wanted)
-    return float((rest**2).sum())
+SPEED_NOISE = 0.1
+COURSE_NOISE = 0.3
+COURSE_WINDOW = 0.9
+LEAST_SPEED = 1.0
 
 
-def _around(points: Ints, i: int, samples: int) -> tuple[int, int, Ints]:
-    """Return the stretch that changepoint i has a say in: start, stop, and the other changepoints in it."""
-    before, after = points[max(i - 2, 0) : i], points[i + 1 : i + 3]
-    start = int(before[0]) if len(before) == 2 else 0
-    stop = int(after[1]) + 1 if len(after) == 2 else samples
-    others = np.concatenate([before[-1:], after[:1]])
-    return start, stop, others
+@kernel(F2, F2, I1, I, I1, OUT1)
+def knot_misfits(signals: Floats, weights: Floats, knots: Ints, moved: int, places: Ints, out: Floats) -> None:
+    """Weighted squared misfit of continuous piecewise-linear functions, for each place of one knot.
 
-
-def cost_of_removal(signals: Floats, points: Ints, i: int) -> float:
-    """How much worse the signals are described without changepoint i."""
-    start, stop, others = _around(points, i, signals.shape[1])
-    return misfit(signals, start, stop, others) - misfit(signals, start, stop, np.sort(np.append(others, points[i])))
-
-
-def settle(signals: Floats, points: Ints, reach: int, gap: int, rounds: int = 3) -> Ints:
-    """Shift each changepoint by up to `reach` samples to where the signals' trends change.
+    The hat functions' normal equations are tridiagonal: accumulated and eliminated in one pass.
 
     Args:
-        signals: (n, T), each in units of its own noise.
-        points: (K,) changepoints.
-        reach: samples.
-        gap: least distance between changepoints and from either end.
-        rounds: passes over all changepoints.
+        signals: (n, T).
+        weights: (n, T), the inverse of each sample's standard deviation.
+        knots: (K,) rising sample indices; the first and last bound the stretch looked at.
+        moved: index of the knot that is put at each of `places`; -1: none, and `places` has one entry that is not used.
+        places: (P,) between the neighbours of that knot.
+        out: (P,).
     """
-    points = np.array(points)
-    home = points.copy()
-    samples = signals.shape[1]
-    for _ in range(rounds):
-        before = points.copy()
-        for i in range(len(points)):
-            low = max(home[i] - reach, (points[i - 1] if i else 0) + gap)
-            high = min(home[i] + reach, (points[i + 1] if i + 1 < len(points) else samples - 1) - gap)
-            start, stop, others = _around(points, i, samples)
-            places = np.arange(low, high + 1)
-            if len(places):
-                costs = [misfit(signals, start, stop, np.sort(np.append(others, c))) for c in places]
-                points[i] = places[int(np.argmin(costs))]
-        if np.array_equal(before, points):
-            break
-    return points
+    count = len(knots)
+    at = knots.copy()
+    diagonal, beside, right = np.empty(count), np.empty(count), np.empty(count)
+    for place in range(len(places)):
+        if moved >= 0:
+            at[moved] = places[place]
+        total = 0.0
+        for row in range(signals.shape[0]):
+            for k in range(count):
+                diagonal[k], beside[k], right[k] = 1e-9, 0.0, 0.0
+            for k in range(count - 1):
+                a, b = at[k], at[k + 1]
+                for t in range(a, b + (1 if k == count - 2 else 0)):
+                    w = weights[row, t] ** 2
+                    y = signals[row, t]
+                    h = (t - a) / (b - a)
+                    diagonal[k] += w * (1.0 - h) ** 2
+                    beside[k] += w * h * (1.0 - h)
+                    diagonal[k + 1] += w * h * h
+                    right[k] += w * (1.0 - h) * y
+                    right[k + 1] += w * h * y
+                    total += w * y * y
+            for k in range(count):
+                if k > 0:
+                    ratio = beside[k - 1] / diagonal[k - 1]
+                    diagonal[k] -= ratio * beside[k - 1]
+                    right[k] -= ratio * right[k - 1]
+                total -= right[k] ** 2 / diagonal[k]
+        out[place] = total
 
 
-def thin(signals: Floats, points: Ints, wanted: int) -> Ints:
-    """Drop changepoints, always the one that the signals' description misses least, until `wanted` are left."""
-    points = np.array(points)
-    while len(points) > wanted:
-        costs = [cost_of_removal(signals, points, i) for i in range(len(points))]
-        points = np.delete(points, int(np.argmin(costs)))
-    return points
+@dataclass(frozen=True, eq=False)
+class Trends:
+    """The signals whose trends count: speed [m/s] and course [rad] of every vehicle.
+
+    Attributes:
+        signals: (2N, T), each less its mean.
+        weights: (2N, T), inverse standard deviations; 0 for the course of a vehicle that hardly moves.
+    """
+
+    signals: Floats
+    weights: Floats
+    _cache: dict[tuple[int, ...], tuple[float, int]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, encounter: Encounter) -> "Trends":
+        """Take the trends of an encounter; noise is at least 0.1 m/s in speed and 0.3 m/s across the course."""
+        signals, weights = [], []
+        for position, speed in zip(encounter.position, encounter.speed, strict=True):
+            bend = np.diff(speed, 2)
+            noise = max(SPEED_NOISE, 1.4826 * float(np.median(np.abs(bend))) / np.sqrt(6.0) if len(bend) else 0.0)
+            signals.append(speed)
+            weights.append(np.full(len(speed), 1.0 / noise))
+            angle, pace = course(position, speed, encounter.dt)
+            signals.append(angle)
+            weights.append(np.where(pace > LEAST_SPEED, pace / COURSE_NOISE, 0.0))
+        stack = np.array(signals)
+        return cls(np.ascontiguousarray(stack - stack.mean(axis=1, keepdims=True)), np.array(weights))
+
+    @property
+    def samples(self) -> int:
+        """T."""
+        return int(self.signals.shape[1])
+
+    def misfits(self, knots: list[int], moved: int, places: Ints) -> Floats:
+        """(P,) misfit for each place of knot number `moved` (-1: the misfit as it is)."""
+        out = np.empty(len(places))
+        knot_misfits(self.signals, self.weights, np.array(knots, dtype=np.int64), moved, places, out)
+        return out
+
+    def gain(self, points: list[int], i: int) -> float:
+        """Return how much worse the description is without changepoint i."""
+        knots, j = self._around(points, i)
+        return self._best(knots[:j] + knots[j + 1 :], j, np.array([knots[j]]))[0]
+
+    def _around(self, points: list[int], i: int) -> tuple[list[int], int]:
+        """Knots that bear on changepoint i: two on either side; and its index among them."""
+        every = [0, *points, self.samples - 1]
+        low = max(i + 1 - 2, 0)
+        return every[low : i + 4], i + 1 - low
+
+    def _best(self, knots: list[int], j: int, places: Ints) -> tuple[float, int]:
+        """Return the largest gain of one more knot before knot number j, and where."""
+        key = (*knots, -1, j, int(places[0]), int(places[-1]), len(places))
+        if key not in self._cache:
+            without = self.misfits(knots, -1, places[:1])[0]
+            costs = self.misfits([*knots[:j], int(places[0]), *knots[j:]], j, places)
+            self._cache[key] = (float(without - costs.min()), int(places[costs.argmin()]))
+        return self._cache[key]
+
+    def settle(self, points: list[int], reach: int, gap: int, rounds: int = 3) -> list[int]:
+        """Shift each changepoint by up to `reach` samples to where the trends change; at least `gap` samples apart."""
+        home, points = list(points), list(points)
+        for _ in range(rounds):
+            before = list(points)
+            for i in range(len(points)):
+                knots, j = self._around(points, i)
+                low = max(home[i] - reach, knots[j - 1] + gap)
+                high = min(home[i] + reach, knots[j + 1] - gap)
+                if low <= high:
+                    places = np.arange(low, high + 1)
+                    points[i] = int(places[self.misfits(knots, j, places).argmin()])
+            if points == before:
+                break
+        return points
+
+    def drop(self, points: list[int], least_gain: float, most: int) -> list[int]:
+        """Drop changepoints, always the least useful one, until each gains `least_gain` and there are `most` at most."""
+        points = list(points)
+        while points:
+            gains = [self.gain(points, i) for i in range(len(points))]
+            i = int(np.argmin(gains))
+            if gains[i] >= least_gain and len(points) <= most:
+                break
+            del points[i]
+        return points
+
+    def add(self, points: list[int], candidates: Ints, least_gain: float, gap: int) -> list[int]:
+        """Add candidates, always the most useful one, while one gains `least_gain`."""
+        points = list(points)
+        while True:
+            every = [0, *points, self.samples - 1]
+            best = (least_gain, 0, 0)
+            for i in range(len(points) + 1):
+                places = candidates[(candidates >= every[i] + gap) & (candidates <= every[i + 1] - gap)]
+                if len(places):
+                    low = max(i - 1, 0)
+                    gain, place = self._best(every[low : i + 3], i + 1 - low, places)
+                    best = max(best, (gain, place, i))
+            if best[0] <= least_gain:
+                return points
+            points.insert(best[2], best[1])
+
+
+def course(position: Floats, speed: Floats, dt: float) -> tuple[Floats, Floats]:
+    """Course over ground [rad], unwrapped and held where the vehicle hardly moves, and smoothed speed [m/s], each (T,)."""
+    half = max(1, min(round(COURSE_WINDOW / dt) // 2, (len(speed) - 1) // 2))
+    steps = np.arange(-half, half + 1)
+    padded = np.pad(position, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
+    velocity = sliding_window_view(padded, 2 * half + 1, axis=0) @ steps / (steps @ steps * dt)
+    pace = uniform_filter1d(speed, 2 * half + 1, mode="nearest")
+    moves = pace > LEAST_SPEED
+    angle = np.arctan2(velocity[:, 1], velocity[:, 0])
+    if moves.any():
+        last = np.maximum.accumulate(np.where(moves, np.arange(len(speed)), 0))
+        angle = angle[np.maximum(last, int(np.argmax(moves)))]
+    return np.unwrap(angle), pace
