@@ -13,6 +13,7 @@ import numpy as np
 
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.encounter import Vehicle
+from scenario_gen.sampling.along import displaced_anchors
 from scenario_gen.sampling.clock import DT, Clock
 from scenario_gen.sampling.gp import combine
 from scenario_gen.sampling.lateral import kept_within
@@ -20,7 +21,6 @@ from scenario_gen.sampling.path import BasePath, arc_lengths, states
 from scenario_gen.sampling.time_law import SpeedProfile, TimeLaw, TimeLayout
 from scenario_gen.scenario import Scenario
 
-_ANCHOR_SHARE = 0.3  # an anchor moves along the route by at most this share of the way to its neighbours
 DAMPING = (1.0, 0.5, 0.25, 0.0)  # of a candidate's clock, until a speed profile exists
 
 
@@ -42,6 +42,7 @@ class VehicleModel:
         path: the route.
         anchor: (K + 2,) arc length [m] of each anchor on it.
         factor: (G, r) square root of the covariance of the lateral deviation.
+        along: (D, r) the same of its distinct inner anchors' displacements along the route.
         room: (G,) metres that the road leaves to either side.
         law: the time law on the vehicle's knots.
     """
@@ -50,28 +51,18 @@ class VehicleModel:
     path: BasePath
     anchor: Floats
     factor: Floats
+    along: Floats
     room: Floats
     law: TimeLaw
 
     @property
     def size(self) -> int:
         """Standard normal numbers needed per candidate."""
-        return int(self.factor.shape[1]) + len(self.anchor)
+        return int(self.factor.shape[1] + self.along.shape[1])
 
     def deviations(self, z: Floats) -> Floats:
         """Lateral deviations (S, G) [m]."""
         return kept_within(combine(z, self.factor), self.room)
-
-    def anchors(self, z: Floats, sigma: float) -> Floats:
-        """Arc lengths (S, K + 2) of the anchors, moved by sigma [m]; a dwell's two anchors move together."""
-        distinct, which = np.unique(self.anchor, return_inverse=True)
-        if len(distinct) < 3:
-            return np.broadcast_to(self.anchor, (len(z), len(self.anchor))).copy()
-        gap = np.diff(distinct)
-        most = _ANCHOR_SHARE * np.minimum(gap[:-1], gap[1:])
-        inner = distinct[1:-1] + np.clip(sigma * z[:, 1 : len(distinct) - 1], -most, most)
-        ends = np.broadcast_to(distinct[[0, -1]], (len(z), 2))
-        return np.asarray(np.hstack([ends[:, :1], inner, ends[:, 1:]])[:, which])
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +142,8 @@ def _scenario(vehicles: tuple[Vehicle, ...], time: Floats, state: Floats, seed: 
 class CandidateModel:
     """Draws candidates of one encounter on its routes."""
 
-    def __init__(self, vehicles: tuple[VehicleModel, ...], clock: Clock, longitudinal_sigma: float, most_slide: float) -> None:
-        self.vehicles, self.clock = vehicles, clock
-        self.longitudinal_sigma, self.most_slide = longitudinal_sigma, most_slide
+    def __init__(self, vehicles: tuple[VehicleModel, ...], clock: Clock, most_slide: float) -> None:
+        self.vehicles, self.clock, self.most_slide = vehicles, clock, most_slide
 
     @property
     def size(self) -> int:
@@ -186,7 +176,7 @@ class CandidateModel:
             clock[open_] = self.clock.sample(z[open_, : self.clock.size], np.full(len(open_), damp * scale.time))
             feasible = np.ones(len(open_), dtype=np.bool_)
             for n, v in enumerate(self.vehicles):
-                u = v.anchors(own[n][open_, v.factor.shape[1] :], scale.longitudinal * self.longitudinal_sigma)
+                u = displaced_anchors(v.anchor, v.along, scale.longitudinal * own[n][open_, v.factor.shape[1] :])
                 knot[n][open_] = knots_on(clock[open_], self.clock.times, v.law.layout)
                 lengths = piece_lengths(v.law.layout, paths[n][0][open_], paths[n][1][open_], v.path.spacing, u)
                 speed[n][open_], ok = self._speeds(v, knot[n][open_], lengths)

@@ -19,6 +19,9 @@ class SamplingConfig:
     longitudinal_sigma: float = parameter(
         0.5, "σ_s: standard deviation of an interior anchor along the route", unit="m", low=0.0, high=10.0
     )
+    longitudinal_time: float = parameter(
+        4.0, "time over which displacements along the route vary", unit="s", low=0.1, high=1000.0
+    )
     time_sigma: float = parameter(
         0.8, "σ_t: standard deviation of the changepoint clock that all vehicles share", unit="s", low=0.0, high=10.0
     )

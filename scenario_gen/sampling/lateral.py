@@ -3,9 +3,8 @@
 import numpy as np
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
-from scenario_gen.arrays import Floats
+from scenario_gen.arrays import Bools, Floats
 from scenario_gen.encounter import Vehicle
-from scenario_gen.roads.clearance import clearance_field
 from scenario_gen.roads.road import Road
 from scenario_gen.sampling.config import SamplingConfig
 from scenario_gen.sampling.gp import Features, Observations, Regression
@@ -13,9 +12,11 @@ from scenario_gen.sampling.path import BasePath
 
 SHORTEST_ROUTE = 3.0  # m; a shorter one is driven as planned
 ROOM_SIGMAS = 2.0  # a deviation of so many standard deviations still leaves the footprint on the road
+MOST_SIGMAS = 5.0  # more room than so many standard deviations is not looked for
 SOFT = 0.6  # share of the room from which on a deviation is bent back
-_OUTLINE_STEP = 0.4  # m
-_SMOOTHING = 5.0  # m along the route
+_FLANK_STEP = 0.5  # m
+_ROOM_STEP = 0.1  # m
+_SMOOTHING = 4.0  # m along the route, each of two passes
 
 
 def lateral_factor(path: BasePath, room: Floats, config: SamplingConfig) -> Floats:
@@ -44,29 +45,35 @@ def lateral_factor(path: BasePath, room: Floats, config: SamplingConfig) -> Floa
     return np.asarray(np.minimum(room / (ROOM_SIGMAS * sigma), 1.0)[:, None] * u[:, keep] * s[keep])
 
 
-def lateral_room(path: BasePath, vehicle: Vehicle, road: Road) -> Floats:
-    """Metres (G,) by which the vehicle may leave its route to either side and stay on the road, smooth along the route.
+def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> Floats:
+    """Metres (G,), at most `most`, by which the vehicle may leave its route to either side, smooth along the route.
 
-    Every point of the footprint's outline may move as far as the nearest cell that is not drivable. Conservative: the
-    field is that of the point's own cell, less what the point may be off its centre, and ahead is not told from aside.
+    Both flanks of the footprint are moved outwards step by step until a point of them leaves drivable space; what lies
+    ahead and behind, such as the edge of the map where a vehicle enters, does not count.
     """
-    x, y = 0.5 * vehicle.length, 0.5 * vehicle.width
-    along, across = (np.linspace(-half, half, int(np.ceil(2.0 * half / _OUTLINE_STEP)) + 1) for half in (x, y))
-    outline = [np.column_stack([along, np.full_like(along, side)]) for side in (-y, y)]
-    outline += [np.column_stack([np.full_like(across, end), across]) for end in (-x, x)]
-    ahead, left = np.concatenate(outline).T
-    cos, sin = np.cos(path.node[:, 2, None]), np.sin(path.node[:, 2, None])
-    points = np.stack(
-        [path.node[:, 0, None] + ahead * cos - left * sin, path.node[:, 1, None] + ahead * sin + left * cos], axis=-1
-    )
-    field = clearance_field(road)
-    cell = np.floor((points - road.origin) / road.resolution).astype(np.int64)
-    row, column = np.clip(cell[..., 1], 0, field.shape[0] - 1), np.clip(cell[..., 0], 0, field.shape[1] - 1)
-    inside = (row == cell[..., 1]) & (column == cell[..., 0])
-    room = np.where(inside, field[row, column], 0.0).min(axis=1) - road.resolution / np.sqrt(2.0)
+    flank = np.linspace(-0.5, 0.5, int(np.ceil(vehicle.length / _FLANK_STEP)) + 1) * vehicle.length
+    ahead = np.stack([np.cos(path.node[:, 2]), np.sin(path.node[:, 2])], axis=-1)[:, None, :]
+    left = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
+    axis = path.node[:, None, :2] + flank[:, None] * ahead
+    room, free = np.zeros(len(path.node)), np.ones(len(path.node), dtype=np.bool_)
+    for step in np.arange(1, int(np.ceil(most / _ROOM_STEP)) + 1) * _ROOM_STEP:
+        for side in (0.5 * vehicle.width + step, -0.5 * vehicle.width - step):
+            free &= _drivable(road, axis + side * left).all(axis=1)
+        room[free] = min(step, most)
     reach = int(np.ceil(_SMOOTHING / max(path.spacing, 1e-9))) if len(room) > 1 else 0
-    lowest = minimum_filter1d(np.maximum(room, 0.0), 2 * reach + 1, mode="nearest")
-    return np.asarray(uniform_filter1d(lowest, 2 * reach + 1, mode="nearest"))
+    smooth = minimum_filter1d(room, 4 * reach + 1, mode="nearest")
+    for _ in range(2):
+        smooth = uniform_filter1d(smooth, 2 * reach + 1, mode="nearest")
+    return np.asarray(smooth)
+
+
+def _drivable(road: Road, points: Floats) -> Bools:
+    """Whether points (..., 2) lie in drivable cells."""
+    cell = np.floor((points - road.origin) / road.resolution).astype(np.int64)
+    height, width = road.drivable.shape
+    inside = (cell[..., 0] >= 0) & (cell[..., 0] < width) & (cell[..., 1] >= 0) & (cell[..., 1] < height)
+    found = road.drivable[np.clip(cell[..., 1], 0, height - 1), np.clip(cell[..., 0], 0, width - 1)]
+    return np.asarray(inside & found)
 
 
 def kept_within(deviation: Floats, room: Floats) -> Floats:

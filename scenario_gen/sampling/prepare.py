@@ -11,10 +11,11 @@ from scenario_gen.errors import InputError
 from scenario_gen.interaction import Wait
 from scenario_gen.planning.route import Route
 from scenario_gen.roads.road import Road
+from scenario_gen.sampling.along import along_factor
 from scenario_gen.sampling.candidates import CandidateModel, VehicleModel, knots_on, piece_lengths
 from scenario_gen.sampling.clock import Clock
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.lateral import ROOM_SIGMAS, lateral_factor, lateral_room
+from scenario_gen.sampling.lateral import MOST_SIGMAS, ROOM_SIGMAS, lateral_factor, lateral_room
 from scenario_gen.sampling.path import BasePath
 from scenario_gen.sampling.time_law import STAND, SpeedBounds, SpeedProfile, TimeLaw, TimeLayout, layout
 from scenario_gen.scenario import BoundaryStates
@@ -190,7 +191,7 @@ def _model(
     for vehicle, path, nominal in zip(encounter.vehicles, paths, found, strict=True):
         if nominal.slid > 1e-6:
             said.append(f"vehicle {vehicle.id} passes changepoints up to {nominal.slid:.2f} m from their place")
-        room = lateral_room(path, vehicle, road)
+        room = lateral_room(path, vehicle, road, MOST_SIGMAS * config.lateral_sigma)
         narrow = room < ROOM_SIGMAS * config.lateral_sigma
         if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
             said.append(
@@ -198,10 +199,10 @@ def _model(
             )
         factor = lateral_factor(path, room, config)
         law = TimeLaw(_rescaled(nominal.law.layout, stretch), config, nominal.law.bounds)
-        vehicles.append(VehicleModel(vehicle, path, nominal.anchor, factor, room, law))
-    return Prepared(
-        CandidateModel(tuple(vehicles), Clock(stretch * times, config), config.longitudinal_sigma, slide), tuple(said)
-    )
+        vehicles.append(
+            VehicleModel(vehicle, path, nominal.anchor, factor, along_factor(times, nominal.anchor, config), room, law)
+        )
+    return Prepared(CandidateModel(tuple(vehicles), Clock(stretch * times, config), slide), tuple(said))
 
 
 def _rescaled(lay: TimeLayout, stretch: float) -> TimeLayout:
