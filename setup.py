@@ -34,7 +34,7 @@ setup(
     entry_points={
         "console_scripts": [
             "scenario-gen = scenario_gen.cli:main",
-            *(f"{node} = scenario_gen.nodes.{node}:main" for node in NODES),
+            *(f"{node} = scenario_gen.nodes.start:{node}" for node in NODES),
         ],
     },
 )

@@ -1,0 +1,222 @@
+"""What all nodes with a stage have in common: lifecycle, parameters, raw topics, a worker, diagnostics, a clean end."""
+
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from time import perf_counter
+from typing import Any
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.utilities import remove_ros_args
+
+from msg_conventions.diagnostics import Level, Status, encode_diagnostics
+from msg_conventions.topics import Quality, topic_entry
+from scenario_gen import kernels
+from scenario_gen.errors import ScenarioGenError
+from scenario_gen.nodes.message_classes import message_class
+from scenario_gen.nodes.ros_parameters import ConfigParameters
+from scenario_gen.nodes.worker import Job, Worker
+
+
+def qos(quality: Quality) -> QoSProfile:
+    """Return the profile of a topic."""
+    return QoSProfile(
+        depth=quality.depth,
+        reliability=ReliabilityPolicy.RELIABLE if quality.reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if quality.transient_local else DurabilityPolicy.VOLATILE,
+    )
+
+
+class StageNode(LifecycleNode):  # type: ignore[misc]
+    """A lifecycle node around a stage.
+
+    A subclass names its inputs in `INPUTS` and takes them in `received`; it does its work in jobs given to `work`. Inputs
+    are subscribed while the node is active; being latched, they come again after a deactivation or a restart.
+    """
+
+    INPUTS: tuple[str, ...] = ()
+    KERNELS = True  # the stage has compiled kernels
+
+    def __init__(self, name: str, config: Any, namespace: str | None = None) -> None:
+        super().__init__(name, namespace=namespace)
+        self._raw_publishers: dict[str, Any] = {}
+        self._inputs: dict[str, Any] = {}
+        self._worker: Worker | None = None
+        self.parameters = ConfigParameters(self, config)
+        self.declare_parameter("autostart", True)
+        self.parameters.log()
+
+    @property
+    def config(self) -> Any:
+        """The configuration in effect."""
+        return self.parameters.config
+
+    @property
+    def active(self) -> bool:
+        """True between activation and deactivation."""
+        return self._worker is not None
+
+    def autostart(self) -> None:
+        """Configure and activate, unless the parameter `autostart` is false."""
+        if self.get_parameter("autostart").value and self.trigger_configure() is TransitionCallbackReturn.SUCCESS:
+            self.trigger_activate()
+
+    # --- for subclasses ---------------------------------------------------------------------------------------
+
+    def received(self, topic: str, data: bytes) -> None:
+        """Take an input in; called on the executor's thread, so anything long goes to `work`."""
+
+    def started(self) -> None:
+        """Begin what needs no input; called at activation."""
+
+    def listen(self, topic: str) -> None:
+        """Subscribe to a topic of the suite, raw; `received` gets its messages."""
+        if topic not in self._inputs:
+            kind, quality = topic_entry(topic)
+            self._inputs[topic] = self.create_subscription(
+                message_class(kind), topic, lambda data: self._receive(topic, data), qos(quality), raw=True
+            )
+
+    def ignore(self, topic: str) -> None:
+        """End a subscription."""
+        if topic in self._inputs:
+            self.destroy_subscription(self._inputs.pop(topic))
+
+    def send(self, topic: str, data: bytes) -> None:
+        """Publish the CDR bytes of a topic of the suite."""
+        if topic not in self._raw_publishers:
+            kind, quality = topic_entry(topic)
+            self._raw_publishers[topic] = self.create_publisher(message_class(kind), topic, qos(quality))
+        if self.context.ok():
+            self._raw_publishers[topic].publish(data)
+
+    def work(self, name: str, job: Job) -> None:
+        """Run a job off the executor's thread; a waiting one of the same name is replaced, a running one cancelled."""
+        if self._worker is not None:
+            self._worker.submit(name, job)
+
+    def cancel(self) -> list[str]:
+        """Cancel all jobs; return their names."""
+        return self._worker.cancel() if self._worker is not None else []
+
+    def report(self, *statuses: Status, stamp_ns: int = 0) -> None:
+        """Publish statuses on /diagnostics."""
+        self.send("/diagnostics", encode_diagnostics(statuses, stamp_ns))
+
+    def status(self, level: Level, message: str, subject: str = "status", stamp_ns: int = 0, **values: str) -> None:
+        """Publish one status on /diagnostics and log it."""
+        log = self.get_logger()
+        {Level.OK: log.info, Level.WARN: log.warning}.get(level, log.error)(message)
+        self.report(Status(f"{self.get_fully_qualified_name()}: {subject}", level, message, values), stamp_ns=stamp_ns)
+
+    # --- lifecycle --------------------------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Compile the kernels, or load them from the cache."""
+        if self.KERNELS:
+            count, seconds = compile_kernels()
+            self.get_logger().info(f"{count} kernels ready after {seconds:.1f} s")
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Subscribe to the inputs."""
+        self._worker = Worker(self._failed)
+        for topic in self.INPUTS:
+            self.listen(topic)
+        self.started()
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Cancel the work and forget the inputs; what was published stays for late joiners."""
+        self._stop()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Withdraw what was published."""
+        for topic in list(self._raw_publishers):
+            self.destroy_publisher(self._raw_publishers.pop(topic))
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """End the work."""
+        self._stop()
+        return super().on_shutdown(state)
+
+    def _stop(self) -> None:
+        for topic in list(self._inputs):
+            self.ignore(topic)
+        if self._worker is not None:
+            self._worker.close()
+            self._worker = None
+
+    def destroy_node(self) -> None:
+        """End the work, then the node."""
+        self._stop()
+        super().destroy_node()
+
+    def _receive(self, topic: str, data: bytes) -> None:
+        """Take an input in; whatever is wrong with it, the node lives on."""
+        try:
+            self.received(topic, data)
+        except Exception as error:
+            self._failed(topic, error)
+
+    def _failed(self, name: str, error: BaseException) -> None:
+        if not self.context.ok():
+            return
+        if not isinstance(error, ScenarioGenError):
+            self.get_logger().error("".join(traceback.format_exception(error)))
+        kind = type(error).__name__
+        self.status(Level.ERROR, str(error) if isinstance(error, ScenarioGenError) else f"{kind}: {error}", name, error=kind)
+
+
+def compile_kernels() -> tuple[int, float]:
+    """Compile, or load from the cache, the kernels of the stages that this process has imported; return number and seconds."""
+    started = perf_counter()
+    for dispatcher, argument_types in kernels._registry:
+        dispatcher.compile(argument_types)
+    return len(kernels._registry), perf_counter() - started
+
+
+def namespaces(arguments: Sequence[str]) -> list[str | None]:
+    """Return the values of `--namespace` (one node for each, all in this process); [None] if there is none."""
+    rest = remove_ros_args(list(arguments))[1:]
+    if any(word != "--namespace" for word in rest[::2]) or len(rest) % 2:
+        raise SystemExit(f"usage: {arguments[0]} [--namespace NAME]... [--ros-args ...]")
+    return list(rest[1::2]) or [None]
+
+
+def run_nodes(make: Callable[[str | None], Any], arguments: Sequence[str] | None = None) -> int:
+    """Spin one node per `--namespace` until Ctrl-C, SIGTERM or shutdown; return the exit code."""
+    arguments = sys.argv if arguments is None else arguments
+    where = namespaces(arguments)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)  # rclpy calls it after its own: both end as KeyboardInterrupt
+    rclpy.init(args=list(arguments))
+    executor = SingleThreadedExecutor()
+    nodes: list[Any] = []
+    code = 0
+    try:
+        for namespace in where:
+            nodes.append(make(namespace))
+            executor.add_node(nodes[-1])
+        for node in nodes:
+            node.autostart()
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except ScenarioGenError as error:
+        print(f"error: {error}", file=sys.stderr)
+        code = error.exit_code
+    finally:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)  # a second Ctrl-C does not disturb the clean end
+        for node in nodes:
+            node.destroy_node()
+        executor.shutdown(timeout_sec=1.0)
+        rclpy.try_shutdown()
+    return code

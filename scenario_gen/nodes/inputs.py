@@ -1,0 +1,53 @@
+"""Latched inputs that belong together: complete once all bear the same stamp."""
+
+from collections.abc import Iterable
+
+from msg_conventions.cdr import CdrReader
+
+
+def stamp_of(data: bytes, topic: str) -> int:
+    """Return the header stamp [ns] of a CDR message that begins with a header."""
+    return CdrReader(data, topic).stamp()
+
+
+class Inputs:
+    """The newest message of each topic.
+
+    Args:
+        paired: topics that must bear the same stamp.
+        unpaired: topics whose newest message counts, whatever its stamp.
+    """
+
+    def __init__(self, paired: Iterable[str], unpaired: Iterable[str] = ()) -> None:
+        self._paired = set(paired)
+        self._unpaired = set(unpaired)
+        self._newest: dict[str, bytes] = {}
+
+    def expect(self, topics: Iterable[str]) -> None:
+        """Add topics to the paired ones, e.g. the routes of the vehicles of the tracks."""
+        self._paired |= set(topics)
+
+    def forget(self, topics: Iterable[str]) -> None:
+        """Remove topics and what they said."""
+        for topic in topics:
+            self._paired.discard(topic)
+            self._newest.pop(topic, None)
+
+    def put(self, topic: str, data: bytes) -> None:
+        """Take a message in."""
+        self._newest[topic] = data
+
+    def get(self, topic: str) -> bytes | None:
+        """Return the newest message of a topic."""
+        return self._newest.get(topic)
+
+    def missing(self) -> list[str]:
+        """Return the topics from which nothing came yet, or nothing of the newest template's stamp."""
+        silent = [topic for topic in sorted(self._paired | self._unpaired) if topic not in self._newest]
+        stamps = {topic: stamp_of(self._newest[topic], topic) for topic in self._paired if topic in self._newest}
+        newest = stamps.get("tracks", max(stamps.values(), default=0))
+        return silent + sorted(topic for topic, stamp in stamps.items() if stamp != newest)
+
+    def complete(self) -> dict[str, bytes] | None:
+        """Return all messages if none is missing and the paired ones bear one stamp."""
+        return None if self.missing() else dict(self._newest)

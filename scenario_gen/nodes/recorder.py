@@ -1,0 +1,159 @@
+"""recorder: any topics of any type, as raw CDR, to a bag; `~/start` and `~/stop` begin and end one.
+
+What a publisher offers decides how it is subscribed, so latched topics are recorded from late on too. Messages are logged at the
+time they arrive. The bag is closed on `~/stop`, on Ctrl-C and on SIGTERM; a killed recorder leaves all but the last chunk.
+"""
+
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from rclpy.time import Time
+from std_srvs.srv import Trigger
+
+from msg_conventions.topics import Quality, topic_entry
+from scenario_gen.bags import BagWriter, Split
+from scenario_gen.bags.metadata import qos_yaml
+from scenario_gen.errors import InputError
+from scenario_gen.nodes.base import qos, run_nodes
+from scenario_gen.nodes.message_classes import message_class
+from scenario_gen.nodes.ros_parameters import ConfigParameters
+from scenario_gen.parameters import check, parameter
+
+DEFAULT_TOPICS = (
+    r".*(/map|/road/(entries|exits)|/tracks|/changepoints|/posterior|/fit|/vehicle_\w+/(route|footprint|fix|speed)"
+    r"|/scenarios|/scenarios/info|/markers|/report|/diagnostics)"
+)
+DEPTH = 1000
+
+
+@dataclass(frozen=True)
+class Config:
+    """The recorder's parameters."""
+
+    bag: str = parameter("", "folder of the bag to begin at once; empty waits for ~/start and names it by the time")
+    topics: str = parameter(DEFAULT_TOPICS, "regular expression of the full names of the topics to record")
+    compress: bool = parameter(True, "compress chunks with zstd")
+    split_bytes: int = parameter(0, "begin a new file after so many bytes of messages; 0 never", unit="B", low=0)
+    split_seconds: float = parameter(0.0, "begin a new file after so long; 0 never", unit="s", low=0.0)
+
+    def __post_init__(self) -> None:
+        check(self)
+        try:
+            re.compile(self.topics)
+        except re.error as error:
+            raise InputError(f"parameter topics is no regular expression: {error}") from None
+
+
+class Recorder(Node):  # type: ignore[misc]
+    """Records what matches."""
+
+    def __init__(self, namespace: str | None = None) -> None:
+        super().__init__("recorder", namespace=namespace)
+        self.parameters = ConfigParameters(self, Config())
+        self.parameters.log()
+        self._bag: BagWriter | None = None
+        self._listening: dict[str, Any] = {}
+        self._refused: set[str] = set()
+        self.create_service(Trigger, "~/start", self._start_service)
+        self.create_service(Trigger, "~/stop", self._stop_service)
+        self.create_timer(0.1, self._look_around)
+
+    def autostart(self) -> None:
+        """Begin the bag that the parameter names."""
+        if self.parameters.config.bag:
+            self._start(Path(self.parameters.config.bag))
+
+    def _start(self, folder: Path) -> None:
+        config = self.parameters.config
+        self._bag = BagWriter(folder, compress=config.compress, split=Split(config.split_bytes, config.split_seconds))
+        self.get_logger().info(f"recording to {folder}")
+        self._look_around()
+
+    def stop(self) -> str:
+        """Close the bag, if one is open; return its folder."""
+        for topic in list(self._listening):
+            self.destroy_subscription(self._listening.pop(topic))
+        bag, self._bag = self._bag, None
+        if bag is None:
+            return ""
+        bag.close()
+        return str(bag.folder)
+
+    def destroy_node(self) -> None:
+        """Close the bag, then the node."""
+        self.stop()
+        super().destroy_node()
+
+    def _look_around(self) -> None:
+        """Subscribe to topics that have come up since."""
+        if self._bag is None:
+            return
+        wanted = re.compile(self.parameters.config.topics)
+        for topic, kinds in self.get_topic_names_and_types():
+            if topic not in self._listening and topic not in self._refused and wanted.fullmatch(topic):
+                self._listen(topic, kinds[0])
+
+    def _listen(self, topic: str, kind: str) -> None:
+        publishers = self.get_publishers_info_by_topic(topic)
+        if not publishers or self._bag is None:
+            return
+        offered = [publisher.qos_profile for publisher in publishers]
+        quality = Quality(
+            depth=max(DEPTH, *(profile.depth for profile in offered)),
+            reliable=all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in offered),
+            transient_local=all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in offered),
+        )
+        try:
+            message = message_class(kind)
+            depth = max(profile.depth for profile in offered) or (
+                DEPTH if topic.endswith(("/scenarios", "/scenarios/info")) else 1
+            )
+            profile = qos_yaml(Quality(depth, quality.reliable, quality.transient_local))
+            self._bag.add_topic(topic, kind, profile, str(publishers[0].topic_type_hash))
+        except InputError as error:
+            self._refused.add(topic)
+            self.get_logger().error(f"{topic} is not recorded: {error}")
+            return
+        self._listening[topic] = self.create_subscription(
+            message, topic, lambda data: self._write(topic, data), qos(quality), raw=True
+        )
+
+    def _write(self, topic: str, data: bytes) -> None:
+        if self._bag is not None:
+            now: Time = self.get_clock().now()
+            self._bag.write(topic, data, now.nanoseconds)
+
+    def _start_service(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        now = self.get_clock().now().nanoseconds
+        folder = Path(self.parameters.config.bag or f"bag_{now // 1_000_000}")
+        try:
+            if self._bag is not None:
+                raise InputError(f"{self._bag.folder} is being recorded; call ~/stop first")
+            self._start(folder)
+            response.success, response.message = True, str(folder)
+        except InputError as error:
+            response.success, response.message = False, str(error)
+        return response
+
+    def _stop_service(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        folder = self.stop()
+        response.success, response.message = bool(folder), folder or "nothing is being recorded"
+        return response
+
+
+def depth_of(topic: str) -> int:
+    """Return the depth to offer at replay; discovery does not tell the publisher's."""
+    try:
+        return topic_entry(topic)[1].depth
+    except KeyError:
+        return DEPTH
+
+
+def main() -> None:
+    """Run the node."""
+    sys.exit(run_nodes(Recorder))

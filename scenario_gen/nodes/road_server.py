@@ -1,0 +1,120 @@
+"""road_server: `map`, `road/entries`, `road/exits`; `~/get_map`, and `~/load_map` for another road.
+
+Built-in roads are sized to the template, so the node listens to `tracks` and publishes the road for each encounter it hears, with
+its stamp. Without tracks it publishes the road in its plain size, stamp 0 (`corridor` waits for tracks).
+"""
+
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from nav_msgs.msg import OccupancyGrid
+from nav_msgs.srv import GetMap, LoadMap
+from rclpy.serialization import deserialize_message
+
+from msg_conventions.diagnostics import Level
+from msg_conventions.roads import encode_map, encode_poses
+from msg_conventions.tracks import decode_tracks
+from scenario_gen.errors import InputError, ScenarioGenError
+from scenario_gen.nodes.base import StageNode, run_nodes
+from scenario_gen.parameters import check, parameter
+from scenario_gen.roads import Road, RoadConfig, build_road
+
+
+@dataclass(frozen=True)
+class Config:
+    """The road server's parameters."""
+
+    road_name: str = parameter("t_intersection", "straight, t_intersection, four_way, corridor, or a map_server YAML file")
+    wait_for_tracks: bool = parameter(False, "publish nothing until tracks say what the road is sized to")
+    road: RoadConfig = field(default_factory=RoadConfig)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+def road_of_url(url: str) -> str:
+    """Return the built-in name or file path that a LoadMap request means.
+
+    Raises:
+        InputError: another scheme than file:// and package://, or a package that is not installed.
+    """
+    parts = urlparse(url)
+    if parts.scheme == "file":
+        return unquote(parts.path)
+    if parts.scheme == "package":
+        try:
+            return str(Path(get_package_share_directory(parts.netloc)) / unquote(parts.path).lstrip("/"))
+        except (PackageNotFoundError, ValueError):
+            raise InputError(f"{url}: package {parts.netloc!r} is not installed or not sourced") from None
+    if parts.scheme:
+        raise InputError(f"{url}: give file://, package://, a path, or the name of a built-in road")
+    return url
+
+
+class RoadServer(StageNode):
+    """Serves one road at a time."""
+
+    INPUTS = ("tracks",)
+
+    def __init__(self, namespace: str | None = None) -> None:
+        super().__init__("road_server", Config(), namespace)
+        self._tracks: bytes | None = None
+        self._name = self.config.road_name
+        self._grid: bytes | None = None
+        self.create_service(GetMap, "~/get_map", self._get_map)
+        self.create_service(LoadMap, "~/load_map", self._load_map)
+
+    def started(self) -> None:
+        """Publish the plain road until tracks come."""
+        if not self.config.wait_for_tracks and self.config.road_name != "corridor":
+            self.work("road", lambda _cancelled: self._publish(*self._build(self._name)))
+
+    def received(self, topic: str, data: bytes) -> None:
+        """Size the road to the newest encounter."""
+        self._tracks = data
+        self.work("road", lambda _cancelled: self._publish(*self._build(self._name)))
+
+    def _build(self, name: str) -> tuple[Road, int]:
+        encounter = decode_tracks(self._tracks) if self._tracks else None
+        return build_road(name, encounter, self.config.road), encounter.start_ns if encounter else 0
+
+    def _publish(self, road: Road, stamp_ns: int) -> None:
+        self._grid = encode_map(road, stamp_ns)
+        self.send("road/entries", encode_poses(road.entries, road.frame_id, stamp_ns))
+        self.send("road/exits", encode_poses(road.exits, road.frame_id, stamp_ns))
+        self.send("map", self._grid)
+        height, width = road.drivable.shape
+        message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, {len(road.entries)} entries"
+        self.status(Level.OK, message, "road", stamp_ns)
+
+    def _get_map(self, _request: GetMap.Request, response: GetMap.Response) -> GetMap.Response:
+        if self._grid is not None:
+            response.map = deserialize_message(self._grid, OccupancyGrid)
+        return response
+
+    def _load_map(self, request: LoadMap.Request, response: LoadMap.Response) -> LoadMap.Response:
+        """Load another road; it stays until the next request or restart."""
+        try:
+            name = road_of_url(request.map_url)
+            if self.active:
+                road, stamp_ns = self._build(name)
+                self._name = name
+                self._publish(road, stamp_ns)
+                response.map = deserialize_message(self._grid, OccupancyGrid)
+                response.result = LoadMap.Response.RESULT_SUCCESS
+            else:
+                response.result = LoadMap.Response.RESULT_UNDEFINED_FAILURE
+        except ScenarioGenError as error:
+            missing = not Path(request.map_url.removeprefix("file://")).exists()
+            codes = LoadMap.Response
+            response.result = codes.RESULT_MAP_DOES_NOT_EXIST if missing else codes.RESULT_INVALID_MAP_METADATA
+            self.status(Level.ERROR, f"load_map {request.map_url!r}: {error}", "load_map", error=type(error).__name__)
+        return response
+
+
+def main() -> None:
+    """Run the node."""
+    sys.exit(run_nodes(RoadServer))

@@ -1,0 +1,32 @@
+"""The executables. Each sets the signals first, so that Ctrl-C while the libraries load ends without a traceback."""
+
+import importlib
+import os
+import signal
+from functools import partial
+
+
+def _leave(number: int, _frame: object) -> None:
+    os._exit(128 + number)
+
+
+def start(name: str) -> None:
+    """Load the node `name` and run it; rclpy takes the signals over once it is initialised."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _leave)
+    importlib.import_module(f"scenario_gen.nodes.{name}").main()
+
+
+segmenter = partial(start, "segmenter")
+planner = partial(start, "planner")
+gp_sampler = partial(start, "gp_sampler")
+road_server = partial(start, "road_server")
+log_player = partial(start, "log_player")
+evaluator = partial(start, "evaluator")
+recorder = partial(start, "recorder")
+player = partial(start, "player")
+
+if __name__ == "__main__":
+    import sys
+
+    start(sys.argv.pop(1))

@@ -1,0 +1,50 @@
+"""A fitted template as the sampler and the evaluator hear it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from msg_conventions.changepoints import decode_changepoints
+from msg_conventions.fits import anchor_stamps, decode_fit
+from msg_conventions.names import tokens
+from msg_conventions.paths import decode_route
+from msg_conventions.roads import decode_map
+from msg_conventions.topics import vehicle_topic
+from msg_conventions.tracks import decode_tracks
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+from scenario_gen.planning import Route
+from scenario_gen.roads import Road
+from scenario_gen.scenario import BoundaryStates
+from scenario_gen.segmentation.result import Segmentation
+
+
+@dataclass(frozen=True, eq=False)
+class Template:
+    """An encounter with its changepoints, placed on a road."""
+
+    encounter: Encounter
+    segmentation: Segmentation
+    road: Road
+    asked: BoundaryStates
+    routes: tuple[Route, ...]
+
+
+def read_template(messages: Mapping[str, bytes]) -> Template:
+    """Return the template that the messages (by topic) describe.
+
+    Raises:
+        InputError: a message is damaged, or in another frame than the map.
+    """
+    encounter = decode_tracks(messages["tracks"])
+    segmentation = decode_changepoints(messages["changepoints"], encounter)
+    _, road = decode_map(messages["map"])
+    _, frame, asked, _ = decode_fit(messages["fit"])
+    anchors = anchor_stamps(encounter, segmentation.changepoints)
+    routes = []
+    for name in tokens(vehicle.id for vehicle in encounter.vehicles):
+        topic = vehicle_topic(name, "route")
+        route_frame, route = decode_route(messages[topic], anchors, topic)
+        if {frame, route_frame} != {road.frame_id}:
+            raise InputError(f"{topic}: frame {route_frame!r}, fit {frame!r} and map {road.frame_id!r} must be one and the same")
+        routes.append(route)
+    return Template(encounter, segmentation, road, asked, tuple(routes))

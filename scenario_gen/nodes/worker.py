@@ -1,0 +1,64 @@
+"""Long work off the executor's thread: one thread per node, jobs in order, a newer job replaces a waiting one of its name."""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+
+Job = Callable[[Callable[[], bool]], object]
+
+
+class Worker:
+    """Runs jobs one after the other; each gets a function that says whether it has been cancelled.
+
+    A job that is cancelled before its turn still runs, so that it can answer whoever waits for it: it looks first.
+    """
+
+    def __init__(self, failed: Callable[[str, BaseException], None]) -> None:
+        """Start the thread; `failed` is called with a job's name and what it raised."""
+        self._failed = failed
+        self._waiting: OrderedDict[str, tuple[Job, threading.Event]] = OrderedDict()
+        self._running: tuple[str, threading.Event] | None = None
+        self._changed = threading.Condition()
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def submit(self, name: str, job: Job) -> None:
+        """Queue a job; one of the same name that still waits is replaced, one that runs is cancelled."""
+        with self._changed:
+            self._waiting.pop(name, None)
+            self._waiting[name] = (job, threading.Event())
+            if self._running is not None and self._running[0] == name:
+                self._running[1].set()
+            self._changed.notify()
+
+    def cancel(self) -> list[str]:
+        """Cancel the running job and the waiting ones; return their names, the running one first."""
+        with self._changed:
+            running = [self._running] if self._running else []
+            every = running + [(name, cancelled) for name, (_, cancelled) in self._waiting.items()]
+            for _, cancelled in every:
+                cancelled.set()
+        return [name for name, _ in every]
+
+    def close(self, timeout: float = 1.0) -> None:
+        """Cancel everything and end the thread; a job that does not listen is left behind after `timeout` seconds."""
+        self.cancel()
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        self._thread.join(timeout)
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._running = None
+                self._changed.wait_for(lambda: self._closed or bool(self._waiting))
+                if not self._waiting:
+                    return
+                name, (job, cancelled) = self._waiting.popitem(last=False)
+                self._running = (name, cancelled)
+            try:
+                job(cancelled.is_set)
+            except Exception as error:
+                self._failed(name, error)
