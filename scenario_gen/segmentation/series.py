@@ -1,15 +1,14 @@
 """A plain (T, D) array -> posterior over its segmentations: the sticky HDP-HMM without any driving in it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import InputError
 from scenario_gen.parameters import check, parameter
-from scenario_gen.segmentation._chain import run_chain
-from scenario_gen.segmentation._emission import joint_prior
-from scenario_gen.segmentation._start import Problem, find_start
+from scenario_gen.segmentation._problem import Problem
+from scenario_gen.segmentation._start import find_start, sample_weight
 from scenario_gen.segmentation.posterior import Posterior, pool
 
 
@@ -26,7 +25,7 @@ class SamplerConfig:
         0.05, "prior samples that the mean (or the regression) of a state is worth", low=1e-6, high=100.0
     )
     weight: float = parameter(
-        1.0, "what one sample counts for; below 1 where smoothing makes neighbours repeat each other", low=1e-3, high=1.0
+        0.0, "what one sample counts for, below 1 where neighbours repeat each other; 0: from the data", low=0.0, high=1.0
     )
     gamma_shape: float = parameter(1.0, "shape of γ's Gamma prior", low=1e-3)
     gamma_rate: float = parameter(0.1, "rate of γ's Gamma prior", low=1e-6)
@@ -84,38 +83,19 @@ def segment_series(
     if not varies.any():
         return Posterior.constant(len(x))
     unknown = np.zeros(varies.sum()) if blur is None else (np.asarray(blur)[varies] / spread[varies]) ** 2
-    problem = Problem.build((x[:, varies] - x[:, varies].mean(axis=0)) / spread[varies], stops, config, config.weight, unknown)
-    seeds = np.random.SeedSequence([seed]).spawn(config.chains)
+    scaled = (x[:, varies] - x[:, varies].mean(axis=0)) / spread[varies]
+    first, *seeds = np.random.SeedSequence([seed]).spawn(config.chains + 1)
+    problem = Problem.build(scaled, stops, config, unknown)
+    if config.weight == 0.0:
+        problem = replace(problem, weight=sample_weight(problem, config.states, np.random.Generator(np.random.PCG64(first))))
     results = [_run(problem, config, index, stream) for index, stream in enumerate(seeds)]
     return pool([labels for labels, _ in results], [trace for _, trace in results], stops, problem.lead)
 
 
 def _run(problem: Problem, config: SamplerConfig, index: int, stream: np.random.SeedSequence) -> tuple[Ints, Floats]:
-    """Run chain number `index`; returns its kept labels (S, T) and its trace (S, 5)."""
+    """Run chain number `index`; returns its kept labels (S, T') and their trace (S, 5)."""
     rng = np.random.Generator(np.random.PCG64(stream))
     start = find_start(problem, config, index, rng)
     sweeps = max(config.sweeps - start.sweeps, 4)
     burn = sweeps // 3
-    samples = np.empty((sweeps - burn, len(problem.v)), np.int64)
-    trace = np.empty((sweeps, 5))
-    emissions = np.empty((config.states, problem.dimensions, problem.v.shape[1]))
-    hyper = problem.hyper(config, start.nu)
-    top = np.array([1.0, 50.0, 0.9])
-    g0 = joint_prior(problem.mean, problem.precision, start.scale)
-    seed = int(rng.integers(2**62))
-    run_chain(
-        problem.v,
-        problem.vt,
-        problem.ends,
-        g0,
-        hyper,
-        start.labels,
-        top,
-        problem.regressors,
-        seed,
-        burn,
-        samples,
-        trace,
-        emissions,
-    )
-    return samples, trace[burn:]
+    return problem.run(config, start.prior, start.labels, burn, sweeps - burn, int(rng.integers(2**62)))

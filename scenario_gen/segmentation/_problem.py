@@ -1,0 +1,137 @@
+"""The samples and priors as the kernels want them."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.segmentation._chain import TRACE, run_chain
+from scenario_gen.segmentation._emission import joint_prior
+from scenario_gen.segmentation._merge import merge_states
+
+if TYPE_CHECKING:
+    from scenario_gen.segmentation.series import SamplerConfig
+
+START = np.array([1.0, 50.0, 0.9])
+MERGE_ROWS = (40.0, 0.1)
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """Scale S0 (D, D) and degrees of freedom ν0 of the states' covariances."""
+
+    scale: Floats
+    nu: float
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """The samples as the kernels want them.
+
+    Attributes:
+        v: (T', P + D) rows (z, y): regressors, then the sample itself.
+        vt: its transpose.
+        ends: index one past the last row of each sequence.
+        regressors: P.
+        mean: (D, P) prior mean M of the regression.
+        precision: (P, P) prior K.
+        lead: samples at the head of each sequence that have no full past and hence no row.
+        weight: what a sample counts for.
+        blur: (D,) variance to which each channel is known at all.
+    """
+
+    v: Floats
+    vt: Floats
+    ends: Ints
+    regressors: int
+    mean: Floats
+    precision: Floats
+    lead: int
+    weight: float
+    blur: Floats
+
+    @property
+    def dimensions(self) -> int:
+        """D."""
+        return int(self.v.shape[1]) - self.regressors
+
+    @property
+    def y(self) -> Floats:
+        """(T', D) samples."""
+        return self.v[:, self.regressors :]
+
+    @classmethod
+    def build(cls, x: Floats, ends: Ints, config: "SamplerConfig", blur: Floats) -> "Problem":
+        """Stack regressors and samples of the standardised x (T, D)."""
+        d = x.shape[1]
+        order = config.order if config.emission == "autoregressive" else 0
+        starts = np.concatenate([[0], ends[:-1]])
+        order = min(order, int((ends - starts).min()) - 2)
+        rows = [
+            np.hstack(
+                [np.ones((b - a - order, 1)), *[x[a + order - lag : b - lag] for lag in range(1, order + 1)], x[a + order : b]]
+            )
+            for a, b in zip(starts, ends, strict=True)
+        ]
+        v = np.ascontiguousarray(np.vstack(rows))
+        p = 1 + order * d
+        mean = np.zeros((d, p))
+        if order:
+            mean[:, 1 : 1 + d] = np.eye(d)
+        precision = np.eye(p) * config.mean_weight
+        return cls(
+            v,
+            np.ascontiguousarray(v.T),
+            ends - order * np.arange(1, len(ends) + 1),
+            p,
+            mean,
+            precision,
+            order,
+            config.weight,
+            blur,
+        )
+
+    def residual(self, labels: Ints) -> Floats:
+        """(T', D) what the regressions of the states given by `labels` leave unexplained."""
+        z, y = self.v[:, : self.regressors], self.y
+        residual = np.empty_like(y)
+        for k in range(int(labels.max()) + 1):
+            chosen = labels == k
+            gram = z[chosen].T @ z[chosen] + self.precision
+            coefficients = np.linalg.solve(gram, z[chosen].T @ y[chosen] + self.precision @ self.mean.T)
+            residual[chosen] = y[chosen] - z[chosen] @ coefficients
+        return residual
+
+    def within(self, labels: Ints) -> Floats:
+        """(D, D) covariance of what the states given by `labels` leave unexplained, a little regularised."""
+        residual = self.residual(labels)
+        scatter = residual.T @ residual
+        freedom = max(len(residual) - self.regressors * (labels.max() + 1), len(residual) // 2)
+        scatter = scatter / freedom + np.diag(self.blur)
+        result: Floats = scatter + np.eye(self.dimensions) * (1e-3 * np.trace(scatter) / self.dimensions + 1e-6)
+        return result
+
+    def run(self, config: "SamplerConfig", prior: Prior, labels: Ints, burn: int, keep: int, seed: int) -> tuple[Ints, Floats]:
+        """Run a chain from `labels` for `burn` + `keep` sweeps; returns kept labels (keep, T') and their trace (keep, 5)."""
+        samples = np.empty((keep, len(self.v)), np.int64)
+        trace = np.empty((burn + keep, len(TRACE)))
+        emissions = np.empty((config.states, self.dimensions, self.v.shape[1]))
+        hyper = np.concatenate([config.hyper, [prior.nu, self.weight], self.blur])
+        g0 = joint_prior(self.mean, self.precision, prior.scale)
+        run_chain(self.v, self.vt, self.ends, g0, hyper, labels, START, self.regressors, seed, burn, samples, trace, emissions)
+        return samples, trace[burn:]
+
+    def merge(self, config: "SamplerConfig", prior: Prior, labels: Ints) -> tuple[float, Ints]:
+        """Merge states greedily under `prior`; returns log p(samples | labels) and the labels."""
+        merged = labels.copy()
+        score = np.zeros(1)
+        hyper = np.concatenate([config.hyper, [prior.nu, self.weight], self.blur])
+        g0 = joint_prior(self.mean, self.precision, prior.scale)
+        merge_states(self.v, self.ends, g0, hyper, self.regressors, *MERGE_ROWS, score, merged)
+        return float(score[0]), compact(merged)
+
+
+def compact(labels: Ints) -> Ints:
+    """Renumber labels to 0 .. K - 1 without gaps."""
+    return np.unique(labels, return_inverse=True)[1].astype(np.int64).reshape(-1)
