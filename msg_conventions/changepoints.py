@@ -7,6 +7,8 @@ vehicle, primitive [uint16], t [s since the stamp, float64], p [posterior probab
 Both bear the stamp of their tracks. QoS: reliable, transient_local, depth 1.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from msg_conventions import trajectory
@@ -15,7 +17,9 @@ from msg_conventions.tracks import FRAME
 from msg_conventions.trajectory import TYPE, Trajectory
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
-from scenario_gen.segmentation.result import Segmentation
+
+if TYPE_CHECKING:
+    from scenario_gen.segmentation.result import Segmentation
 
 __all__ = ["POSTERIOR_TYPE", "TYPE", "decode_changepoints", "decode_posterior", "encode_changepoints", "encode_posterior"]
 
@@ -25,7 +29,7 @@ POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("vehicle", "<u2"), 
 DATATYPES = {"<f4": FLOAT32, "<u2": UINT16, "<f8": FLOAT64}
 
 
-def encode_changepoints(encounter: Encounter, segmentation: Segmentation) -> bytes:
+def encode_changepoints(encounter: Encounter, segmentation: "Segmentation") -> bytes:
     """Return the states at the changepoints as CDR bytes."""
     at = segmentation.changepoints
     return trajectory.encode(
@@ -42,7 +46,7 @@ def encode_changepoints(encounter: Encounter, segmentation: Segmentation) -> byt
     )
 
 
-def decode_changepoints(data: bytes, encounter: Encounter, what: str = "changepoints") -> Segmentation:
+def decode_changepoints(data: bytes, encounter: Encounter, what: str = "changepoints") -> "Segmentation":
     """Return the segmentation that the message and its tracks describe: a primitive of its own for every segment.
 
     Shared labels, probabilities and descriptions are in `posterior` and the diagnostics; no later stage needs them.
@@ -50,6 +54,8 @@ def decode_changepoints(data: bytes, encounter: Encounter, what: str = "changepo
     Raises:
         InputError: the message is damaged, bears another stamp, or has a changepoint off the template's clock.
     """
+    from scenario_gen.segmentation.result import Segmentation
+
     message = trajectory.decode(data, what)
     if message.stamp_ns != encounter.start_ns:
         raise InputError(f"{what}: stamp {message.stamp_ns} ns is not that of the tracks ({encounter.start_ns} ns)")
@@ -67,7 +73,7 @@ def decode_changepoints(data: bytes, encounter: Encounter, what: str = "changepo
     )
 
 
-def encode_posterior(encounter: Encounter, segmentation: Segmentation) -> bytes:
+def encode_posterior(encounter: Encounter, segmentation: "Segmentation") -> bytes:
     """Return labels and changepoint probabilities as CDR bytes of a PointCloud2."""
     n, samples = encounter.speed.shape
     cloud = np.zeros((n, samples), dtype=POINT)
@@ -83,12 +89,14 @@ def encode_posterior(encounter: Encounter, segmentation: Segmentation) -> bytes:
     return writer.raw(cloud.tobytes()).pack("B", 1).finish()
 
 
-def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str = "posterior") -> Segmentation:
+def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str = "posterior") -> "Segmentation":
     """Return the segmentation; its sentences for people travel on the diagnostics.
 
     Raises:
         InputError: the message is damaged or not of this convention.
     """
+    from scenario_gen.segmentation.result import Segmentation
+
     reader = CdrReader(data, what)
     reader.header()
     n, samples = reader.number(), reader.number()

@@ -9,12 +9,15 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.scenarios import digest
 from scenario_gen.errors import InputError
-from scenario_gen.fitting.result import Fit
 from scenario_gen.scenario import Cause, Scenario, ScenarioSet
+
+if TYPE_CHECKING:
+    from scenario_gen.fitting.result import Fit
 
 TYPE = "diagnostic_msgs/msg/DiagnosticArray"
 
@@ -132,7 +135,7 @@ def read_request(status: Status, scenarios: tuple[Scenario, ...] = ()) -> Scenar
         raise InputError(f"scenarios/info: {status.name!r} is no account of a request ({error})") from None
 
 
-def fit_statuses(fit: Fit, node: str) -> tuple[Status, ...]:
+def fit_statuses(fit: "Fit", node: str) -> tuple[Status, ...]:
     """Return what the fitting decided: one status per vehicle, one for the notes."""
     per_vehicle = tuple(
         Status(

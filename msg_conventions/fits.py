@@ -5,6 +5,8 @@ states asked of every scenario, speed included. Speeds in between are the templa
 What the fitting decided travels as sentences in diagnostics. QoS: reliable, transient_local, depth 1.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from msg_conventions import trajectory
@@ -12,8 +14,10 @@ from msg_conventions.trajectory import TYPE, Trajectory
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
-from scenario_gen.fitting.result import Fit
 from scenario_gen.scenario import BoundaryStates
+
+if TYPE_CHECKING:
+    from scenario_gen.fitting.result import Fit
 
 __all__ = ["TYPE", "anchor_stamps", "decode_fit", "encode_fit"]
 
@@ -24,7 +28,7 @@ def anchor_stamps(encounter: Encounter, changepoints: Ints) -> list[int]:
     return [encounter.start_ns + k * encounter.dt_ns for k in index]
 
 
-def encode_fit(encounter: Encounter, fit: Fit, frame_id: str) -> bytes:
+def encode_fit(encounter: Encounter, fit: "Fit", frame_id: str) -> bytes:
     """Return the anchors as CDR bytes; `frame_id` is the road's."""
     poses = np.stack([vehicle.anchors for vehicle in fit.fitted])
     speed = encounter.speed[:, fit.anchor_index] * np.array([[vehicle.scale] for vehicle in fit.fitted])

@@ -7,6 +7,7 @@ Arc length does not travel; it is the sum of the chords, and `canonical_route` g
 """
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +15,9 @@ from msg_conventions.cdr import NANOSECONDS, CdrReader, CdrWriter
 from msg_conventions.roads import pose_rows, poses_of
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import InputError
-from scenario_gen.planning.route import Route
+
+if TYPE_CHECKING:
+    from scenario_gen.planning.route import Route
 
 TYPE = "nav_msgs/msg/Path"
 
@@ -62,12 +65,14 @@ def chord_length(points: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
 
 
-def canonical_route(route: Route) -> Route:
+def canonical_route(route: "Route") -> "Route":
     """Return the route as the other side of a message sees it."""
+    from scenario_gen.planning.route import Route
+
     return Route(points=route.points, anchor=route.anchor, length=chord_length(route.points))
 
 
-def encode_route(route: Route, anchors_ns: Sequence[int], frame_id: str) -> bytes:
+def encode_route(route: "Route", anchors_ns: Sequence[int], frame_id: str) -> bytes:
     """Return the route as CDR bytes; `anchors_ns` (K + 2,) are the template's stamps at the anchors, the first its own."""
     index, stamps = [int(route.anchor[0])], [anchors_ns[0]]
     for k in range(1, len(route.anchor)):
@@ -82,12 +87,14 @@ def encode_route(route: Route, anchors_ns: Sequence[int], frame_id: str) -> byte
     return encode_path(route.points[index], np.array(stamps, dtype=np.int64), frame_id, anchors_ns[0])
 
 
-def decode_route(data: bytes, anchors_ns: Sequence[int], what: str = "route") -> tuple[str, Route]:
+def decode_route(data: bytes, anchors_ns: Sequence[int], what: str = "route") -> tuple[str, "Route"]:
     """Return the frame and the route.
 
     Raises:
         InputError: the message is damaged, bears another stamp, or has no pose at an anchor's stamp.
     """
+    from scenario_gen.planning.route import Route
+
     stamp_ns, frame_id, poses, stamps = decode_path(data, what)
     if stamp_ns != anchors_ns[0]:
         raise InputError(f"{what}: stamp {stamp_ns} ns is not that of the template ({anchors_ns[0]} ns)")

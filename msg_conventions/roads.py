@@ -6,13 +6,17 @@ of it. Stamp: that of the template the road was made for, or 0 for one that suit
 The road's name does not travel: nothing is computed from it.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.yaw import quaternion, yaw
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
-from scenario_gen.roads.road import Road
+
+if TYPE_CHECKING:
+    from scenario_gen.roads.road import Road
 
 MAP_TYPE = "nav_msgs/msg/OccupancyGrid"
 POSES_TYPE = "geometry_msgs/msg/PoseArray"
@@ -39,7 +43,7 @@ def poses_of(rows: Floats, what: str) -> Floats:
     return np.column_stack([rows[:, :2], yaw(rows[:, 3:])])
 
 
-def encode_map(road: Road, stamp_ns: int) -> bytes:
+def encode_map(road: "Road", stamp_ns: int) -> bytes:
     """Return the grid as CDR bytes."""
     height, width = road.drivable.shape
     origin = [*road.origin, 0.0, 0.0, 0.0, 0.0, 1.0]
@@ -66,12 +70,14 @@ def decode_poses(data: bytes, what: str = "poses") -> tuple[int, str, Floats]:
     return stamp_ns, frame_id, poses_of(reader.floats(7 * count).reshape(count, 7), what)
 
 
-def decode_map(data: bytes, entries: bytes | None = None, exits: bytes | None = None, name: str = "map") -> tuple[int, Road]:
+def decode_map(data: bytes, entries: bytes | None = None, exits: bytes | None = None, name: str = "map") -> tuple[int, "Road"]:
     """Return the stamp [ns] and the road; without entries and exits it has none (a plain map server sends none).
 
     Raises:
         InputError: the message is damaged, the map is rotated or empty, or the frames disagree.
     """
+    from scenario_gen.roads.road import Road
+
     reader = CdrReader(data, name)
     stamp_ns, frame_id = reader.header()
     reader.stamp()

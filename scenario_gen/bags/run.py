@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from msg_conventions.changepoints import encode_changepoints, encode_posterior
 from msg_conventions.diagnostics import (
@@ -25,11 +26,13 @@ from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
-from scenario_gen.fitting.result import Fit
-from scenario_gen.planning.route import Route
-from scenario_gen.roads.road import Road
 from scenario_gen.scenario import ScenarioSet
-from scenario_gen.segmentation.result import Segmentation
+
+if TYPE_CHECKING:
+    from scenario_gen.fitting.result import Fit
+    from scenario_gen.planning.route import Route
+    from scenario_gen.roads.road import Road
+    from scenario_gen.segmentation.result import Segmentation
 
 SCENARIO_STEP_NS = 100_000_000  # scenarios are logged this far apart, so that a player shows one after the other
 
@@ -39,10 +42,10 @@ class Run:
     """All that one request made of one template on one road; `namespace` stands before its topics, "" or e.g. "/case_a"."""
 
     encounter: Encounter
-    road: Road
-    segmentation: Segmentation
-    fit: Fit
-    routes: tuple[Route, ...]
+    road: "Road"
+    segmentation: "Segmentation"
+    fit: "Fit"
+    routes: tuple["Route", ...]
     result: ScenarioSet
     seed: int
     request: str = "1"
@@ -80,7 +83,7 @@ def run_messages(run: Run) -> Iterator[tuple[str, bytes, int]]:
     yield "scenarios/info", encode_diagnostics([closing], stamp), stamp + len(run.result.scenarios) * SCENARIO_STEP_NS
 
 
-def segmentation_status(segmentation: Segmentation, node: str = "/segmenter") -> Status:
+def segmentation_status(segmentation: "Segmentation", node: str = "/segmenter") -> Status:
     """Return what the segmenter found, in words."""
     values = {f"segment.{k}": text for k, text in enumerate(segmentation.descriptions)}
     message = f"{len(segmentation.changepoints)} changepoints, {segmentation.n_primitives} primitives"

@@ -15,7 +15,6 @@ from rclpy.utilities import remove_ros_args
 
 from msg_conventions.diagnostics import Level, Status, encode_diagnostics
 from msg_conventions.topics import Quality, topic_entry
-from scenario_gen import kernels
 from scenario_gen.errors import ScenarioGenError
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.ros_parameters import ConfigParameters
@@ -176,6 +175,8 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
 def compile_kernels() -> tuple[int, float]:
     """Compile, or load from the cache, the kernels of the stages that this process has imported; return number and seconds."""
+    from scenario_gen import kernels  # not for nodes without kernels: numba takes a second to load
+
     started = perf_counter()
     for dispatcher, argument_types in kernels._registry:
         dispatcher.compile(argument_types)
