@@ -1,5 +1,7 @@
 """From a placement to a fit: anchors at the changepoints, repaired where they have no room, and the states asked for."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from scenario_gen.arrays import Bools, Floats, Ints, frozen_ints
@@ -18,8 +20,15 @@ _STAND_LENGTH = 0.5  # metres
 _STAND_SPEED = 0.3  # m/s: slower is standing
 
 
-def finish(encounter: Encounter, segmentation: Segmentation, road: Road, placement: Placement, config: FittingConfig) -> Fit:
-    """Read the anchors off a placement.
+def finish(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    placement: Placement,
+    config: FittingConfig,
+    given: Floats | None = None,
+) -> Fit:
+    """Read the anchors off a placement; `given` (N, 2, 4) are start and end states to be met exactly, if there are any.
 
     Raises:
         RefusedError: an anchor is farther than `max_move` from the nearest pose with room.
@@ -30,19 +39,31 @@ def finish(encounter: Encounter, segmentation: Segmentation, road: Road, placeme
     fitted, states = [], []
     for i, track in enumerate(placement.tracks):
         stands = _stands(track, index)
-        anchors, moved, said = _anchors(road, track, _snapped(track, index, stands), index, encounter.dt, config)
+        progress = _snapped(track, index, stands)
+        anchors = track.curve.at(progress)
+        if given is not None:
+            anchors[progress == progress[0]] = given[i, 0, :3]
+            if not track.still:
+                anchors[progress == progress[-1]] = given[i, 1, :3]
+        anchors, moved, said = _repaired(road, track, anchors, progress, [float(t) for t in index * encounter.dt], config)
         notes += said
+        moved = moved + placement.moved[i]
+        if moved.max() > config.max_move:
+            raise RefusedError(
+                f"vehicle {track.vehicle.id} would be moved by {moved.max():.2f} m in all, to be clear of others and on road "
+                f"{road.name}; accepted is {config.max_move:g} m"
+            )
         fitted.append(
             FittedVehicle(
                 anchors=anchors,
-                moved=moved + placement.moved[i],
+                moved=moved,
                 stands=stands,
                 scale=float(placement.scale[i]),
                 manoeuvre=placement.manoeuvre[i],
             )
         )
-        ends = encounter.speed[i, [0, last]] * placement.scale[i]
-        ends = np.where((encounter.speed[i, [0, last]] < _STAND_SPEED) | track.still, 0.0, ends)
+        ends = encounter.speed[i, [0, last]] * placement.scale[i] if given is None else given[i, :, 3]
+        ends = np.where((ends < _STAND_SPEED) | track.still, 0.0, ends)
         states.append(np.column_stack((anchors[[0, -1]], ends)))
     asked = BoundaryStates(start=np.stack([s[0] for s in states]), end=np.stack([s[1] for s in states]))
     return Fit(encounter.vehicles, tuple(fitted), index, asked, tuple(notes))
@@ -52,7 +73,7 @@ def _stands(track: Track, index: Ints) -> Bools:
     """(K + 1,) primitives in which the vehicle stands: slow throughout, and hardly any path."""
     if track.still:
         return np.ones(len(index) - 1, dtype=np.bool_)
-    pieces = list(zip(index[:-1], index[1:], strict=True))
+    pieces = list(pairwise(index))
     driven = np.array([track.progress[b] - track.progress[a] for a, b in pieces])
     fastest = np.array([track.speed[a : b + 1].max() for a, b in pieces])
     stands = (driven < _STAND_LENGTH) & (fastest < _STAND_SPEED) | (driven < 1e-3)
@@ -77,11 +98,11 @@ def _snapped(track: Track, index: Ints, stands: Bools) -> Floats:
     return progress
 
 
-def _anchors(
-    road: Road, track: Track, progress: Floats, index: Ints, dt: float, config: FittingConfig
+def _repaired(
+    road: Road, track: Track, anchors: Floats, progress: Floats, times: list[float], config: FittingConfig
 ) -> tuple[Floats, Floats, list[str]]:
     """Anchors (K + 2, 3), how far each was moved (K + 2,), and sentences about it."""
-    anchors = track.curve.at(progress)
+    anchors = anchors.copy()
     moved = np.zeros(len(anchors))
     said = []
     for k in range(len(anchors)):
@@ -89,7 +110,7 @@ def _anchors(
             anchors[k], moved[k] = anchors[k - 1], moved[k - 1]
             continue
         vehicle = track.vehicle
-        what = "start" if k == 0 else "end" if k == len(anchors) - 1 else f"changepoint at {index[k] * dt:.1f} s"
+        what = "start" if k == 0 else "end" if k == len(anchors) - 1 else f"changepoint at {times[k]:.1f} s"
         answer = nearest_pose_with_room(road, anchors[k], vehicle.length, vehicle.width, config.max_move)
         if answer is None:
             x, y = anchors[k, :2]

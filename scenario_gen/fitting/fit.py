@@ -7,8 +7,9 @@ from scenario_gen.encounter import Encounter
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.fitting.finish import finish
+from scenario_gen.fitting.given import place_given
 from scenario_gen.fitting.identity import place_in_own_frame
-from scenario_gen.fitting.junction import place_at_junction
+from scenario_gen.fitting.junction import is_laned, place_at_junction
 from scenario_gen.fitting.lanes import place_along_lanes
 from scenario_gen.fitting.placement import Placement
 from scenario_gen.fitting.result import Fit
@@ -17,7 +18,8 @@ from scenario_gen.roads.road import Road
 from scenario_gen.roads.tracks import Track, clean_tracks
 from scenario_gen.segmentation.result import Segmentation
 
-_AT_HOME = 0.98  # share of footprints with room at which a road is taken for the template's own
+_AT_HOME = 0.98  # share of footprints with room at which any road is taken for the template's own
+_NEAR_HOME = 0.5  # the same for a map without lanes to go by: recorded cars leave recorded maps here and there
 
 
 def fit_template(
@@ -44,36 +46,40 @@ def fit_template(
         InputError: `starts` and `goals` disagree with the encounter.
     """
     if starts is not None or goals is not None:
-        from scenario_gen.fitting.given import fit_given
-
-        return fit_given(encounter, segmentation, road, config, starts, goals)
+        placement, given = place_given(encounter, road, config, starts, goals)
+        return finish(encounter, segmentation, road, placement, config, given)
     return finish(encounter, segmentation, road, _place(encounter, road, config), config)
 
 
 def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement:
+    if config.placement == "identity":
+        return place_in_own_frame(encounter, road, config)[0]
     tracks = clean_tracks(encounter)
     ways: dict[str, Callable[[tuple[Track, ...], Road, FittingConfig], Placement]] = {
         "lanes": place_along_lanes,
         "junction": place_at_junction,
         "search": place_by_search,
     }
-    if config.placement == "identity":
-        return place_in_own_frame(encounter, road, config)[0]
     if config.placement != "auto":
         return ways[config.placement](tracks, road, config)
-    own: Placement | None = None
-    reasons = []
+    own, share = None, 0.0
+    reasons: list[str] = []
+    order: tuple[str, ...]
     try:
         own, share = place_in_own_frame(encounter, road, config)
-        if share >= _AT_HOME:
-            return own
     except RefusedError as error:
-        reasons.append(str(error))
-    for place in ways.values():
+        reasons.append(f"in its own frame, {error}")
+    if own is not None and share >= _AT_HOME:
+        return own
+    if is_laned(road, tracks):
+        order, reasons = ("lanes", "junction"), []
+    elif own is not None and share >= _NEAR_HOME:
+        return own
+    else:
+        order = ("search",)
+    for name in order:
         try:
-            return place(tracks, road, config)
+            return ways[name](tracks, road, config)
         except RefusedError as error:
             reasons.append(str(error))
-    if own is not None:
-        return own
     raise RefusedError(f"the template does not fit road {road.name}: " + "; ".join(reasons))

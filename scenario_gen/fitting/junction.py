@@ -87,6 +87,12 @@ def place_at_junction(tracks: tuple[Track, ...], road: Road, config: FittingConf
     raise RefusedError(f"the template does not fit the ways of road {road.name}: {reasons[0]}")
 
 
+def is_laned(road: Road, tracks: tuple[Track, ...]) -> bool:
+    """True if a route can be drawn from every entry: the road's entries and exits are lanes that explain it."""
+    ways = _all_ways(tracks, road)
+    return len(road.entries) > 0 and {way.entry for way in ways} == set(range(len(road.entries)))
+
+
 def _doing(track: Track) -> str:
     if track.makes_u_turn:
         return "makes a U-turn"
@@ -106,6 +112,11 @@ def _why_not(choice: _Choice, scale: float) -> str:
 
 def _ways(tracks: tuple[Track, ...], road: Road) -> list[list[_Way]]:
     """The drawn routes that suit each vehicle's turning."""
+    everything = _all_ways(tracks, road)
+    return [[way for way in everything if _suits(track, way)] for track in tracks]
+
+
+def _all_ways(tracks: tuple[Track, ...], road: Road) -> list[_Way]:
     length, width = max(t.vehicle.length for t in tracks), max(t.vehicle.width for t in tracks)
 
     def fits(poses: Floats) -> bool:
@@ -124,7 +135,7 @@ def _ways(tracks: tuple[Track, ...], road: Road) -> list[list[_Way]]:
                     curve = draw_u_turn(entry, leave, float(apex), fits)
                     if curve is not None:
                         everything.append(_Way(e, x, curve, float(curve.points[-1, 2] - curve.points[0, 2])))
-    return [[way for way in everything if _suits(track, way)] for track in tracks]
+    return everything
 
 
 def _suits(track: Track, way: _Way) -> bool:
@@ -133,7 +144,7 @@ def _suits(track: Track, way: _Way) -> bool:
     if track.makes_u_turn or abs(way.turn) > np.radians(150.0):
         return track.makes_u_turn and abs(way.turn) > np.radians(150.0) and way.turn * turn > 0.0
     low, high = min(way.turn, 0.0) - _TURN_TOLERANCE, max(way.turn, 0.0) + _TURN_TOLERANCE
-    return low <= turn <= high
+    return bool(low <= turn <= high)
 
 
 def _search(tracks: tuple[Track, ...], ways: list[list[_Way]], relations: tuple[Relation, ...], scale: float) -> _Choice:

@@ -113,7 +113,7 @@ def _axes(road: Road, tracks: tuple[Track, ...]) -> list[_Axis]:
 
 def _belongs(entry: Floats, axis: _Axis) -> bool:
     turned = abs(float(wrap_angle(np.asarray(entry[2] - axis.yaw))))
-    return turned < _PARALLEL or turned > np.pi - _PARALLEL
+    return bool(turned < _PARALLEL or turned > np.pi - _PARALLEL)
 
 
 def _lay(track: Track, i: int, unrolled: Unrolled, axis: _Axis, centre: float, scale: float) -> Track:

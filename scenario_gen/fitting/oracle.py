@@ -1,6 +1,7 @@
 """The template's own motion replayed on the road: the oracle row of the evaluation."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -65,7 +66,7 @@ def fitted_template(encounter: Encounter, fit: Fit, routes: Sequence[RouteLike])
 def _replayed(progress: Floats, speed: Floats, index: Ints, fitted: FittedVehicle, route: RouteLike) -> tuple[Floats, Floats]:
     """(T, 3) poses and (T,) speeds of one vehicle."""
     along, ratio = np.zeros(len(progress)), np.zeros(len(progress))
-    for k, (a, b) in enumerate(zip(index[:-1], index[1:], strict=True)):
+    for k, (a, b) in enumerate(pairwise(index)):
         here = slice(a, b + 1)
         start, end = route.length[route.anchor[k]], route.length[route.anchor[k + 1]]
         driven = progress[b] - progress[a]

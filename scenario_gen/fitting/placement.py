@@ -1,5 +1,6 @@
 """A template placed on a road: what every way of placing it answers, before changepoints come in."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,7 @@ from scenario_gen.arrays import Floats
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.roads.clearance import footprint_fits
+from scenario_gen.roads.repair import nearest_pose_with_room
 from scenario_gen.roads.road import Road
 from scenario_gen.roads.separation import separate
 from scenario_gen.roads.tracks import Track
@@ -57,3 +59,23 @@ def room(road: Road, track: Track, every: int = 5) -> Floats:
     """Share of the track's samples (every n-th and the last) at which its footprint has room: a number from 0 to 1."""
     poses = np.concatenate((track.poses[:-1:every], track.poses[-1:]))
     return np.asarray(footprint_fits(road, poses, track.vehicle.length, track.vehicle.width).mean())
+
+
+def farthest_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:
+    """How far [m] the worst sampled footprint (twice a second, and the ends) is from a pose with room.
+
+    Raises:
+        RefusedError: one is farther than `max_move`; the message names vehicle, sample and place.
+    """
+    farthest = 0.0
+    for track in tracks:
+        poses = track.poses
+        for t in sorted({0, len(poses) - 1, *range(0, len(poses), 5)}):
+            answer = nearest_pose_with_room(road, poses[t], track.vehicle.length, track.vehicle.width, max_move)
+            if answer is None:
+                raise RefusedError(
+                    f"vehicle {track.vehicle.id} is more than {max_move:g} m from any pose with room on road {road.name} "
+                    f"at sample {t} (x {poses[t, 0]:.1f}, y {poses[t, 1]:.1f})"
+                )
+            farthest = max(farthest, answer[1])
+    return farthest

@@ -96,7 +96,8 @@ def _clean(encounter: Encounter, i: int) -> Track:
         return Track(encounter.vehicles[i], curve, frozen(np.zeros(len(speed))), speed, True, deviation)
     best: tuple[float, Curve, Floats, float] | None = None
     for wavelength in _WAVELENGTHS:
-        grid, curve = _smooth(claimed, position, wavelength)
+        grid, smooth = smoothing_spline(claimed, position, wavelength)
+        curve = Curve.through(smooth)
         progress = np.interp(claimed, grid, curve.station)
         deviation = float(np.hypot(*(curve.at(progress)[:, :2] - position).T).max())
         curvature = np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)
@@ -127,8 +128,17 @@ def _increasing(u: Floats, values: Floats) -> tuple[Floats, Floats]:
     return u[keep], values[keep]
 
 
-def _smooth(u: Floats, position: Floats, wavelength: float) -> tuple[Floats, Curve]:
-    """The penalised spline f at equal steps of u, as (grid, curve through f(grid))."""
+def smoothing_spline(u: Floats, values: Floats, wavelength: float) -> tuple[Floats, Floats]:
+    """The penalised spline f at equal steps of u.
+
+    Args:
+        u: (T,) metres, non-decreasing from 0.
+        values: (T, D).
+        wavelength: metres of an oscillation that is halved.
+
+    Returns:
+        The grid (G,) and f on it (G, D).
+    """
     count = max(int(np.ceil(u[-1] / 0.5)), 6) + 1
     grid = np.linspace(0.0, u[-1], count)
     step = grid[1]
@@ -137,16 +147,15 @@ def _smooth(u: Floats, position: Floats, wavelength: float) -> tuple[Floats, Cur
     right = u / step - cell
     left = 1.0 - right
     bands = np.zeros((3, count))  # upper diagonals 2, 1, 0 of the normal matrix
-    rhs = np.zeros((count, 2))
+    rhs = np.zeros((count, values.shape[1]))
     np.add.at(bands[2], cell, weight * left**2)
     np.add.at(bands[2], cell + 1, weight * right**2)
     np.add.at(bands[1], cell + 1, weight * left * right)
-    np.add.at(rhs, cell, (weight * left)[:, None] * position)
-    np.add.at(rhs, cell + 1, (weight * right)[:, None] * position)
+    np.add.at(rhs, cell, (weight * left)[:, None] * values)
+    np.add.at(rhs, cell + 1, (weight * right)[:, None] * values)
     penalty = (wavelength / (2.0 * np.pi)) ** 4 / step**3
     for k, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))):
         factor = penalty * (1.0, 4.0, 1.0, -2.0, -2.0, 1.0)[k]
         columns = np.arange(count - 2) + b
         bands[2 - (b - a), columns] += factor
-    solution = solveh_banded(bands, rhs)
-    return grid, Curve.through(solution)
+    return grid, np.asarray(solveh_banded(bands, rhs))

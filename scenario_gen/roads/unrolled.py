@@ -11,11 +11,12 @@ import numpy as np
 from scenario_gen.arrays import Floats, Ints, frozen, frozen_ints, wrap_angle
 from scenario_gen.errors import RefusedError
 from scenario_gen.roads.curve import Curve
-from scenario_gen.roads.tracks import Track
+from scenario_gen.roads.tracks import Track, smoothing_spline
 
 _ALONG = np.radians(50.0)  # a vehicle along the road is never turned from it by more
 _SAME_LANE = 1.75  # metres of offset within which two vehicles may share a lane
 _LANE_CHANGE = 2.1  # metres of offset between start and end that make a lane change
+_STEADY = 150.0  # metres: what projection adds is smoothed over this wavelength
 _BUMPER = 1.0  # metres kept between two footprints that share a lane
 
 
@@ -60,7 +61,7 @@ def unroll(tracks: tuple[Track, ...]) -> Unrolled:
     for i, track in enumerate(tracks):
         poses = track.poses
         station[i], offset[i] = line.project(poses[:, :2])
-        station[i] = direction[i] * np.maximum.accumulate(direction[i] * station[i])
+        station[i] = _steadied(track, station[i] * direction[i]) * direction[i]
         turned = np.abs(wrap_angle(poses[:, 2] - line.at(station[i])[:, 2] + (np.pi if direction[i] < 0 else 0.0)))
         if turned.max() > _ALONG:
             raise RefusedError(
@@ -69,6 +70,18 @@ def unroll(tracks: tuple[Track, ...]) -> Unrolled:
             )
     lane, change, lanes = _lanes(tracks, direction, station, offset)
     return Unrolled(line, frozen_ints(direction), frozen(station), frozen(offset), frozen_ints(lane), frozen(change), lanes)
+
+
+def _steadied(track: Track, along: Floats) -> Floats:
+    """Stations that advance as the vehicle's own path does.
+
+    What projection adds to the distance driven (bends, offsets, noise of either path) is taken only as far as it changes
+    slowly; so speeds along the line are the recorded ones.
+    """
+    if track.still:
+        return np.full_like(along, along.mean())
+    grid, extra = smoothing_spline(track.progress, (along - track.progress)[:, None], _STEADY)
+    return np.maximum.accumulate(track.progress + np.interp(track.progress, grid, extra[:, 0]))
 
 
 def _reference_line(tracks: tuple[Track, ...]) -> tuple[Curve, Ints]:

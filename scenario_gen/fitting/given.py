@@ -1,0 +1,123 @@
+"""Start and goal given by the user: eqs 7-9, put right, one vehicle at a time."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, frozen
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError, RefusedError
+from scenario_gen.fitting.config import FittingConfig
+from scenario_gen.fitting.placement import Placement, check_scale
+from scenario_gen.fitting.routes import draw_route
+from scenario_gen.roads.clearance import footprint_fits
+from scenario_gen.roads.curve import Curve
+from scenario_gen.roads.road import Road
+from scenario_gen.roads.tracks import Track, clean_tracks
+
+_CHORD = 2.0  # metres: a shorter one gives no direction (eq 8) and no scale (eq 9)
+_SAME_PLACE = 0.5  # metres
+_TURN = np.radians(50.0)  # a drawn route may turn by this much more or less than the template
+
+
+def place_given(
+    encounter: Encounter, road: Road, config: FittingConfig, starts: Floats | None, goals: Floats | None
+) -> tuple[Placement, Floats]:
+    """Map every vehicle's start to the given start and its end to the given goal.
+
+    Where a route of line, arc and line can be drawn between the two, eq 9 is taken along it (one-dimensional: the
+    template's arc lengths times s); elsewhere it is the similarity of the plane. A vehicle whose chord is too short for
+    that takes rotation and scale from all vehicles together (Umeyama 1991).
+
+    Returns:
+        The placement, and (N, 2, 4) the given start and end states, speeds filled in.
+
+    Raises:
+        InputError: shapes disagree with the encounter, or a value is not finite.
+        RefusedError: a scale is out of range, or a vehicle that waits throughout is asked to move.
+    """
+    tracks = clean_tracks(encounter)
+    states = np.stack((_states("starts", starts, encounter, 0), _states("goals", goals, encounter, -1)), axis=1)
+    joint = _joint_similarity(tracks, states)
+    placed, scales, manoeuvres, notes = [], [], [], []
+    for track, ends in zip(tracks, states, strict=True):
+        moved, scale, how = _place(track, ends, joint, road, config)
+        placed.append(moved)
+        scales.append(scale)
+        manoeuvres.append("wait" if track.still else _name(moved))
+        notes.append(f"vehicle {track.vehicle.id}: start and goal as given, {how}")
+    n = len(tracks)
+    return Placement(tuple(placed), frozen(scales), tuple(manoeuvres), frozen(np.zeros(n)), tuple(notes)), states
+
+
+def _states(name: str, given: Floats | None, encounter: Encounter, sample: int) -> Floats:
+    """(N, 4) given states; a missing speed is the template's."""
+    n = len(encounter.vehicles)
+    if given is None:
+        raise InputError(f"{name} is missing; give both starts and goals, or neither")
+    array = np.asarray(given, dtype=np.float64)
+    if array.ndim != 2 or array.shape[0] != n or array.shape[1] not in (3, 4):
+        raise InputError(f"{name} has shape {array.shape}; one row of x, y, yaw and optionally speed per vehicle ({n}) is needed")
+    if not np.isfinite(array).all() or (array[:, 3:] < 0.0).any():
+        raise InputError(f"{name} holds a value that is not finite, or a negative speed")
+    if array.shape[1] == 3:
+        array = np.column_stack((array, encounter.speed[:, sample]))
+    return array
+
+
+def _joint_similarity(tracks: tuple[Track, ...], states: Floats) -> tuple[float, float]:
+    """Rotation [rad] and scale of the least-squares similarity (det R = +1) from all starts and ends to the given ones."""
+    source = np.concatenate([track.poses[[0, -1]] for track in tracks])
+    target = states.reshape(-1, 4)
+    u, v = source[:, :2] - source[:, :2].mean(axis=0), target[:, :2] - target[:, :2].mean(axis=0)
+    if all(track.still for track in tracks) or (u**2).sum() < 1e-6:
+        off = target[:, 2] - source[:, 2]
+        return float(np.arctan2(np.sin(off).sum(), np.cos(off).sum())), 1.0
+    sine, cosine = float((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum()), float((u * v).sum())
+    return float(np.arctan2(sine, cosine)), float(np.hypot(sine, cosine) / (u**2).sum())
+
+
+def _place(track: Track, ends: Floats, joint: tuple[float, float], road: Road, config: FittingConfig) -> tuple[Track, float, str]:
+    vehicle = track.vehicle
+    start, goal = ends[0], ends[1]
+    v = goal[:2] - start[:2]
+    if track.still:
+        if np.hypot(*v) > _SAME_PLACE:
+            raise RefusedError(
+                f"vehicle {vehicle.id} waits throughout the template, but its start and goal are {np.hypot(*v):.1f} m apart"
+            )
+        ahead = start[:3] + np.array([np.cos(start[2]), np.sin(start[2]), 0.0])
+        return replace(track, curve=Curve(np.array([start[:3], ahead]))), 1.0, "a wait"
+
+    def fits(poses: Floats) -> bool:
+        return bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all())
+
+    template_turn = float(track.curve.points[-1, 2] - track.curve.points[0, 2])
+    route = draw_route(start[:3], goal[:3], fits)
+    if route is not None and abs(float(route.points[-1, 2] - route.points[0, 2]) - template_turn) < _TURN:
+        scale = route.length / track.travelled
+        if config.scale_low <= scale <= config.scale_high:
+            placed = replace(track, curve=route.cut(0.0, route.length, 0.25), progress=frozen(scale * track.progress))
+            return placed, scale, f"along a drawn route (s = {scale:.2f})"
+    u = (track.poses[-1] - track.poses[0])[:2]
+    if np.hypot(*u) < _CHORD:
+        (turn, scale), how = joint, "rotation and scale from all vehicles"
+    else:
+        turn = float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))  # eq 8a
+        scale, how = float(np.hypot(*v) / np.hypot(*u)), "similarity"
+    check_scale(scale, f"vehicle {vehicle.id} (template chord {np.hypot(*u):.1f} m, asked {np.hypot(*v):.1f} m)", config)
+    cos, sin = np.cos(turn), np.sin(turn)
+    points = track.curve.points.copy()
+    points[:, :2] = scale * (points[:, :2] - points[0, :2]) @ np.array([[cos, sin], [-sin, cos]]) + start[:2]  # eqs 8b, 9
+    share = track.curve.station / track.curve.length
+    points[:, :2] += share[:, None] * (goal[:2] - points[-1, :2])  # zero but for short chords
+    curve = Curve.through(points[:, :2])
+    progress = np.interp(track.progress / track.curve.length, share, curve.station)
+    return replace(track, curve=curve, progress=frozen(progress)), scale, f"{how} (s = {scale:.2f}, {np.degrees(turn):.0f}°)"
+
+
+def _name(track: Track) -> str:
+    turn = float(track.curve.points[-1, 2] - track.curve.points[0, 2])
+    if abs(turn) < np.radians(35.0):
+        return "straight"
+    return "left" if turn > 0.0 else "right"
