@@ -237,12 +237,16 @@ def _stay(mine: Floats, half: Size, poses: Floats, circles: Floats, other: Size)
 @kernel(inline=True)
 def _shared_path(a: Floats, b: Floats, circles_b: Floats, half_a: Size, half_b: Size) -> tuple[float, float]:
     """(metres of a's path shared with b in the same direction, metres of it on which a came first minus second)."""
-    shared, lead = 0.0, 0.0
+    shared, lead, last = 0.0, 0.0, 0
+    reach = np.hypot(half_a[0] + half_b[0], half_a[1] + half_b[1])
     for i in range(1, a.shape[0]):
         step = np.hypot(a[i, 1] - a[i - 1, 1], a[i, 2] - a[i - 1, 2])
         if step == 0.0:
             continue
-        near, nearest = -1, np.hypot(half_a[0] + half_b[0], half_a[1] + half_b[1]) ** 2
+        near, nearest = -1, reach * reach
+        distance = (b[last, 1] - a[i, 1]) ** 2 + (b[last, 2] - a[i, 2]) ** 2  # a good first guess leaves few to look at
+        if distance < nearest:
+            near, nearest = last, distance
         for c in range(circles_b.shape[0]):
             dx, dy = circles_b[c, 0] - a[i, 1], circles_b[c, 1] - a[i, 2]
             if dx * dx + dy * dy >= (circles_b[c, 2] + np.sqrt(nearest)) ** 2:
@@ -251,6 +255,7 @@ def _shared_path(a: Floats, b: Floats, circles_b: Floats, half_a: Size, half_b: 
                 distance = (b[j, 1] - a[i, 1]) ** 2 + (b[j, 2] - a[i, 2]) ** 2
                 if distance < nearest:
                     near, nearest = j, distance
+        last = max(near, 0)
         if near < 0 or a[i, 3] * b[near, 3] + a[i, 4] * b[near, 4] < np.cos(FOLLOWING_ANGLE):
             continue
         dx, dy = b[near, 1] - a[i, 1], b[near, 2] - a[i, 2]
