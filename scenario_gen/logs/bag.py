@@ -78,9 +78,7 @@ def bag_files(path: Path) -> list[Path]:
         info = yaml.safe_load(metadata.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
         files = [path / Path(name).name for name in info["relative_file_paths"]]
     except (yaml.YAMLError, KeyError, TypeError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"{metadata} is not the metadata of a bag ({error!r}); delete it to read the bag's files alone"
-        ) from error
+        raise InputError(f"{metadata} is no metadata of a bag ({error!r}); delete it to read the files alone") from error
     if info.get("compression_mode"):
         return [path]
     for file in files:
@@ -277,6 +275,8 @@ def between(encounter: Encounter, config: LogConfig) -> Encounter:
     ids = [vehicle.id for vehicle in encounter.vehicles]
     for unknown in (name for name in names if name not in ids):
         raise InputError(f"parameter vehicles: {encounter.name} has no vehicle {unknown!r}; it has {', '.join(ids)}")
+    if config.start >= encounter.duration:
+        raise InputError(f"parameter start is {config.start:g} s, but {encounter.name} is only {encounter.duration:.1f} s long")
     rows = [ids.index(name) for name in dict.fromkeys(names)] or list(range(len(ids)))
     first = math.ceil(config.start / encounter.dt - 1e-9)
     last = math.floor(config.end / encounter.dt + 1e-9) + 1 if config.end else len(encounter.time)

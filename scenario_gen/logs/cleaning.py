@@ -175,7 +175,7 @@ def to_metres(
     if config.origin:
         origin = parse_origin(config.origin)
     else:
-        middle = np.round(np.median(everything, axis=0), 5)  # about a metre: the origin reads well and does not hang on one fix
+        middle = np.round(np.percentile(everything, [5, 95], axis=0).mean(axis=0), 5)  # a few wrong fixes do not move it
         origin = (float(middle[0]), float(middle[1]))
     frame = pyproj.Proj(proj="aeqd", lat_0=origin[0], lon_0=origin[1], ellps="WGS84")
     projected = []

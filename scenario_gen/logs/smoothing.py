@@ -23,7 +23,7 @@ from scenario_gen.logs.path import STRAIGHT, Path, fit_path, straight_path
 STANDS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
 STILL = 0.1  # m/s: below this it is not on its way to or from standing
 CREEPS = 1.0  # m: fixes that move further than this while the speed is zero say that the speed is wrong
-DOUBTED = 3.0  # m/s: a speed that differs more from that of the fixes is not trusted with the first layout
+DOUBTED = 3.0  # m/s: a speed that differs more from that of the fixes has no say in the first layout; if most do, in nothing
 MOVED = 0.5  # m: who moves less has no direction of travel
 ROUNDS = 3  # of path and motion in turn
 
@@ -76,7 +76,8 @@ def smooth_piece(piece: Track, origin_ns: int, config: LogConfig) -> Smooth | No
     motion = Motion(stands, config)
     differs = speed - np.interp(speed_t, fix_t, raw)
     deviation = config.speed_noise or float(np.clip(white_equivalent(differs), 0.3, 3.0))
-    measured = [(speed_t, speed, deviation * np.ones(len(speed)), True)] if len(piece.speed) else []
+    trusted = len(piece.speed) > 0 and np.median(np.abs(differs)) <= max(DOUBTED, 5.0 * noise)
+    measured = [(speed_t, speed, deviation * np.ones(len(speed)), True)] if trusted else []
     guess = layout(ticks, stands, np.interp(ticks, speed_t, speed), np.interp(ticks, fix_t, raw), fix_t)
     weight = np.ones(len(fix_t))
     for _ in range(ROUNDS):

@@ -157,12 +157,12 @@ def make_case(name: str) -> Case:
         )
         return Case("synthetic_a", (waits, turns))
     if name == "b":
-        passes = Drive(first, (-38.0, near, east), 5.0, (Leg(1.0),), (Phase(15.0, 0.5),))
+        passes = Drive(first, (-36.0, near, east), 5.0, (Leg(1.0),), (Phase(15.0, 0.45),))
         turns = Drive(
             second,
-            (near + 12.0 + 49.0 - 3.0, far, west),
+            (near + 12.0 + 50.0, far, west),
             10.5,
-            (Leg(46.0), quarter(12.0, 1), Leg(1.0)),
+            (Leg(50.0), quarter(12.0, 1), Leg(1.0)),
             (Phase(7.0, -1.0), Phase(8.0, 0.5)),
         )
         return Case("synthetic_b", (passes, turns))

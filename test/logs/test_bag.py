@@ -1,0 +1,237 @@
+"""Bags, MCAP and SQLite: streams per vehicle, odometry, tracks, and everything that can be wrong with them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from builders import crossing, geographic, save
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from msg_conventions.tracks import encode_tracks
+from scenario_gen.errors import InputError
+from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs.bag import FIX, ODOMETRY, STORES, TWIST
+from scenario_gen.logs.synthetic import fix_message, nanoseconds_to_time, twist_message
+
+TRACKS = "trajectory_msgs/msg/MultiDOFJointTrajectory"
+STRING = "std_msgs/msg/String"
+
+
+@dataclass
+class Line:
+    topic: str
+    type: str
+    stamp: int
+    data: bytes
+
+
+def header(stamp):
+    return STORES.types["std_msgs/msg/Header"](stamp=nanoseconds_to_time(stamp), frame_id="map")
+
+
+def streams(rows, stamped=True, prefix=""):
+    """NavSatFix and TwistStamped per vehicle."""
+    lines = []
+    for row in geographic(rows).itertuples():
+        stamp = round(row.t_s * 1e9)
+        head = header(stamp if stamped else 0)
+        space = f"{prefix}/vehicle_{row.vehicle_id}"
+        fix = STORES.serialize_cdr(fix_message(head, row.lat_deg, row.lon_deg), FIX)
+        speed = STORES.serialize_cdr(twist_message(head, row.speed_mps), TWIST)
+        lines += [Line(f"{space}/fix", FIX, stamp + 20_000_000, bytes(fix)), Line(f"{space}/speed", TWIST, stamp, bytes(speed))]
+    return lines
+
+
+def odometry(rows):
+    """nav_msgs/Odometry per vehicle."""
+    types = STORES.types
+    vector, zero = types["geometry_msgs/msg/Vector3"], {"x": 0.0, "y": 0.0, "z": 0.0}
+    lines = []
+    for row in rows.itertuples():
+        yaw = 0.0 if row.vehicle_id == "a" else np.pi / 2.0
+        turn = types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=np.sin(yaw / 2.0), w=np.cos(yaw / 2.0))
+        pose = types["geometry_msgs/msg/Pose"](types["geometry_msgs/msg/Point"](row.x_m, row.y_m, 0.0), turn)
+        twist = types["geometry_msgs/msg/Twist"](vector(**zero | {"x": row.speed_mps}), vector(**zero))
+        message = types[ODOMETRY](
+            header=header(round(row.t_s * 1e9)),
+            child_frame_id="base_link",
+            pose=types["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36)),
+            twist=types["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)),
+        )
+        lines.append(
+            Line(f"/{row.vehicle_id}/odom", ODOMETRY, round(row.t_s * 1e9), bytes(STORES.serialize_cdr(message, ODOMETRY)))
+        )
+    return lines
+
+
+def write(path, lines, plugin=StoragePlugin.MCAP):
+    """Write a genuine bag."""
+    with Writer(path, version=9, storage_plugin=plugin) as writer:
+        connections = {}
+        for line in lines:
+            if line.topic not in connections:
+                connections[line.topic] = writer.add_connection(line.topic, line.type, typestore=STORES)
+            writer.write(connections[line.topic], line.stamp, line.data)
+    return path
+
+
+@pytest.fixture
+def plain(tmp_path):
+    return read_log(save(geographic(crossing()), tmp_path)).encounters[0]
+
+
+@pytest.mark.parametrize("plugin", StoragePlugin, ids=lambda plugin: plugin.value)
+def test_fixes_and_speeds(tmp_path, plain, plugin):
+    bag = write(tmp_path / "drive", streams(crossing()), plugin)
+    (bare,) = (file for file in bag.iterdir() if file.suffix in (".mcap", ".db3"))
+    for path in (bag, bare):
+        result = read_log(path)
+        (encounter,) = result.encounters
+        assert encounter.name == "drive"
+        assert [vehicle.id for vehicle in encounter.vehicles] == ["a", "b"]
+        assert encounter.start_ns == plain.start_ns  # of the header, not of the reception
+        np.testing.assert_allclose(encounter.position, plain.position, atol=1e-3)
+        assert result.quality.rows == 484
+    (bag / "metadata.yaml").unlink()
+    assert len(read_log(bag).encounters) == 1
+
+
+def test_any_namespace_names_the_vehicle(tmp_path):
+    (encounter,) = read_log(write(tmp_path / "bag", streams(crossing(), prefix="/fleet"))).encounters
+    assert [vehicle.id for vehicle in encounter.vehicles] == ["a", "b"]
+
+
+def test_without_header_stamps_the_reception_counts_and_is_said(tmp_path, plain):
+    result = read_log(write(tmp_path / "bag", streams(crossing(), stamped=False)))
+    assert any("no header stamps" in line for line in result.quality.lines())
+    assert abs(result.encounters[0].start_ns - plain.start_ns) <= 100_000_000
+
+
+def test_without_speeds_the_positions_tell(tmp_path, plain):
+    result = read_log(write(tmp_path / "bag", [line for line in streams(crossing()) if line.type == FIX]))
+    np.testing.assert_allclose(result.encounters[0].speed, plain.speed, atol=0.8)
+    assert any("has no speeds" in line for line in result.quality.lines())
+
+
+def test_a_fix_without_fix_is_dropped(tmp_path):
+    lines = streams(crossing())
+    bad = STORES.deserialize_cdr(lines[40].data, FIX)
+    bad.status.status = -1
+    lines[40].data = bytes(STORES.serialize_cdr(bad, FIX))
+    (drop,) = read_log(write(tmp_path / "bag", lines)).quality.dropped
+    assert (drop.reason, drop.count) == ("position is not a number", 1)
+    assert drop.first.endswith("topic /vehicle_a/fix, message 11")
+
+
+def test_odometry(tmp_path):
+    (plain,) = read_log(save(crossing(), tmp_path)).encounters
+    (encounter,) = read_log(write(tmp_path / "bag", odometry(crossing()))).encounters
+    assert encounter.origin is None
+    np.testing.assert_allclose(encounter.position, plain.position, atol=0.02)
+    np.testing.assert_allclose(encounter.heading[1], np.pi / 2.0, atol=0.01)
+
+
+def test_recorded_tracks_are_the_same_encounter_bit_for_bit(tmp_path, plain):
+    data = encode_tracks(plain)
+    lines = [Line("/case/tracks", TRACKS, 5, data), Line("/case/tracks", TRACKS, 6, data), *streams(crossing())]
+    result = read_log(write(tmp_path / "bag", lines))
+    (encounter,) = result.encounters
+    assert encounter.name == "bag"
+    for field in ("position", "heading", "speed"):
+        assert getattr(encounter, field).tobytes() == getattr(plain, field).tobytes()
+    assert (encounter.vehicles, encounter.start_ns, encounter.dt_ns) == (plain.vehicles, plain.start_ns, plain.dt_ns)
+    assert "/vehicle_a/fix" in result.quality.notes[0]
+    part = read_log(tmp_path / "bag", LogConfig(start=2.0, end=5.0)).encounters[0]
+    np.testing.assert_array_equal(part.position, plain.position[:, 20:51])
+    chosen = read_log(tmp_path / "bag", LogConfig(topics="/vehicle_a/fix,/vehicle_a/speed,/vehicle_b/fix,/vehicle_b/speed"))
+    np.testing.assert_allclose(chosen.encounters[0].position, plain.position, atol=1e-3)
+    for config, words in (
+        (LogConfig(vehicles="a,z"), "no vehicle 'z'"),
+        (LogConfig(vehicles="a"), "at least 2"),
+        (LogConfig(start=50.0), "only 12.0 s"),
+    ):
+        with pytest.raises(InputError, match=words):
+            read_log(tmp_path / "bag", config)
+
+
+def test_several_tracks_are_several_encounters(tmp_path, plain):
+    part = encode_tracks(read_log(tmp_path / "log.csv", LogConfig(end=8.0)).encounters[0])
+    lines = [Line("/a/tracks", TRACKS, 5, encode_tracks(plain)), Line("/b/tracks", TRACKS, 6, part)]
+    assert [e.name for e in read_log(write(tmp_path / "bag", lines)).encounters] == ["bag-1", "bag-2"]
+
+
+def test_unknown_types_are_named(tmp_path):
+    text = bytes(STORES.serialize_cdr(STORES.types[STRING](data="hi"), STRING))
+    bag = write(tmp_path / "bag", [Line("/chatter", STRING, 1, text)])
+    with pytest.raises(InputError, match=rf"no topic to read. It has /chatter \({STRING}\). Needed is {FIX}"):
+        read_log(bag)
+    with pytest.raises(InputError, match=rf"topic /chatter: type {STRING} is not one of"):
+        read_log(bag, LogConfig(topics="/chatter"))
+    with pytest.raises(InputError, match="has no topic '/fix'; it has /chatter"):
+        read_log(bag, LogConfig(topics="/fix"))
+
+
+def test_topics_that_cannot_be_told_apart(tmp_path):
+    lines = streams(crossing())
+    twice = [*lines, Line("/vehicle_a/gps", FIX, lines[0].stamp, lines[0].data)]
+    with pytest.raises(InputError, match="/vehicle_a/fix and /vehicle_a/gps are both"):
+        read_log(write(tmp_path / "twice", twice))
+    with pytest.raises(InputError, match="choose with the parameter topics"):
+        read_log(write(tmp_path / "mixed", [*lines, *odometry(crossing())]))
+    with pytest.raises(InputError, match="speeds but no positions for a, b"):
+        read_log(write(tmp_path / "speeds", [line for line in lines if line.type == TWIST]))
+
+
+def test_a_damaged_message_is_named(tmp_path):
+    lines = streams(crossing())
+    lines[8].data = lines[8].data[:20]
+    with pytest.raises(InputError, match=rf"topic /vehicle_a/fix, message 3: not a {FIX}"):
+        read_log(write(tmp_path / "bag", lines))
+
+
+@pytest.mark.parametrize("plugin", StoragePlugin, ids=lambda plugin: plugin.value)
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.1, 0.5, 0.9, 0.999])
+def test_truncated_bags(tmp_path, plugin, share):
+    bag = write(tmp_path / "bag", streams(crossing()), plugin)
+    (file,) = (file for file in bag.iterdir() if file.suffix in (".mcap", ".db3"))
+    whole = file.read_bytes()
+    file.write_bytes(whole[: int(len(whole) * share)])
+    for path in (bag, file):
+        with pytest.raises(InputError, match=file.name):
+            read_log(path)
+
+
+def test_flipped_bits_never_end_in_a_traceback(tmp_path):
+    bag = write(tmp_path / "bag", streams(crossing(seconds=6.0)))
+    whole = (bag / "bag.mcap").read_bytes()
+    rng = np.random.Generator(np.random.PCG64(1))
+    refused = 0
+    for _ in range(60):
+        damaged = bytearray(whole)
+        for place in rng.integers(0, len(whole), 20):
+            damaged[place] ^= 1 << int(rng.integers(8))
+        (tmp_path / "flipped.mcap").write_bytes(bytes(damaged))
+        try:
+            read_log(tmp_path / "flipped.mcap")
+        except InputError as error:
+            refused += "flipped" in str(error)
+    assert refused > 30
+
+
+def test_missing_files_and_metadata(tmp_path):
+    bag = write(tmp_path / "bag", streams(crossing()))
+    (bag / "bag.mcap").rename(tmp_path / "elsewhere.mcap")
+    with pytest.raises(InputError, match=r"metadata\.yaml lists bag\.mcap, which is not there"):
+        read_log(bag)
+    (bag / "metadata.yaml").write_text("- nonsense")
+    with pytest.raises(InputError, match=r"metadata\.yaml is no metadata of a bag"):
+        read_log(bag)
+
+
+def test_genuine_bags_without_vehicles_are_refused_by_their_topics(data):
+    bags = sorted(path for path in data.glob("bags/*/*") if path.is_dir())
+    assert len(bags) == 8
+    for bag in bags:
+        for path in (bag, next(file for file in sorted(bag.iterdir()) if file.suffix in (".mcap", ".db3"))):
+            with pytest.raises(InputError, match="no topic to read. It has .*msgs"):
+                read_log(path)

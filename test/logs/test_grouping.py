@@ -1,0 +1,95 @@
+"""Who belongs to an encounter, and for how long."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from builders import save
+
+from scenario_gen.errors import InputError
+from scenario_gen.logs import LogConfig, read_log
+
+
+def car(name, begin, end, x, y, vx=0.0, vy=0.0):
+    """A car with constant velocity from `begin` to `end` [s]; (x, y) is where it is at 0 s."""
+    time = np.round(np.arange(begin, end + 0.05, 0.1), 3)
+    speed = float(np.hypot(vx, vy))
+    return pd.DataFrame({"t_s": time, "vehicle_id": name, "x_m": x + vx * time, "y_m": y + vy * time, "speed_mps": speed})
+
+
+def groups(tmp_path, *cars, **options):
+    result = read_log(save(pd.concat(cars), tmp_path), LogConfig(**options))
+    return [(",".join(v.id for v in e.vehicles), round(e.duration, 1)) for e in result.encounters], result.quality
+
+
+def test_a_vehicle_that_is_there_for_most_of_it_shortens_the_encounter(tmp_path):
+    found, quality = groups(tmp_path, car("1", 0, 10, 0, 0, 8), car("2", 0, 10, 0, 4, 8), car("3", 0, 7, 20, 0, 8))
+    assert found == [("1,2,3", 7.0)]
+    assert quality.notes == ("vehicle 3 shortens its encounter to 7.0 of 10.0 s",)
+
+
+def test_a_vehicle_that_is_there_for_little_is_left_out(tmp_path):
+    found, quality = groups(tmp_path, car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0, 4, 20, 0, 8))
+    assert found == [("1,2", 20.0)]
+
+
+def test_proximity_bounds_the_encounter(tmp_path):
+    found, _ = groups(tmp_path, car("1", 0, 40, -150, 0, 10), car("2", 0, 40, 150, 4, -10))
+    ((name, seconds),) = found
+    assert name == "1,2"
+    assert seconds == pytest.approx(10.0, abs=0.25)  # nearer than 100 m from 10 s to 20 s
+
+
+def test_a_chain_of_neighbours_is_one_encounter(tmp_path):
+    found, _ = groups(tmp_path, *(car(str(k), 0, 10, 60 * k, 0, 10) for k in range(4)))
+    assert found == [("0,1,2,3", 10.0)]  # the ends are 180 m apart
+
+
+def test_parked_cars_are_no_encounter(tmp_path):
+    with pytest.raises(InputError, match="while one drives 5 m"):
+        groups(tmp_path, car("1", 0, 20, 0, 0), car("2", 0, 20, 10, 0))
+
+
+def test_a_long_standstill_ends_an_encounter(tmp_path):
+    drive, stand = car("1", 0, 10, -80, 0, 8), car("1", 10.1, 40, 0, 0)
+    again = car("1", 40.1, 50, -320.8, 0, 8)
+    found, _ = groups(tmp_path, drive, stand, again, car("2", 0, 50, 5, 5))
+    assert [name for name, _ in found] == ["1,2", "1,2"]
+    assert all(10.0 < seconds < 14.0 for _, seconds in found)  # two seconds of standing stay
+
+
+def test_long_meetings_are_cut(tmp_path):
+    found, _ = groups(tmp_path, car("1", 0, 100, 0, 0, 8), car("2", 0, 100, 0, 4, 8), car("3", 0, 100, 0, 8, 8), longest=30.0)
+    assert {name for name, _ in found} == {"1,2,3"}
+    assert all(seconds <= 30.0 for _, seconds in found)
+    assert sum(seconds for _, seconds in found) > 95.0
+
+
+def test_in_a_busy_log_only_those_who_interact_meet(tmp_path):
+    """Six cars: two pairs pass each other, a queue stands by; four at most in one encounter."""
+    cars = [
+        car("1", 0, 10, -40, 0, 8),
+        car("2", 0, 10, 40, 3.5, -8),
+        car("3", 0, 10, -40, 50, 8),
+        car("4", 0, 10, 40, 53.5, -8),
+        car("5", 0, 10, 0, 25),
+        car("6", 0, 10, 8, 25),
+    ]
+    found, _ = groups(tmp_path, *cars)
+    assert found == [("1,2", 10.0), ("3,4", 10.0)]
+
+
+def test_the_largest_group_is_a_parameter(tmp_path):
+    cars = [car(str(k), 0, 10, 12 * k, 0, 10) for k in range(7)]
+    found, _ = groups(tmp_path, *cars, most_vehicles=7)
+    assert found == [("0,1,2,3,4,5,6", 10.0)]
+    found, _ = groups(tmp_path, *cars, most_vehicles=2)
+    assert all(len(name.split(",")) == 2 for name, _ in found)
+    assert {"0,1", "1,2", "2,3", "3,4", "4,5", "5,6"} <= {name for name, _ in found}
+
+
+def test_a_reversal_cuts_the_track(tmp_path):
+    there, stand = car("1", 0, 10, -80, 0, 8), car("1", 10.1, 13, 0, 0)
+    back = car("1", 13.1, 25, 104.8, 0, -8)
+    found, quality = groups(tmp_path, there, stand, back, car("2", 0, 25, 5, 5))
+    assert quality.vehicles[0].reversals == 1
+    assert [name for name, _ in found] == ["1,2", "1,2"]

@@ -1,0 +1,148 @@
+"""Every recorded file reads without options, and what comes out is a drive that a car can do."""
+
+import numpy as np
+import pytest
+
+from scenario_gen.interaction import find_waits
+from scenario_gen.logs import LogConfig, read_log
+
+VEHICLES = {
+    "cats_av_lane_change/encounter_3plus_lane_change_four_vehicles_utc36110.csv": 4,
+    "cats_av_lane_change/encounter_c_opposite_v2_v4_utc35195.csv": 2,
+    "ngsim_commonroad/encounter_3plus_two_left_turners_one_opposite_Lanker-2_13.csv": 3,
+    "ngsim_commonroad/encounter_a_cross_one_stops_Lanker-2_15_21202_21260.csv": 2,
+    "ngsim_commonroad/encounter_b_left_turn_vs_opposite_Lanker-2_13_2839_21019.csv": 2,
+    "ngsim_commonroad/encounter_c_opposite_stop_go_Peach-4_2_134_334.csv": 2,
+    "openacc_zalazone/encounter_3plus_platoon4_openacc_no_ACC_handling_part22_60-100s.csv": 4,
+    "psu_2obu/encounter_c_opposite_approach_then_stop_meet_300-340s.csv": 2,
+    "psu_2obu/encounter_following_follow_230-270s.csv": 2,
+}
+
+
+def test_the_list_is_complete(data):
+    found = {str(path.relative_to(data / "trajectories")) for path in data.glob("trajectories/*/encounter_*.csv")}
+    assert found == set(VEHICLES)
+
+
+@pytest.fixture(params=VEHICLES, ids=lambda name: name.partition("/")[2][:30])
+def one(request, data):
+    return request.param, read_log(data / "trajectories" / request.param)
+
+
+def assert_drivable(encounter, config):
+    """Position, speed and heading agree, nothing runs backwards, and who stands is still."""
+    steps = np.linalg.norm(np.diff(encounter.position, axis=1), axis=2)
+    mean_speed = (encounter.speed[:, 1:] + encounter.speed[:, :-1]) / 2.0
+    np.testing.assert_allclose(steps, mean_speed * encounter.dt, atol=0.01)
+    acceleration = np.diff(encounter.speed, axis=1) / encounter.dt
+    assert acceleration.max() <= config.acceleration_limit + 1e-3
+    assert acceleration.min() >= -config.braking_limit - 1e-3
+    turned = np.abs(np.diff(encounter.heading, axis=1))
+    assert (turned <= 0.5 * steps + 1e-6).all(), "a heading that turns without driving"  # a car's circle is above 2 m
+    stands = (encounter.speed[:, 1:] == 0.0) & (encounter.speed[:, :-1] == 0.0)
+    assert (steps[stands] < 1e-6).all()
+    moving = steps > 0.2
+    direction = np.arctan2(*np.moveaxis(np.diff(encounter.position, axis=1), 2, 0)[::-1])
+    middle = (encounter.heading[:, 1:] + encounter.heading[:, :-1]) / 2.0
+    off = np.angle(np.exp(1j * (direction - middle)))
+    assert np.abs(off[moving]).max() < 0.05
+
+
+def test_an_encounter_file_is_one_encounter_of_all_its_vehicles(one):
+    name, result = one
+    assert [len(encounter.vehicles) for encounter in result.encounters] == [VEHICLES[name]]
+    (encounter,) = result.encounters
+    assert encounter.dt_ns == 100_000_000
+    assert encounter.duration >= 5.0
+    assert_drivable(encounter, LogConfig())
+    quality = result.quality
+    assert quality.rows > 100
+    assert all(vehicle.speed_after <= min(0.08, vehicle.speed_before + 0.02) for vehicle in quality.vehicles)
+    assert all(vehicle.moved < 0.6 for vehicle in quality.vehicles)
+    assert quality.lines()[0].startswith(name.rpartition("/")[2].removesuffix(".csv"))
+
+
+def test_recorded_overlaps_are_reported(data):
+    quality = read_log(data / "trajectories" / next(name for name in VEHICLES if "four_vehicles" in name)).quality
+    (overlap,) = quality.encounters[0].overlaps
+    assert (overlap.first, overlap.second) == ("1", "2")
+    assert 0.4 < overlap.share < 0.7  # the data folder's README: they overlap for half of it
+    assert any("overlap 5" in line for line in quality.lines())
+
+
+def test_who_waits_in_the_record_waits_in_the_encounter(data):
+    name = next(name for name in VEHICLES if "one_stops" in name)
+    encounter = read_log(data / "trajectories" / name).encounters[0]
+    waits = find_waits(encounter)
+    assert [(wait.vehicle, wait.start) for wait in waits] == [(0, 0.0)]
+    still = encounter.position[0, : int(waits[0].end / encounter.dt) - 5]
+    assert np.ptp(still, axis=0).max() < 0.02
+
+
+def test_sizes_and_frame_of_ngsim_are_kept(data):
+    name = next(name for name in VEHICLES if "left_turn_vs" in name)
+    encounter = read_log(data / "trajectories" / name).encounters[0]
+    assert (encounter.vehicles[0].length, encounter.vehicles[0].width) == (3.81, 1.9812)
+    assert encounter.origin is None
+    assert np.linalg.norm(encounter.position[0, 0] - [11.0857, -4.9679]) < 0.3
+
+
+def test_jittering_vehicles_have_steady_headings(data):
+    name = next(name for name in VEHICLES if "four_vehicles" in name)
+    encounter = read_log(data / "trajectories" / name).encounters[0]
+    turned = np.degrees(np.abs(np.diff(encounter.heading, axis=1))).max(axis=1) / encounter.dt
+    assert (turned < 45.0).all()  # raw: jumps of 180 degrees within a sample
+    assert np.degrees(encounter.heading.std(axis=1)).max() < 8.0
+
+
+@pytest.mark.parametrize(
+    "pattern", ["psu_2obu/*_full.csv", "openacc_zalazone/*first150s.csv", "ngsim_commonroad/*Peach*all*.csv"]
+)
+def test_long_logs_give_sensible_encounters(data, pattern):
+    (path,) = data.glob(f"trajectories/{pattern}")
+    config = LogConfig(most_vehicles=3, longest=40.0)
+    result = read_log(path, config)
+    assert len(result.encounters) >= 3
+    for encounter in result.encounters:
+        assert 2 <= len(encounter.vehicles) <= 3
+        assert config.shortest - 0.05 <= encounter.duration <= config.longest + 1e-6
+        assert_drivable(encounter, config)
+        gaps = np.linalg.norm(encounter.position[:, None] - encounter.position[None], axis=3)
+        gaps[np.arange(len(gaps)), np.arange(len(gaps))] = np.inf
+        assert (gaps.min(axis=1) < config.proximity).mean() > 0.85
+        driven = encounter.speed.sum(axis=1).max() * encounter.dt
+        assert driven >= config.travel
+    assert len({encounter.name for encounter in result.encounters}) == len(result.encounters)
+
+
+def test_losses_of_the_full_psu_file_are_counted(data):
+    quality = read_log(next(data.glob("trajectories/psu_2obu/*_full.csv"))).quality
+    for vehicle in quality.vehicles:
+        assert vehicle.cut > 5 and vehicle.bridged > 50
+        assert vehicle.longest_cut > 10.0
+        assert vehicle.longest_bridged <= 1.001
+
+
+def test_several_files_on_one_clock_are_one_log(data):
+    paths = sorted(data.glob("trajectories/cats_av_lane_change/cats_vehicle[24]_full.csv"))
+    result = read_log(paths, LogConfig(start=30.0, end=75.0))
+    (encounter,) = result.encounters
+    assert [vehicle.id for vehicle in encounter.vehicles] == ["2", "4"]
+    assert 35_150 * 10**9 < encounter.start_ns < 35_230 * 10**9
+
+
+def test_window_and_vehicles_can_be_chosen(data):
+    (path,) = data.glob("trajectories/openacc_zalazone/*first150s.csv")
+    config = LogConfig(vehicles="TESLA_MODELS,BMW_I3", start=40.0, end=60.0)
+    (encounter,) = read_log(path, config).encounters
+    assert [vehicle.id for vehicle in encounter.vehicles] == ["BMW_I3", "TESLA_MODELS"]
+    assert encounter.duration == pytest.approx(20.0, abs=0.11)
+
+
+def test_reading_twice_gives_the_same_bytes(one, data):
+    name, first = one
+    again = read_log(data / "trajectories" / name)
+    for a, b in zip(first.encounters, again.encounters, strict=True):
+        for field in ("position", "heading", "speed"):
+            assert getattr(a, field).tobytes() == getattr(b, field).tobytes()
+    assert first.quality == again.quality

@@ -1,0 +1,121 @@
+"""Path and motion, each against its definition."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+
+from scenario_gen.logs import LogConfig
+from scenario_gen.logs.cleaning import Track
+from scenario_gen.logs.motion import Motion
+from scenario_gen.logs.path import fit_path, straight_path
+from scenario_gen.logs.smoothing import smooth_piece, standing, white_equivalent
+
+CONFIG = LogConfig()
+
+
+def test_the_motion_is_the_minimum_of_its_quadratic_program():
+    """Against scipy's general-purpose solver on a small case with active limits."""
+    rng = np.random.Generator(np.random.PCG64(3))
+    config = LogConfig(jerk=5.0, acceleration_limit=1.0, braking_limit=2.0)
+    motion = Motion(np.zeros(12, dtype=bool), config)
+    time = np.sort(rng.uniform(0.0, 1.1, 15))
+    place = np.where(time < 0.5, 2.0 * time, 1.0) + rng.normal(0.0, 0.05, 15)
+    found = motion.solve([(time, place, np.full(15, 0.1), False)])
+
+    def cost(coefficients):
+        misfit = (motion.place(coefficients, time) - place) / 0.1
+        jerk = np.diff(coefficients, 3) / 0.1**3
+        return 0.5 * (misfit @ misfit) + 0.5 * 0.1 * (jerk @ jerk) / 25.0
+
+    limits = [
+        {"type": "ineq", "fun": lambda c: np.diff(c) / 0.1},
+        {"type": "ineq", "fun": lambda c: 1.0 - np.diff(c, 2) / 0.01},
+        {"type": "ineq", "fun": lambda c: 2.0 + np.diff(c, 2) / 0.01},
+    ]
+    best = minimize(cost, found + 0.01, constraints=limits, options={"maxiter": 2000, "ftol": 1e-14})
+    assert cost(found) <= best.fun * (1.0 + 1e-4)
+    acceleration = np.diff(found, 2) / 0.01
+    assert acceleration.max() <= 1.0 + 1e-5 and acceleration.min() >= -2.0 - 1e-5
+    assert acceleration.min() == pytest.approx(-2.0, abs=1e-3)  # the limit is active
+
+
+def test_between_samples_the_acceleration_is_constant():
+    rng = np.random.Generator(np.random.PCG64(4))
+    motion = Motion(np.zeros(30, dtype=bool), CONFIG)
+    coefficients = np.cumsum(rng.uniform(0.0, 1.0, 31))
+    place, speed = motion.at_ticks(coefficients)
+    np.testing.assert_allclose(np.diff(place), (speed[1:] + speed[:-1]) / 2.0 * 0.1, atol=1e-12)
+    np.testing.assert_allclose(motion.place(coefficients, 0.1 * np.arange(30)), place, atol=1e-9)
+    half = motion.place(coefficients, 0.1 * np.arange(29) + 0.05)
+    np.testing.assert_allclose(half, place[:-1] + 0.05 * (3.0 * speed[:-1] + speed[1:]) / 4.0, atol=1e-9)
+
+
+@given(seed=st.integers(0, 10_000), radius=st.floats(8.0, 200.0), noise=st.floats(0.0, 0.4))
+@settings(max_examples=25, deadline=None, derandomize=True)
+def test_a_path_through_noisy_points_of_an_arc(seed, radius, noise):
+    rng = np.random.Generator(np.random.PCG64(seed))
+    along = np.linspace(0.0, min(60.0, 4.0 * radius), 120)
+    angle = along / radius
+    truth = radius * np.column_stack([np.sin(angle), 1.0 - np.cos(angle)])
+    path = fit_path(along, truth + rng.normal(0.0, noise, truth.shape), np.ones(120), max(noise, 0.1))
+    arc, aside = path.project(along, truth)
+    assert aside.max() < 0.15 + 1.5 * noise
+    np.testing.assert_allclose(np.ptp(arc), np.ptp(along), rtol=0.03)
+    position, heading = path.pose(np.linspace(arc[0], arc[-1], 300))
+    steps = np.hypot(*np.diff(position, axis=0).T)
+    np.testing.assert_allclose(steps, steps.mean(), rtol=2e-3)  # by arc length
+    assert np.ptp(heading) == pytest.approx(np.ptp(angle), abs=0.1 + noise)
+
+
+def test_a_straight_path():
+    path = straight_path(np.array([3.0, 4.0]), np.pi / 2.0, 0.0, 2.0)
+    position, heading = path.pose(np.array([1.0, 2.0]))
+    np.testing.assert_allclose(position, [[3.0, 4.0], [3.0, 5.0]], atol=1e-9)
+    np.testing.assert_allclose(heading, np.pi / 2.0)
+
+
+def drive(speed, noise, seed=0, rate=10.0, sensor=1.0):
+    """A track east with the given speeds at `rate` Hz."""
+    rng = np.random.Generator(np.random.PCG64(seed))
+    place = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 / rate)])
+    stamps = (np.arange(len(speed)) / rate * 1e9).astype(np.int64)
+    fix = np.column_stack([place, np.zeros(len(speed))]) + rng.normal(0.0, noise, (len(speed), 2))
+    return place, Track("v", stamps, fix, np.full(len(speed), np.nan), stamps, speed * sensor, 4.8, 1.9)
+
+
+def test_standing_is_still_and_keeps_its_heading():
+    speed = np.interp(np.arange(0.0, 20.0, 0.1), [0, 5, 8, 13, 18], [8.0, 8.0, 0.0, 0.0, 6.0])
+    place, track = drive(speed, noise=0.3)
+    smooth = smooth_piece(track, 0, CONFIG)
+    still = (smooth.speed == 0.0).nonzero()[0]
+    assert abs(still[0] - 80) <= 4 and abs(still[-1] - 130) <= 4
+    assert np.ptp(smooth.position[still], axis=0).max() < 1e-9
+    assert np.ptp(smooth.heading[still]) < 1e-12
+    assert np.abs(smooth.heading).max() < 0.12
+    assert np.abs(smooth.position[:, 0] - place).max() < 0.4
+
+
+def test_a_sensor_that_is_off_by_three_percent_does_not_lengthen_the_way():
+    speed = np.full(400, 12.0)
+    place, track = drive(speed, noise=0.2, sensor=1.03)
+    smooth = smooth_piece(track, 0, CONFIG)
+    assert np.abs(smooth.position[:, 0] - place).max() < 0.5
+    assert smooth.speed.mean() == pytest.approx(12.0, abs=0.1)
+
+
+def test_a_stuck_speed_sensor_does_not_stop_the_car():
+    speed = np.full(100, 10.0)
+    place, track = drive(speed, noise=0.1, sensor=0.0)
+    assert not standing(0.1 * np.arange(100), track.fix_ns * 1e-9, track.fix, track.speed_ns * 1e-9, track.speed).any()
+    smooth = smooth_piece(track, 0, CONFIG)
+    assert np.abs(smooth.position[:, 0] - place).max() < 1.5
+
+
+def test_coloured_noise_counts_for_more_than_white():
+    rng = np.random.Generator(np.random.PCG64(5))
+    white = rng.normal(0.0, 1.0, 20_000)
+    assert white_equivalent(white) == pytest.approx(1.0, rel=0.03)
+    coloured = np.convolve(white, np.ones(5) / np.sqrt(5.0), mode="same")  # autocorrelation time 5
+    assert white_equivalent(coloured) == pytest.approx(np.sqrt(5.0), rel=0.08)
