@@ -156,7 +156,10 @@ def _distributions(reference: _Reference, motions: Sequence[Motion], bootstrap: 
         compared = compare(quantity, reference.values[quantity.id], [values[quantity.id] for values in samples])
         result[f"js_{quantity.id}"] = bootstrap.interval(compared.jensen_shannon)
         near = bootstrap.interval(compared.wasserstein_near)
-        result[f"wasserstein_{quantity.id}"] = Interval(compared.wasserstein, near.low, near.high)
+        exact = compared.wasserstein
+        result[f"wasserstein_{quantity.id}"] = Interval(
+            exact, float(np.minimum(exact, near.low)), float(np.maximum(exact, near.high))
+        )
         covered.append(compared)
     result["coverage"] = bootstrap.interval(lambda weights: np.mean([one.coverage(weights) for one in covered], axis=0))
     return result
