@@ -14,8 +14,9 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Group, find_groups
 from scenario_gen.logs.overlaps import find_overlaps
 from scenario_gen.logs.pieces import Piece, pieces_of
-from scenario_gen.logs.quality import Dropped, EncounterQuality, Quality
+from scenario_gen.logs.quality import Dropped, EncounterQuality, Quality, VehicleQuality
 from scenario_gen.logs.raw import RawLog, natural
+from scenario_gen.logs.smoothing import DOUBTED
 from scenario_gen.logs.sources import read_raw
 
 
@@ -58,6 +59,7 @@ def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogCon
     groups, notes = find_groups(pieces, config)
     if not groups:
         raise InputError(no_meeting(log, pieces, config))
+    notes += unmet(vehicles, {pieces[m].track.id for group in groups for m in group.members}, config)
     encounters = []
     for k, group in enumerate(groups):
         name = log.name if len(groups) == 1 else f"{log.name}-{k + 1:0{len(str(len(groups)))}d}"
@@ -73,6 +75,17 @@ def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogCon
         notes=(*log.notes, *dict.fromkeys(notes)),
     )
     return LogResult(tuple(encounters), summary)
+
+
+def unmet(vehicles: Sequence[VehicleQuality], met: set[str], config: LogConfig) -> tuple[str, ...]:
+    """Say who is in no encounter, and whose measured speeds were not believed."""
+    doubted = [v.id for v in vehicles if v.changed > DOUBTED]
+    left = [v for v in vehicles if v.id not in met]
+    if len(left) > config.most_vehicles:
+        said = [f"{len(left)} of {len(vehicles)} vehicles are in no encounter: {', '.join(v.id for v in left)}"]
+    else:
+        said = [f"vehicle {v.id} is in no encounter: there for {v.seconds:.1f} s" for v in left]
+    return (*said, *(f"vehicle {name}: its measured speeds contradict its positions and are not used" for name in doubted))
 
 
 def as_recorded(log: RawLog, config: LogConfig) -> LogResult:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from builders import crossing, geographic, save
+from log_builders import crossing, geographic, save
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from msg_conventions.tracks import encode_tracks
@@ -233,5 +233,5 @@ def test_genuine_bags_without_vehicles_are_refused_by_their_topics(data):
     assert len(bags) == 8
     for bag in bags:
         for path in (bag, next(file for file in sorted(bag.iterdir()) if file.suffix in (".mcap", ".db3"))):
-            with pytest.raises(InputError, match="no topic to read. It has .*msgs"):
+            with pytest.raises(InputError, match=r"no topic to read\. It has .*msgs"):
                 read_log(path)

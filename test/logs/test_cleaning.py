@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from builders import crossing, geographic, save
+from log_builders import crossing, geographic, save
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -11,11 +11,14 @@ from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
 
 
+PLAIN = LogConfig()
+
+
 def drops(result):
     return {drop.reason: (drop.count, drop.first.rpartition(" ")[2]) for drop in result.quality.dropped}
 
 
-def assert_close_to(result, rows, tmp_path, config=LogConfig(), atol=0.3):
+def assert_close_to(result, rows, tmp_path, config=PLAIN, atol=0.3):
     """The damage leaves no trace beyond `atol` metres."""
     (clean,) = read_log(save(rows, tmp_path, "clean.csv"), config).encounters
     (encounter,) = result.encounters

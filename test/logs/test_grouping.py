@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from builders import save
+from log_builders import save
 
 from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
@@ -30,6 +30,7 @@ def test_a_vehicle_that_is_there_for_most_of_it_shortens_the_encounter(tmp_path)
 def test_a_vehicle_that_is_there_for_little_is_left_out(tmp_path):
     found, quality = groups(tmp_path, car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0, 4, 20, 0, 8))
     assert found == [("1,2", 20.0)]
+    assert quality.notes == ("vehicle 3 is in no encounter: there for 4.0 s",)
 
 
 def test_proximity_bounds_the_encounter(tmp_path):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from builders import crossing, geographic
+from log_builders import crossing, geographic
 
 from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
@@ -17,7 +17,7 @@ def messages(rows):
     lines = []
     for number, row in enumerate(out.itertuples()):
         heading = 90.0 if row.vehicle_id == "a" else 0.0  # degrees clockwise from north
-        fields = {name: "0" for name in COLUMNS} | {
+        fields = dict.fromkeys(COLUMNS, "0") | {
             "RxDevice": "7",
             "FileId": "1",
             "TxDevice": "11" if row.vehicle_id == "a" else "12",

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from builders import crossing, geographic, save
+from log_builders import crossing, geographic, save
 
 from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
