@@ -1,8 +1,10 @@
 """Settings of the planning stage."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from scenario_gen.parameters import check, parameter
+from scenario_gen.planning.ompl_planners import OmplConfig
+from scenario_gen.planning.rrt_star_connect import RrtStarConnectConfig
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,9 @@ class PlanningConfig:
     max_curvature: float = parameter(0.2, "largest curvature of a route", unit="1/m", low=0.01, high=2.0)
     spacing: float = parameter(0.5, "largest distance between two points of a route", unit="m", low=0.05, high=0.5)
     traffic_side: str = parameter("right", "the side of the road to keep to", choices=("right", "left"))
+
+    rrt_star_connect: RrtStarConnectConfig = field(default_factory=RrtStarConnectConfig)
+    ompl: OmplConfig = field(default_factory=OmplConfig)
 
     def __post_init__(self) -> None:
         check(self)

@@ -85,7 +85,11 @@ def deviations(route: Route, fitted: FittedVehicle) -> Floats:
 
 def make_planner(config: PlanningConfig) -> Planner:
     """The geometric planner that `config` names."""
-    return RrtStarConnect()
+    if config.planner == "rrt_star_connect":
+        return RrtStarConnect(config.rrt_star_connect)
+    from scenario_gen.planning.ompl_planners import OmplPlanner
+
+    return OmplPlanner(config.planner, config.ompl)
 
 
 def _route(task: _Task) -> Route:

@@ -14,7 +14,7 @@ from scenario_gen.roads.clearance import clearance_in_cells, to_cells, to_metres
 from scenario_gen.roads.flood import component_at, component_cells
 from scenario_gen.roads.road import Road
 
-OCCUPANCY = 24  # nodes per bucket at which its side is halved
+OCCUPANCY = 64  # nodes per bucket at which its side is halved
 BATCH = 512  # iterations between two looks at the clock
 
 
@@ -57,7 +57,7 @@ class _Trees:
         self.counter[trees.MEETING] = -1
         self.history = np.empty((256, 2))
         self.random = np.random.SeedSequence([seed]).generate_state(1, np.uint64).astype(np.uint64)
-        self._empty_pool(1024)
+        self._empty_pool(256)
         trees.plant(self.ends, self.columns, self.node, self.link, self.chunk, self.head, self.counter, self.setting)
 
     @property

@@ -1,6 +1,6 @@
 """Algorithms 1-5 of the paper's appendix as kernels: two rapidly-exploring trees that rewire, meet, and go on.
 
-Lengths are in cells. Both trees share one pool of nodes. A node lives in a *chunk* of eight that belongs to one tree and one
+Lengths are in cells. Both trees share one pool of nodes. A node lives in a *chunk* of 32 that belongs to one tree and one
 square bucket, so that looking for neighbours reads memory in order; the bucket's side is halved as the trees grow.
 
     node   (n, 4)  x, y, cost from the root, length of the edge to the parent
@@ -16,7 +16,7 @@ from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F2, I1, I2, OUT1, OUT2, OUTI1, OUTI2, I, kernel
 from scenario_gen.roads.clearance import segment_free
 
-CHUNK = 8
+CHUNK = 32
 NEAR = 2048  # scratch for a near set; what exceeds it is left out
 X, Y, COST, EDGE = 0, 1, 2, 3
 PARENT, CHILD, NEXT, PREVIOUS, PARTNER = 0, 1, 2, 3, 4

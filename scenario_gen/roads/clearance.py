@@ -189,7 +189,7 @@ def near_squares_free(clearance: Floats, ax: float, ay: float, bx: float, by: fl
     return True
 
 
-@kernel(inline=True)
+@kernel(F2, F, F, F, F, F)
 def segment_free(clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float) -> bool:
     """Whether a disc can move from a to b, exactly: the field skips what is surely free, squares decide the rest."""
     height, width = clearance.shape
