@@ -21,7 +21,7 @@ from scenario_gen.sampling.path import BasePath, arc_lengths, states
 from scenario_gen.sampling.time_law import SpeedProfile, TimeLaw, TimeLayout
 from scenario_gen.scenario import Scenario
 
-DAMPING = (1.0, 0.5, 0.25, 0.0)  # of a candidate's clock, until a speed profile exists
+DAMPING = (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)  # of a candidate's clock, until a speed profile exists
 
 
 @dataclass(frozen=True)

@@ -18,14 +18,16 @@ class Clock:
     The end's deviation is drawn first, from its Gaussian truncated to the duration tolerance, the rest given the end.
     """
 
-    def __init__(self, times: Floats, config: SamplingConfig) -> None:
+    def __init__(self, times: Floats, config: SamplingConfig, fastest: Floats | None = None) -> None:
         """Prepare.
 
         Args:
             times: (K + 2,) seconds of start, changepoints and end, strictly increasing from 0.
             config: σ_t and the tolerance of the duration.
+            fastest: (K + 1,) the shortest each primitive may become, as a share of its duration.
         """
         self.times = times
+        self._fastest = np.full(len(times) - 1, FASTEST) if fastest is None else fastest
         end = float(times[-1])
         self._shortest = np.ceil(end * (1.0 - config.duration_tolerance) / DT - 1e-6)
         self._longest = np.floor(end * (1.0 + config.duration_tolerance) / DT + 1e-6)
@@ -50,16 +52,16 @@ class Clock:
 
     def sample(self, z: Floats, scale: Floats) -> Floats:
         """Clocks (S, K + 2) [s] from numbers z (S, size), deviations multiplied by scale (S,)."""
-        end = float(self.times[-1])
         rest = combine(z[:, 1:], self._factor)
         delta = (self._share * self._end(z[:, 0])[:, None] + rest) * scale[:, None]
         steps = np.diff(self.times)
-        rate = np.diff(delta, axis=1) / steps
-        room = np.where(rate > 0.0, (SLOWEST - 1.0), (1.0 - FASTEST)) / np.maximum(np.abs(rate), 1e-12)
-        warped = self.times + delta * np.minimum(room.min(axis=1), 1.0)[:, None]
-        whole = np.clip(np.round(warped[:, -1] / DT), self._shortest, self._longest) * DT
-        warped += (self.times / end) * (whole - warped[:, -1])[:, None]
-        warped[:, -1] = whole
+        rate = np.clip(1.0 + np.diff(delta, axis=1) / steps, self._fastest, SLOWEST)
+        end = (rate * steps).sum(axis=1)
+        missing = np.clip(np.round(end / DT), self._shortest, self._longest) * DT - end
+        room = np.where(missing[:, None] < 0.0, rate - self._fastest, SLOWEST - rate) * steps + 1e-9
+        pieces = rate * steps + room * (missing / room.sum(axis=1))[:, None]
+        warped = np.concatenate([np.zeros((len(z), 1)), np.cumsum(pieces, axis=1)], axis=1)
+        warped[:, -1] = np.round(warped[:, -1] / DT) * DT
         return np.asarray(warped)
 
     def _end(self, z: Floats) -> Floats:

@@ -23,12 +23,12 @@ class SamplingConfig:
         4.0, "time over which displacements along the route vary", unit="s", low=0.1, high=1000.0
     )
     time_sigma: float = parameter(
-        0.8, "σ_t: standard deviation of the changepoint clock that all vehicles share", unit="s", low=0.0, high=10.0
+        1.0, "σ_t: standard deviation of the changepoint clock that all vehicles share", unit="s", low=0.0, high=10.0
     )
     duration_tolerance: float = parameter(0.1, "share by which a sample may be longer or shorter", low=0.0, high=0.5)
     fixed_duration: bool = parameter(False, "keep the template's duration")
     max_speed: float = parameter(40.0, "highest speed", unit="m/s", low=0.1)
-    max_acceleration: float = parameter(4.0, "strongest speeding up", unit="m/s²", low=0.1)
+    max_acceleration: float = parameter(4.5, "strongest speeding up", unit="m/s²", low=0.1)
     max_deceleration: float = parameter(8.0, "strongest braking", unit="m/s²", low=0.1)
     max_lateral_acceleration: float = parameter(5.0, "largest speed² times curvature", unit="m/s²", low=0.1)
     max_stretch: float = parameter(

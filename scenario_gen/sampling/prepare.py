@@ -13,7 +13,7 @@ from scenario_gen.planning.route import Route
 from scenario_gen.roads.road import Road
 from scenario_gen.sampling.along import along_factor
 from scenario_gen.sampling.candidates import CandidateModel, VehicleModel, knots_on, piece_lengths
-from scenario_gen.sampling.clock import Clock
+from scenario_gen.sampling.clock import FASTEST, Clock
 from scenario_gen.sampling.config import SamplingConfig
 from scenario_gen.sampling.lateral import MOST_SIGMAS, ROOM_SIGMAS, lateral_factor, lateral_room
 from scenario_gen.sampling.path import BasePath
@@ -22,7 +22,8 @@ from scenario_gen.scenario import BoundaryStates
 from scenario_gen.segmentation.result import Segmentation
 
 SLIDE_SIGMAS = 2.0  # an anchor that slides by so many σ_s is no farther from the template than a sample is anyway
-_SHORTEST_WAIT = 1.5  # s; shorter waits are lengthened to it, so that a fast clock cannot make them vanish
+_SHORTEST_WAIT = 1.25  # s; shorter waits are lengthened to it, so that they are still waits on the published grid
+_LEAST_WAIT = 1.15  # s, to which a fast clock may shorten one
 _STRETCHES = 9
 _CURVE_REACH = 2.0  # m, around a position, in which the route's curvature is looked at
 _CURVE_MARGIN = 0.85  # share of the lateral limit that the route itself may use; the rest is the samples'
@@ -74,8 +75,19 @@ def prepare(
                 for n in range(len(routes))
             ]
             if not reasons:
-                return _model(encounter, road, times, stretch, paths, [f for f in found if f is not None], config)
+                clock = Clock(stretch * times, config, _fastest(times, waits))
+                return _model(encounter, road, times, clock, paths, [f for f in found if f is not None], config)
     return Prepared(None, (), "; ".join(reasons))
+
+
+def _fastest(times: Floats, waits: Sequence[Wait]) -> Floats:
+    """The shortest each primitive may become, as a share of its duration, so that every wait remains one."""
+    fastest = np.full(len(times) - 1, FASTEST)
+    for wait in waits:
+        inside = (times[1:] > wait.start) & (times[:-1] < wait.end)
+        least = _LEAST_WAIT / max(wait.end - wait.start, _SHORTEST_WAIT)
+        fastest[inside] = np.maximum(fastest[inside], least)
+    return fastest
 
 
 def _layout(
@@ -177,15 +189,15 @@ def _model(
     encounter: Encounter,
     road: Road,
     times: Floats,
-    stretch: float,
+    clock: Clock,
     paths: list[BasePath],
     found: list[_Nominal],
     config: SamplingConfig,
 ) -> Prepared:
-    """The model on the clock stretched by `stretch`."""
-    said = []
+    """The model on a clock that may be stretched."""
+    said, stretch = [], float(clock.times[-1] / times[-1])
     slide = max(SLIDE_SIGMAS * config.longitudinal_sigma, *(nominal.slid for nominal in found))
-    if stretch > 1.0:
+    if stretch > 1.0 + 1e-9:
         said.append(f"clock stretched by {100.0 * (stretch - 1.0):.1f} % so that every vehicle can keep to its limits")
     vehicles = []
     for vehicle, path, nominal in zip(encounter.vehicles, paths, found, strict=True):
@@ -202,7 +214,7 @@ def _model(
         vehicles.append(
             VehicleModel(vehicle, path, nominal.anchor, factor, along_factor(times, nominal.anchor, config), room, law)
         )
-    return Prepared(CandidateModel(tuple(vehicles), Clock(stretch * times, config), slide), tuple(said))
+    return Prepared(CandidateModel(tuple(vehicles), clock, slide), tuple(said))
 
 
 def _rescaled(lay: TimeLayout, stretch: float) -> TimeLayout:
