@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
@@ -17,6 +16,7 @@ from msg_conventions.yaw import yaw
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.files import bag_files
 from scenario_gen.logs.raw import Observations, RawLog, Segment
 
 FIX = "sensor_msgs/msg/NavSatFix"
@@ -24,7 +24,6 @@ TWIST = "geometry_msgs/msg/TwistStamped"
 ODOMETRY = "nav_msgs/msg/Odometry"
 USED = (FIX, TWIST, ODOMETRY, trajectory.TYPE)
 STORES = get_typestore(Stores.ROS2_JAZZY)  # the four types are standard, so bags without type definitions read as well
-EXTENSIONS = (".mcap", ".db3")
 
 
 @dataclass
@@ -45,46 +44,15 @@ class Vehicle:
     speeds: list[tuple[int, int, float]] = field(default_factory=list)
 
 
-class BagSource:
-    """A bag's folder, or a bare .mcap or .db3 file."""
-
-    def accepts(self, path: Path) -> bool:
-        """Return whether it looks like a bag."""
-        return bool(bag_files(path))
-
-    def read(self, paths: Sequence[Path], config: LogConfig) -> RawLog:
-        """Read the topics that this project knows; several bags are one log."""
-        topics = read_topics([file for path in paths for file in bag_files(path)], config)
-        label = str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
-        tracks = [topic for topic in topics if topic.type == trajectory.TYPE]
-        name = paths[0].stem if paths[0].is_file() else paths[0].name
-        if tracks:
-            return read_tracks(tracks, name, label, others=[topic.name for topic in topics if topic not in tracks])
-        return read_streams(topics, name, label)
-
-
-def bag_files(path: Path) -> list[Path]:
-    """Return the files of a bag in order: those that metadata.yaml lists, or else those in the folder; none if it is no bag.
-
-    The files are opened one by one: through the folder rosbags 0.11 passes over messages whose quality of service reads
-    differently in metadata.yaml and in the file. A compressed bag is opened through its folder.
-    """
-    if path.is_file():
-        return [path] if path.suffix.lower() in EXTENSIONS else []
-    metadata = path / "metadata.yaml"
-    if not metadata.is_file():
-        return sorted((file for file in path.iterdir() if file.suffix.lower() in EXTENSIONS), key=lambda f: (len(f.name), f.name))
-    try:
-        info = yaml.safe_load(metadata.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
-        files = [path / Path(name).name for name in info["relative_file_paths"]]
-    except (yaml.YAMLError, KeyError, TypeError, UnicodeDecodeError) as error:
-        raise InputError(f"{metadata} is no metadata of a bag ({error!r}); delete it to read the files alone") from error
-    if info.get("compression_mode"):
-        return [path]
-    for file in files:
-        if not file.is_file():
-            raise InputError(f"{metadata} lists {file.name}, which is not there")
-    return files
+def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
+    """Read the topics that this project knows; several bags are one log."""
+    topics = read_topics([file for path in paths for file in bag_files(path)], config)
+    label = str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
+    tracks = [topic for topic in topics if topic.type == trajectory.TYPE]
+    name = paths[0].stem if paths[0].is_file() else paths[0].name
+    if tracks:
+        return read_tracks(tracks, name, label, others=[topic.name for topic in topics if topic not in tracks])
+    return read_streams(topics, name, label)
 
 
 def read_topics(files: Sequence[Path], config: LogConfig) -> list[Topic]:

@@ -83,11 +83,7 @@ class RawLog:
 
 
 class LogSource(Protocol):
-    """A reader of one format."""
-
-    def accepts(self, path: Path) -> bool:
-        """Return whether the file or folder looks like this format."""
-        ...
+    """A reader of one format: the modules `bag`, `spmd` and `table` are such."""
 
     def read(self, paths: Sequence[Path], config: LogConfig) -> RawLog:
         """Read the files as one log.

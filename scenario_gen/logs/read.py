@@ -8,7 +8,6 @@ import numpy as np
 
 from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import InputError
-from scenario_gen.logs.bag import between
 from scenario_gen.logs.cleaning import Drops, clean
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Group, find_groups
@@ -90,6 +89,8 @@ def unmet(vehicles: Sequence[VehicleQuality], met: set[str], config: LogConfig) 
 
 def as_recorded(log: RawLog, config: LogConfig) -> LogResult:
     """Encounters that were recorded as such stay as they are, bit for bit; only the window and the vehicles are chosen."""
+    from scenario_gen.logs.bag import between
+
     encounters = tuple(between(encounter, config) for encounter in log.encounters)
     summary = Quality(log.name, log.rows, (), (), tuple(map(encounter_quality, encounters)), log.notes)
     return LogResult(encounters, summary)

@@ -10,8 +10,7 @@ the heading is the path's direction, held while standing.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
-from scipy.signal import savgol_filter
+from numpy.lib.stride_tricks import sliding_window_view
 
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.logs.cleaning import Track
@@ -139,10 +138,13 @@ def speed_of_fixes(seconds: Floats, fix: Floats, window: float = 0.5) -> Floats:
 
 def estimated_noise(fix: Floats) -> float:
     """Standard deviation of the fixes [m]: from their residuals about local parabolas."""
-    window = min(31, len(fix) - 1 + len(fix) % 2)
-    if window < 7:
+    half = min(15, (len(fix) - 1) // 2)
+    if half < 3:
         return 0.5
-    residual = fix - savgol_filter(fix, window, 2, axis=0)
+    lag = np.arange(-half, half + 1)
+    square = lag**2 - (lag**2).mean()
+    parabola = 1.0 / len(lag) - (lag**2).mean() * square / (square @ square)  # the fitted parabola's value at lag 0
+    residual = fix[half : len(fix) - half] - np.array([np.convolve(axis, parabola, mode="valid") for axis in fix.T]).T
     return float(np.clip(max(white_equivalent(residual[:, 0]), white_equivalent(residual[:, 1])), 0.1, 1.5))
 
 
@@ -175,7 +177,9 @@ def standing(ticks: Floats, fix_t: Floats, fix: Floats, speed_t: Floats, speed: 
         speed: (S,) m/s.
     """
     dt = ticks[1] - ticks[0]
-    smooth = median_filter(np.interp(ticks, speed_t, speed), 2 * round(0.2 / dt) + 1, mode="nearest")
+    half = round(0.2 / dt)
+    padded = np.pad(np.interp(ticks, speed_t, speed), half, mode="edge")
+    smooth = np.median(sliding_window_view(padded, 2 * half + 1), axis=1)
     stands = np.zeros(len(ticks), dtype=bool)
     for begin, end in runs(smooth < STANDS):
         still = begin + np.flatnonzero(smooth[begin:end] <= max(STILL, 1.5 * float(np.median(smooth[begin:end]))))

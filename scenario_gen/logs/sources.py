@@ -4,13 +4,26 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scenario_gen.errors import InputError
-from scenario_gen.logs.bag import BagSource, bag_files
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.files import TABLES, is_bag, is_spmd, is_table
 from scenario_gen.logs.raw import LogSource, RawLog
-from scenario_gen.logs.spmd import SpmdSource
-from scenario_gen.logs.table import TableSource
 
-SOURCES: dict[str, LogSource] = {"bag": BagSource(), "spmd": SpmdSource(), "table": TableSource()}
+ACCEPTS = {"bag": is_bag, "spmd": is_spmd, "table": is_table}  # asked in this order
+
+
+def source(name: str) -> LogSource:
+    """Return the reader of a format; its libraries are loaded only now, for each takes up to a second."""
+    if name == "bag":
+        from scenario_gen.logs import bag
+
+        return bag
+    if name == "spmd":
+        from scenario_gen.logs import spmd
+
+        return spmd
+    from scenario_gen.logs import table
+
+    return table
 
 
 def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
@@ -23,18 +36,17 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
         if path.is_file() and path.stat().st_size == 0:
             raise InputError(f"{path} is empty (0 bytes); record or copy it again")
     files = [file for path in paths for file in expand(path)]
-    for name, source in SOURCES.items():
-        if name == config.format or (config.format == "auto" and all(source.accepts(file) for file in files)):
-            return source.read(files, config)
+    for name, accepts in ACCEPTS.items():
+        if name == config.format or (config.format == "auto" and all(accepts(file) for file in files)):
+            return source(name).read(files, config)
     raise InputError(
-        f"{paths[0]} is none of the known logs: {', '.join(TableSource.extensions)} tables and SPMD files, "
+        f"{paths[0]} is none of the known logs: {', '.join(TABLES)} tables and SPMD files, "
         "rosbag2 folders, .mcap, .db3; set the parameter format if its name misleads"
     )
 
 
 def expand(path: Path) -> list[Path]:
     """Return the files of a folder of tables; a file and a bag's folder stand for themselves."""
-    if path.is_file() or bag_files(path):
+    if path.is_file() or is_bag(path):
         return [path]
-    tables = sorted(file for file in path.iterdir() if file.suffix.lower() in TableSource.extensions and file.stat().st_size)
-    return tables or [path]
+    return sorted(file for file in path.iterdir() if is_table(file) and file.stat().st_size) or [path]

@@ -9,61 +9,21 @@ import pandas as pd
 
 from scenario_gen.errors import InputError
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.files import COLUMNS
 from scenario_gen.logs.raw import RawLog, Segment
 from scenario_gen.logs.table import from_frame, vehicle_name
 
-COLUMNS = (
-    "RxDevice",
-    "FileId",
-    "TxDevice",
-    "Gentime",
-    "TxRandom",
-    "MsgCount",
-    "DSecond",
-    "Latitude",
-    "Longitude",
-    "Elevation",
-    "Speed",
-    "Heading",
-    "Ax",
-    "Ay",
-    "Az",
-    "Yawrate",
-    "PathCount",
-    "RadiusOfCurve",
-    "Confidence",
-)
 EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime counts microseconds from there
 
 
-class SpmdSource:
-    """One or several `TripStart_4####_p???.csv` or `TripStart_bsmrx_4####.csv` files."""
-
-    def accepts(self, path: Path) -> bool:
-        """Return whether the first line has 19 fields and all of them are numbers."""
-        if path.suffix.lower() not in (".csv", ".txt"):
-            return False
-        with path.open(encoding="utf-8-sig", errors="replace") as file:
-            fields = file.readline().split(",")
-        return len(fields) == len(COLUMNS) and all(is_number(field) for field in fields)
-
-    def read(self, paths: Sequence[Path], config: LogConfig) -> RawLog:
-        """Read the files as one log; a vehicle is a TxDevice."""
-        frames, segments, row = [], [], 0
-        for path in paths:
-            frames.append(read_messages(path))
-            segments.append(Segment(row, str(path), "line", 1))
-            row += len(frames[-1])
-        return from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments))
-
-
-def is_number(field: str) -> bool:
-    """Return whether a field is empty or a number, as every field of a basic safety message is."""
-    try:
-        float(field.strip() or "nan")
-    except ValueError:
-        return False
-    return True
+def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
+    """Read the files as one log; a vehicle is a TxDevice."""
+    frames, segments, row = [], [], 0
+    for path in paths:
+        frames.append(read_messages(path))
+        segments.append(Segment(row, str(path), "line", 1))
+        row += len(frames[-1])
+    return from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments))
 
 
 def read_messages(path: Path) -> pd.DataFrame:

@@ -60,28 +60,19 @@ class Column:
     clockwise: bool = False
 
 
-class TableSource:
-    """CSV (also tab- or semicolon-separated) and Parquet tables with a header."""
-
-    extensions = (".csv", ".tsv", ".txt", ".parquet", ".pq")
-
-    def accepts(self, path: Path) -> bool:
-        """Return whether the name says table; a headerless file belongs to the SPMD reader, which is asked first."""
-        return path.suffix.lower() in self.extensions
-
-    def read(self, paths: Sequence[Path], config: LogConfig) -> RawLog:
-        """Read tables that share a clock as one log."""
-        frames, segments, row = [], [], 0
-        for path in paths:
-            frame = read_frame(path)
-            columns = find_columns(frame, path, config.columns)
-            frames.append(to_numbers(frame, columns))
-            parquet = path.suffix.lower() in (".parquet", ".pq")
-            segments.append(Segment(row, str(path), "row" if parquet else "line", 1 if parquet else 2))
-            row += len(frame)
-        if len({"lat" in frame for frame in frames}) > 1:
-            raise InputError(f"{paths[0]} and the files beside it mix latitude/longitude and x/y; read them one by one")
-        return from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments))
+def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
+    """Read tables that share a clock as one log: CSV (also with tabs or semicolons) or Parquet, with a header."""
+    frames, segments, row = [], [], 0
+    for path in paths:
+        frame = read_frame(path)
+        columns = find_columns(frame, path, config.columns)
+        frames.append(to_numbers(frame, columns))
+        parquet = path.suffix.lower() in (".parquet", ".pq")
+        segments.append(Segment(row, str(path), "row" if parquet else "line", 1 if parquet else 2))
+        row += len(frame)
+    if len({"lat" in frame for frame in frames}) > 1:
+        raise InputError(f"{paths[0]} and the files beside it mix latitude/longitude and x/y; read them one by one")
+    return from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments))
 
 
 def read_frame(path: Path) -> pd.DataFrame:

@@ -3,13 +3,12 @@
 import numpy as np
 import pandas as pd
 import pytest
-from log_builders import crossing, geographic, save
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from log_builders import crossing, geographic, save
 
 from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-
 
 PLAIN = LogConfig()
 

@@ -6,7 +6,8 @@ from log_builders import crossing, geographic
 
 from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.spmd import COLUMNS, EPOCH_NS
+from scenario_gen.logs.files import COLUMNS
+from scenario_gen.logs.spmd import EPOCH_NS
 
 FIRST = 270_000_000_000_000  # Gentime: microseconds since 2004-01-01, in July 2012
 

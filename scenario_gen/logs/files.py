@@ -1,0 +1,84 @@
+"""What a file or folder looks like, told without loading the libraries that read it."""
+
+from pathlib import Path
+
+from scenario_gen.errors import InputError
+
+BAGS = (".mcap", ".db3")
+TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
+# Of a basic safety message in the files of the Safety Pilot Model Deployment.
+COLUMNS = (
+    "RxDevice",
+    "FileId",
+    "TxDevice",
+    "Gentime",
+    "TxRandom",
+    "MsgCount",
+    "DSecond",
+    "Latitude",
+    "Longitude",
+    "Elevation",
+    "Speed",
+    "Heading",
+    "Ax",
+    "Ay",
+    "Az",
+    "Yawrate",
+    "PathCount",
+    "RadiusOfCurve",
+    "Confidence",
+)
+
+
+def is_bag(path: Path) -> bool:
+    """Return whether it is a bag's folder or a bare .mcap or .db3 file."""
+    return bool(bag_files(path))
+
+
+def bag_files(path: Path) -> list[Path]:
+    """Return the files of a bag in order: those that metadata.yaml lists, or else those in the folder; none if it is no bag.
+
+    The files are opened one by one: through the folder rosbags 0.11 passes over messages whose quality of service reads
+    differently in metadata.yaml and in the file. A compressed bag is opened through its folder.
+    """
+    if path.is_file():
+        return [path] if path.suffix.lower() in BAGS else []
+    metadata = path / "metadata.yaml"
+    if not metadata.is_file():
+        return sorted((file for file in path.iterdir() if file.suffix.lower() in BAGS), key=lambda f: (len(f.name), f.name))
+    import yaml
+
+    try:
+        info = yaml.safe_load(metadata.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
+        files = [path / Path(name).name for name in info["relative_file_paths"]]
+    except (yaml.YAMLError, KeyError, TypeError, UnicodeDecodeError) as error:
+        raise InputError(f"{metadata} is no metadata of a bag ({error!r}); delete it to read the files alone") from error
+    if info.get("compression_mode"):
+        return [path]
+    for file in files:
+        if not file.is_file():
+            raise InputError(f"{metadata} lists {file.name}, which is not there")
+    return files
+
+
+def is_spmd(path: Path) -> bool:
+    """Return whether the first line has 19 fields and all of them are numbers."""
+    if path.suffix.lower() not in (".csv", ".txt"):
+        return False
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        fields = file.readline().split(",")
+    return len(fields) == len(COLUMNS) and all(is_number(field) for field in fields)
+
+
+def is_number(field: str) -> bool:
+    """Return whether a field is empty or a number, as every field of a basic safety message is."""
+    try:
+        float(field.strip() or "nan")
+    except ValueError:
+        return False
+    return True
+
+
+def is_table(path: Path) -> bool:
+    """Return whether the name says table; a headerless one is asked for as SPMD first."""
+    return path.suffix.lower() in TABLES
