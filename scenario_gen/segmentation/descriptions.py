@@ -10,6 +10,7 @@ from scenario_gen.encounter import Encounter
 STANDING = 0.5
 STEADY = 0.25
 TURNING = np.deg2rad(15.0)
+LEANING = 0.5
 
 
 def describe_motion(speed: Floats, heading: Floats, dt: float) -> str:
@@ -42,3 +43,18 @@ def describe_segments(encounter: Encounter, changepoints: Ints) -> tuple[str, ..
         )
         for a, b in pairwise(edges)
     )
+
+
+def describe_accelerations(mean: Floats) -> str:
+    """Describe a primitive by its mean features (3N,), vehicles numbered from 0; see `features`."""
+    parts = []
+    for i, (along, across, moves) in enumerate(mean.reshape(-1, 3)):
+        if moves < 0.5:
+            parts.append(f"vehicle {i} stands")
+            continue
+        pace = (
+            "drives steadily" if abs(along) < STEADY else f"{'accelerates' if along > 0.0 else 'brakes'} at {abs(along):.1f} m/s²"
+        )
+        bend = "" if abs(across) < LEANING else f", turning {'left' if across > 0.0 else 'right'} at {abs(across):.1f} m/s²"
+        parts.append(f"vehicle {i} {pace}{bend}")
+    return ", ".join(parts)

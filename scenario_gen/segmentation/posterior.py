@@ -1,6 +1,6 @@
 """The posterior over segmentations: a point estimate, changepoint probabilities, intervals, and whether to believe them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -36,6 +36,12 @@ class Posterior:
         """The posterior of a series that does not vary: one primitive, with certainty."""
         zeros = np.zeros(samples, np.int64)
         return cls(zeros, zeros[None], np.zeros(samples), np.array([samples]), np.zeros(1, np.int64), (), np.zeros(0, np.bool_))
+
+    def part(self, start: int, stop: int) -> "Posterior":
+        """Return the posterior of the samples start..stop alone."""
+        ends = np.array([stop - start])
+        labels, samples = in_order(self.labels[start:stop]), self.samples[:, start:stop]
+        return replace(self, labels=labels, samples=samples, probability=self.probability[start:stop], ends=ends)
 
     @property
     def changepoints(self) -> Ints:

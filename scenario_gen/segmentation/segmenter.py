@@ -32,8 +32,8 @@ class SegmentationConfig:
     settle: float = parameter(
         0.8, "a changepoint may move this far to where trends of speed or course change", unit="s", low=0.0, high=2.0
     )
-    least_gain: float = parameter(
-        20.0, "what a changepoint must improve the description of speeds and courses by, in squared standard deviations", low=0.0
+    chance_alone: float = parameter(
+        1e-4, "probability with which noise alone makes a changepoint look as useful as is asked of one", low=1e-12, high=0.5
     )
     least_chance: float = parameter(0.05, "posterior probability above which a changepoint may be added", low=0.0, high=1.0)
     speed_window: float = parameter(1.0, "window of the longitudinal acceleration", unit="s", low=0.3, high=5.0)
@@ -48,7 +48,10 @@ class SegmentationConfig:
         check(self)
 
 
-def segment(encounter: Encounter, config: SegmentationConfig = SegmentationConfig(), seed: int = 0) -> Segmentation:
+DEFAULT = SegmentationConfig()
+
+
+def segment(encounter: Encounter, config: SegmentationConfig = DEFAULT, seed: int = 0) -> Segmentation:
     """Cut an encounter into joint primitives (paper II-B).
 
     Args:
@@ -61,33 +64,34 @@ def segment(encounter: Encounter, config: SegmentationConfig = SegmentationConfi
     """
     if config.preset == "paper":
         posterior = segment_series(paper_features(encounter), config.sampler, seed)
-        points = merge_short(posterior, config, encounter.dt)
+        points = cut(posterior, config, encounter.dt)
     else:
         features, blur = driving_features(
             encounter, config.speed_window, config.turn_window, config.speed_noise, config.turn_noise
         )
         posterior = segment_series(features, config.sampler, seed, blur=blur)
-        points = on_trends(encounter, posterior, merge_short(posterior, config, encounter.dt), config)
-    labels = relabel(posterior.labels, points)
+        points = on_trends(encounter, posterior, cut(posterior, config, encounter.dt), config)
+    labels = in_order(relabel(posterior.labels, points))
     return Segmentation(labels, points, posterior.probability, describe_segments(encounter, points))
 
 
 def on_trends(encounter: Encounter, posterior: Posterior, points: Ints, config: SegmentationConfig) -> Ints:
     """Put changepoints where trends change, see `trends`, and keep the most useful ones up to `max_rate`."""
-    trends = Trends.of(encounter)
+    trends = Trends.of(encounter.position, encounter.speed, encounter.dt)
+    least = trends.threshold(config.chance_alone)
     reach = round(config.settle / encounter.dt)
     gap = max(2, int(np.ceil(config.min_segment / encounter.dt - 1e-9)))
     most = int(encounter.duration * config.max_rate)
     everything = encounter.speed.shape[1]
     candidates = np.flatnonzero(posterior.probability_within(round(0.5 / encounter.dt)) > config.least_chance)
     found = trends.settle([int(c) for c in points], reach, gap)
-    found = trends.settle(trends.drop(found, config.least_gain, everything), reach, gap)
-    found = trends.settle(trends.add(found, candidates, config.least_gain, gap), reach, gap)
-    found = trends.settle(trends.drop(found, config.least_gain, most), reach, gap)
+    found = trends.settle(trends.drop(found, least, everything), reach, gap)
+    found = trends.settle(trends.add(found, candidates, least, gap), reach, gap)
+    found = trends.settle(trends.drop(found, least, most), reach, gap)
     return np.array(found, dtype=np.int64)
 
 
-def merge_short(posterior: Posterior, config: SegmentationConfig, dt: float) -> Ints:
+def cut(posterior: Posterior, config: SegmentationConfig, dt: float) -> Ints:
     """Return the estimate's changepoints without segments below `min_segment` or states with fewer than 2 samples.
 
     Of the two changepoints around such a segment the less probable one goes (at either end, the inner one).
@@ -107,16 +111,20 @@ def merge_short(posterior: Posterior, config: SegmentationConfig, dt: float) -> 
     return np.array(points, dtype=np.int64)
 
 
-def relabel(labels: Ints, points: Ints) -> Ints:
-    """Give every segment between `points` the label that most of its samples have, and neighbours different ones."""
+def relabel(labels: Ints, points: Ints, *, fresh: bool = True) -> Ints:
+    """Give every segment between `points` the label that most of its samples have, and neighbours different ones.
+
+    Where a segment holds no other label than its left neighbour's, it gets a new one; or, if not `fresh`, the
+    neighbour's after all, so that the changepoint between them is one no longer.
+    """
     edges = [0, *(int(c) for c in points), len(labels)]
     result = np.empty_like(labels)
-    previous, fresh = -1, int(labels.max()) + 1
+    previous, new = -1, int(labels.max()) + 1
     for a, b in pairwise(edges):
         votes = np.bincount(labels[a:b])
         if 0 <= previous < len(votes):
             votes[previous] = 0
-        label = int(votes.argmax()) if votes.max() > 0 else fresh
-        fresh += label == fresh
+        label = int(votes.argmax()) if votes.max() > 0 else (new if fresh else previous)
+        new += label == new
         result[a:b] = previous = label
-    return in_order(result)
+    return result

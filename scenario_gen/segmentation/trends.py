@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import uniform_filter1d
+from scipy.special import gammainccinv
 
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.encounter import Encounter
 from scenario_gen.kernels import F2, I1, OUT1, I, kernel
 
 SPEED_NOISE = 0.1
@@ -82,19 +82,29 @@ class Trends:
     _cache: dict[tuple[int, ...], tuple[float, int]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, encounter: Encounter) -> "Trends":
-        """Take the trends of an encounter; noise is at least 0.1 m/s in speed and 0.3 m/s across the course."""
+    def of(cls, position: Floats, speed: Floats, dt: float) -> "Trends":
+        """Take the trends of N vehicles; noise is at least 0.1 m/s in speed and 0.3 m/s across the course.
+
+        Args:
+            position: (N, T, 2) m.
+            speed: (N, T) m/s.
+            dt: s.
+        """
         signals, weights = [], []
-        for position, speed in zip(encounter.position, encounter.speed, strict=True):
-            bend = np.diff(speed, 2)
+        for xy, v in zip(position, speed, strict=True):
+            bend = np.diff(v, 2)
             noise = max(SPEED_NOISE, 1.4826 * float(np.median(np.abs(bend))) / np.sqrt(6.0) if len(bend) else 0.0)
-            signals.append(speed)
-            weights.append(np.full(len(speed), 1.0 / noise))
-            angle, pace = course(position, speed, encounter.dt)
+            signals.append(v)
+            weights.append(np.full(len(v), 1.0 / noise))
+            angle, pace = course(xy, v, dt)
             signals.append(angle)
             weights.append(np.where(pace > LEAST_SPEED, pace / COURSE_NOISE, 0.0))
         stack = np.array(signals)
         return cls(np.ascontiguousarray(stack - stack.mean(axis=1, keepdims=True)), np.array(weights))
+
+    def threshold(self, chance: float) -> float:
+        """Return the gain that noise alone exceeds with probability `chance`: a quantile of χ² with one degree per signal."""
+        return float(2.0 * gammainccinv(len(self.signals) / 2.0, chance))
 
     @property
     def samples(self) -> int:

@@ -1,0 +1,103 @@
+"""The peers, each by its own public functions; None where one is not installed (`pip install jax-moseq hmmlearn ruptures`)."""
+
+import importlib.util
+import time
+import warnings
+from typing import Any
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, Ints
+
+
+def installed(name: str) -> bool:
+    """True if the peer can be imported."""
+    return importlib.util.find_spec(name) is not None
+
+
+def standardised(x: Floats) -> Floats:
+    """Channels with mean 0 and variance 1."""
+    return np.asarray((x - x.mean(axis=0)) / x.std(axis=0))
+
+
+def jax_moseq(x: Floats, sweeps: int, seed: int = 0, states: int = 20) -> tuple[Ints, float] | None:
+    """Gaussian sticky HDP-HMM from jax-moseq's Gibbs steps (its concentrations stay fixed); labels and CPU seconds without JIT."""
+    if not installed("jax_moseq"):
+        return None
+    import jax
+    import jax.numpy as jnp
+    import jax.random as jr
+    import tensorflow_probability.substrates.jax.distributions as tfd
+    from jax_moseq.models.arhmm.gibbs import _resample_regression_params
+    from jax_moseq.utils.distributions import sample_hmm_stateseq
+    from jax_moseq.utils.transitions import init_hdp_transitions, resample_hdp_transitions
+
+    jax.config.update("jax_enable_x64", True)
+    y = jnp.asarray(standardised(x))
+    samples, d = y.shape
+    ones, mask = jnp.ones((samples, 1)), jnp.ones((1, samples))
+    s0 = jnp.asarray(0.75 * np.cov(np.asarray(y).T))
+    concentrations = {"alpha": 5.7, "kappa": 100.0, "gamma": 1.0}
+
+    @jax.jit
+    def emissions(key: Any, z: Any) -> Any:
+        members = jnp.eye(states)[:, z]
+        step = lambda args: _resample_regression_params(ones, y, d + 2.0, s0, jnp.zeros((d, 1)), 10.0 * jnp.eye(1), args)  # noqa: E731
+        return jax.lax.map(step, (jr.split(key, states), members))
+
+    @jax.jit
+    def labels_given(key: Any, means: Any, covariances: Any, pi: Any) -> Any:
+        log_prob = jax.lax.map(lambda p: tfd.MultivariateNormalFullCovariance(p[0][:, 0], p[1]).log_prob(y), (means, covariances))
+        return sample_hmm_stateseq(key, pi, log_prob.T, mask[0])[1]
+
+    key = jr.PRNGKey(seed)
+    betas, _ = init_hdp_transitions(key, num_states=states, **concentrations)
+    z = jr.randint(key, (samples,), 0, states)
+    started = time.process_time()
+    for sweep in range(sweeps + 2):
+        if sweep == 2:
+            jax.block_until_ready(z)
+            started = time.process_time()
+        key, a, b, c = jr.split(key, 4)
+        betas, pi = resample_hdp_transitions(a, z[None], mask, betas, **concentrations)
+        means, covariances = emissions(b, z)
+        z = labels_given(c, means, covariances, pi)
+    jax.block_until_ready(z)
+    return np.asarray(z, dtype=np.int64), time.process_time() - started
+
+
+def hmmlearn(x: Floats, states: int, starts: int = 10) -> Ints | None:
+    """Gaussian HMM by EM with the true number of states, the likeliest of several starts."""
+    if not installed("hmmlearn"):
+        return None
+    import logging
+
+    from hmmlearn.hmm import GaussianHMM
+
+    logging.getLogger("hmmlearn").setLevel(logging.CRITICAL)
+    y = standardised(x)
+    best: tuple[float, Ints] | None = None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for seed in range(starts):
+            try:
+                model = GaussianHMM(states, "full", n_iter=100, random_state=seed, min_covar=1e-3).fit(y)
+                score = float(model.score(y))
+            except ValueError:
+                continue
+            if best is None or score > best[0]:
+                best = (score, np.asarray(model.predict(y), dtype=np.int64))
+    return None if best is None else best[1]
+
+
+def ruptures(x: Floats) -> Ints | None:
+    """Changepoints by PELT with a normal cost and a BIC penalty."""
+    if not installed("ruptures"):
+        return None
+    import ruptures as rpt
+
+    y = standardised(x)
+    samples, d = y.shape
+    penalty = (d + d * (d + 1) / 2 + 1) * np.log(samples)
+    found = rpt.Pelt(model="normal", min_size=max(d + 2, 5), jump=2).fit(y).predict(pen=penalty)
+    return np.array(found[:-1], dtype=np.int64)

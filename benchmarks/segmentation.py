@@ -1,0 +1,241 @@
+"""Segmentation: speed and accuracy on sequences with known states, on labelled recordings, and online, beside the peers.
+
+Every figure is the median over seeds that were not looked at while developing; the interquartile range stands beside it.
+Speed is the CPU time of exactly the configuration that is scored: features, starts, all chains, point estimate.
+"""
+
+import csv
+import os
+import subprocess
+import sys
+import time
+import tracemalloc
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks import _segmentation_peers as peers
+from benchmarks._segmentation_data import CELLS, driving, gaussian_hmm
+from benchmarks._segmentation_scores import changes, f1, hamming, smoother
+from benchmarks.row import Row
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.segmentation import (
+    OnlineSegmenter,
+    SamplerConfig,
+    SegmentationConfig,
+    segment,
+    segment_series,
+)
+
+SEEDS = range(9001, 9013)
+TARGET_SPEED = {"A": 60.0, "B": 40.0, "D": 50.0}
+TARGET_HAMMING = {"A": 0.01, "B": 0.01, "C": 0.02}
+TARGET_F1 = {"A": 0.03, "B": 0.03, "C": 0.05}
+DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")) / "labelled_series"
+NOT_INSTALLED = "peer not installed"
+
+
+def spread(values: list[float]) -> str:
+    """Interquartile range, as text."""
+    low, high = np.quantile(values, [0.25, 0.75])
+    return f"IQR {low:.3g}-{high:.3g}"
+
+
+def run() -> list[Row]:
+    """Return all rows."""
+    segment_series(np.random.default_rng(0).normal(size=(50, 2)))
+    rows = [_first_call()]
+    seconds: dict[str, float] = {}
+    for cell in CELLS:
+        rows += _cell(cell, seconds)
+    rows += _driving(seconds)
+    rows += _speed(seconds)
+    rows += _online()
+    return rows + _labelled()
+
+
+def _first_call() -> Row:
+    """Seconds from starting an interpreter to its first answer, kernels in the cache."""
+    code = "import numpy as n; from scenario_gen.segmentation import segment_series as s; s(n.random.default_rng(0).normal(size=(50, 2)))"
+    started = time.perf_counter()
+    subprocess.run([sys.executable, "-c", code], check=True)
+    return Row("first call in a fresh process", time.perf_counter() - started, "s", "lower", 2.0)
+
+
+def _cell(cell: str, seconds: dict[str, float]) -> list[Row]:
+    """Accuracy of one Gaussian cell, as what is lost to the smoother that knows the truth."""
+    lost_hamming, lost_f1, best_hamming, best_f1, spurious, spent = [], [], [], [], [], []
+    for seed in SEEDS:
+        sequence = gaussian_hmm(cell, seed)
+        best = smoother(sequence)
+        started = time.process_time()
+        found = segment_series(sequence.x, seed=seed)
+        spent.append(time.process_time() - started)
+        best_hamming.append(hamming(sequence.labels, best))
+        best_f1.append(f1(sequence.changepoints, changes(best), 5))
+        lost_hamming.append(hamming(sequence.labels, found.labels) - best_hamming[-1])
+        lost_f1.append(best_f1[-1] - f1(sequence.changepoints, found.changepoints, 5))
+        spurious.append(float((np.bincount(found.labels) < 0.01 * len(found.labels)).sum()))
+    seconds[cell] = float(np.median(spent))
+    truth = f"true parameters: Hamming {np.median(best_hamming):.4f}, F1 {np.median(best_f1):.3f}"
+    limit = 2.0 if cell == "C" else None
+    return [
+        Row(
+            f"{cell}: Hamming above the smoother's",
+            float(np.median(lost_hamming)),
+            "",
+            "lower",
+            TARGET_HAMMING[cell],
+            f"{truth}; {spread(lost_hamming)}",
+        ),
+        Row(f"{cell}: F1 below the smoother's", float(np.median(lost_f1)), "", "lower", TARGET_F1[cell], spread(lost_f1)),
+        Row(f"{cell}: spurious states, worst seed", max(spurious), "", "lower", 1.0),
+        Row(f"{cell}: CPU", seconds[cell], "s", "lower", limit, spread(spent)),
+    ]
+
+
+def _driving(seconds: dict[str, float]) -> list[Row]:
+    """Cell D: changepoints of two simulated vehicles."""
+    config = SegmentationConfig(max_rate=10.0)
+    scores, spent, ratios, pelt = [], [], [], []
+    for seed in SEEDS:
+        sequence = driving(seed)
+        assert sequence.encounter is not None
+        started = time.process_time()
+        found = segment(sequence.encounter, config, seed)
+        spent.append(time.process_time() - started)
+        scores.append(f1(sequence.changepoints, found.changepoints, 5))
+        ratios.append(len(found.changepoints) / len(sequence.changepoints))
+        rivals = peers.ruptures(np.gradient(sequence.x[:, [2, 5]], axis=0)) if seed < SEEDS[3] else None
+        if rivals is not None:
+            pelt.append(f1(sequence.changepoints, rivals, 5))
+    seconds["D"] = float(np.median(spent))
+    rival = f"; ruptures PELT on accelerations {np.median(pelt):.3f}" if pelt else f"; ruptures: {NOT_INSTALLED}"
+    return [
+        Row("D: F1", float(np.median(scores)), "", "higher", 0.90, spread(scores) + rival),
+        Row("D: changepoints found per true one", float(np.median(ratios)), "", "lower"),
+        Row("D: CPU", seconds["D"], "s", "lower", None, spread(spent)),
+    ]
+
+
+def _speed(seconds: dict[str, float]) -> list[Row]:
+    """CPU time of 200 sweeps of jax-moseq's Gaussian sampler (without its compilation), over ours of everything."""
+    rows = []
+    for cell, target in TARGET_SPEED.items():
+        sequence = driving(SEEDS[0]) if cell == "D" else gaussian_hmm(cell, SEEDS[0])
+        rival = peers.jax_moseq(sequence.x, 200)
+        if rival is None:
+            rows.append(Row(f"{cell}: times faster than jax-moseq", 0.0, "", "higher", None, NOT_INSTALLED))
+            continue
+        labels, cpu = rival
+        score = f"jax-moseq {cpu:.1f} s, Hamming {hamming(sequence.labels, labels):.3f}, F1 {f1(sequence.changepoints, changes(labels), 5):.3f}"
+        rows.append(Row(f"{cell}: times faster than jax-moseq", cpu / seconds[cell], "", "higher", target, score))
+    return rows
+
+
+def _online() -> list[Row]:
+    """The online segmenter on D, its memory over an hour, and its time with 8 vehicles."""
+    scores, delays = [], []
+    for seed in SEEDS:
+        sequence = driving(seed)
+        encounter = sequence.encounter
+        assert encounter is not None
+        online = OnlineSegmenter(2, 0.1)
+        found = [c for t in range(len(sequence.x)) for c in online.push(encounter.position[:, t], encounter.speed[:, t])]
+        samples = np.array([c.sample for c in found], dtype=np.int64)
+        scores.append(f1(sequence.changepoints, samples, 5))
+        for change in found:
+            truth = sequence.changepoints[np.abs(sequence.changepoints - change.sample).argmin()]
+            if abs(truth - change.sample) <= 5:
+                delays.append((change.confirmed - truth) * 0.1)
+    return [
+        Row("online D: F1", float(np.median(scores)), "", "higher", 0.85, spread(scores)),
+        Row("online D: median delay", float(np.median(delays)), "s", "lower", 1.5),
+        *_hour(),
+    ]
+
+
+def _hour() -> list[Row]:
+    """Memory growth and CPU time per sample over an hour of 8 vehicles."""
+    four = []
+    for seed in range(4):
+        encounter = driving(SEEDS[0] + seed, 6000).encounter
+        assert encounter is not None
+        four.append(encounter)
+    position = np.concatenate([e.position for e in four])
+    speed = np.concatenate([e.speed for e in four])
+    online = OnlineSegmenter(8, 0.1)
+    tracemalloc.start()
+    sizes, started = [], time.process_time()
+    for t in range(36_000):
+        online.push(position[:, t % 6000], speed[:, t % 6000])
+        if t in (9000, 35_999):
+            sizes.append(tracemalloc.get_traced_memory()[0])
+    spent = time.process_time() - started
+    tracemalloc.stop()
+    return [
+        Row("online: memory growth over an hour, 8 vehicles", (sizes[1] - sizes[0]) / 1024.0, "KiB", "lower", 64.0),
+        Row("online: CPU per sample, 8 vehicles (traced)", 1e3 * spent / 36_000, "ms", "lower", 100.0),
+    ]
+
+
+def _mocap6() -> Iterator[tuple[Floats, Ints]]:
+    """Sequences of mocap6: 12 channels and an action per step."""
+    for path in sorted((DATA / "mocap6").glob("*.csv")):
+        with path.open(newline="") as file:
+            rows = list(csv.reader(file))[1:]
+        actions = sorted({row[-1] for row in rows})
+        yield np.array([[float(v) for v in row[2:14]] for row in rows]), np.array([actions.index(row[-1]) for row in rows])
+
+
+def _bee_dance() -> Iterator[tuple[Floats, Ints]]:
+    """Sequences of bee_dance: 3 channels and a segment per frame."""
+    for path in sorted((DATA / "bee_dance").glob("*.csv")):
+        values = np.loadtxt(path, delimiter=",", skiprows=1)
+        yield values[:, 1:4], values[:, 5].astype(np.int64)
+
+
+def _labelled() -> list[Row]:
+    """Labelled recordings; each peer's figure beside ours is the target."""
+    if not DATA.is_dir():
+        return []
+    mocap, bees = list(_mocap6()), list(_bee_dance())
+    moves = [segment_series(x, seed=1) for x, _ in mocap]
+    dances = [segment_series(x, SamplerConfig(emission="autoregressive", order=2), seed=1) for x, _ in bees]
+    rows = []
+    learned = [peers.hmmlearn(x, int(z.max()) + 1) for x, z in mocap]
+    pairs = list(zip(mocap, moves, strict=True))
+    ours = float(np.mean([hamming(z, p.labels) for (_, z), p in pairs]))
+    rows.append(_against("mocap6: Hamming", ours, "lower", {"hmmlearn, true K": _mean(mocap, learned, hamming)}))
+    rivals = {
+        "hmmlearn, true K": _mean(mocap, [None if z is None else changes(z) for z in learned], lambda z, c: f1(changes(z), c, 5)),
+        "ruptures": _mean(mocap, [peers.ruptures(x) for x, _ in mocap], lambda z, c: f1(changes(z), c, 5)),
+    }
+    ours = float(np.mean([f1(changes(z), p.changepoints, 5) for (_, z), p in pairs]))
+    rows.append(_against("mocap6: F1 (5 samples)", ours, "higher", rivals))
+    learned = [peers.hmmlearn(x, 3) for x, _ in bees]
+    rivals = {
+        "hmmlearn, 3 dances": _mean(
+            bees, [None if z is None else changes(z) for z in learned], lambda z, c: f1(changes(z), c, 15)
+        ),
+        "ruptures": _mean(bees, [peers.ruptures(x) for x, _ in bees], lambda z, c: f1(changes(z), c, 15)),
+    }
+    ours = float(np.mean([f1(changes(z), p.changepoints, 15) for (_, z), p in zip(bees, dances, strict=True)]))
+    rows.append(_against("bee_dance: F1 (15 frames), AR(2)", ours, "higher", rivals))
+    return rows
+
+
+def _mean(series: list[tuple[Floats, Ints]], found: list[Ints | None], score: Callable[[Ints, Ints], float]) -> float | None:
+    """Mean score over a set; None if the peer is missing."""
+    scores = [score(z, f) for (_, z), f in zip(series, found, strict=True) if f is not None]
+    return float(np.mean(scores)) if len(scores) == len(series) else None
+
+
+def _against(name: str, ours: float, better: str, rivals: dict[str, float | None]) -> Row:
+    """Return a row whose target is the best rival's figure."""
+    known = [value for value in rivals.values() if value is not None]
+    text = ", ".join(f"{rival} {NOT_INSTALLED if value is None else f'{value:.3f}'}" for rival, value in rivals.items())
+    if better == "lower":
+        return Row(name, ours, "", "lower", min(known) if known else None, text)
+    return Row(name, ours, "", "higher", max(known) if known else None, text)
