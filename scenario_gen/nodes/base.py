@@ -188,7 +188,7 @@ def namespaces(arguments: Sequence[str]) -> list[str | None]:
     rest = remove_ros_args(list(arguments))[1:]
     if any(word != "--namespace" for word in rest[::2]) or len(rest) % 2:
         raise SystemExit(f"usage: {arguments[0]} [--namespace NAME]... [--ros-args ...]")
-    return list(rest[1::2]) or [None]
+    return [name or None for name in rest[1::2]] or [None]
 
 
 def run_nodes(make: Callable[[str | None], Any], arguments: Sequence[str] | None = None) -> int:

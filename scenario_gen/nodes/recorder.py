@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.time import Time
 from std_srvs.srv import Trigger
 
+from msg_conventions.diagnostics import Level, Status, encode_diagnostics
 from msg_conventions.topics import Quality, topic_entry
 from scenario_gen.bags import BagWriter, Split
 from scenario_gen.bags.metadata import qos_yaml
@@ -62,6 +64,8 @@ class Recorder(Node):  # type: ignore[misc]
         self.create_service(Trigger, "~/start", self._start_service)
         self.create_service(Trigger, "~/stop", self._stop_service)
         self.create_timer(0.1, self._look_around)
+        self._counts = self.create_publisher(DiagnosticArray, "/diagnostics", qos(topic_entry("/diagnostics")[1]))
+        self.create_timer(0.5, self._tell_counts)
 
     def autostart(self) -> None:
         """Begin the bag that the parameter names."""
@@ -97,6 +101,13 @@ class Recorder(Node):  # type: ignore[misc]
         for topic, kinds in self.get_topic_names_and_types():
             if topic not in self._listening and topic not in self._refused and wanted.fullmatch(topic):
                 self._listen(topic, kinds[0])
+
+    def _tell_counts(self) -> None:
+        """Say on /diagnostics how many messages of each topic are in the bag."""
+        if self._bag is not None:
+            counts = {topic.name: str(topic.count) for topic in self._bag.info.topics}
+            status = Status(f"{self.get_fully_qualified_name()}: recorded", Level.OK, str(self._bag.folder), counts)
+            self._counts.publish(encode_diagnostics([status], self.get_clock().now().nanoseconds))
 
     def _listen(self, topic: str, kind: str) -> None:
         publishers = self.get_publishers_info_by_topic(topic)

@@ -1,0 +1,37 @@
+"""A ROS domain that nobody else on this machine uses."""
+
+import fcntl
+import socket
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from scenario_gen.errors import RefusedError
+
+DOMAINS = range(1, 102)  # above, the ports would be ephemeral ones
+
+
+def _quiet(domain: int) -> bool:
+    """Say whether the first participant's port of a domain is free (RTPS: 7400 + 250·domain + 10)."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, suppress(OSError):
+        probe.bind(("", 7410 + 250 * domain))
+        return True
+    return False
+
+
+@contextmanager
+def free_domain() -> Iterator[int]:
+    """Hold a domain id: no participant is in it, and no other run of ours takes it meanwhile.
+
+    Raises:
+        RefusedError: none is free.
+    """
+    for domain in reversed(DOMAINS):
+        path = Path(tempfile.gettempdir()) / f"scenario_gen_domain_{domain}.lock"
+        with suppress(OSError), path.open("a") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if _quiet(domain):
+                yield domain
+                return
+    raise RefusedError(f"no free ROS domain among {DOMAINS.start} to {DOMAINS.stop - 1}; end other ROS processes")
