@@ -178,7 +178,8 @@ class CandidateModel:
             for n, v in enumerate(self.vehicles):
                 u = displaced_anchors(v.anchor, v.along, scale.longitudinal * own[n][open_, v.factor.shape[1] :])
                 knot[n][open_] = knots_on(clock[open_], self.clock.times, v.law.layout)
-                lengths = piece_lengths(v.law.layout, paths[n][0][open_], paths[n][1][open_], v.path.spacing, u)
+                curve, arc = paths[n] if len(open_) == samples else (paths[n][0][open_], paths[n][1][open_])
+                lengths = piece_lengths(v.law.layout, curve, arc, v.path.spacing, u)
                 speed[n][open_], ok = self._speeds(v, knot[n][open_], lengths)
                 feasible &= ok
             damping[open_] = damp

@@ -145,6 +145,31 @@ def arc_lengths(curve: Floats, arc: Floats, h: float, u: Floats, out: Floats) ->
             out[s, k] = arc[s, j] + _part(curve[s], j, h, min(max(u[s, k] / h - j, 0.0), 1.0))
 
 
+@kernel(inline=True)
+def _fraction(curve: Floats, j: int, h: float, at: float, length: float) -> float:
+    """Fraction of cell j at which `at` metres of its `length` are behind (Newton: |dp/du| hardly varies in a cell)."""
+    x = at / length
+    for _ in range(3):
+        missing = at - _part(curve, j, h, x)
+        x += missing / (h * _speed(curve, j, h, x))
+        if abs(missing) < 1e-6:  # the next step would change nothing that can be seen
+            break
+    return min(max(x, 0.0), 1.0)
+
+
+@kernel(inline=True)
+def _pose(c: Floats, j: int, h: float, x: float, out: Floats) -> None:
+    """Write x, y and yaw at fraction x of cell j."""
+    y = 1.0 - x
+    p, q, r, w = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x), h * x * y * y, -h * x * x * y
+    for axis in range(2):
+        out[axis] = p * c[j, axis] + q * c[j + 1, axis] + r * c[j, 2 + axis] + w * c[j + 1, 2 + axis]
+    e, f, d = 6.0 * x * y / h, y * (1.0 - 3.0 * x), x * (3.0 * x - 2.0)
+    dx = e * (c[j + 1, 0] - c[j, 0]) + f * c[j, 2] + d * c[j + 1, 2]
+    dy = e * (c[j + 1, 1] - c[j, 1]) + f * c[j, 3] + d * c[j + 1, 3]
+    out[2] = np.arctan2(dy, dx)
+
+
 @kernel(F3, F2, F, F2, F2, F2, I1, OUT3)
 def states(curve: Floats, arc: Floats, h: float, knot: Floats, speed: Floats, time: Floats, count: Ints, out: Floats) -> None:
     """States of one vehicle of every sample at given times.
@@ -161,7 +186,7 @@ def states(curve: Floats, arc: Floats, h: float, knot: Floats, speed: Floats, ti
     """
     g, m = curve.shape[1], knot.shape[1]
     for s in range(curve.shape[0]):
-        i, start, j = 0, 0.0, 0
+        i, j, start, before = 0, 0, 0.0, -1.0
         c = curve[s]
         for k in range(count[s]):
             t = time[s, k]
@@ -178,19 +203,12 @@ def states(curve: Floats, arc: Floats, h: float, knot: Floats, speed: Floats, ti
                 out[s, k, 2] = np.arctan2(c[0, 3], c[0, 2])
                 continue
             at = start + (speed[s, i] + 0.5 * a * since) * since
+            if at == before:  # stands
+                out[s, k, :3] = out[s, k - 1, :3]
+                continue
+            before = at
             while j < g - 2 and at > arc[s, j + 1]:
                 j += 1
             while j > 0 and at < arc[s, j]:
                 j -= 1
-            x = (at - arc[s, j]) / (arc[s, j + 1] - arc[s, j])
-            for _ in range(2):  # Newton; the speed |dp/du| is within a few per cent of constant in a cell
-                x -= (arc[s, j] + _part(c, j, h, x) - at) / (h * _speed(c, j, h, x))
-            x = min(max(x, 0.0), 1.0)
-            y = 1.0 - x
-            p, q, r, w = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x), h * x * y * y, -h * x * x * y
-            for axis in range(2):
-                out[s, k, axis] = p * c[j, axis] + q * c[j + 1, axis] + r * c[j, 2 + axis] + w * c[j + 1, 2 + axis]
-            e, f, d = 6.0 * x * y / h, y * (1.0 - 3.0 * x), x * (3.0 * x - 2.0)
-            dx = e * (c[j + 1, 0] - c[j, 0]) + f * c[j, 2] + d * c[j + 1, 2]
-            dy = e * (c[j + 1, 1] - c[j, 1]) + f * c[j, 3] + d * c[j + 1, 3]
-            out[s, k, 2] = np.arctan2(dy, dx)
+            _pose(c, j, h, _fraction(c, j, h, at - arc[s, j], arc[s, j + 1] - arc[s, j]), out[s, k])

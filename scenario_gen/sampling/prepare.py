@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Encounter
@@ -27,6 +28,7 @@ _LEAST_WAIT = 1.15  # s, to which a fast clock may shorten one
 _STRETCHES = 9
 _CURVE_REACH = 2.0  # m, around a position, in which the route's curvature is looked at
 _CURVE_MARGIN = 0.85  # share of the lateral limit that the route itself may use; the rest is the samples'
+_CURVE_NEAR = 0.7  # a speed above this share of its bound may exceed it in a sample
 _BOUND_ROUNDS = 6
 
 
@@ -147,10 +149,10 @@ def _feasible(
             if slid > most:
                 reasons.append(f"vehicle {name} would have to pass a changepoint {slid:.1f} m from its place")
                 return None
-        tighter = _curve_bounds(path, SpeedProfile(knot[0], speed[0]), lay, config)
-        if tighter is None:
+        needed, kept = _curve_bounds(path, SpeedProfile(knot[0], speed[0]), lay, config)
+        if kept and (len(bounds.interval) or not len(needed.interval)):
             break
-        bounds = tighter
+        bounds = needed
     return _Nominal(law, anchor, slid)
 
 
@@ -165,24 +167,21 @@ def _slide(anchor: Floats, lay: TimeLayout, moved: Floats) -> tuple[Floats, floa
     return slid, float(np.abs(slid - anchor).max())
 
 
-def _curve_bounds(path: BasePath, profile: SpeedProfile, lay: TimeLayout, config: SamplingConfig) -> SpeedBounds | None:
-    """Speed bounds where the route's curvature asks for them; None if the profile keeps to the lateral limit already."""
+def _curve_bounds(path: BasePath, profile: SpeedProfile, lay: TimeLayout, config: SamplingConfig) -> tuple[SpeedBounds, bool]:
+    """Speed bounds wherever the route's curvature might ask for them, and whether the profile itself keeps to the limit."""
     if len(path.node) == 1:
-        return None
+        return SpeedBounds.none(), True
     bend = np.abs(path.curvature)
-    reach = int(np.ceil(_CURVE_REACH / path.spacing))
-    wide = np.array([bend[max(0, j - reach) : j + reach + 1].max() for j in range(len(bend))])
+    wide = maximum_filter1d(bend, 2 * int(np.ceil(_CURVE_REACH / path.spacing)) + 1, mode="nearest")
     limit = _CURVE_MARGIN * config.max_lateral_acceleration
-    fine = np.linspace(profile.time[0], profile.time[-1], 20 * len(lay.knot))
-    s, v, _ = profile.state(fine)
-    if (v**2 * np.interp(s, path.arc, bend)).max() <= limit * 1.02:
-        return None
+    s, v, _ = profile.state(np.linspace(profile.time[0], profile.time[-1], 20 * len(lay.knot)))
+    kept = bool((v**2 * np.interp(s, path.arc, bend)).max() <= limit * 1.02)
     moving = np.flatnonzero(~lay.still)
     interval, at = np.repeat(moving, 4), np.tile(np.arange(1, 5) / 4.0, len(moving))
-    t = profile.time[interval] + at * np.diff(profile.time)[interval]
-    most = np.sqrt(limit / np.maximum(np.interp(profile.state(t)[0], path.arc, wide), 1e-6))
-    given = ~((at == 1.0) & (lay.unknown[interval + 1] < 0))
-    return SpeedBounds(interval[given], at[given], most[given])
+    s, v, _ = profile.state(profile.time[interval] + at * np.diff(profile.time)[interval])
+    most = np.sqrt(limit / np.maximum(np.interp(s, path.arc, wide), 1e-6))
+    needed = ~((at == 1.0) & (lay.unknown[interval + 1] < 0)) & (v > _CURVE_NEAR * most)
+    return SpeedBounds(interval[needed], at[needed], most[needed]), kept
 
 
 def _model(
