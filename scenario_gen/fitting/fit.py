@@ -71,7 +71,7 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         reasons.append(f"in its own frame, {error}")
     if own is not None and share >= _AT_HOME:
         return own
-    if is_laned(road, tracks):
+    if is_laned(road):
         order, reasons = ("lanes", "junction"), []
     elif own is not None and share >= _NEAR_HOME:
         return own

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.arrays import Floats, frozen, wrap_angle
+from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.fitting.placement import Placement, check_scale, kept_apart
@@ -87,9 +88,9 @@ def place_at_junction(tracks: tuple[Track, ...], road: Road, config: FittingConf
     raise RefusedError(f"the template does not fit the ways of road {road.name}: {reasons[0]}")
 
 
-def is_laned(road: Road, tracks: tuple[Track, ...]) -> bool:
-    """True if a route can be drawn from every entry: the road's entries and exits are lanes that explain it."""
-    ways = _all_ways(tracks, road)
+def is_laned(road: Road) -> bool:
+    """True if a route for a car can be drawn from every entry: the road's entries and exits are lanes that explain it."""
+    ways = _all_ways(Vehicle("car"), road, u_turns=False)
     return len(road.entries) > 0 and {way.entry for way in ways} == set(range(len(road.entries)))
 
 
@@ -112,18 +113,15 @@ def _why_not(choice: _Choice, scale: float) -> str:
 
 def _ways(tracks: tuple[Track, ...], road: Road) -> list[list[_Way]]:
     """The drawn routes that suit each vehicle's turning."""
-    everything = _all_ways(tracks, road)
-    return [[way for way in everything if _suits(track, way)] for track in tracks]
+    everything = [_all_ways(track.vehicle, road, u_turns=track.makes_u_turn) for track in tracks]
+    return [[way for way in own if _suits(track, way)] for track, own in zip(tracks, everything, strict=True)]
 
 
-def _all_ways(tracks: tuple[Track, ...], road: Road) -> list[_Way]:
-    length, width = max(t.vehicle.length for t in tracks), max(t.vehicle.width for t in tracks)
-
+def _all_ways(vehicle: Vehicle, road: Road, *, u_turns: bool) -> list[_Way]:
     def fits(poses: Floats) -> bool:
-        return bool(footprint_fits(road, poses, length, width).all())
+        return bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all())
 
     everything: list[_Way] = []
-    u_turns = any(track.makes_u_turn for track in tracks)
     for e, entry in enumerate(road.entries):
         for x, leave in enumerate(road.exits):
             curve = draw_route(entry, leave, fits)

@@ -14,6 +14,9 @@ _ROOM = 6.0  # metres kept free behind the first and before the last footprint
 _SLACK = 12.0  # metres by which a junction's geometry may differ from the template's
 _SHORTEST = 30.0
 _U_TURN = 9.3  # metres between the lanes of a U-turn
+_SAME_WAY = np.radians(25.0)
+_LANE_GAP = 2.0  # metres sideways that make another lane
+_WIDEST = 12.0
 _PLAIN = 60.0  # metres: an arm when there is no template
 
 
@@ -76,14 +79,13 @@ def _at_a_junction(tracks: tuple[Track, ...], config: RoadConfig) -> Layout:
 
 
 def _parallel_lanes(tracks: tuple[Track, ...]) -> int:
-    """The most vehicles side by side, heading the same way, at any instant."""
-    poses = np.stack([track.poses for track in tracks])
+    """The most lanes in which vehicles come or leave the same way, by how far beside one's path others start or end."""
     most = 1
-    for i in range(len(tracks)):
-        rel = poses[:, :, :2] - poses[i, :, :2]
-        cos, sin = np.cos(poses[i, :, 2]), np.sin(poses[i, :, 2])
-        ahead, left = rel[..., 0] * cos + rel[..., 1] * sin, rel[..., 1] * cos - rel[..., 0] * sin
-        same = np.cos(poses[:, :, 2] - poses[i, :, 2]) > np.cos(np.radians(30.0))
-        beside = same & (np.abs(ahead) < tracks[i].vehicle.length) & (np.abs(left) > 1.0) & (np.abs(left) < 12.0)
-        most = max(most, 1 + int(beside.sum(axis=0).max()))
+    for k in (0, -1):
+        poses = np.stack([track.poses[k] for track in tracks])
+        for track in tracks:
+            station, offset = track.curve.project(poses[:, :2])
+            same = (np.cos(poses[:, 2] - track.curve.at(station)[:, 2]) > np.cos(_SAME_WAY)) & (np.abs(offset) < _WIDEST)
+            gaps = np.diff(np.sort(offset[same]))
+            most = max(most, 1 + int((gaps > _LANE_GAP).sum()))
     return most

@@ -16,6 +16,7 @@ from scenario_gen.roads.tracks import Track, smoothing_spline
 _ALONG = np.radians(50.0)  # a vehicle along the road is never turned from it by more
 _SAME_LANE = 1.75  # metres of offset within which two vehicles may share a lane
 _LANE_CHANGE = 2.1  # metres of offset between start and end that make a lane change
+_LINE = 20.0  # metres: the reference line is smoothed over this wavelength
 _STEADY = 150.0  # metres: what projection adds is smoothed over this wavelength
 _BUMPER = 1.0  # metres kept between two footprints that share a lane
 
@@ -96,7 +97,8 @@ def _reference_line(tracks: tuple[Track, ...]) -> tuple[Curve, Ints]:
         direction[i] = -1 if against else 1
         if not tracks[i].still:
             line = _extended(line, curve.reversed() if against else curve)
-    return line, direction
+    _, smooth = smoothing_spline(line.station, line.points[:, :2], _LINE)
+    return Curve.through(smooth), direction
 
 
 def _extended(line: Curve, other: Curve) -> Curve:
