@@ -38,6 +38,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     """
 
     INPUTS: tuple[str, ...] = ()
+    OUTPUTS: tuple[str, ...] = ()  # announced while configuring, so that listeners are there before the first message
     KERNELS = True  # the stage has compiled kernels
 
     def __init__(self, name: str, config: Any, namespace: str | None = None) -> None:
@@ -87,11 +88,14 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     def send(self, topic: str, data: bytes) -> None:
         """Publish the CDR bytes of a topic of the suite."""
+        self._announce(topic)
+        if self.context.ok():
+            self._raw_publishers[topic].publish(data)
+
+    def _announce(self, topic: str) -> None:
         if topic not in self._raw_publishers:
             kind, quality = topic_entry(topic)
             self._raw_publishers[topic] = self.create_publisher(message_class(kind), topic, qos(quality))
-        if self.context.ok():
-            self._raw_publishers[topic].publish(data)
 
     def work(self, name: str, job: Job) -> None:
         """Run a job off the executor's thread; a waiting one of the same name is replaced, a running one cancelled."""
@@ -115,10 +119,12 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     # --- lifecycle --------------------------------------------------------------------------------------------
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Compile the kernels, or load them from the cache."""
+        """Compile the kernels, or load them from the cache, and announce the outputs."""
         if self.KERNELS:
             count, seconds = compile_kernels()
             self.get_logger().info(f"{count} kernels ready after {seconds:.1f} s")
+        for topic in ("/diagnostics", *self.OUTPUTS):
+            self._announce(topic)
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -49,6 +49,7 @@ class GpSampler(StageNode):
     """Samples valid scenarios around the planned routes."""
 
     INPUTS = ("map", "tracks", "changepoints", "fit")
+    OUTPUTS = ("scenarios", "scenarios/info", "markers")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("gp_sampler", Config(), namespace)

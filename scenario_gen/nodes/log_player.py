@@ -29,6 +29,7 @@ class Config:
 class LogPlayer(StageNode):
     """Reads a log and publishes the encounter that is asked for."""
 
+    OUTPUTS = ("tracks",)
     KERNELS = False
 
     def __init__(self, namespace: str | None = None) -> None:

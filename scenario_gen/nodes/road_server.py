@@ -58,6 +58,7 @@ class RoadServer(StageNode):
     """Serves one road at a time."""
 
     INPUTS = ("tracks",)
+    OUTPUTS = ("map", "road/entries", "road/exits")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("road_server", Config(), namespace)

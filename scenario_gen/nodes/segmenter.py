@@ -28,6 +28,7 @@ class Segmenter(StageNode):
     """Finds the driving primitives of every encounter it hears."""
 
     INPUTS = ("tracks",)
+    OUTPUTS = ("changepoints", "posterior")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("segmenter", Config(), namespace)
