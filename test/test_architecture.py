@@ -24,7 +24,8 @@ ORDER = (
     ("evaluation",),
     ("pipeline",),
     ("bags",),
-    ("nodes", "cli", "demo", "doctor"),
+    ("results",),
+    ("nodes", "cli"),
 )
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])

@@ -1,0 +1,89 @@
+"""The main job on every recorded encounter: valid new scenarios on at least two roads, re-checked by independent means."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracle import oracle_violations
+
+from scenario_gen.errors import RefusedError
+from scenario_gen.evaluation import WITH, WITHOUT, Case
+from scenario_gen.interaction import find_conflicts, find_waits
+from scenario_gen.logs import read_log
+from scenario_gen.pipeline import PipelineConfig, generate
+
+DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+ENCOUNTERS = sorted((DATA / "trajectories").glob("*/encounter_*.csv"))
+ROADS = ("corridor", "four_way", "t_intersection", "straight")
+OWN_MAPS = ("USA_Lanker-2_13_T-1", "USA_Peach-4_2_T-1")
+COUNT = 50
+CONFIG = PipelineConfig()
+
+
+def test_the_recorded_encounters_are_there(data):
+    assert len(ENCOUNTERS) >= 9, data
+
+
+def recheck(case: Case) -> list[str]:
+    """Return what the independent oracle finds wrong with the published scenarios."""
+    encounter = case.encounter
+    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
+    waits = find_waits(encounter)
+    return [
+        f"scenario {scenario.index}: {violation}"
+        for scenario in case.with_changepoints.scenarios
+        for violation in oracle_violations(scenario, case.road, case.fit.asked, conflicts, waits, CONFIG.limits, dt=0.02)
+    ]
+
+
+def assert_sound(case: Case) -> None:
+    """The claims that hold for every generated set."""
+    made = case.with_changepoints
+    assert len(made.scenarios) == COUNT, made.refused
+    assert made.candidates == COUNT + sum(made.refused.values())
+    assert recheck(case) == []
+    assert len(case.segmentation.changepoints) <= case.encounter.duration / 2.0
+    for figure in ("e_position", "e_speed"):
+        with_, without = case.evaluation.value(WITH, figure), case.evaluation.value(WITHOUT, figure)
+        if without >= 0.03:
+            assert with_ < without, f"{figure}: {with_:.3f} with, {without:.3f} without changepoints on {case.road.name}"
+
+
+@pytest.mark.data()
+@pytest.mark.parametrize("path", ENCOUNTERS, ids=lambda path: path.stem)
+def test_generates_valid_scenarios_on_at_least_two_roads(path, data):
+    (encounter,) = read_log(path).encounters
+    done, refusals = [], []
+    for road in ROADS:
+        try:
+            case = generate(encounter, road, CONFIG, count=COUNT, seed=7)
+        except RefusedError as refusal:
+            refusals.append(f"{road}: {refusal}")
+            continue
+        assert_sound(case)
+        done.append(road)
+        if len(done) == 2:
+            break
+    assert len(done) == 2, refusals
+
+
+@pytest.mark.data()
+@pytest.mark.parametrize("path", [p for p in ENCOUNTERS if p.parent.name.startswith("ngsim")], ids=lambda path: path.stem)
+def test_ngsim_encounters_run_on_their_own_recorded_map(path, data):
+    (encounter,) = read_log(path).encounters
+    name = next(name for name in OWN_MAPS if name.split("-")[0].removeprefix("USA_") in path.stem)
+    case = generate(encounter, str(data / "maps" / "occupancy_grids" / f"{name}.yaml"), CONFIG, count=COUNT, seed=7)
+    assert_sound(case)
+
+
+@pytest.mark.data()
+def test_same_seed_same_scenarios_and_another_seed_others(data):
+    path = next(path for path in ENCOUNTERS if "encounter_b" in path.name)
+    (encounter,) = read_log(path).encounters
+    first, again, other = (generate(encounter, "corridor", CONFIG, count=3, seed=seed) for seed in (7, 7, 8))
+    for a, b, c in zip(
+        first.with_changepoints.scenarios, again.with_changepoints.scenarios, other.with_changepoints.scenarios, strict=True
+    ):
+        assert a.position.tobytes() == b.position.tobytes() and a.speed.tobytes() == b.speed.tobytes()
+        assert a.position.shape != c.position.shape or not np.array_equal(a.position, c.position)
