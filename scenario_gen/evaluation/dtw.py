@@ -235,8 +235,8 @@ def mean_feature(a: Floats, b: Floats, distance: Distance = "euclidean") -> Floa
     return mean
 
 
-def blocks(n: int, width: int, budget: int = 2_000_000) -> list[range]:
-    """Cut n rows of `width` numbers into ranges of at most `budget` numbers (16 MB), at least one row each."""
+def blocks(n: int, width: int, budget: int = 400_000) -> list[range]:
+    """Cut n rows of `width` numbers into ranges of at most `budget` numbers (3 MB), at least one row each."""
     step = max(1, budget // max(width, 1))
     return [range(first, min(n, first + step)) for first in range(0, n, step)]
 

@@ -23,6 +23,8 @@ from scenario_gen.segmentation.result import Segmentation
 
 WITH, WITHOUT, ORACLE = "with changepoints", "without changepoints", "oracle"
 """Names of the rows that the report looks for in an evaluation."""
+SIGNIFICANT = 0.03
+"""Below this, E without changepoints leaves nothing to gain and the case is not counted."""
 MAX_SAMPLES = 50
 """Scenarios of each arm that a page draws; the figures count all."""
 
@@ -99,6 +101,7 @@ def render(report: ReportInput) -> str:
         report=report,
         views=views,
         verdict=_verdict(views),
+        significant=SIGNIFICANT,
         facts=[fact for fact in report.provenance.items() if not _is_parameter(fact[0])],
         parameters=[fact for fact in report.provenance.items() if _is_parameter(fact[0])],
         css=Markup(asset("report.css")),
@@ -163,7 +166,7 @@ def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     for view in views:
         for key, found in better.items():
             one, other = view["errors"][WITH, key], view["errors"][WITHOUT, key]
-            if one is not None and other is not None and other.value >= 0.03:
+            if one is not None and other is not None and other.value >= SIGNIFICANT:
                 found.append(one.value < other.value)
     sets = [view["case"].with_changepoints for view in views]
     return {

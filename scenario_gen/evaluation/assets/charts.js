@@ -86,7 +86,7 @@ function drawFeature(place, text, duration, vehicles) {
   const z = Array.from({ length: side }, (_, i) => Array.from(bytes.subarray(i * side, (i + 1) * side), (v) => +(v / 255).toFixed(3)));
   const time = Array.from({ length: side }, (_, i) => +((duration * i) / (side - 1)).toFixed(2));
   const trace = {
-    type: "heatmap", x: time, y: time, z, zmin: 0, zmax: 1, colorscale: HEAT, showscale: false,
+    type: "heatmap", x: time, y: time, z, zmin: 0, zmax: 1, colorscale: HEAT, zsmooth: "fast", showscale: false,
     hovertemplate: "%{y:.1f} s, %{x:.1f} s: %{z:.2f}<extra></extra>",
   };
   const short = (name) => (name.length > 9 ? `${name.slice(0, 8)}…` : name);

@@ -29,6 +29,7 @@ class Player {
     this.find = (role) => section.querySelector(`[data-role="${role}"]`);
     this.view = new View(this.find("stage"), box, 8);
     this.whole = this.view.box;
+    this.find("follow").checked = Math.max(box[2] - box[0], box[3] - box[1]) > 160; // from farther away a car is a dot
     this.time = 0;
     this.playing = false;
     this.arm = sets.with ? "with" : Object.keys(sets)[0];

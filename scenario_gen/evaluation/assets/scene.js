@@ -90,6 +90,7 @@ class View {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
     this.box = [box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin];
+    canvas.style.aspectRatio = `${this.box[2] - this.box[0]} / ${this.box[3] - this.box[1]}`; // within the bounds of the style sheet
   }
 
   /** Fit the canvas to its place on the page and clear it. */
