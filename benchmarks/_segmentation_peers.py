@@ -21,7 +21,7 @@ def standardised(x: Floats) -> Floats:
 
 
 def jax_moseq(x: Floats, sweeps: int, seed: int = 0, states: int = 20) -> tuple[Ints, float] | None:
-    """Gaussian sticky HDP-HMM from jax-moseq's Gibbs steps (its concentrations stay fixed); labels and CPU seconds without JIT."""
+    """Gaussian sticky HDP-HMM of jax-moseq's Gibbs steps (concentrations fixed): labels, and CPU seconds without compilation."""
     if not installed("jax_moseq"):
         return None
     import jax

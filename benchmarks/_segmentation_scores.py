@@ -51,4 +51,5 @@ def smoother(sequence: Labelled) -> Ints:
     for t in range(len(likelihood) - 2, -1, -1):
         backward[t] = sequence.transition @ (likelihood[t + 1] * backward[t + 1])
         backward[t] /= backward[t].sum()
-    return (forward * backward).argmax(axis=1).astype(np.int64)
+    best: Ints = (forward * backward).argmax(axis=1).astype(np.int64)
+    return best

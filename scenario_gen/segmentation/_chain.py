@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.kernels import F1, F2, I1, OUT2, OUT3, OUTI2, I, kernel
+from scenario_gen.kernels import F1, F2, I1, OUT1, OUT2, OUT3, OUTI2, I, kernel
 from scenario_gen.segmentation._emission import (
     BLOCK,
     accumulate,
@@ -221,7 +221,7 @@ def log_transitions(n: Ints, top: Floats, beta: Floats) -> float:
     return value
 
 
-@kernel(F2, F2, I1, F2, F1, I1, F1, I, I, I, OUTI2, OUT2, OUT3)
+@kernel(F2, F2, I1, F2, F1, I1, OUT1, I, I, I, OUTI2, OUT2, OUT3)
 def run_chain(
     v: Floats,
     vt: Floats,
@@ -229,7 +229,7 @@ def run_chain(
     g0: Floats,
     hyper: Floats,
     start: Ints,
-    start_top: Floats,
+    top: Floats,
     regressors: int,
     seed: int,
     burn: int,
@@ -246,7 +246,7 @@ def run_chain(
         g0: (M, M) joint prior of the emissions.
         hyper: hyperpriors (see HYPER), then ν0, the weight of a sample, and the blur of each of the D channels.
         start: (T,) labels to start from, 0 .. L - 1.
-        start_top: (γ, α+κ, ρ) to start from.
+        top: (3 + L,) γ, α+κ, ρ and β to start from; updated.
         regressors: P.
         seed: any integer.
         burn: sweeps that are run before the first row of `samples` is kept.
@@ -262,12 +262,11 @@ def run_chain(
     state = np.empty(1, np.uint64)
     state[0] = np.uint64(seed)
     labels = start.copy()
-    top = start_top.copy()
     g = np.empty((states, m, m))
     counts = np.empty(states, np.int64)
     n = np.empty((states + 1, states), np.int64)
     pi = np.empty((states + 1, states))
-    beta = np.full(states, 1.0 / states)
+    beta = top[3:]
     logdet = np.empty(states)
     w = np.empty((t_max, states))
     factor = g0.copy()

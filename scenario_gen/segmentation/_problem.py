@@ -13,7 +13,7 @@ from scenario_gen.segmentation._merge import merge_states
 if TYPE_CHECKING:
     from scenario_gen.segmentation.series import SamplerConfig
 
-START = np.array([1.0, 50.0, 0.9])
+START = (1.0, 50.0, 0.9)
 MERGE_ROWS = (40.0, 0.1)
 
 
@@ -119,7 +119,8 @@ class Problem:
         emissions = np.empty((config.states, self.dimensions, self.v.shape[1]))
         hyper = np.concatenate([config.hyper, [prior.nu, self.weight], self.blur])
         g0 = joint_prior(self.mean, self.precision, prior.scale)
-        run_chain(self.v, self.vt, self.ends, g0, hyper, labels, START, self.regressors, seed, burn, samples, trace, emissions)
+        top = np.concatenate([START, np.full(config.states, 1.0 / config.states)])
+        run_chain(self.v, self.vt, self.ends, g0, hyper, labels, top, self.regressors, seed, burn, samples, trace, emissions)
         return samples, trace[burn:]
 
     def merge(self, config: "SamplerConfig", prior: Prior, labels: Ints) -> tuple[float, Ints]:

@@ -1,0 +1,109 @@
+"""The sampler samples what it says: Geweke's joint-distribution test, and calibration on sequences from the model's own prior."""
+
+import numpy as np
+import pytest
+
+from scenario_gen.segmentation._chain import run_chain
+from scenario_gen.segmentation._emission import joint_prior
+
+HYPER = np.array([3.0, 1.0, 6.0, 0.5, 4.0, 2.0])
+NU = 8.0
+STATES = 4
+
+
+def draw_prior(rng, samples, d, order):
+    """Draw concentrations, transitions, emissions, labels and a series from the model; returns labels, x, top, means, scales."""
+    gamma, total, rho = rng.gamma(HYPER[0]) / HYPER[1], rng.gamma(HYPER[2]) / HYPER[3], rng.beta(HYPER[4], HYPER[5])
+    beta = np.maximum(rng.dirichlet(np.full(STATES, gamma / STATES)), 1e-12)
+    own = rho * total * np.eye(STATES)
+    pi = np.array([rng.dirichlet(np.maximum((1 - rho) * total * beta + own[j], 1e-9)) for j in range(STATES)])
+    first = rng.dirichlet(np.maximum((1 - rho) * total * beta, 1e-9))
+    labels = np.empty(samples, np.int64)
+    labels[0] = rng.choice(STATES, p=first)
+    for t in range(1, samples):
+        labels[t] = rng.choice(STATES, p=pi[labels[t - 1]])
+    p = 1 + order * d
+    bartlett = np.zeros((STATES, d, d))
+    for k in range(STATES):
+        for i in range(d):
+            bartlett[k, i, i] = np.sqrt(rng.chisquare(NU - i))
+            bartlett[k, i, :i] = rng.normal(size=i)
+    scale_root = np.linalg.cholesky(prior(d, order)[2])
+    roots = np.array([scale_root @ np.linalg.inv(b).T for b in bartlett])
+    mean, precision, _ = prior(d, order)
+    column_root = np.linalg.inv(np.linalg.cholesky(precision))
+    regressions = np.array([mean + root @ rng.normal(size=(d, p)) @ column_root for root in roots])
+    return labels, regressions, roots, np.concatenate([[gamma, total, rho], beta])
+
+
+def prior(d, order):
+    """Mean M, precision K and scale S0 of the emissions."""
+    p = 1 + order * d
+    mean = np.zeros((d, p))
+    if order:
+        mean[:, 1:] = 0.5 * np.eye(d)
+    return mean, np.diag([0.5] + [40.0] * (p - 1)), np.eye(d) * 4.0 + 0.5
+
+
+def draw_series(rng, labels, regressions, roots, order):
+    """Rows v = (regressors, sample) of a series given labels and emissions; a past before the first sample is zero."""
+    d = roots.shape[1]
+    past = np.zeros(d)
+    rows = []
+    for k in labels:
+        z = np.concatenate([[1.0], past]) if order else np.ones(1)
+        x = regressions[k] @ z + roots[k] @ rng.normal(size=d)
+        rows.append(np.concatenate([z, x]))
+        past = x
+    return np.array(rows)
+
+
+def gibbs(v, labels, top, d, order, seed):
+    """One sweep of the chain; returns labels, concentrations and the emissions' coefficients."""
+    mean, precision, scale = prior(d, order)
+    hyper = np.concatenate([HYPER, [NU, 1.0], np.zeros(d)])
+    samples, trace, emissions = np.empty((1, len(v)), np.int64), np.empty((1, 5)), np.empty((STATES, d, v.shape[1]))
+    g0 = joint_prior(mean, precision, scale)
+    vt = np.ascontiguousarray(v.T)
+    top = top.copy()
+    run_chain(v, vt, np.array([len(v)]), g0, hyper, labels, top, 1 + order * d, seed, 0, samples, trace, emissions)
+    whitening = emissions[:, :, 1 + order * d :]
+    regressions = np.linalg.solve(whitening, -emissions[:, :, : 1 + order * d])
+    return samples[0], top, regressions, np.linalg.inv(whitening)
+
+
+def statistics(labels, v, top, d):
+    """What both ways of drawing must agree on."""
+    y = v[:, -d:]
+    return [
+        np.log(top[0]),
+        np.log(top[1]),
+        top[2],
+        len(np.unique(labels)),
+        (np.diff(labels) != 0).mean(),
+        np.tanh(y[:, 0].mean()),
+        np.log((y**2).mean()),
+        np.tanh((y[1:, 0] * y[:-1, 0]).mean()),
+    ]
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_geweke(order):
+    """Prior draws and the chain (labels, parameters | series) <-> (series | labels, parameters) have the same moments."""
+    d, samples, draws = 2, 12, 2500
+    rng = np.random.default_rng([11, order])
+    forward = []
+    for _ in range(draws):
+        labels, regressions, roots, top = draw_prior(rng, samples, d, order)
+        forward.append(statistics(labels, draw_series(rng, labels, regressions, roots, order), top, d))
+    labels, regressions, roots, top = draw_prior(rng, samples, d, order)
+    chain = []
+    for sweep in range(4 * draws):
+        v = draw_series(rng, labels, regressions, roots, order)
+        labels, top, regressions, roots = gibbs(v, labels, top, d, order, 1000 + sweep)
+        chain.append(statistics(labels, v, top, d))
+    forward, chain = np.array(forward), np.array(chain)
+    batches = chain[: len(chain) // 50 * 50].reshape(50, -1, chain.shape[1]).mean(axis=1)
+    error = np.sqrt(forward.var(axis=0) / len(forward) + batches.var(axis=0) / len(batches))
+    z = (forward.mean(axis=0) - chain.mean(axis=0)) / error
+    assert np.abs(z).max() < 4.0, z
