@@ -1,0 +1,68 @@
+"""The evaluation of any bag that keeps the conventions of the suite, ours or not."""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from msg_conventions.changepoints import decode_changepoints
+from msg_conventions.roads import decode_map
+from msg_conventions.scenarios import decode_scenario
+from msg_conventions.tracks import decode_tracks
+from scenario_gen.bags.reader import read_messages
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+from scenario_gen.evaluation import CheckCounts, Evaluation, EvaluationConfig, evaluate
+from scenario_gen.interaction import find_conflicts, find_waits
+from scenario_gen.segmentation import Segmentation
+from scenario_gen.validity import Checker, Limits
+
+TOPICS = ("tracks", "changepoints", "map", "scenarios")
+SCENARIOS = "scenarios"
+
+
+def evaluate_bag(
+    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0
+) -> tuple[Evaluation, ...]:
+    """Evaluate every namespace of a bag that holds both `tracks` and `scenarios`.
+
+    The scenarios are checked anew, on the bag's map if it has one. What the bag does not say is left out: without
+    `changepoints` K counts as 0; start and end states are not asked.
+
+    Raises:
+        InputError: the bag is missing or damaged, or no namespace has both topics.
+    """
+    found: dict[str, dict[str, list[bytes]]] = defaultdict(lambda: defaultdict(list))
+    for message in read_messages(path, lambda topic: topic.rpartition("/")[2] in TOPICS):
+        namespace, _, topic = message.topic.rpartition("/")
+        found[namespace][topic].append(message.data)
+    whole = {name: topics for name, topics in sorted(found.items()) if topics["tracks"] and topics[SCENARIOS]}
+    if not whole:
+        raise InputError(f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare")
+    return tuple(
+        _evaluate(f"{path.stem}{name}", name, topics, config or EvaluationConfig(), limits, seed)
+        for name, topics in whole.items()
+    )
+
+
+def _evaluate(
+    name: str, namespace: str, topics: Mapping[str, Sequence[bytes]], config: EvaluationConfig, limits: Limits | None, seed: int
+) -> Evaluation:
+    encounter = decode_tracks(topics["tracks"][-1], name)
+    segmentation = _segmentation(encounter, topics["changepoints"], f"{namespace}/changepoints")
+    road = decode_map(topics["map"][-1], name=f"{namespace}/map")[1] if topics["map"] else None
+    scenarios = [decode_scenario(data, index=k, what=f"{namespace}/{SCENARIOS}")[1] for k, data in enumerate(topics[SCENARIOS])]
+    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
+    waits = find_waits(encounter) if segmentation.changepoints.size else ()
+    counts = CheckCounts.of_verdicts(Checker(road, None, conflicts, waits, limits).check(scenarios))
+    rows, checks = {SCENARIOS: scenarios}, {SCENARIOS: counts}
+    return evaluate(encounter, segmentation, rows, checks=checks, road=road.name if road else "", config=config, seed=seed)
+
+
+def _segmentation(encounter: Encounter, messages: Sequence[bytes], what: str) -> Segmentation:
+    if messages:
+        return decode_changepoints(messages[-1], encounter, what)
+    steps = len(encounter.time)
+    none = np.zeros(0, dtype=np.int64)
+    return Segmentation(np.zeros(steps, dtype=np.int64), none, np.zeros(steps), ("the whole encounter",))
