@@ -44,11 +44,14 @@ def draw(name: str, layout: Layout, config: RoadConfig) -> Road:
     half = layout.lanes * config.lane_width
     reach = {arm: layout.main if arm in ("west", "east") else layout.side for arm in arms}
     verge = layout.side if config.paper else half + _VERGE
-    low = np.array([-reach["west"], -reach.get("south", verge)])
+    cell = config.resolution
+    low = -half - cell * np.ceil(
+        (np.array([reach["west"], reach.get("south", verge)]) - half) / cell - 1e-6
+    )  # kerbs on cell edges
     high = np.array([reach["east"], reach.get("north", verge)])
-    cells = np.ceil((high - low) / config.resolution - 1e-9).astype(np.int64)
-    x = low[0] + (np.arange(cells[0]) + 0.5) * config.resolution
-    y = low[1] + (np.arange(cells[1]) + 0.5) * config.resolution
+    cells = np.ceil((high - low) / cell - 1e-6).astype(np.int64)
+    x = low[0] + (np.arange(cells[0]) + 0.5) * cell
+    y = low[1] + (np.arange(cells[1]) + 0.5) * cell
     drivable = np.repeat(np.abs(y)[:, None] < half, len(x), axis=1)
     for arm in arms:
         if arm in ("south", "north"):

@@ -57,7 +57,7 @@ def unroll(tracks: tuple[Track, ...]) -> Unrolled:
                 f"vehicle {track.vehicle.id} turns {'left' if turn > 0 else 'right'} by {abs(turn):.0f}° within 30 m: "
                 f"that is a junction's manoeuvre, not one along a road"
             )
-    line, direction = _reference_line(tracks)
+    line, direction = min((_reference_line(tracks, base) for base in _bases(tracks)), key=lambda found: _restless(tracks, *found))
     station, offset = np.empty((len(tracks), len(tracks[0].progress))), np.empty((len(tracks), len(tracks[0].progress)))
     for i, track in enumerate(tracks):
         poses = track.poses
@@ -85,10 +85,28 @@ def _steadied(track: Track, along: Floats) -> Floats:
     return np.maximum.accumulate(track.progress + np.interp(track.progress, grid, extra[:, 0]))
 
 
-def _reference_line(tracks: tuple[Track, ...]) -> tuple[Curve, Ints]:
-    """The longest path, extended at both ends by the parts of the others that reach beyond it."""
+def _bases(tracks: tuple[Track, ...]) -> list[int]:
+    """Vehicles whose path could be the reference: long enough, the longest first."""
     order = sorted(range(len(tracks)), key=lambda i: -tracks[i].travelled)
-    line = tracks[order[0]].curve
+    return [i for i in order if tracks[i].travelled >= tracks[order[0]].travelled / 2.0]
+
+
+def _restless(tracks: tuple[Track, ...], line: Curve, direction: Ints) -> tuple[int, float]:
+    """How many vehicles change lanes as seen from a line, and how much the line itself turns, per metre.
+
+    Seen from the path of a vehicle that changes lanes, all others seem to do so.
+    """
+    changes = 0
+    for track in tracks:
+        _, offset = line.project(track.poses[:: max(len(track.progress) // 20, 1), :2])
+        changes += bool(abs(offset[-2:].mean() - offset[:2].mean()) > _LANE_CHANGE)
+    return changes, round(float(np.abs(np.diff(line.points[:, 2])).sum() / line.length), 6)
+
+
+def _reference_line(tracks: tuple[Track, ...], base: int) -> tuple[Curve, Ints]:
+    """One vehicle's path, extended at both ends by the parts of the others that reach beyond it."""
+    order = [base, *sorted((i for i in range(len(tracks)) if i != base), key=lambda i: -tracks[i].travelled)]
+    line = tracks[base].curve
     direction = np.ones(len(tracks), dtype=np.int64)
     for i in order[1:]:
         curve = tracks[i].curve

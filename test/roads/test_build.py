@@ -1,0 +1,80 @@
+"""Built-in roads and the corridor: lanes, entries, exits, sizes."""
+
+import numpy as np
+import pytest
+
+from scenario_gen.errors import InputError
+from scenario_gen.logs import read_log
+from scenario_gen.roads import RoadConfig, build_road
+from scenario_gen.roads.clearance import footprint_fits
+from scenario_gen.roads.own_paths import own_paths
+from scenario_gen.roads.separation import smallest_gaps
+
+ARMS = {"straight": 2, "t_intersection": 3, "four_way": 4}
+
+
+@pytest.mark.parametrize("name", list(ARMS))
+@pytest.mark.parametrize("lanes", [1, 2])
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_one_entry_and_one_exit_per_lane_on_the_right_side(name, lanes, side):
+    road = build_road(name, None, RoadConfig(lanes=lanes, traffic_side=side))
+    assert len(road.entries) == len(road.exits) == ARMS[name] * lanes
+    width, height = road.drivable.shape[1] * 0.2, road.drivable.shape[0] * 0.2
+    for poses, sign in ((road.entries, 1.0), (road.exits, -1.0)):
+        for x, y, yaw in poses:
+            inward = np.array([np.cos(yaw), np.sin(yaw)]) * sign
+            at_edge = min(x, y, abs(width - x), abs(height - y))
+            assert at_edge < 0.3
+            inside = np.array([x, y]) + inward * 3.0
+            assert footprint_fits(road, np.array([[*inside, yaw]]), 4.8, 1.9)[0]
+            assert not footprint_fits(road, np.array([[*(inside - inward * 6.0), yaw]]), 4.8, 1.9)[0]
+    # two vehicles that meet on the same road pass on the agreed side of each other
+    entry, leave = road.entries[0], next(x for x in road.exits if abs(np.cos(x[2] - road.entries[0][2]) + 1.0) < 1e-6)
+    left = -np.sin(entry[2]) * (leave[0] - entry[0]) + np.cos(entry[2]) * (leave[1] - entry[1])
+    assert (left > 0.0) == (side == "right")
+
+
+@pytest.mark.parametrize("name", ["t_intersection", "four_way"])
+def test_corners_are_rounded_with_the_asked_radius(name):
+    sharp = build_road(name, None, RoadConfig(lanes=1, corner_radius=1.0)).drivable
+    round_ = build_road(name, None, RoadConfig(lanes=1, corner_radius=9.0)).drivable
+    corners = 2 if name == "t_intersection" else 4
+    gained = (round_.sum() - sharp.sum()) * 0.2**2
+    assert gained == pytest.approx(corners * (81.0 - 1.0) * (1.0 - np.pi / 4.0), rel=0.05)
+
+
+def test_resolution_and_arm_length_are_kept():
+    road = build_road("straight", None, RoadConfig(arm_length=50.0, lanes=1, resolution=0.1))
+    assert road.drivable.shape[1] in (1000, 1001)  # kerbs are on cell edges, ends need not be
+    assert road.drivable.sum(axis=0).max() == 70  # 2 x 3.5 m in cells
+
+
+@pytest.mark.parametrize("name", ["straight", "t_intersection"])
+def test_paper_versions_have_a_thousand_cells_a_side(name):
+    road = build_road(name, None, RoadConfig(paper=True))
+    assert road.drivable.shape == (1000, 1000)
+    assert road.resolution == 1.0
+
+
+def test_unknown_and_impossible_roads_are_named():
+    with pytest.raises(InputError, match="motorway"):
+        build_road("motorway", None)
+    with pytest.raises(InputError, match="corridor"):
+        build_road("corridor", None)
+    with pytest.raises(InputError, match="four_way"):
+        build_road("four_way", None, RoadConfig(paper=True))
+
+
+@pytest.mark.data
+def test_every_recorded_encounter_has_a_corridor_in_which_its_separated_paths_fit(data):
+    paths = sorted((data / "trajectories").glob("*/encounter_*.csv"))
+    assert paths
+    for path in paths:
+        for encounter in read_log(path).encounters:
+            road = build_road("corridor", encounter)
+            separation = own_paths(encounter)
+            assert smallest_gaps(separation.tracks).min() > 0.49
+            assert separation.moved.max() <= 3.0
+            for track in separation.tracks:
+                roomy = footprint_fits(road, track.poses, track.vehicle.length, track.vehicle.width + 1.0)
+                assert roomy.all(), (path.name, track.vehicle.id)

@@ -1,0 +1,112 @@
+"""Maps of nav2's map_server."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from scenario_gen.errors import InputError
+from scenario_gen.roads import build_road
+from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.openings import find_openings
+
+GOOD = {
+    "image": "map.pgm",
+    "resolution": "0.05",
+    "origin": "[1.0, 2.0, 0.0]",
+    "negate": "0",
+    "occupied_thresh": "0.65",
+    "free_thresh": "0.25",
+}
+
+
+def write(folder, pixels=None, **changes):
+    keys = {**GOOD, **changes}
+    if pixels is not None:
+        Image.fromarray(np.asarray(pixels, dtype=np.uint8)).save(folder / "map.pgm")
+    path = folder / "map.yaml"
+    path.write_text("".join(f"{key}: {value}\n" for key, value in keys.items() if value is not None))
+    return str(path)
+
+
+def test_rows_are_turned_over_and_unknown_is_not_drivable(tmp_path):
+    path = write(tmp_path, [[254, 205, 0], [0, 0, 254]], free_thresh="0.196")
+    road = build_road(path, None)
+    assert road.drivable.tolist() == [[False, False, True], [True, False, False]]
+    assert road.origin.tolist() == [1.0, 2.0]
+    assert road.resolution == float(np.float32(0.05))
+
+
+@pytest.mark.parametrize(
+    ("mode", "negate", "pixels", "drivable"),
+    [
+        ("trinary", "1", [[0, 100, 255]], [True, False, False]),
+        ("scale", "0", [[255, 195, 0]], [True, True, False]),
+        ("scale", "0", [[255, 185, 0]], [True, False, False]),
+        ("raw", "0", [[0, 24, 100]], [True, True, False]),
+        ("raw", "0", [[25, 0, 255]], [False, True, False]),
+    ],
+)
+def test_modes_and_negate(tmp_path, mode, negate, pixels, drivable):
+    assert build_road(write(tmp_path, pixels, mode=mode, negate=negate), None).drivable[0].tolist() == drivable
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("image", "nothing.pgm"),
+        ("image", None),
+        ("resolution", "-1"),
+        ("resolution", "fine"),
+        ("resolution", ".nan"),
+        ("origin", "[0, 0, 0.5]"),
+        ("origin", "here"),
+        ("origin", "[0, .inf, 0]"),
+        ("mode", "colour"),
+        ("negate", "2"),
+        ("free_thresh", "0.9"),
+        ("occupied_thresh", "7"),
+    ],
+)
+def test_what_cannot_be_used_is_named_with_its_key(tmp_path, key, value):
+    path = write(tmp_path, [[254, 0]], **{key: value})
+    with pytest.raises(InputError) as error:
+        build_road(path, None)
+    assert key in str(error.value)
+    assert "map.yaml" in str(error.value)
+
+
+def test_broken_files_are_errors_too(tmp_path):
+    (tmp_path / "map.pgm").write_bytes(b"P5\n10 10\n255\nshort")
+    with pytest.raises(InputError, match=r"map\.pgm"):
+        build_road(write(tmp_path), None)
+    (tmp_path / "list.yaml").write_text("- 1\n")
+    with pytest.raises(InputError, match=r"list\.yaml"):
+        build_road(str(tmp_path / "list.yaml"), None)
+    with pytest.raises(InputError, match=r"absent\.yaml"):
+        build_road(str(tmp_path / "absent.yaml"), None)
+    with pytest.raises(InputError, match="free"):
+        build_road(write(tmp_path, [[0, 0]]), None)
+
+
+def test_openings_keep_to_the_side_of_the_road():
+    drivable = np.zeros((100, 200), dtype=bool)
+    drivable[30:65, :] = True  # 7 m of road along x at 0.2 m
+    entries, exits = find_openings(drivable, 0.2, np.zeros(2), RoadConfig())
+    east_bound, west_bound = 6.0 + 1.75, 6.0 + 5.25
+    assert sorted(np.round(entries, 6).tolist()) == [
+        pytest.approx([0.0, east_bound, 2.0 * np.pi]),
+        pytest.approx([40.0, west_bound, np.pi]),
+    ]
+    assert sorted(np.round(exits, 6).tolist()) == [
+        pytest.approx([0.0, west_bound, np.pi]),
+        pytest.approx([40.0, east_bound, 0.0]),
+    ]
+
+
+@pytest.mark.data
+def test_every_recorded_map_is_read(data):
+    paths = sorted((data / "maps").glob("*/*.yaml"))
+    assert paths
+    for path in paths:
+        road = build_road(str(path), None)
+        assert 0.01 < road.drivable.mean() < 0.99, path.name
