@@ -1,7 +1,8 @@
 """From an encounter and its routes to a model that draws candidates: knots, limits in curves, and a feasible clock."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -26,8 +27,10 @@ SLIDE_SIGMAS = 2.0  # an anchor that slides by so many σ_s is no farther from t
 _SHORTEST_WAIT = 1.25  # s; shorter waits are lengthened to it, so that they are still waits on the published grid
 _LEAST_WAIT = 1.15  # s, to which a fast clock may shorten one
 _STRETCHES = 9
+_KNOT_SHARES = (None, 0.5, 0.35, 0.65, 0.2, 0.8, 0.1, 0.9)  # of a primitive; None: where the template bends
 _CURVE_REACH = 2.0  # m, around a position, in which the route's curvature is looked at
-_CURVE_MARGIN = 0.85  # share of the lateral limit that the route itself may use; the rest is the samples'
+_CURVE_MARGINS = (0.85, 1.0)  # share of the lateral limit that the route itself may use; the rest is the samples'
+_CURVE_STEP = 0.5  # s, at which speeds are bounded
 _CURVE_NEAR = 0.7  # a speed above this share of its bound may exceed it in a sample
 _BOUND_ROUNDS = 6
 
@@ -65,20 +68,18 @@ def prepare(
     if len(routes) != len(encounter.vehicles) or any(len(route.anchor) != len(times) for route in routes):
         raise InputError(f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each")
     paths = [BasePath.of(route) for route in routes]
-    lays = [_layout(n, encounter, times, routes[n], asked, waits) for n in range(len(routes))]
+    lays = [partial(_layout, n, encounter, times, routes[n], asked, waits) for n in range(len(routes))]
     slide = SLIDE_SIGMAS * config.longitudinal_sigma
     stretches = np.linspace(1.0, 1.0 + config.max_stretch, _STRETCHES if config.max_stretch > 0.0 else 1)
     reasons: list[str] = []
     for most, factors in ((slide, stretches), (np.inf, stretches)):
         for stretch in factors.tolist():
-            reasons = []
-            found = [
-                _feasible(paths[n], lays[n], times, stretch * times, most, config, encounter.vehicles[n].id, reasons)
-                for n in range(len(routes))
-            ]
+            clock = stretch * times
+            tried = [_nominal(path, lay, times, clock, most, config) for path, lay in zip(paths, lays, strict=True)]
+            reasons = [f"vehicle {v.id} {why}" for v, why in zip(encounter.vehicles, tried, strict=True) if isinstance(why, str)]
             if not reasons:
-                clock = Clock(stretch * times, config, _fastest(times, waits))
-                return _model(encounter, road, times, clock, paths, [f for f in found if f is not None], config)
+                found = [nominal for nominal in tried if isinstance(nominal, _Nominal)]
+                return _model(encounter, road, times, Clock(clock, config, _fastest(times, waits)), paths, found, config)
     return Prepared(None, (), "; ".join(reasons))
 
 
@@ -93,7 +94,7 @@ def _fastest(times: Floats, waits: Sequence[Wait]) -> Floats:
 
 
 def _layout(
-    n: int, encounter: Encounter, times: Floats, route: Route, asked: BoundaryStates, waits: Sequence[Wait]
+    n: int, encounter: Encounter, times: Floats, route: Route, asked: BoundaryStates, waits: Sequence[Wait], share: float | None
 ) -> TimeLayout:
     """The knots of vehicle n; a route without length stands throughout, whatever speed is asked."""
     dwells = route.anchor[:-1] == route.anchor[1:]
@@ -105,9 +106,9 @@ def _layout(
     ends = (float(asked.start[n, 3]), float(asked.end[n, 3]))
     if dwells.all():
         ends = (0.0, 0.0)
-    lay = layout(times, dwells, own, encounter.time, encounter.speed[n], ends)
+    lay = layout(times, dwells, own, encounter.time, encounter.speed[n], ends, 0.5)
     standing = [v if v > STAND or not still else 0.0 for v, still in zip(ends, lay.still[[0, -1]], strict=True)]
-    return layout(times, dwells, own, encounter.time, encounter.speed[n], (standing[0], standing[1]))
+    return layout(times, dwells, own, encounter.time, encounter.speed[n], (standing[0], standing[1]), share)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,22 +120,36 @@ class _Nominal:
     slid: float
 
 
-def _feasible(
+def _nominal(
     path: BasePath,
-    lay: TimeLayout,
+    lay: Callable[[float | None], TimeLayout],
     times: Floats,
     clock: Floats,
     most: float,
     config: SamplingConfig,
-    name: str,
-    reasons: list[str],
-) -> _Nominal | None:
-    """Anchors and speed bounds with which the undisturbed route can be driven on `clock`, or None and a reason."""
+) -> _Nominal | str:
+    """How the undisturbed route can be driven on `clock`, or why it cannot.
+
+    With the knots where the template bends if possible, else elsewhere; well within the lateral limit, else just.
+    """
+    reason = ""
+    for share in _KNOT_SHARES:
+        for margin in _CURVE_MARGINS:
+            found = _feasible(path, lay(share), times, clock, most, config, margin)
+            if isinstance(found, _Nominal):
+                return found
+            reason = reason or found
+    return reason
+
+
+def _feasible(
+    path: BasePath, lay: TimeLayout, times: Floats, clock: Floats, most: float, config: SamplingConfig, margin: float
+) -> _Nominal | str:
+    """Anchors and speed bounds with which the undisturbed route can be driven on `clock`, or why it cannot."""
     curve, arc = path.displaced(np.zeros((1, len(path.node))))
     knot = knots_on(clock[None], times, lay)
     lengths = piece_lengths(lay, curve, arc, path.spacing, path.anchor[None])
-    bounds, anchor, slid = SpeedBounds.none(), path.anchor, 0.0
-    law = TimeLaw(lay, config, bounds)
+    bounds = SpeedBounds.none()
     for _ in range(_BOUND_ROUNDS):
         law = TimeLaw(lay, config, bounds)
         speed, ok = law.solve(knot, lengths)
@@ -143,17 +158,15 @@ def _feasible(
             speed, ok, moved = law.slide(knot, lengths)
             if not ok[0]:
                 limit = "" if len(bounds.interval) == 0 else " through its curves"
-                reasons.append(f"vehicle {name} cannot drive {path.length:.1f} m{limit} in {clock[-1]:.1f} s within the limits")
-                return None
+                return f"cannot drive {path.length:.1f} m{limit} in {clock[-1]:.1f} s within the limits"
             anchor, slid = _slide(path.anchor, lay, moved[0])
             if slid > most:
-                reasons.append(f"vehicle {name} would have to pass a changepoint {slid:.1f} m from its place")
-                return None
-        needed, kept = _curve_bounds(path, SpeedProfile(knot[0], speed[0]), lay, config)
+                return f"would have to pass a changepoint {slid:.1f} m from its place"
+        needed, kept = _curve_bounds(path, SpeedProfile(knot[0], speed[0]), lay, margin * config.max_lateral_acceleration)
         if kept and (len(bounds.interval) or not len(needed.interval)):
-            break
+            return _Nominal(law, anchor, slid)
         bounds = needed
-    return _Nominal(law, anchor, slid)
+    return f"cannot drive its curves within {config.max_lateral_acceleration:g} m/s² sideways in {clock[-1]:.1f} s"
 
 
 def _slide(anchor: Floats, lay: TimeLayout, moved: Floats) -> tuple[Floats, float]:
@@ -167,18 +180,20 @@ def _slide(anchor: Floats, lay: TimeLayout, moved: Floats) -> tuple[Floats, floa
     return slid, float(np.abs(slid - anchor).max())
 
 
-def _curve_bounds(path: BasePath, profile: SpeedProfile, lay: TimeLayout, config: SamplingConfig) -> tuple[SpeedBounds, bool]:
+def _curve_bounds(path: BasePath, profile: SpeedProfile, lay: TimeLayout, limit: float) -> tuple[SpeedBounds, bool]:
     """Speed bounds wherever the route's curvature might ask for them, and whether the profile itself keeps to the limit."""
     if len(path.node) == 1:
         return SpeedBounds.none(), True
     bend = np.abs(path.curvature)
     wide = maximum_filter1d(bend, 2 * int(np.ceil(_CURVE_REACH / path.spacing)) + 1, mode="nearest")
-    limit = _CURVE_MARGIN * config.max_lateral_acceleration
     s, v, _ = profile.state(np.linspace(profile.time[0], profile.time[-1], 20 * len(lay.knot)))
     kept = bool((v**2 * np.interp(s, path.arc, bend)).max() <= limit * 1.02)
     moving = np.flatnonzero(~lay.still)
-    interval, at = np.repeat(moving, 4), np.tile(np.arange(1, 5) / 4.0, len(moving))
-    s, v, _ = profile.state(profile.time[interval] + at * np.diff(profile.time)[interval])
+    steps = np.diff(profile.time)
+    parts = np.maximum(np.ceil(steps[moving] / _CURVE_STEP), 4).astype(np.int64)
+    interval = np.repeat(moving, parts)
+    at = np.concatenate([np.arange(1, n + 1) / n for n in parts.tolist()])
+    s, v, _ = profile.state(profile.time[interval] + at * steps[interval])
     most = np.sqrt(limit / np.maximum(np.interp(s, path.arc, wide), 1e-6))
     needed = ~((at == 1.0) & (lay.unknown[interval + 1] < 0)) & (v > _CURVE_NEAR * most)
     return SpeedBounds(interval[needed], at[needed], most[needed]), kept

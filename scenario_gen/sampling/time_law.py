@@ -26,6 +26,7 @@ Marks = npt.NDArray[np.intc]
 
 STAND = 0.05  # m/s; an asked speed below this is met by standing
 SHORTEST = 0.2  # s, between two knots in the template
+KNOT_DISTANCE = 0.25  # s, of a primitive's knot from its ends where there is room: at most one knot between two samples
 _RAMP = 1.5  # m/s², by which a vehicle that is asked to roll comes to a stand
 _TARGET_SCALE = 4.0  # a template speed is scaled at most so much; beyond it, lengths alone decide
 _STIFFNESS = 100.0  # 1/s, cost of sliding an anchor: strong, so that it happens only where it must
@@ -98,6 +99,7 @@ def layout(
     time: Floats,
     speed: Floats,
     ends: tuple[float, float],
+    knot_share: float | None = None,
 ) -> TimeLayout:
     """Lay out the knots of one vehicle.
 
@@ -108,12 +110,15 @@ def layout(
         time: (T,) the template's samples [s].
         speed: (T,) its speeds [m/s].
         ends: asked speeds [m/s] at start and end.
+        knot_share: where in each primitive its knot lies, as a share of its duration; None for where the template bends.
     """
     cuts, still = _cuts(clock, dwells, waits, ends)
     knots, stands = [cuts[0]], []
     for a, b, stand in zip(cuts[:-1], cuts[1:], still, strict=True):
         if not stand:
-            knots.append(best_knot(time, speed, a, b))
+            at = best_knot(time, speed, a, b) if knot_share is None else a + knot_share * (b - a)
+            apart = min(KNOT_DISTANCE, 0.5 * (b - a))
+            knots.append(min(max(at, a + apart), b - apart))
             stands.append(False)
         knots.append(b)
         stands.append(stand)
