@@ -28,8 +28,7 @@ setup(
         (f"share/{NAME}/launch", [str(path) for path in sorted(Path("launch").glob("*.launch.py"))]),
     ],
     install_requires=[line for line in NEEDED if not line.startswith("ros-jazzy")],
-    extras_require={"ros": [line for line in NEEDED if line.startswith("ros-jazzy")]},
-    tests_require=["pytest"],
+    extras_require={"ros": [line for line in NEEDED if line.startswith("ros-jazzy")], "test": ["pytest"]},
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -1,0 +1,66 @@
+"""The whole suite: ros2 launch scenario_gen suite.launch.py log:=/path/to/log road:=t_intersection count:=50 seed:=7."""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch.actions import DeclareLaunchArgument
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration, PythonExpression
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+from launch import LaunchDescription
+
+SHARE = Path(get_package_share_directory("scenario_gen"))
+
+ARGUMENTS = {
+    "log": ("", "log to read: a file, a bag or a folder of files"),
+    "encounter": ("0", "which encounter of the log, from 0"),
+    "road": ("t_intersection", "straight, t_intersection, four_way, corridor, or a map_server YAML file"),
+    "count": ("50", "scenarios to generate"),
+    "seed": ("0", "seed of every stage"),
+    "namespace": ("", "namespace of all nodes"),
+    "params": (str(SHARE / "config" / "suite.yaml"), "parameter file"),
+    "bag": ("", "folder to record to; empty records nothing"),
+    "rviz": ("false", "open RViz"),
+}
+
+
+def argument(name, kind):
+    return ParameterValue(LaunchConfiguration(name), value_type=kind)
+
+
+def node(name, condition=None, **parameters):
+    return Node(
+        package="scenario_gen",
+        executable=name,
+        name=name,
+        namespace=LaunchConfiguration("namespace"),
+        parameters=[LaunchConfiguration("params"), parameters],
+        output="screen",
+        condition=condition,
+    )
+
+
+def generate_launch_description():
+    seed = argument("seed", int)
+    recording = IfCondition(PythonExpression(["'", LaunchConfiguration("bag"), "' != ''"]))
+    return LaunchDescription(
+        [
+            *(DeclareLaunchArgument(name, default_value=value, description=text) for name, (value, text) in ARGUMENTS.items()),
+            node("recorder", recording, bag=argument("bag", str)),
+            node("road_server", road_name=argument("road", str), wait_for_tracks=True),
+            node("segmenter", seed=seed),
+            node("planner", seed=seed),
+            node("gp_sampler", seed=seed, count=argument("count", int)),
+            node("evaluator"),
+            node("log_player", log_path=argument("log", str), encounter=argument("encounter", int)),
+            Node(
+                package="rviz2",
+                executable="rviz2",
+                arguments=["-d", str(SHARE / "config" / "suite.rviz")],
+                namespace=LaunchConfiguration("namespace"),
+                condition=IfCondition(LaunchConfiguration("rviz")),
+            ),
+        ]
+    )

@@ -1,0 +1,95 @@
+"""evaluator: `tracks`, `changepoints` and the `scenarios` of a request in; its figures out as `report`."""
+
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from msg_conventions.changepoints import decode_changepoints
+from msg_conventions.diagnostics import Level, Status, decode_diagnostics, encode_diagnostics, read_request
+from msg_conventions.scenarios import decode_scenario, digest
+from msg_conventions.tracks import decode_tracks
+from scenario_gen.errors import InputError
+from scenario_gen.evaluation import WITH, CheckCounts, EvaluationConfig, evaluate
+from scenario_gen.nodes.base import StageNode, run_nodes
+from scenario_gen.parameters import check, parameter
+
+
+@dataclass(frozen=True)
+class Config:
+    """The evaluator's parameters."""
+
+    seed: int = parameter(0, "seed of the bootstrap", low=0)
+    keep: int = parameter(10_000, "scenarios kept until their request is closed; older ones are forgotten", low=1)
+    evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+class Evaluator(StageNode):
+    """Measures every request's scenarios against their template once the request is closed."""
+
+    INPUTS = ("tracks", "changepoints", "scenarios", "scenarios/info")
+    OUTPUTS = ("report",)
+
+    def __init__(self, namespace: str | None = None) -> None:
+        super().__init__("evaluator", Config(), namespace)
+        self._newest: dict[str, bytes] = {}
+        self._scenarios: dict[str, bytes] = {}  # by SHA-256
+        self._open: dict[str, list[str]] = {}  # request -> digests, in order
+        self._closed: list[Status] = []
+
+    def received(self, topic: str, data: bytes) -> None:
+        """Keep what comes, and evaluate a request when all of it is there."""
+        if topic == "scenarios":
+            self._scenarios[digest(data)] = data
+            while len(self._scenarios) > self.config.keep:
+                self._scenarios.pop(next(iter(self._scenarios)))
+        elif topic == "scenarios/info":
+            for status in decode_diagnostics(data)[1]:
+                if "published" in status.values:
+                    self._closed.append(status)
+                elif "sha256" in status.values:
+                    self._open.setdefault(status.values["request"], []).append(status.values["sha256"])
+        else:
+            self._newest[topic] = data
+        for status in list(self._closed):
+            digests = self._open.get(status.values["request"], [])
+            if {"tracks", "changepoints"} <= set(self._newest) and all(key in self._scenarios for key in digests):
+                self._closed.remove(status)
+                self._open.pop(status.values["request"], None)
+                scenarios = [self._scenarios.pop(key) for key in dict.fromkeys(digests)]
+                self._submit(dict(self._newest), scenarios, status)
+
+    def _submit(self, messages: Mapping[str, bytes], scenarios: list[bytes], status: Status) -> None:
+        name = f"request {status.values['request']}"
+        self.work(name, lambda cancelled: None if cancelled() else self._evaluate(messages, scenarios, status))
+
+    def _evaluate(self, messages: Mapping[str, bytes], scenarios: list[bytes], status: Status) -> None:
+        encounter = decode_tracks(messages["tracks"])
+        segmentation = decode_changepoints(messages["changepoints"], encounter)
+        decoded = [decode_scenario(data) for data in scenarios]
+        if any(stamp != encounter.start_ns for stamp, _ in decoded):
+            raise InputError(f"request {status.values['request']}: its scenarios are not those of the newest tracks")
+        account = read_request(status, tuple(scenario for _, scenario in decoded))
+        evaluation = evaluate(
+            encounter,
+            segmentation,
+            {WITH: account.scenarios},
+            checks={WITH: CheckCounts.of_set(account)},
+            config=self.config.evaluation,
+            seed=self.config.seed,
+        )
+        statuses = []
+        for row in evaluation.rows:
+            figures = {key: repr(entry.value) for key, entry in row.values.items() if math.isfinite(entry.value)}
+            values = {"request": status.values["request"], "samples": str(row.samples), **figures}
+            statuses.append(Status(f"{self.get_fully_qualified_name()}: {row.name}", Level.OK, "; ".join(row.notes), values))
+        self.send("report", encode_diagnostics(statuses, encounter.start_ns))
+        self.get_logger().info(f"request {status.values['request']} evaluated: {len(decoded)} scenarios")
+
+
+def main() -> None:
+    """Run the node."""
+    sys.exit(run_nodes(Evaluator))

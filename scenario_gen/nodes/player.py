@@ -1,0 +1,153 @@
+"""player: a bag's messages as they were recorded, raw; `~/pause` and `~/resume`; any rosbag2 bag, MCAP or SQLite.
+
+Each topic is offered with the quality of service it was recorded with. With an offset, what latched topics had said before it is
+published first. With `clock`, the bag's time is published on /clock, so that nodes with `use_sim_time` follow it.
+"""
+
+import re
+import sys
+import threading
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
+
+from msg_conventions.cdr import CdrWriter
+from scenario_gen.bags import BagMessage, bag_topics, read_messages
+from scenario_gen.errors import InputError, ScenarioGenError
+from scenario_gen.nodes.base import qos, run_nodes
+from scenario_gen.nodes.message_classes import message_class
+from scenario_gen.nodes.ros_parameters import ConfigParameters
+from scenario_gen.parameters import check, parameter
+
+TICK = 0.01  # seconds between two clock messages
+
+
+@dataclass(frozen=True)
+class Config:
+    """The player's parameters."""
+
+    bag: str = parameter("", "bag to play: its folder or one of its files")
+    topics: str = parameter(".*", "regular expression of the full names of the topics to play")
+    rate: float = parameter(1.0, "how many times as fast as it was recorded", low=0.01, high=1000.0)
+    start_offset: float = parameter(0.0, "begin so far into the bag", unit="s", low=0.0)
+    loop: bool = parameter(False, "begin again at the end")
+    paused: bool = parameter(False, "wait for ~/resume before the first message")
+    clock: bool = parameter(False, "publish /clock")
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+class Player(Node):  # type: ignore[misc]
+    """Plays one bag."""
+
+    def __init__(self, namespace: str | None = None) -> None:
+        super().__init__("player", namespace=namespace)
+        self.parameters = ConfigParameters(self, Config())
+        self.parameters.log()
+        self._running = threading.Event()
+        self._ended = threading.Event()
+        self._offered: dict[str, tuple[Any, bool, int]] = {}
+        self._clock_publisher = self.create_publisher(Clock, "/clock", 10) if self.parameters.config.clock else None
+        self.create_service(Trigger, "~/pause", lambda _, response: self._set_running(response, running=False))
+        self.create_service(Trigger, "~/resume", lambda _, response: self._set_running(response, running=True))
+
+    def autostart(self) -> None:
+        """Offer the bag's topics and begin.
+
+        Raises:
+            InputError: the bag cannot be read, or none of its topics can be played.
+        """
+        config: Config = self.parameters.config
+        if not config.bag:
+            raise InputError("parameter bag is empty; name the bag to play")
+        for topic in bag_topics(Path(config.bag)):
+            name = topic.name if topic.name.startswith("/") else f"/{topic.name}"
+            if not re.fullmatch(config.topics, name):
+                continue
+            try:
+                publisher = self.create_publisher(message_class(topic.type), name, qos(topic.quality))
+                self._offered[topic.name] = (publisher, topic.quality.transient_local, topic.quality.depth)
+            except InputError as error:
+                self.get_logger().error(f"{name} is not played: {error}")
+        if not self._offered:
+            raise InputError(f"{config.bag}: none of its topics can be played; see the messages above and the parameter topics")
+        if not config.paused:
+            self._running.set()
+        threading.Thread(target=self._play, args=(config,), daemon=True).start()
+
+    def _play(self, config: Config) -> None:
+        try:
+            while not self._ended.is_set():
+                self._play_once(config)
+                if not config.loop:
+                    break
+            self.get_logger().info(f"{config.bag}: played")
+        except ScenarioGenError as error:
+            self.get_logger().error(str(error))
+
+    def _play_once(self, config: Config) -> None:
+        first: int | None = None
+        elapsed = config.start_offset  # seconds of the bag that have been played
+        for message in self._from_offset(config):
+            first = message.stamp_ns if first is None else first
+            elapsed = self._wait_until((message.stamp_ns - first) * 1e-9 + config.start_offset, elapsed, config, first)
+            if self._ended.is_set():
+                return
+            self._offered[message.topic][0].publish(message.data)
+
+    def _from_offset(self, config: Config) -> Iterator[BagMessage]:
+        """Yield the messages from the offset on; before the first, publish what latched topics hold by then."""
+        latched: dict[str, deque[bytes]] = {}
+        begin: int | None = None
+        for message in read_messages(Path(config.bag), lambda topic: topic in self._offered):
+            begin = message.stamp_ns if begin is None else begin
+            if message.stamp_ns - begin < config.start_offset * 1e9:
+                _, transient_local, depth = self._offered[message.topic]
+                if transient_local:
+                    latched.setdefault(message.topic, deque(maxlen=depth)).append(message.data)
+                continue
+            for topic in list(latched):
+                for data in latched.pop(topic):
+                    self._offered[topic][0].publish(data)
+            yield message
+
+    def _wait_until(self, due: float, elapsed: float, config: Config, first_ns: int) -> float:
+        """Let the bag's time run, at `rate` and unless paused, from `elapsed` to `due` [s]; return where it stands."""
+        while elapsed < due and not self._ended.is_set():
+            self._running.wait(TICK)
+            started = monotonic()
+            if self._running.is_set():
+                self._ended.wait(min(TICK, (due - elapsed) / config.rate))
+                elapsed += (monotonic() - started) * config.rate
+            self._tell_time(first_ns + round((min(elapsed, due) - config.start_offset) * 1e9))
+        self._running.wait()
+        return max(elapsed, due) if elapsed < due + 1.0 else due
+
+    def _tell_time(self, stamp_ns: int) -> None:
+        if self._clock_publisher is not None and self.context.ok():
+            self._clock_publisher.publish(CdrWriter().stamp(stamp_ns).finish())
+
+    def _set_running(self, response: Trigger.Response, *, running: bool) -> Trigger.Response:
+        response.success = running != self._running.is_set()
+        response.message = ("playing" if running else "paused") if response.success else "it is so already"
+        (self._running.set if running else self._running.clear)()
+        return response
+
+    def destroy_node(self) -> None:
+        """End playing, then the node."""
+        self._ended.set()
+        self._running.set()
+        super().destroy_node()
+
+
+def main() -> None:
+    """Run the node."""
+    sys.exit(run_nodes(Player))
