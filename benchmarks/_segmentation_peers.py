@@ -27,7 +27,7 @@ def jax_moseq(x: Floats, sweeps: int, seed: int = 0, states: int = 20) -> tuple[
     import jax
     import jax.numpy as jnp
     import jax.random as jr
-    import tensorflow_probability.substrates.jax.distributions as tfd
+    import tensorflow_probability.substrates.jax.distributions as tfd  # type: ignore[import-not-found]
     from jax_moseq.models.arhmm.gibbs import _resample_regression_params
     from jax_moseq.utils.distributions import sample_hmm_stateseq
     from jax_moseq.utils.transitions import init_hdp_transitions, resample_hdp_transitions
@@ -39,13 +39,13 @@ def jax_moseq(x: Floats, sweeps: int, seed: int = 0, states: int = 20) -> tuple[
     s0 = jnp.asarray(0.75 * np.cov(np.asarray(y).T))
     concentrations = {"alpha": 5.7, "kappa": 100.0, "gamma": 1.0}
 
-    @jax.jit
+    @jax.jit  # type: ignore[untyped-decorator]
     def emissions(key: Any, z: Any) -> Any:
         members = jnp.eye(states)[:, z]
         step = lambda args: _resample_regression_params(ones, y, d + 2.0, s0, jnp.zeros((d, 1)), 10.0 * jnp.eye(1), args)  # noqa: E731
         return jax.lax.map(step, (jr.split(key, states), members))
 
-    @jax.jit
+    @jax.jit  # type: ignore[untyped-decorator]
     def labels_given(key: Any, means: Any, covariances: Any, pi: Any) -> Any:
         log_prob = jax.lax.map(lambda p: tfd.MultivariateNormalFullCovariance(p[0][:, 0], p[1]).log_prob(y), (means, covariances))
         return sample_hmm_stateseq(key, pi, log_prob.T, mask[0])[1]
@@ -64,6 +64,31 @@ def jax_moseq(x: Floats, sweeps: int, seed: int = 0, states: int = 20) -> tuple[
         z = labels_given(c, means, covariances, pi)
     jax.block_until_ready(z)
     return np.asarray(z, dtype=np.int64), time.process_time() - started
+
+
+def jax_moseq_public(x: Floats, sweeps: int, states: int = 20) -> float | None:
+    """CPU seconds, without compilation, of jax-moseq's public sampler, arhmm.resample_model (AR(1): it has no plain Gaussian)."""
+    if not installed("jax_moseq"):
+        return None
+    import jax
+    import jax.numpy as jnp
+    import jax.random as jr
+    from jax_moseq.models import arhmm
+
+    jax.config.update("jax_enable_x64", True)
+    y = jnp.asarray(standardised(x))[None]
+    data = {"x": y, "mask": jnp.ones(y.shape[:2])}
+    transitions = {"num_states": states, "alpha": 5.7, "kappa": 100.0, "gamma": 1.0}
+    regression = {"latent_dim": y.shape[2], "nlags": 1, "S_0_scale": 0.75, "K_0_scale": 10.0}
+    model = arhmm.init_model(data, seed=jr.PRNGKey(0), trans_hypparams=transitions, ar_hypparams=regression)
+    started = time.process_time()
+    for sweep in range(sweeps + 2):
+        if sweep == 2:
+            jax.block_until_ready(model["states"]["z"])
+            started = time.process_time()
+        model = arhmm.resample_model(data, **model)
+    jax.block_until_ready(model["states"]["z"])
+    return time.process_time() - started
 
 
 def hmmlearn(x: Floats, states: int, starts: int = 10) -> Ints | None:

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import _segmentation_peers as peers
+from benchmarks._segmentation_calibration import calibrate
 from benchmarks._segmentation_data import CELLS, driving, gaussian_hmm
 from benchmarks._segmentation_scores import changes, f1, hamming, smoother
 from benchmarks.row import Row
@@ -51,6 +52,7 @@ def run() -> list[Row]:
         rows += _cell(cell, seconds)
     rows += _driving(seconds)
     rows += _speed(seconds)
+    rows += _calibration()
     rows += _online()
     return rows + _labelled()
 
@@ -132,7 +134,32 @@ def _speed(seconds: dict[str, float]) -> list[Row]:
         wrong = hamming(sequence.labels, labels)
         score = f"jax-moseq {cpu:.1f} s, Hamming {wrong:.3f}, F1 {f1(sequence.changepoints, changes(labels), 5):.3f}"
         rows.append(Row(f"{cell}: times faster than jax-moseq", cpu / seconds[cell], "", "higher", target, score))
+        public = peers.jax_moseq_public(sequence.x, 200)
+        if public is not None:
+            text = f"its own resample_model, AR(1): {public:.1f} s"
+            rows.append(
+                Row(f"{cell}: times faster than jax-moseq's public sampler", public / seconds[cell], "", "higher", None, text)
+            )
     return rows
+
+
+def _calibration() -> list[Row]:
+    """Sequences from the model's own prior: are probabilities and intervals right?"""
+    found = calibrate(range(SEEDS[0], SEEDS[0] + 400), d=1)
+    table = ", ".join(f"{p:.2f}: {o:.2f} ({n})" for p, o, n in zip(found.predicted, found.observed, found.counts, strict=True))
+    return [
+        Row(
+            "calibration: worst decile with 30 samples or more", found.worst, "", "lower", 0.1, f"predicted: observed (n) {table}"
+        ),
+        Row(
+            "calibration: coverage of 5-95 % intervals",
+            found.coverage,
+            "",
+            "higher",
+            0.85,
+            f"{found.intervals} intervals; 0.85-0.95",
+        ),
+    ]
 
 
 def _online() -> list[Row]:
