@@ -11,10 +11,11 @@ from scenario_gen.planning import tree_kernels as trees
 from scenario_gen.planning.planner import Budget, BudgetSpentError, Plan, Query, check_query, path_length
 from scenario_gen.planning.shortcut import pull
 from scenario_gen.roads.clearance import clearance_in_cells, to_cells, to_metres
-from scenario_gen.roads.flood import component_at, component_cells
+from scenario_gen.roads.flood import component_at, component_cells, corner_cells
 from scenario_gen.roads.road import Road
 
 OCCUPANCY = 64  # nodes per bucket at which its side is halved
+HAIR = 1e-7  # [cells]
 BATCH = 512  # iterations between two looks at the clock
 
 
@@ -28,6 +29,8 @@ class RrtStarConnectConfig:
         1.1, "gamma of eq 10 as a multiple of the least that is asymptotically optimal", low=1.0, high=10.0
     )
     greedy: bool = parameter(True, "extend as far as possible until the first path is found (the paper: one step)")
+    skip: bool = parameter(True, "let new edges skip ancestors in sight, as Quick-RRT* does (the paper: no)")
+    corners: float = parameter(0.3, "share of samples beside convex corners of obstacles (the paper: 0)", low=0.0, high=0.9)
     informed: bool = parameter(True, "sample only where a shorter path can lie, once there is one")
     pull: bool = parameter(True, "draw the path taut at the end")
 
@@ -35,7 +38,7 @@ class RrtStarConnectConfig:
         check(self)
 
 
-PAPER = RrtStarConnectConfig(step=5.0, greedy=False, informed=False, pull=False)
+PAPER = RrtStarConnectConfig(step=5.0, greedy=False, skip=False, corners=0.0, informed=False, pull=False)
 
 
 class _Trees:
@@ -46,13 +49,14 @@ class _Trees:
         self.ends = to_cells(road, np.stack((query.start, query.goal)))
         label = component_at(road, query.start, query.radius)
         self.free_cells = component_cells(road, query.radius, label)
-        self.config = config
+        self.corner_cells = corner_cells(road, query.radius, label)
         area = max(len(self.free_cells), 1)
         least_gamma = 2.0 * 1.5**0.5 * (area / np.pi) ** 0.5  # Karaman & Frazzoli 2011, d = 2
         side = max(max(self.clearance.shape) / 12.0, 1.0)
         radius = query.radius / road.resolution
         gamma = config.gamma_factor * least_gamma
-        self.setting = np.array([radius, config.step, gamma, config.zeta, side, np.inf, np.inf, float(config.greedy)])
+        switches = float(config.greedy), float(config.skip), config.corners
+        self.setting = np.array([radius, config.step, gamma, config.zeta, side, np.inf, np.inf, *switches])
         self.counter = np.zeros(7, dtype=np.int64)
         self.counter[trees.MEETING] = -1
         self.history = np.empty((256, 2))
@@ -78,7 +82,7 @@ class _Trees:
         while self.counter[trees.ITERATION] < goal:
             had_path = self.best < np.inf
             trees.grow(
-                goal - self.counter[trees.ITERATION], self.clearance, self.ends, self.free_cells, self.node, self.link,
+                goal - self.counter[trees.ITERATION], self.clearance, self.ends, self.free_cells, self.corner_cells, self.node, self.link,
                 self.chunk, self.head, self.counter, self.setting, self.history, self.random,
             )  # fmt: skip
             if self.counter[trees.HISTORY] + 1 >= len(self.history):
@@ -166,7 +170,7 @@ class RrtStarConnect:
 
 
 def taut(clearance: Floats, path: Floats, radius: float, passes: int = 30) -> Floats:
-    """`path` (P, 2) drawn taut for a disc of `radius`; all in cells."""
+    """`path` (P, 2) drawn taut for a disc of `radius`, a hair off the corners so that rounding cannot touch them; in cells."""
     room = np.empty((2 * len(path) + 32, 2))
     room[: len(path)] = path
-    return room[: pull(clearance, len(path), radius, passes, room)].copy()
+    return room[: pull(clearance, len(path), radius + HAIR, passes, room)].copy()

@@ -23,8 +23,9 @@ PARENT, CHILD, NEXT, PREVIOUS, PARTNER = 0, 1, 2, 3, 4
 # `counter`, whole numbers that change: nodes per tree, chunks, the tree to extend next, iterations, history, meeting node
 NODES_A, NODES_B, CHUNKS, ACTIVE, ITERATION, HISTORY, MEETING = 0, 1, 2, 3, 4, 5, 6
 # `setting`, what steers the search: disc radius, step, gamma and zeta of eq 10, bucket side, length of the best path known
-# from elsewhere (it bounds the informed set), length of the trees' own best path, 1 to extend greedily before the first path
-RADIUS, STEP, GAMMA, ZETA, SIDE, BOUND, BEST, GREEDY = 0, 1, 2, 3, 4, 5, 6, 7
+# from elsewhere (it bounds the informed set), length of the trees' own best path, 1 to extend greedily before the
+# first path, 1 to let edges skip ancestors in sight, share of samples beside obstacles' corners
+RADIUS, STEP, GAMMA, ZETA, SIDE, BOUND, BEST, GREEDY, SKIP, CORNERS = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
 TRAPPED, ADVANCED, REACHED = 0, 1, 2
 
 RandomState = types.Array(types.uint64, 1, "C")
@@ -167,6 +168,15 @@ def _propagate(top: int, node: Floats, link: Ints, counter: Ints, setting: Float
 
 
 @kernel(inline=True)
+def _ancestor_in_sight(parent: int, x: float, y: float, clearance: Floats, node: Floats, link: Ints, radius: float) -> int:
+    """The farthest of the parent's ancestors, one after the other, that still sees (x, y): as Quick-RRT* (Jeong et al. 2019)."""
+    above = link[parent, PARENT]
+    while above >= 0 and segment_free(clearance, node[above, X], node[above, Y], x, y, radius):
+        parent, above = above, link[above, PARENT]
+    return parent
+
+
+@kernel(inline=True)
 def _extend(
     tree: int, qx: float, qy: float, ends: Floats, clearance: Floats, node: Floats, link: Ints, chunk: Ints, head: Ints,
     counter: Ints, setting: Floats, columns: int, near: Ints, gap: Floats,
@@ -202,6 +212,10 @@ def _extend(
             parent, cost, edge = m, cheapest, gap[candidate]
             break
         near[candidate] = -1  # no edge: not for rewiring either
+    if setting[SKIP] > 0.0 and setting[BEST] < np.inf:
+        parent = _ancestor_in_sight(parent, x, y, clearance, node, link, radius)
+        edge = np.sqrt((x - node[parent, X]) ** 2 + (y - node[parent, Y]) ** 2)
+        cost = node[parent, COST] + edge
     if cost + to_go >= setting[BEST]:
         return TRAPPED, -1
     new = _insert(tree, x, y, node, link, chunk, head, counter, side, columns)
@@ -211,17 +225,44 @@ def _extend(
         if m < 0 or m == parent or cost + gap[k] >= node[m, COST] - 1e-9:
             continue
         if segment_free(clearance, node[m, X], node[m, Y], x, y, radius):
+            above, length = new, gap[k]
+            if setting[SKIP] > 0.0 and setting[BEST] < np.inf:
+                above = _ancestor_in_sight(new, node[m, X], node[m, Y], clearance, node, link, radius)
+                length = np.sqrt((node[m, X] - node[above, X]) ** 2 + (node[m, Y] - node[above, Y]) ** 2)
             _release(m, link)
-            _adopt(new, m, gap[k], node, link)
+            _adopt(above, m, length, node, link)
             _propagate(m, node, link, counter, setting)
     return status, new
 
 
 @kernel(inline=True)
+def _in_cell(cells: Ints, width: int, random: "np.typing.NDArray[np.uint64]") -> tuple[float, float]:
+    """A point of one of the cells (flat indices), uniformly."""
+    cell = cells[int(uniform(random) * cells.size)]
+    return cell % width + uniform(random), cell // width + uniform(random)
+
+
+@kernel(inline=True)
+def _detour(ends: Floats, x: float, y: float) -> float:
+    """The least length of a path from start to goal by way of (x, y)."""
+    from_start = np.sqrt((x - ends[0, 0]) ** 2 + (y - ends[0, 1]) ** 2)
+    return from_start + np.sqrt((x - ends[1, 0]) ** 2 + (y - ends[1, 1]) ** 2)
+
+
+@kernel(inline=True)
 def _sample(
-    ends: Floats, free_cells: Ints, clearance: Floats, bound: float, random: "np.typing.NDArray[np.uint64]"
-) -> tuple[float, float]:
-    """A point of the component, uniformly; once a path of length `bound` is known, of the ellipse that can better it."""
+    ends: Floats, free_cells: Ints, corner_cells: Ints, clearance: Floats, bound: float, corners: float,
+    random: "np.typing.NDArray[np.uint64]",
+) -> tuple[float, float]:  # fmt: skip
+    """A point of the component, uniformly; once a path of length `bound` is known, of the ellipse that can better it.
+
+    From then on a share of the samples lies in the cells diagonally before obstacles' convex corners: where shortest paths bend.
+    """
+    if corner_cells.size > 0 and corners > 0.0 and bound < np.inf and uniform(random) < corners:
+        for _ in range(20):
+            x, y = _in_cell(corner_cells, clearance.shape[1], random)
+            if _detour(ends, x, y) < bound:
+                return x, y
     height, width = clearance.shape
     dx, dy = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
     straight = np.sqrt(dx * dx + dy * dy)
@@ -240,16 +281,15 @@ def _sample(
             if 0 <= i < height and 0 <= j < width and clearance[i, j] > 0.0:
                 break
         else:
-            cell = free_cells[int(uniform(random) * free_cells.size)]
-            x, y = cell % width + uniform(random), cell // width + uniform(random)
-            if np.hypot(x - ends[0, 0], y - ends[0, 1]) + np.hypot(x - ends[1, 0], y - ends[1, 1]) < bound:
+            x, y = _in_cell(free_cells, width, random)
+            if _detour(ends, x, y) < bound:
                 break
     return x, y
 
 
-@kernel(I, F2, F2, I1, OUT2, OUTI2, OUTI2, OUTI2, OUTI1, OUT1, OUT2, RandomState)
+@kernel(I, F2, F2, I1, I1, OUT2, OUTI2, OUTI2, OUTI2, OUTI1, OUT1, OUT2, RandomState)
 def grow(
-    iterations: int, clearance: Floats, ends: Floats, free_cells: Ints, node: Floats, link: Ints, chunk: Ints, head: Ints,
+    iterations: int, clearance: Floats, ends: Floats, free_cells: Ints, corner_cells: Ints, node: Floats, link: Ints, chunk: Ints, head: Ints,
     counter: Ints, setting: Floats, history: Floats, random: "np.typing.NDArray[np.uint64]",
 ) -> None:  # fmt: skip
     """Algorithm 1 for at most `iterations`; returns early at the first path, and when the pool or the history is full.
@@ -259,6 +299,7 @@ def grow(
         clearance: (H, W) cells.
         ends: (2, 2) start and goal, the trees' roots.
         free_cells: flat indices of the cells to sample from.
+        corner_cells: those of them that lie before convex corners of obstacles.
         node: see the module's docstring; this and the next five are changed in place.
         link: as above.
         chunk: as above.
@@ -277,7 +318,7 @@ def grow(
         if counter[ITERATION] == 0:
             x, y = ends[1 - tree, 0], ends[1 - tree, 1]  # the straight way first
         else:
-            x, y = _sample(ends, free_cells, clearance, setting[BOUND], random)
+            x, y = _sample(ends, free_cells, corner_cells, clearance, setting[BOUND], setting[CORNERS], random)
         counter[ITERATION] += 1
         known = setting[BEST]
         status, new = _extend(

@@ -13,11 +13,11 @@ import numpy as np
 
 from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.kernels import B2, OUTI2, kernel
-from scenario_gen.roads.clearance import clearance_in_cells, segments_free, to_cells, to_metres
+from scenario_gen.roads.clearance import clearance_in_cells, segments_free, to_metres
 from scenario_gen.roads.road import Road
 
 _labels: "WeakKeyDictionary[Road, dict[float, Ints]]" = WeakKeyDictionary()
-_cells: "WeakKeyDictionary[Road, dict[tuple[float, int], Ints]]" = WeakKeyDictionary()
+_cells: "WeakKeyDictionary[Road, dict[tuple[float, int], tuple[Ints, Ints]]]" = WeakKeyDictionary()
 
 
 def components(road: Road, radius: float) -> Ints:
@@ -33,11 +33,26 @@ def components(road: Road, radius: float) -> Ints:
 
 def component_cells(road: Road, radius: float, label: int) -> Ints:
     """Flat indices (n,) of the cells of one component, in order; read-only, cached."""
+    return _cells_of(road, radius, label)[0]
+
+
+def corner_cells(road: Road, radius: float, label: int) -> Ints:
+    """Those cells of a component that lie diagonally before a convex corner of what the disc cannot enter: (c,) flat indices."""
+    return _cells_of(road, radius, label)[1]
+
+
+def _cells_of(road: Road, radius: float, label: int) -> tuple[Ints, Ints]:
     known = _cells.setdefault(road, {})
     if (radius, label) not in known:
-        cells = np.flatnonzero(components(road, radius) == label)
-        cells.setflags(write=False)
-        known[radius, label] = cells
+        inside = np.zeros(np.add(road.drivable.shape, 2), dtype=np.bool_)
+        inside[1:-1, 1:-1] = components(road, radius) == label
+        corner = np.zeros(road.drivable.shape, dtype=np.bool_)
+        rows, columns = road.drivable.shape
+        for di, dj in ((0, 0), (0, 2), (2, 0), (2, 2)):  # the diagonal neighbour is closed, the two between are open
+            beside, above = inside[1:-1, dj : dj + columns], inside[di : di + rows, 1:-1]
+            corner |= ~inside[di : di + rows, dj : dj + columns] & beside & above
+        corner &= inside[1:-1, 1:-1]
+        known[radius, label] = np.flatnonzero(inside[1:-1, 1:-1]), np.flatnonzero(corner)
     return known[radius, label]
 
 
