@@ -1,5 +1,6 @@
 """Maps of the planning benchmark, the true optimum on them, and a rasteriser that shares no code with the planner."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -91,7 +92,7 @@ def enters_blocked(drivable: Bools, path: Floats) -> bool:
     height, width = drivable.shape
     scale = 1 << 1074  # every float is a whole multiple of 2^-1074
     whole = [[n * (scale // d) for n, d in (float(x).as_integer_ratio() for x in point)] for point in path]
-    for p, q in zip(whole[:-1], whole[1:], strict=True):
+    for p, q in itertools.pairwise(whole):
         steep = abs(q[1] - p[1]) > abs(q[0] - p[0])
         (ax, ay), (bx, by) = (p[::-1], q[::-1]) if steep else (p, q)
         if ax > bx:

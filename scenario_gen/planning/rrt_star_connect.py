@@ -82,8 +82,8 @@ class _Trees:
         while self.counter[trees.ITERATION] < goal:
             had_path = self.best < np.inf
             trees.grow(
-                goal - self.counter[trees.ITERATION], self.clearance, self.ends, self.free_cells, self.corner_cells, self.node, self.link,
-                self.chunk, self.head, self.counter, self.setting, self.history, self.random,
+                goal - self.counter[trees.ITERATION], self.clearance, self.ends, self.free_cells, self.corner_cells, self.node,
+                self.link, self.chunk, self.head, self.counter, self.setting, self.history, self.random,
             )  # fmt: skip
             if self.counter[trees.HISTORY] + 1 >= len(self.history):
                 self.history = np.concatenate((self.history, np.empty_like(self.history)))

@@ -246,7 +246,8 @@ def _in_cell(cells: Ints, width: int, random: "np.typing.NDArray[np.uint64]") ->
 def _detour(ends: Floats, x: float, y: float) -> float:
     """The least length of a path from start to goal by way of (x, y)."""
     from_start = np.sqrt((x - ends[0, 0]) ** 2 + (y - ends[0, 1]) ** 2)
-    return from_start + np.sqrt((x - ends[1, 0]) ** 2 + (y - ends[1, 1]) ** 2)
+    to_goal = np.sqrt((x - ends[1, 0]) ** 2 + (y - ends[1, 1]) ** 2)
+    return float(from_start + to_goal)
 
 
 @kernel(inline=True)
@@ -289,7 +290,8 @@ def _sample(
 
 @kernel(I, F2, F2, I1, I1, OUT2, OUTI2, OUTI2, OUTI2, OUTI1, OUT1, OUT2, RandomState)
 def grow(
-    iterations: int, clearance: Floats, ends: Floats, free_cells: Ints, corner_cells: Ints, node: Floats, link: Ints, chunk: Ints, head: Ints,
+    iterations: int, clearance: Floats, ends: Floats, free_cells: Ints, corner_cells: Ints,
+    node: Floats, link: Ints, chunk: Ints, head: Ints,
     counter: Ints, setting: Floats, history: Floats, random: "np.typing.NDArray[np.uint64]",
 ) -> None:  # fmt: skip
     """Algorithm 1 for at most `iterations`; returns early at the first path, and when the pool or the history is full.

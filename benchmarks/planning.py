@@ -1,0 +1,223 @@
+"""Planning: RRT*-Connect against the true optimum and against OMPL's planners, in one process, seeds interleaved, CPU time.
+
+A query is timed whole, as a caller sees it: checks, trees, path and string pulling; OMPL likewise from its set-up to its
+path. OMPL has our compiled exact edge check as its motion validator, and its simplifier's time is not counted. Cached per
+road are the clearance field and the cell lists made from it.
+"""
+
+import os
+from collections import defaultdict
+from pathlib import Path
+from statistics import median
+from time import process_time
+
+import numpy as np
+
+from benchmarks._planning_maps import clutter, enters_blocked, lane, optimum, recorded_maps, road_of, t_intersection
+from benchmarks.row import Row
+from scenario_gen.arrays import Floats
+from scenario_gen.encounter import Vehicle
+from scenario_gen.errors import RefusedError
+from scenario_gen.fitting.result import Fit, FittedVehicle
+from scenario_gen.planning import PlanningConfig, plan_routes
+from scenario_gen.planning.ompl_solve import PLANNERS, solve
+from scenario_gen.planning.planner import Budget, BudgetSpentError, Query, path_length
+from scenario_gen.planning.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig
+from scenario_gen.roads.clearance import clearance_in_cells, distance_transform
+from scenario_gen.roads.flood import component_at, components, connected
+from scenario_gen.roads.road import Road
+from scenario_gen.scenario import BoundaryStates
+
+SEEDS = 20
+BUDGETS = (0.01, 0.1, 1.0)  # [s] of CPU time
+STEP = RrtStarConnectConfig(step=5.0, pull=False)
+DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+Case = tuple[Road, Floats, float]
+
+
+def run() -> list[Row]:
+    """All figures."""
+    cases: dict[str, Case] = {}
+    for road, ends in (lane(), t_intersection(), clutter()):
+        cases[road.name] = road, ends, optimum(road, ends)
+        _warm(road, ends)
+    rows = _field(cases["clutter"][0]) + _first(cases) + _curves(cases) + _throughput(cases)
+    return rows + _soundness() + _recorded() + _drivable()
+
+
+def _warm(road: Road, ends: Floats) -> None:
+    RrtStarConnect().plan(road, Query(*ends), Budget(2000), 0)
+    for name in PLANNERS:
+        _ompl(road, ends, name, 0.02)
+
+
+def _ompl(road: Road, ends: Floats, name: str, seconds: float, step: float | None = None, *, simplify: bool = True) -> Floats:
+    """OMPL's path (P, 2) after so much CPU time (or its first one, for RRTConnect)."""
+    started = process_time()
+    answer = solve(
+        clearance_in_cells(road), ends, 0.0, name, lambda _: process_time() - started > seconds, step=step, simplify=simplify
+    )
+    return answer.simplified
+
+
+def _field(road: Road) -> list[Row]:
+    out = np.empty(road.drivable.shape)
+    times = []
+    for _ in range(10):
+        started = process_time()
+        distance_transform(road.drivable, out)
+        times.append(process_time() - started)
+    return [Row("clearance field, 1000×1000", 1e3 * median(times), "ms", "lower", 30.0)]
+
+
+def _first(cases: dict[str, Case]) -> list[Row]:
+    """Time to the first path at step 5."""
+    rows = []
+    for name, target in (("lane", None), ("T", 5.0), ("clutter", 15.0)):
+        road, ends, _ = cases[name]
+        ours, theirs = [], []
+        for seed in range(SEEDS):
+            started = process_time()
+            RrtStarConnect(STEP).plan(road, Query(*ends), Budget(10**7, first=True), seed)
+            ours.append(process_time() - started)
+            started = process_time()
+            _ompl(road, ends, "ompl_rrt_connect", 60.0, 5.0, simplify=False)
+            theirs.append(process_time() - started)
+        peer = f"OMPL RRTConnect {1e3 * median(theirs):.2f} ms"
+        rows.append(Row(f"{name}: first path, step 5", 1e3 * median(ours), "ms", "lower", None, peer))
+        rows.append(Row(f"{name}: first path, speed-up", median(theirs) / median(ours), "×", "higher", target, peer))
+    return rows
+
+
+def _curves(cases: dict[str, Case]) -> list[Row]:
+    """Cost over the optimum at equal CPU time."""
+    targets = {("lane", 0.01): 1e-6, ("T", 0.1): 5e-4, ("clutter", 0.1): 0.02, ("clutter", 1.0): 0.003}
+    rows = []
+    below = 0
+    for name, (road, ends, best) in cases.items():
+        for budget in BUDGETS[:1] if name == "lane" else BUDGETS:
+            excess: dict[str, list[float]] = defaultdict(list)
+            for seed in range(SEEDS):
+                excess["ours"].append(_excess_of_ours(road, ends, best, budget, seed))
+                below += excess["ours"][-1] < -1e-9
+                for planner in list(PLANNERS)[1:]:
+                    path = _ompl(road, ends, planner, budget)
+                    excess[planner].append(path_length(path) / best - 1.0 if len(path) else np.inf)
+            ours = median(excess.pop("ours"))
+            peer, theirs = min(((key, median(values)) for key, values in excess.items()), key=lambda item: item[1])
+            told = f"{peer} {theirs:.2e}"
+            label = f"{name}: excess over the optimum at {budget:g} s"
+            rows.append(Row(label, ours, "", "lower", targets.get((name, budget)), told))
+            if name != "lane":
+                rows.append(Row(f"{label}, ours / best of OMPL", ours / theirs, "", "lower", 0.5, told))
+    return [*rows, Row("paths shorter than the optimum", float(below), "", "lower", 0.0)]
+
+
+def _excess_of_ours(road: Road, ends: Floats, best: float, budget: float, seed: int) -> float:
+    try:
+        return RrtStarConnect().plan(road, Query(*ends), Budget(None, budget), seed).cost / best - 1.0
+    except BudgetSpentError:
+        return np.inf
+
+
+def _throughput(cases: dict[str, Case]) -> list[Row]:
+    """Iterations per second, and how the cost of one grows with their number (neither informed nor pulled: all samples count)."""
+    rows = []
+    for name in ("T", "clutter"):
+        road, ends, _ = cases[name]
+        per_iteration = {}
+        for config, label in ((RrtStarConnectConfig(), "default"), (PAPER, "paper preset")):
+            started = process_time()
+            RrtStarConnect(config).plan(road, Query(*ends), Budget(20_000), 1)
+            per_iteration[label] = (process_time() - started) / 20_000
+            rows.append(Row(f"{name}: iterations per second, {label}", 1 / per_iteration[label], "1/s", "higher", 1e5))
+        started = process_time()
+        RrtStarConnect(PAPER).plan(road, Query(*ends), Budget(1_000_000), 1)
+        growth = (process_time() - started) / 1e6 / per_iteration["paper preset"] / (np.log(1e6) / np.log(2e4))
+        rows.append(Row(f"{name}: cost per iteration at 10⁶ over 2·10⁴, over log n", growth, "×", "lower", 1.0))
+    return rows
+
+
+def _soundness(queries: int = 100_000) -> list[Row]:
+    """Random queries on random grids, re-checked by the exact rasteriser."""
+    rng = np.random.default_rng(0)
+    planner = RrtStarConnect(RrtStarConnectConfig(step=4.0))
+    hits = asked = found = missed = 0
+    while asked < queries:
+        drivable = rng.random((20, 20)) > rng.uniform(0.05, 0.4)
+        drivable[0, 0] = True
+        road = road_of("random", drivable)
+        for _ in range(100):
+            asked += 1
+            query = Query(*rng.uniform(0.0, 20.0, (2, 2)), float(rng.choice((0.0, 0.0, 0.6))))
+            try:
+                path = planner.plan(road, query, Budget(200, first=bool(asked % 4)), asked).path
+            except BudgetSpentError:
+                missed += 1
+                continue
+            except RefusedError:
+                continue
+            found += 1
+            hits += enters_blocked(drivable, path)
+    told = f"{found} paths, {missed} budgets spent"
+    return [Row(f"paths into occupied cells, of {asked} random queries", float(hits), "", "lower", 0.0, told)]
+
+
+def _recorded(queries: int = 500) -> list[Row]:
+    """Random queries on the recorded maps."""
+    rows = []
+    for road in recorded_maps(DATA / "maps" / "occupancy_grids") if DATA.is_dir() else ():
+        for radius in (0.0, 1.25):
+            rng = np.random.default_rng(5)
+            cells = np.argwhere(components(road, radius) > 0)
+            times, ways, failed = [], 0, 0
+            component_at(road, np.zeros(2), radius)
+            for seed in range(queries):
+                ends = road.origin + (cells[rng.integers(len(cells), size=2)][:, ::-1] + 0.5) * road.resolution
+                if not connected(road, *ends, radius):
+                    continue
+                ways += 1
+                started = process_time()
+                try:
+                    RrtStarConnect().plan(road, Query(*ends, radius), Budget(1000), seed)
+                except BudgetSpentError:
+                    failed += 1
+                times.append(process_time() - started)
+            name = f"{road.name}, radius {radius:g} m"
+            rows.append(
+                Row(f"{name}: found where a way exists", 100.0 * (1 - failed / ways), "%", "higher", 100.0, f"{ways} ways")
+            )
+            rows.append(Row(f"{name}: median time", 1e3 * median(times), "ms", "lower", 50.0))
+    return rows
+
+
+def _drivable() -> list[Row]:
+    """Drivable mode on a metric T-intersection with two lanes a road: a left and a right turn, found and not given."""
+    size, half = 500, 3.5
+    y, x = (np.mgrid[:size, :size] + 0.5) * 0.2
+    drivable = (abs(y - 50.0) < half) | ((abs(x - 50.0) < half) & (y < 50.0))
+    for side in (-1.0, 1.0):  # kerbs of 5 m radius
+        corner = np.hypot(x - 50.0 - side * (half + 5.0), y - (50.0 - half - 5.0)) > 5.0
+        drivable |= corner & (y < 50.0) & (y > 50.0 - half - 5.0) & (side * (x - 50.0) > 0.0) & (side * (x - 50.0) < half + 5.0)
+    road = road_of("metric T", drivable, 0.2)
+    config = PlanningConfig()
+    rows = []
+    turns = {"left": ((51.75, 10.0, np.pi / 2), (10.0, 51.75, np.pi)), "right": ((51.75, 10.0, np.pi / 2), (90.0, 48.25, 0.0))}
+    for name, anchors in turns.items():
+        poses = np.array(anchors)
+        fitted = FittedVehicle(poses, np.zeros(2), np.zeros(1, dtype=bool), 1.0, name)
+        states = BoundaryStates(*(np.append(pose, 5.0)[None] for pose in poses))
+        fit = Fit((Vehicle("a"),), (fitted,), np.array([0, 1]), states, ())
+        times = []
+        for seed in range(10):
+            started = process_time()
+            (route,) = plan_routes(road, fit, config, seed)
+            times.append(process_time() - started)
+        curvature = np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max()
+        shortest = RrtStarConnect().plan(road, Query(*poses[:, :2], 0.95), Budget(2000), 0).cost
+        rows.append(Row(f"drivable, {name} turn: time", 1e3 * median(times[1:]), "ms", "lower", 150.0))
+        rows.append(Row(f"drivable, {name} turn: largest curvature", float(curvature), "1/m", "lower", config.max_curvature))
+        rows.append(
+            Row(f"drivable, {name} turn: length", float(route.length[-1]), "m", "lower", None, f"shortest {shortest:.2f} m")
+        )
+    return rows
