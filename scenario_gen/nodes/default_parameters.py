@@ -1,0 +1,39 @@
+"""config/default.yaml, written from the declarations: `python -m scenario_gen.nodes.default_parameters > config/default.yaml`."""
+
+import json
+import re
+from typing import Any
+
+from scenario_gen.parameters import flatten
+from scenario_gen.pipeline import PipelineConfig
+
+HEAD = """\
+# Every parameter of the stages with its default, for the nodes (in any namespace) and for `scenario-gen --params`.
+# A node takes those it declares and leaves the others alone.
+# Written by: python -m scenario_gen.nodes.default_parameters > config/default.yaml
+/**:
+  ros__parameters:
+"""
+
+
+def yaml_value(value: Any) -> str:
+    """Return a value as YAML 1.1 reads it back: a real number always has a point."""
+    text = json.dumps(value)
+    return re.sub(r"^(-?\d+)(e[+-]?\d+)$", r"\1.0\2", text) if isinstance(value, float) else text
+
+
+def default_yaml() -> str:
+    """Return the text of config/default.yaml."""
+    lines, stage = [], ""
+    for name, (entry, value) in flatten(PipelineConfig()).items():
+        head, _, rest = name.partition(".")
+        if head != stage:
+            lines.append(f"    {head}:")
+            stage = head
+        unit = f" [{entry.metadata['unit']}]" if entry.metadata["unit"] else ""
+        lines += [f"      # {entry.metadata['meaning']}{unit}", f"      {rest}: {yaml_value(value)}"]
+    return HEAD + "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    print(default_yaml(), end="")

@@ -1,0 +1,217 @@
+"""The nodes in processes of their own, over DDS."""
+
+import math
+import threading
+import time
+
+import pytest
+from conftest import RESOURCES, Client, Processes
+
+from msg_conventions.diagnostics import Level, decode_diagnostics
+from msg_conventions.roads import decode_map
+from msg_conventions.scenarios import decode_scenario, digest, encode_scenario
+from scenario_gen.bags import read_messages
+from scenario_gen.errors import InputError, RefusedError
+from scenario_gen.logs import read_log
+from scenario_gen.nodes.run_suite import Job, run_suite
+from scenario_gen.pipeline import PipelineConfig, generate
+
+pytestmark = pytest.mark.dds
+LOG = RESOURCES / "synthetic_c"
+CHAIN = ("log_player", "segmenter", "planner", "gp_sampler", "road_server", "evaluator", "recorder")
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory, domain):
+    """All nodes, at work on one log; ended as Ctrl-C does, and then looked at."""
+    folder = tmp_path_factory.mktemp("suite")
+    arguments = {node: [] for node in CHAIN}
+    arguments["log_player"] = ["-p", f"log_path:={LOG}"]
+    arguments["road_server"] = ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"]
+    arguments["gp_sampler"] = ["-p", "count:=4", "-p", "seed:=7"]
+    arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
+    made = Processes(folder, domain, arguments)
+    yield made
+    if made.process.poll() is None:
+        made.process.kill()
+
+
+def _generate(client: Client, name: str = "/gp_sampler/generate", **values):
+    from rcl_interfaces.srv import SetParametersAtomically
+    from rclpy.parameter import Parameter
+
+    parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]
+    return client.call_later(SetParametersAtomically, name, SetParametersAtomically.Request(parameters=parameters))
+
+
+def test_a_late_joiner_gets_everything(suite, client):
+    client.hear("/scenarios", "/scenarios/info")
+    client.wait("/scenarios/info", 5, timeout=120.0)
+    late = Client(client.context.get_domain_id())
+    try:
+        late.hear("/map", "/tracks", "/changepoints", "/posterior", "/fit", "/vehicle_1/route", "/scenarios", "/report")
+        for topic in ("/map", "/tracks", "/changepoints", "/posterior", "/fit", "/vehicle_1/route", "/report"):
+            late.wait(topic)
+        assert late.wait("/scenarios", 4) == client.wait("/scenarios", 4)
+        rows = {s.name: s.values for s in decode_diagnostics(late.heard["/report"][0])[1]}
+        assert math.isfinite(float(rows["/evaluator: with changepoints"]["e_position"]))
+    finally:
+        late.close()
+
+
+def test_in_process_gives_the_same_bytes(suite, client):
+    client.hear("/scenarios")
+    heard = client.wait("/scenarios", 4)
+    (encounter,) = read_log(LOG).encounters
+    case = generate(encounter, "straight", PipelineConfig(), count=4, seed=7)
+    assert [digest(encode_scenario(s, encounter.start_ns)) for s in case.with_changepoints.scenarios] == [
+        digest(data) for data in heard[:4]
+    ]
+
+
+def test_concurrent_requests_get_their_own_answers(suite, client):
+    client.hear("/scenarios", "/scenarios/info")
+    client.wait("/scenarios/info", 5)
+    before = len(client.heard["/scenarios/info"])
+    counts = {seed: 1 + seed % 3 for seed in range(100, 108)}
+    futures = {seed: _generate(client, count=count, seed=seed) for seed, count in counts.items()}
+    for seed, future in futures.items():
+        client.until(future.done, f"the answer for seed {seed}")
+        result = future.result().result
+        assert result.successful, result.reason
+        assert f"{counts[seed]} of {counts[seed]} scenarios" in result.reason
+    assert len({future.result().result.reason.split(":")[0] for future in futures.values()}) == len(counts)
+    client.wait("/scenarios/info", before + sum(counts.values()) + len(counts))
+    infos = [decode_diagnostics(data)[1][0] for data in client.heard["/scenarios/info"]]
+    by_digest = {digest(data): data for data in client.heard["/scenarios"]}
+    for seed, count in counts.items():
+        own = [info.values for info in infos if info.values["seed"] == str(seed) and "sha256" in info.values]
+        assert [int(values["index"]) for values in own] == list(range(count))
+        for values in own:
+            decode_scenario(by_digest[values["sha256"]])
+
+
+def test_bad_requests_are_refused_with_a_reason_and_the_next_one_is_served(suite, client):
+    client.hear("/scenarios/info")
+    client.wait("/scenarios/info", 5)
+    for values, reason in (({"count": -1}, "count"), ({"no_such": 1}, "no_such"), ({"count": "many"}, "type int")):
+        future = _generate(client, **values)
+        client.until(future.done, "an answer")
+        assert not future.result().result.successful
+        assert reason in future.result().result.reason
+    future = _generate(client, count=1)
+    client.until(future.done, "an answer")
+    assert future.result().result.successful
+
+
+def test_parameters_are_checked_on_set_with_a_reason(suite, client):
+    from rcl_interfaces.srv import SetParameters
+    from rclpy.parameter import Parameter
+
+    request = SetParameters.Request(parameters=[Parameter("sampling.no_such", value=1).to_parameter_msg()])
+    assert not client.call(SetParameters, "/gp_sampler/set_parameters", request).results[0].successful
+    request = SetParameters.Request(parameters=[Parameter("road.traffic_side", value="up").to_parameter_msg()])
+    (result,) = client.call(SetParameters, "/road_server/set_parameters", request).results
+    assert not result.successful
+    assert "left" in result.reason
+
+
+def test_maps_are_served_and_bad_ones_refused(suite, client):
+    from nav_msgs.srv import GetMap, LoadMap
+
+    client.hear("/map", "/diagnostics")
+    (grid, *_) = client.wait("/map")
+    answer = client.call(GetMap, "/road_server/get_map", GetMap.Request())
+    assert (answer.map.info.width, answer.map.info.height) == decode_map(grid)[1].drivable.shape[::-1]
+    for url in ("file:///no/such/map.yaml", "nonsense", "package://no_such_package/map.yaml"):
+        answer = client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=url))
+        assert answer.result in (LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST, LoadMap.Response.RESULT_INVALID_MAP_METADATA)
+    client.until(
+        lambda: any("nonsense" in s.message for data in client.heard["/diagnostics"] for s in decode_diagnostics(data)[1]),
+        "the reason on /diagnostics",
+    )
+
+
+def test_a_damaged_message_is_said_and_survived(suite, client):
+    """Garbage under the right type: the segmenter complains and goes on."""
+    from std_srvs.srv import Trigger
+
+    client.hear("/diagnostics", "/changepoints")
+    client.wait("/changepoints")
+
+    def complained() -> bool:
+        statuses = [s for data in client.heard["/diagnostics"] for s in decode_diagnostics(data)[1]]
+        return any(s.level is Level.ERROR and s.name.startswith("/segmenter") for s in statuses)
+
+    client.node.create_publisher  # noqa: B018
+    deadline = time.monotonic() + 30.0
+    while not complained() and time.monotonic() < deadline:
+        client.say("/tracks", b"\x00\x01\x00\x00" + bytes(40))
+        time.sleep(0.5)
+    assert complained()
+    assert client.call(Trigger, "/segmenter/segment", Trigger.Request()).success
+
+
+def test_ctrl_c_ends_everything_cleanly_and_the_bag_is_whole(suite):
+    codes = suite.end()
+    assert codes == dict.fromkeys(CHAIN, 0)
+    for node in CHAIN:
+        assert "Traceback" not in suite.log(node), suite.log(node)
+        if node != "recorder":
+            assert "effective parameters" in suite.log(node)
+    recorded = {message.topic for message in read_messages(suite.folder / "bag")}
+    assert {"/map", "/tracks", "/changepoints", "/fit", "/vehicle_1/route", "/scenarios", "/scenarios/info"} <= recorded
+
+
+def test_a_played_back_bag_gives_the_same_scenarios(suite, tmp_path, domain, client):
+    """Tracks and road from the bag, into a fresh segmenter, planner and sampler."""
+    if suite.process.poll() is None:
+        suite.end()
+    bag = suite.folder / "bag"
+    scenarios = [m.data for m in read_messages(bag) if m.topic == "/scenarios"]
+    topics = "/(tracks|map|road/entries|road/exits)"
+    nodes = {
+        "player": ["-p", f"bag:={bag}", "-p", f"topics:={topics}", "-p", "rate:=1000.0"],
+        "segmenter": [],
+        "planner": [],
+        "gp_sampler": ["-p", "count:=4", "-p", "seed:=7"],
+    }
+    # the last tracks in the bag are the damaged ones of an earlier test: the sound ones come again from a bag without them
+    from scenario_gen.bags import AtomicBag, bag_topics
+    from scenario_gen.bags.metadata import qos_yaml
+
+    with AtomicBag(tmp_path / "sound") as sound:
+        for topic in bag_topics(bag):
+            sound.add_topic(topic.name, topic.type, qos_yaml(topic.quality))
+        first = {}
+        for message in read_messages(bag):
+            if message.topic not in first:
+                first[message.topic] = True
+                sound.write(message.topic, message.data, message.stamp_ns)
+    nodes["player"][1] = f"bag:={tmp_path / 'sound'}"
+    made = Processes(tmp_path, domain, nodes)
+    try:
+        client.hear("/scenarios")
+        assert client.wait("/scenarios", 4, timeout=90.0)[:4] == scenarios[:4]
+    finally:
+        made.end()
+
+
+def test_the_suite_records_several_jobs_in_their_namespaces(tmp_path):
+    jobs = [Job("/case_1", LOG, "straight"), Job("/case_2", RESOURCES / "synthetic_b", "t_intersection")]
+    bag = run_suite(jobs, PipelineConfig(), count=3, seed=7, bag=tmp_path / "bag", timeout=120.0)
+    for job in jobs:
+        encounter = read_log(job.log).encounters[0]
+        case = generate(encounter, job.road, PipelineConfig(), count=3, seed=7)
+        expected = [encode_scenario(s, encounter.start_ns) for s in case.with_changepoints.scenarios]
+        assert [m.data for m in read_messages(bag) if m.topic == f"{job.namespace}/scenarios"] == expected
+    assert [path.name for path in tmp_path.iterdir()] == ["bag"]
+
+
+def test_a_job_that_cannot_be_done_names_the_stage_and_leaves_nothing(tmp_path):
+    with pytest.raises(RefusedError, match="/x/planner: plan: the template does not fit"):
+        run_suite([Job("/x", RESOURCES / "synthetic_b", "straight")], PipelineConfig(), count=3, seed=7, bag=tmp_path / "bag")
+    with pytest.raises(InputError, match="/x/log_player"):
+        run_suite([Job("/x", tmp_path / "none.csv", "straight")], PipelineConfig(), count=3, seed=7, bag=tmp_path / "bag")
+    assert list(tmp_path.iterdir()) == []
+    assert threading.active_count() < 20

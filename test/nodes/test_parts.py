@@ -1,0 +1,151 @@
+"""The parts of the nodes that need no other process."""
+
+import ast
+import threading
+from pathlib import Path
+
+import pytest
+import yaml
+from rclpy.parameter import Parameter
+
+from msg_conventions.cdr import CdrWriter
+from scenario_gen.errors import InputError
+from scenario_gen.nodes.default_parameters import default_yaml
+from scenario_gen.nodes.domain import free_domain
+from scenario_gen.nodes.inputs import Inputs
+from scenario_gen.nodes.road_server import road_of_url
+from scenario_gen.nodes.ros_parameters import descriptor, with_values
+from scenario_gen.nodes.run_suite import SECTIONS, Job, parameters
+from scenario_gen.nodes.worker import Worker
+from scenario_gen.parameters import flatten
+from scenario_gen.pipeline import PipelineConfig
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def _message(stamp: int) -> bytes:
+    return CdrWriter().header(stamp, "map").finish()
+
+
+def test_inputs_are_complete_only_with_equal_stamps():
+    inputs = Inputs(("tracks", "changepoints"), ("map",))
+    assert inputs.missing() == ["changepoints", "map", "tracks"]
+    inputs.put("tracks", _message(1))
+    inputs.put("map", _message(99))
+    inputs.put("changepoints", _message(0))
+    assert inputs.missing() == ["changepoints"]
+    inputs.put("changepoints", _message(1))
+    assert inputs.complete() is not None
+    inputs.put("tracks", _message(2))  # a new template: the old changepoints wait for their like
+    assert inputs.missing() == ["changepoints"]
+    inputs.expect(["vehicle_1/route"])
+    assert inputs.missing() == ["vehicle_1/route", "changepoints"]
+    inputs.forget(["vehicle_1/route"])
+    inputs.put("changepoints", _message(2))
+    assert set(inputs.complete()) == {"tracks", "changepoints", "map"}
+
+
+def test_a_waiting_job_is_replaced_and_a_running_one_cancelled():
+    done, failures, gate = [], [], threading.Event()
+    worker = Worker(lambda name, error: failures.append((name, str(error))))
+    started = threading.Event()
+
+    def long(cancelled):
+        started.set()
+        gate.wait(10.0)
+        done.append(("long", cancelled()))
+
+    worker.submit("a", long)
+    assert started.wait(10.0)
+    worker.submit("b", lambda cancelled: done.append(("old", cancelled())))
+    worker.submit("b", lambda cancelled: done.append(("new", cancelled())))
+    worker.submit("a", lambda cancelled: done.append(("again", cancelled())))
+    worker.submit("c", lambda _: 1 / 0)
+    gate.set()
+    finished = threading.Event()
+    worker.submit("end", lambda _: finished.set())
+    assert finished.wait(10.0)
+    assert done == [("long", True), ("new", False), ("again", False)]
+    assert failures == [("c", "division by zero")]
+    worker.close()
+
+
+def test_cancelled_jobs_still_answer():
+    answers, gate, started = [], threading.Event(), threading.Event()
+    worker = Worker(lambda *_: None)
+    worker.submit("first", lambda _: (started.set(), gate.wait(10.0)))
+    assert started.wait(10.0)
+    worker.submit("second", lambda cancelled: answers.append(cancelled()))
+    assert worker.cancel() == ["first", "second"]
+    gate.set()
+    worker.close(10.0)
+    assert answers == [True]
+
+
+def test_every_parameter_has_a_descriptor_with_its_range():
+    for name, (entry, _value) in flatten(PipelineConfig()).items():
+        made = descriptor(entry)
+        assert made.description, name
+        if isinstance(entry.default, float) and entry.metadata["low"] is not None:
+            assert made.floating_point_range[0].from_value == entry.metadata["low"]
+        if entry.metadata["choices"]:
+            assert entry.metadata["choices"][0] in made.additional_constraints
+
+
+def test_values_are_checked_and_whole_numbers_are_numbers():
+    config = PipelineConfig()
+    assert with_values(config, [Parameter("road.lane_width", value=4)]).road.lane_width == 4.0
+    with pytest.raises(InputError, match=r"lane_width.*at least"):
+        with_values(config, [Parameter("road.lane_width", value=-4.0)])
+
+
+def test_urls_of_load_map():
+    assert road_of_url("file:///maps/a%20b.yaml") == "/maps/a b.yaml"
+    assert road_of_url("straight") == "straight"
+    with pytest.raises(InputError, match="no_such_package"):
+        road_of_url("package://no_such_package/map.yaml")
+    with pytest.raises(InputError, match="file://"):
+        road_of_url("http://example.org/map.yaml")
+
+
+def test_two_runs_get_two_domains():
+    with free_domain() as one, free_domain() as two:
+        assert one != two
+    with free_domain() as again:
+        assert again == one
+
+
+def test_the_suite_hands_every_stage_parameter_to_a_node(tmp_path):
+    body = parameters([Job("/x", tmp_path / "log", "straight", 3)], PipelineConfig(), 5, 7, tmp_path / "bag")
+    given = {name for node in body.values() for name in node["ros__parameters"]}
+    stages = {head for heads in SECTIONS.values() for head in heads}
+    assert {name for name in flatten(PipelineConfig()) if name.split(".")[0] in stages} <= given
+    assert body["/x/gp_sampler"]["ros__parameters"]["count"] == 5
+    assert body["/x/log_player"]["ros__parameters"]["encounter"] == 3
+
+
+def test_default_yaml_holds_the_defaults():
+    text = (ROOT / "config" / "default.yaml").read_text()
+    nested = yaml.safe_load(text)["/**"]["ros__parameters"]
+    flat = {f"{head}.{name}": value for head, body in nested.items() for name, value in body.items()}
+    assert flat == {name: value for name, (_, value) in flatten(PipelineConfig()).items()}
+    assert text == default_yaml(), "run: python -m scenario_gen.nodes.default_parameters > config/default.yaml"
+
+
+def test_nodes_are_thin():
+    for path in (ROOT / "scenario_gen" / "nodes").glob("*.py"):
+        assert len(path.read_text().splitlines()) <= 270, path
+    for name in ("segmenter", "planner", "log_player", "road_server", "evaluator"):
+        assert len((ROOT / "scenario_gen" / "nodes" / f"{name}.py").read_text().splitlines()) <= 150, name
+
+
+def test_the_launch_file_names_nodes_and_parameters_that_exist():
+    """launch itself is not among the wheels, so its text is checked against the entry points and the declared parameters."""
+    tree = ast.parse((ROOT / "launch" / "suite.launch.py").read_text())
+    calls = [call for call in ast.walk(tree) if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "node"]
+    assert len(calls) == 7
+    for call in calls:
+        name = ast.literal_eval(call.args[0])
+        source = (ROOT / "scenario_gen" / "nodes" / f"{name}.py").read_text()
+        for keyword in call.keywords:
+            assert f"    {keyword.arg}: " in source, (name, keyword.arg)
