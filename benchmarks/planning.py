@@ -149,7 +149,8 @@ def _soundness(queries: int = 100_000) -> list[Row]:
         road = road_of("random", drivable)
         for _ in range(100):
             asked += 1
-            query = Query(*rng.uniform(0.0, 20.0, (2, 2)), float(rng.choice((0.0, 0.0, 0.6))))
+            start, goal = rng.uniform(0.0, 20.0, (2, 2))
+            query = Query(start, goal, float(rng.choice((0.0, 0.0, 0.6))))
             try:
                 path = planner.plan(road, query, Budget(200, first=bool(asked % 4)), asked).path
             except BudgetSpentError:
@@ -173,13 +174,13 @@ def _recorded(queries: int = 500) -> list[Row]:
             times, ways, failed = [], 0, 0
             component_at(road, np.zeros(2), radius)
             for seed in range(queries):
-                ends = road.origin + (cells[rng.integers(len(cells), size=2)][:, ::-1] + 0.5) * road.resolution
-                if not connected(road, *ends, radius):
+                start, goal = road.origin + (cells[rng.integers(len(cells), size=2)][:, ::-1] + 0.5) * road.resolution
+                if not connected(road, start, goal, radius):
                     continue
                 ways += 1
                 started = process_time()
                 try:
-                    RrtStarConnect().plan(road, Query(*ends, radius), Budget(1000), seed)
+                    RrtStarConnect().plan(road, Query(start, goal, radius), Budget(1000), seed)
                 except BudgetSpentError:
                     failed += 1
                 times.append(process_time() - started)
@@ -214,7 +215,7 @@ def _drivable() -> list[Row]:
             (route,) = plan_routes(road, fit, config, seed)
             times.append(process_time() - started)
         curvature = np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max()
-        shortest = RrtStarConnect().plan(road, Query(*poses[:, :2], 0.95), Budget(2000), 0).cost
+        shortest = RrtStarConnect().plan(road, Query(poses[0, :2], poses[1, :2], 0.95), Budget(2000), 0).cost
         rows.append(Row(f"drivable, {name} turn: time", 1e3 * median(times[1:]), "ms", "lower", 150.0))
         rows.append(Row(f"drivable, {name} turn: largest curvature", float(curvature), "1/m", "lower", config.max_curvature))
         rows.append(

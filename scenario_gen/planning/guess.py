@@ -25,7 +25,8 @@ def direct(road: Road, start: Floats, end: Floats, radius: float, limit: float) 
         p = start[:2] * (1 + 2 * t) * (1 - t) ** 2 + a * t * (1 - t) ** 2 + end[:2] * t**2 * (3 - 2 * t) + b * t**2 * (t - 1)
         first, second = np.gradient(p, axis=0), np.gradient(np.gradient(p, axis=0), axis=0)
         bend = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / np.maximum(np.hypot(*first.T), 1e-9) ** 3
-        if bend[1:-1].max() <= limit and segments_free(road, p[:-1], p[1:], radius).all():
+        onward = ((p[1:-1] - p[:-2]) * (p[2:] - p[1:-1])).sum(axis=1) > 0.0  # no cusp
+        if onward.all() and bend[1:-1].max() <= limit and segments_free(road, p[:-1], p[1:], radius).all():
             return Guess(p, np.full(count, DIRECT_HOLD))
     return None
 

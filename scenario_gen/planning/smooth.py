@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from scenario_gen.arrays import Floats, Ints
+from scenario_gen.arrays import Floats, Ints, wrap_angle
 from scenario_gen.encounter import Vehicle
 from scenario_gen.planning.band import relax
 from scenario_gen.planning.config import PlanningConfig
@@ -139,6 +139,8 @@ def verified(road: Road, vehicle: Vehicle, points: Floats, start: Floats, end: F
     first, second = spline(u, 1), spline(u, 2)
     bend = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / np.hypot(*first.T) ** 3
     poses = np.column_stack((spline(u), np.arctan2(first[:, 1], first[:, 0])))
+    turned = np.abs(wrap_angle(np.diff(poses[:, 2]))) / np.maximum(np.hypot(*np.diff(poses[:, :2], axis=0).T), 1e-6)
+    bend[1:] = np.maximum(bend[1:], turned)  # a cusp on a straight line has no curvature, but turns round
     poses[0], poses[-1] = start, end
     fits = footprint_fits(road, poses, vehicle.length, vehicle.width)
     return Curve(spline, float(knots[-1]), float(bend.max()), poses[np.argmax(bend), :2], poses[~fits])
