@@ -33,7 +33,7 @@ def recheck(case: Case) -> list[str]:
     return [
         f"scenario {scenario.index}: {violation}"
         for scenario in case.with_changepoints.scenarios
-        for violation in oracle_violations(scenario, case.road, case.fit.asked, conflicts, waits, CONFIG.limits, dt=0.02)
+        for violation in oracle_violations(scenario, case.road, case.fit.asked, conflicts, waits, CONFIG.limits, dt=0.05)
     ]
 
 
