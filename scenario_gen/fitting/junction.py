@@ -21,7 +21,7 @@ from scenario_gen.roads.curve import Curve
 from scenario_gen.roads.road import Road
 from scenario_gen.roads.tracks import Track
 
-_BEAM = 40
+_BEAM = 24
 _INSTANTS = 15
 _SCALES = (1.0, 0.95, 1.05, 0.9, 1.1, 0.85, 1.15, 0.8, 1.2, 1.25)
 _LOST = 400.0  # cost [m²] of a relation that the routes do not have
@@ -177,13 +177,14 @@ class _Solver:
                 lost += found is None
                 system.extend(found or ())
         start = _least_squares(members, system)
-        for _ in range(2):  # who has no equation is placed by its relative position, then all are compared
+        rotation, shift, yaw = self._align(ways, start, members)
+        untied = [i for i in members if i not in start]
+        for i in untied:  # who has no equation is placed by its relative position
+            target = self.poses[i][::3, :2] @ rotation.T + shift
+            station, _ = ways[i].curve.project(target)
+            start[i] = float(np.median(station - self.driven[i][::3]))
+        if untied:
             rotation, shift, yaw = self._align(ways, start, members)
-            for i in members:
-                if i not in start:
-                    target = self.poses[i][:, :2] @ rotation.T + shift
-                    station, _ = ways[i].curve.project(target)
-                    start[i] = float(np.median(station - self.driven[i]))
         return self._judged(ways, start, members, lost, rotation, shift, yaw)
 
     def _equations(self, k: int, relation: Relation, one: _Way, two: _Way) -> tuple[Equation, ...] | None:

@@ -8,7 +8,7 @@ from scenario_gen.arrays import Floats, wrap_angle
 from scenario_gen.roads.curve import Curve
 
 _RADII = (12.0, 10.5, 9.25, 8.0, 7.0, 6.25, 5.5, 5.0)  # metres, tried from the gentlest
-_ARC_STEP = 0.25
+_ARC_STEP = 0.5
 _PARALLEL = np.radians(8.0)
 _STEEPEST_SHIFT = 0.05  # 1/m, curvature of a change of lanes on the way
 _WIDEST_SHIFT = 12.0  # metres sideways
