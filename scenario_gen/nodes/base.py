@@ -1,5 +1,7 @@
 """What all nodes with a stage have in common: lifecycle, parameters, raw topics, a worker, diagnostics, a clean end."""
 
+import importlib
+import pkgutil
 import signal
 import sys
 import traceback
@@ -39,7 +41,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     INPUTS: tuple[str, ...] = ()
     OUTPUTS: tuple[str, ...] = ()  # announced while configuring, so that listeners are there before the first message
-    KERNELS = True  # the stage has compiled kernels
+    STAGES: tuple[str, ...] = ()  # packages of scenario_gen whose kernels are compiled while configuring
 
     def __init__(self, name: str, config: Any, namespace: str | None = None) -> None:
         super().__init__(name, namespace=namespace)
@@ -97,6 +99,18 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             kind, quality = topic_entry(topic)
             self._raw_publishers[topic] = self.create_publisher(message_class(kind), topic, qos(quality))
 
+    def serve(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
+        """Offer a service; whatever goes wrong in it, the caller gets an answer and the node lives on."""
+
+        def guarded(request: Any, response: Any) -> Any:
+            try:
+                return callback(request, response)
+            except Exception as error:
+                self._failed(name, error)
+                return response
+
+        self.create_service(kind, name, guarded)
+
     def work(self, name: str, job: Job) -> None:
         """Run a job off the executor's thread; a waiting one of the same name is replaced, a running one cancelled."""
         if self._worker is not None:
@@ -112,16 +126,20 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     def status(self, level: Level, message: str, subject: str = "status", stamp_ns: int = 0, **values: str) -> None:
         """Publish one status on /diagnostics and log it."""
-        log = self.get_logger()
-        {Level.OK: log.info, Level.WARN: log.warning}.get(level, log.error)(message)
+        if level is Level.OK:  # a call of its own for each severity: rclpy refuses to change it between calls from one line
+            self.get_logger().info(message)
+        elif level is Level.WARN:
+            self.get_logger().warning(message)
+        else:
+            self.get_logger().error(message)
         self.report(Status(f"{self.get_fully_qualified_name()}: {subject}", level, message, values), stamp_ns=stamp_ns)
 
     # --- lifecycle --------------------------------------------------------------------------------------------
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Compile the kernels, or load them from the cache, and announce the outputs."""
-        if self.KERNELS:
-            count, seconds = compile_kernels()
+        if self.STAGES:
+            count, seconds = compile_kernels(self.STAGES)
             self.get_logger().info(f"{count} kernels ready after {seconds:.1f} s")
         for topic in ("/diagnostics", *self.OUTPUTS):
             self._announce(topic)
@@ -179,11 +197,18 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         self.status(Level.ERROR, str(error) if isinstance(error, ScenarioGenError) else f"{kind}: {error}", name, error=kind)
 
 
-def compile_kernels() -> tuple[int, float]:
-    """Compile, or load from the cache, the kernels of the stages that this process has imported; return number and seconds."""
-    from scenario_gen import kernels  # not for nodes without kernels: numba takes a second to load
+def compile_kernels(stages: Sequence[str]) -> tuple[int, float]:
+    """Compile the kernels of some stages, or load them from the cache; return their number and the seconds it took.
+
+    Only those of the node's own stages: to import all of them would cost every node seconds.
+    """
+    from scenario_gen import kernels
 
     started = perf_counter()
+    for stage in stages:
+        package = importlib.import_module(f"scenario_gen.{stage}")
+        for module in pkgutil.iter_modules(getattr(package, "__path__", ())):
+            importlib.import_module(f"scenario_gen.{stage}.{module.name}")
     for dispatcher, argument_types in kernels._registry:
         dispatcher.compile(argument_types)
     return len(kernels._registry), perf_counter() - started

@@ -31,6 +31,7 @@ class Evaluator(StageNode):
     """Measures every request's scenarios against their template once the request is closed."""
 
     INPUTS = ("tracks", "changepoints", "scenarios", "scenarios/info")
+    STAGES = ("interaction", "evaluation")
     OUTPUTS = ("report",)
 
     def __init__(self, namespace: str | None = None) -> None:

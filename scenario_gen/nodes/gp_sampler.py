@@ -49,6 +49,7 @@ class GpSampler(StageNode):
     """Samples valid scenarios around the planned routes."""
 
     INPUTS = ("map", "tracks", "changepoints", "fit")
+    STAGES = ("interaction", "roads", "sampling", "validity")
     OUTPUTS = ("scenarios", "scenarios/info", "markers")
 
     def __init__(self, namespace: str | None = None) -> None:
@@ -58,7 +59,7 @@ class GpSampler(StageNode):
         self._routes: set[str] = set()
         self._requests = 0
         self.create_service(SetParametersAtomically, "~/generate", self._generate_for_caller)
-        self.create_service(Trigger, "~/cancel", self._cancel)
+        self.serve(Trigger, "~/cancel", self._cancel)
 
     def received(self, topic: str, data: bytes) -> None:
         """Generate when everything is there."""

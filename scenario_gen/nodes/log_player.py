@@ -30,11 +30,10 @@ class LogPlayer(StageNode):
     """Reads a log and publishes the encounter that is asked for."""
 
     OUTPUTS = ("tracks",)
-    KERNELS = False
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("log_player", Config(), namespace)
-        self.create_service(Trigger, "~/play", self._play_again)
+        self.serve(Trigger, "~/play", self._play_again)
 
     def started(self) -> None:
         """Read the log, if one is named."""

@@ -37,6 +37,7 @@ class Planner(StageNode):
     """Fits each template to the road and plans every vehicle's route between its changepoints."""
 
     INPUTS = (*ROAD, "tracks", "changepoints")
+    STAGES = ("interaction", "roads", "fitting", "planning")
     OUTPUTS = ("fit",)
 
     def __init__(self, namespace: str | None = None) -> None:

@@ -58,6 +58,7 @@ class RoadServer(StageNode):
     """Serves one road at a time."""
 
     INPUTS = ("tracks",)
+    STAGES = ("roads",)
     OUTPUTS = ("map", "road/entries", "road/exits")
 
     def __init__(self, namespace: str | None = None) -> None:
@@ -65,8 +66,8 @@ class RoadServer(StageNode):
         self._tracks: bytes | None = None
         self._name = self.config.road_name
         self._grid: bytes | None = None
-        self.create_service(GetMap, "~/get_map", self._get_map)
-        self.create_service(LoadMap, "~/load_map", self._load_map)
+        self.serve(GetMap, "~/get_map", self._get_map)
+        self.serve(LoadMap, "~/load_map", self._load_map)
 
     def started(self) -> None:
         """Publish the plain road until tracks come."""

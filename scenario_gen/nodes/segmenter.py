@@ -28,12 +28,13 @@ class Segmenter(StageNode):
     """Finds the driving primitives of every encounter it hears."""
 
     INPUTS = ("tracks",)
+    STAGES = ("segmentation",)
     OUTPUTS = ("changepoints", "posterior")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("segmenter", Config(), namespace)
         self._tracks: bytes | None = None
-        self.create_service(Trigger, "~/segment", self._segment_again)
+        self.serve(Trigger, "~/segment", self._segment_again)
 
     def received(self, topic: str, data: bytes) -> None:
         """Segment the newest encounter."""

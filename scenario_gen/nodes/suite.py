@@ -13,6 +13,8 @@ import sys
 import traceback
 from pathlib import Path
 
+from scenario_gen.nodes.base import StageNode, compile_kernels
+
 PATIENCE = 5.0  # seconds that a node has to end by itself
 
 
@@ -44,14 +46,20 @@ def _become(node: str, arguments: list[str], log: str) -> None:
         os._exit(code)
 
 
+def _load(nodes: list[str]) -> None:
+    """Import the nodes and compile, or load, the kernels of their stages: what every fork will share."""
+    stages: dict[str, None] = {}
+    for node in nodes:
+        for made in vars(importlib.import_module(f"scenario_gen.nodes.{node}")).values():
+            if isinstance(made, type) and issubclass(made, StageNode):
+                stages |= dict.fromkeys(made.STAGES)
+    count, seconds = compile_kernels(tuple(stages))
+    say(event="loaded", kernels=count, seconds=seconds)
+
+
 def run(specification: list[dict[str, object]]) -> None:
     """Fork the nodes, report those that end, and end them all when asked."""
-    for entry in specification:
-        importlib.import_module(f"scenario_gen.nodes.{entry['node']}")
-    from scenario_gen.nodes.base import compile_kernels
-
-    count, seconds = compile_kernels()
-    say(event="loaded", kernels=count, seconds=seconds)
+    _load([str(entry["node"]) for entry in specification])
     children: dict[int, str] = {}
     for entry in specification:
         pid = os.fork()
