@@ -24,6 +24,7 @@ from scenario_gen.scenario import BoundaryStates
 from scenario_gen.segmentation.result import Segmentation
 
 SLIDE_SIGMAS = 2.0  # an anchor that slides by so many σ_s is no farther from the template than a sample is anyway
+SAMPLE_SLIDE_SIGMAS = 4.0  # by which an anchor of a sample may slide, rather than have its clock drawn back
 _SHORTEST_WAIT = 1.25  # s; shorter waits are lengthened to it, so that they are still waits on the published grid
 _LEAST_WAIT = 1.15  # s, to which a fast clock may shorten one
 _STRETCHES = 9
@@ -210,7 +211,7 @@ def _model(
 ) -> Prepared:
     """The model on a clock that may be stretched."""
     said, stretch = [], float(clock.times[-1] / times[-1])
-    slide = max(SLIDE_SIGMAS * config.longitudinal_sigma, *(nominal.slid for nominal in found))
+    slide = max(SAMPLE_SLIDE_SIGMAS * config.longitudinal_sigma, *(nominal.slid for nominal in found))
     if stretch > 1.0 + 1e-9:
         said.append(f"clock stretched by {100.0 * (stretch - 1.0):.1f} % so that every vehicle can keep to its limits")
     vehicles = []

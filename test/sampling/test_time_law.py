@@ -147,3 +147,10 @@ def test_state_is_the_law():
     assert s == pytest.approx([1.0, 4.0, 7.5, 11.5])
     assert v == pytest.approx([2.0, 4.0, 3.0, 1.0])
     assert a == pytest.approx([2.0, -1.0, -1.0, -1.0])
+
+
+def test_knot_can_be_put_elsewhere_and_keeps_its_distance():
+    one = layout(CLOCK, NO_DWELL, [], TIME, dip(), (10.0, 10.0), 0.25)
+    assert one.knot == pytest.approx([0.0, 1.5, 6.0, 6.75, 9.0, 10.25, 14.0, 15.5, 20.0])
+    short = layout(np.array([0.0, 1.0, 20.0]), NO_DWELL[:2], [], TIME, dip(), (10.0, 10.0), 0.1)
+    assert short.knot[1] == pytest.approx(0.25)

@@ -1,0 +1,102 @@
+"""The chain up to the sampler over every recorded encounter and several roads."""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import ScenarioGenError
+from scenario_gen.evaluation import replay
+from scenario_gen.evaluation.distributions import QUANTITIES, compare, values_of
+from scenario_gen.evaluation.motion import at_count, at_period
+from scenario_gen.fitting import Fit, fit_template
+from scenario_gen.interaction import Conflict, Wait, find_conflicts, find_waits, pair_conflict
+from scenario_gen.logs import read_log
+from scenario_gen.planning import Route, plan_routes
+from scenario_gen.roads import Road, build_road
+from scenario_gen.sampling import SamplingConfig, sample_scenarios
+from scenario_gen.scenario import Scenario, ScenarioSet, Verdict
+from scenario_gen.segmentation import Segmentation, segment
+from scenario_gen.validity import Checker
+
+DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+ROADS = ("corridor", "straight", "t_intersection", "four_way")
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """One recorded encounter planned on one road."""
+
+    name: str
+    road_name: str
+    encounter: Encounter
+    segmentation: Segmentation
+    road: Road
+    fit: Fit
+    routes: tuple[Route, ...]
+    conflicts: tuple[Conflict, ...]
+    waits: tuple[Wait, ...]
+
+    def sample(self, count: int, seed: int = 0, config: SamplingConfig | None = None, *, checked: bool = True) -> ScenarioSet:
+        """Sample `count` scenarios; unchecked, every candidate counts as valid."""
+        checker = Checker(self.road, self.fit.asked, self.conflicts, self.waits)
+        check = checker.check if checked else lambda scenarios: [Verdict() for _ in scenarios]
+        return sample_scenarios(
+            self.encounter, self.segmentation, self.road, self.routes, self.fit.asked, check, config,
+            count=count, seed=seed, waits=self.waits,
+        )  # fmt: skip
+
+
+def cases() -> Iterator[Prepared | str]:
+    """Every recorded encounter on every road that it can be fitted to and planned on; else a sentence why not."""
+    for path in sorted((DATA / "trajectories").glob("*/encounter_*.csv")):
+        encounter = read_log(path).encounters[0]
+        segmentation = segment(encounter)
+        conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
+        waits = find_waits(encounter)
+        for road_name in ROADS:
+            name = path.stem.removeprefix("encounter_")[:32]
+            try:
+                road = build_road(road_name, encounter)
+                fit = fit_template(encounter, segmentation, road)
+                routes = plan_routes(road, fit)
+            except ScenarioGenError as error:
+                yield f"{name} on {road_name}: {error}"
+                continue
+            yield Prepared(name, road_name, encounter, segmentation, road, fit, routes, conflicts, waits)
+
+
+def displacement(scenarios: tuple[Scenario, ...]) -> float:
+    """Mean distance [m] between the same vehicle at the same share of the duration in two samples."""
+    position = np.stack([at_count(s, 101).position for s in scenarios])
+    pairs = np.triu_indices(len(scenarios), 1)
+    return float(np.linalg.norm(position[pairs[0]] - position[pairs[1]], axis=-1).mean())
+
+
+def arrival_spread(case: Prepared, scenarios: tuple[Scenario, ...]) -> float:
+    """Largest standard deviation [s] of the second vehicle's entry over the conflicts that are not following; NaN if none."""
+    spreads = []
+    for conflict in case.conflicts:
+        if conflict.following:
+            continue
+        a, b = sorted((conflict.first, conflict.second))
+        found = [pair_conflict(s.vehicles, s.time, s.position, s.heading, a, b) for s in scenarios]
+        entries = [one.entry_second for one in found if one is not None]
+        if len(entries) > 1:
+            spreads.append(float(np.std(entries)))
+    return max(spreads, default=float("nan"))
+
+
+def divergences(case: Prepared, scenarios: tuple[Scenario, ...]) -> dict[str, float]:
+    """Jensen-Shannon divergence [bit] of each quantity between the samples and the fitted template."""
+    period = case.encounter.dt
+    template = values_of(at_period(replay(case.encounter, case.fit), period))
+    samples = [values_of(at_period(s, period)) for s in scenarios]
+    ones: Floats = np.ones((1, len(scenarios)))
+    return {
+        q.id: float(compare(q, template[q.id], [values[q.id] for values in samples]).jensen_shannon(ones)[0]) for q in QUANTITIES
+    }

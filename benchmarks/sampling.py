@@ -1,0 +1,115 @@
+"""Sampling: the Gaussian process against its peers, throughput, and acceptance, diversity and realism on recorded data."""
+
+from time import process_time
+
+import numpy as np
+
+from benchmarks import _sampling_peers
+from benchmarks._sampling_cases import Prepared, arrival_spread, cases, displacement, divergences
+from benchmarks.row import Row
+from scenario_gen.arrays import Floats
+from scenario_gen.encounter import Encounter, Vehicle
+from scenario_gen.interaction import find_conflicts
+from scenario_gen.planning import Route
+from scenario_gen.roads import Road
+from scenario_gen.sampling import sample_scenarios
+from scenario_gen.scenario import BoundaryStates
+from scenario_gen.segmentation import Segmentation
+from scenario_gen.validity import Checker
+
+COUNT = 200  # scenarios per recorded encounter and road
+TARGETS = {"speed": 0.1, "acceleration": 0.2, "gap": 0.1}
+
+
+def run() -> list[Row]:
+    """Measure."""
+    return [*_sampling_peers.rows(), *_throughput(), *_recorded()]
+
+
+def _throughput() -> list[Row]:
+    base = _seconds(2, 20.0, 2000)
+    rows = [Row("valid two-vehicle 20 s scenarios, checked, one core", 2000 / base, "1/s", "higher", 2000.0)]
+    rows.append(Row("cost of four times the samples", _seconds(2, 20.0, 8000) / base, "×", "lower", 4.4))
+    rows.append(Row("cost of twice the duration", _seconds(2, 40.0, 2000) / base, "×", "lower", 2.2))
+    rows.append(Row("cost of four times the vehicles (8)", _seconds(8, 20.0, 2000) / base, "×", "lower", 16.0))
+    return rows
+
+
+def _seconds(vehicles: int, duration: float, count: int) -> float:
+    """CPU seconds for `count` valid scenarios of vehicles that drive side by side, a changepoint every 2.5 s."""
+    time: Floats = np.linspace(0.0, duration, round(duration / 0.1) + 1)
+    speed = 8.0 + 2.0 * np.sin(time[None] / 3.0 + np.arange(vehicles)[:, None])
+    along = np.concatenate([np.zeros((vehicles, 1)), np.cumsum(0.05 * (speed[:, 1:] + speed[:, :-1]), axis=1)], axis=1)
+    lane = 4.0 * np.arange(vehicles)[:, None]
+    position = np.stack([20.0 + along, lane + 0.0 * along], axis=-1)
+    changes = np.arange(25, len(time) - 12, 25)
+    index = np.concatenate([[0], changes, [len(time) - 1]])
+    routes, heading = [], np.zeros_like(speed)
+    for n in range(vehicles):
+        s = np.linspace(0.0, along[n, -1], int(along[n, -1] / 0.4) + 2)
+        anchor = np.searchsorted(s, along[n, index] - 1e-9).clip(0, len(s) - 1)
+        routes.append(Route(np.column_stack([20.0 + s, np.full_like(s, lane[n, 0]), 0.0 * s]), anchor, s))
+    names = tuple(Vehicle(str(n)) for n in range(vehicles))
+    encounter = Encounter("side by side", names, 0, 100_000_000, position, heading, speed)
+    labels = np.searchsorted(changes, np.arange(len(time)), side="right")
+    segmentation = Segmentation(labels, changes, np.zeros(len(time)), ("",) * (len(changes) + 1))
+    drivable = np.ones((5 * (40 + 4 * vehicles), 5 * int(along.max() + 60)), dtype=bool)
+    road = Road("wide", drivable, 0.2, np.array([-10.0, -20.0]), np.zeros((0, 3)), np.zeros((0, 3)))
+    states = [np.array([[*r.points[k], v[k]] for r, v in zip(routes, speed, strict=True)]) for k in (0, -1)]
+    asked = BoundaryStates(states[0], states[1])
+    checker = Checker(road, asked, find_conflicts(names, time, position, heading), ())
+    started = process_time()
+    found = sample_scenarios(encounter, segmentation, road, routes, asked, checker.check, count=count, waits=())
+    spent = process_time() - started
+    if len(found.scenarios) < count:
+        raise RuntimeError(f"only {len(found.scenarios)} of {count} scenarios: {found.refused}")
+    return spent
+
+
+def _recorded() -> list[Row]:
+    """Acceptance, diversity and realism, from one run at the default standard deviations."""
+    acceptance: dict[str, list[float]] = {}
+    spreads, moved, refused, broken = [], [], 0, 0
+    realism: dict[str, list[float]] = {name: [] for name in TARGETS}
+    for case in cases():
+        if not isinstance(case, Prepared):
+            refused += 1
+            continue
+        found = case.sample(COUNT)
+        acceptance.setdefault(case.name, []).append(found.acceptance)
+        broken += len(found.scenarios) < COUNT
+        if len(found.scenarios) < 2:
+            continue
+        moved.append(displacement(found.scenarios))
+        spread = arrival_spread(case, found.scenarios)
+        spreads += [] if np.isnan(spread) else [spread]
+        for name, value in divergences(case, found.scenarios).items():
+            if name in realism:
+                realism[name].append(value)
+    if not acceptance:
+        return [Row("recorded encounters", 0.0, "cases", "higher", 1.0, "no recorded data, or none can be planned")]
+    everywhere = [value for values in acceptance.values() for value in values]
+    peer = f"{len(everywhere)} encounters × roads, {refused} refused before sampling"
+    rows = [
+        Row(
+            "raw acceptance, worst encounter on its best road", min(max(v) for v in acceptance.values()), "", "higher", 0.7, peer
+        ),
+        Row("raw acceptance, worst encounter and road", min(everywhere), "", "higher", 0.3),
+        Row("sets that stayed short", float(broken), "sets", "lower", 0.0),
+        Row("mean pairwise displacement, least", min(moved), "m", "higher", 0.5, f"median {np.median(moved):.2f} m"),
+    ]
+    if spreads:
+        label = "standard deviation of arrival at a crossing conflict, median"
+        rows.append(Row(label, float(np.median(spreads)), "s", "higher", 0.5, f"from {min(spreads):.2f} to {max(spreads):.2f} s"))
+    rows += [
+        Row(
+            f"JS {name} to the fitted template, median",
+            float(np.median(values)),
+            "bit",
+            "lower",
+            TARGETS[name],
+            f"worst {max(values):.3f}",
+        )
+        for name, values in realism.items()
+    ]
+    return rows
