@@ -1,6 +1,7 @@
 """Where a chain starts, and the prior it runs under: k-means, a few sweeps, greedy merges; scales from the data."""
 
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +34,9 @@ def cluster(problem: Problem, states: int, window: int, rng: np.random.Generator
     window = min(window, max(len(problem.v) // 8, 1))
     signals = problem.y if problem.regressors == 1 else _dynamics(problem)
     smooth = uniform_filter1d(signals, window, axis=0, mode="nearest")
-    return compact(kmeans2(smooth, min(states, max(2, len(smooth) // 4)), minit="++", rng=rng)[1].astype(np.int64))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # fewer clusters than asked for is no trouble: labels are renumbered
+        return compact(kmeans2(smooth, min(states, max(2, len(smooth) // 4)), minit="++", rng=rng)[1].astype(np.int64))
 
 
 def _dynamics(problem: Problem) -> Floats:
@@ -44,22 +47,29 @@ def _dynamics(problem: Problem) -> Floats:
     return np.hstack([y, step / (step.std(axis=0) + 1e-12), size / (size.std(axis=0) + 1e-12)])
 
 
-def sample_weight(problem: Problem, states: int, rng: np.random.Generator) -> float:
+def sample_weight(problem: Problem, config: "SamplerConfig", rng: np.random.Generator) -> float:
     """What a sample counts for: (1 - φ) / (1 + φ), φ the lag-1 autocorrelation of what states leave unexplained.
 
     An HMM takes samples as independent given their state. Where they are not (smoothed, slowly varying or oversampled
     signals), it believes each wiggle and spends states on it. The weight makes n correlated samples count for as many
-    independent ones as they are worth; for independent samples it is 1.
+    independent ones as they are worth; for independent samples it is 1. States that are not right yet leave
+    correlation too, so φ is the smaller of two: around k-means' labels, and around those a chain would start from.
     """
-    labels = cluster(problem, states, WINDOWS[0], rng)
+    whole = replace(problem, weight=1.0)
+    rough = cluster(whole, config.states, WINDOWS[0], rng)
+    phi = min(_autocorrelation(whole, rough), _autocorrelation(whole, find_start(whole, config, 0, rng).labels))
+    return 1.0 if phi < 2.0 / np.sqrt(len(rough)) else max((1.0 - phi) / (1.0 + phi), LEAST_WEIGHT)
+
+
+def _autocorrelation(problem: Problem, labels: Ints) -> float:
+    """Lag-1 autocorrelation of the residuals, mean over channels, from neighbours with one label."""
     residual = problem.residual(labels)
     pairs = labels[:-1] == labels[1:]
     pairs[problem.ends[:-1] - 1] = False
     if not pairs.any():
-        return 1.0
+        return 0.0
     power = (residual**2).mean(axis=0) + 1e-300
-    phi = float(np.mean((residual[:-1] * residual[1:])[pairs].mean(axis=0) / power))
-    return 1.0 if phi < 2.0 / np.sqrt(len(labels)) else max((1.0 - phi) / (1.0 + phi), LEAST_WEIGHT)
+    return float(np.mean((residual[:-1] * residual[1:])[pairs].mean(axis=0) / power))
 
 
 def find_start(problem: Problem, config: "SamplerConfig", index: int, rng: np.random.Generator) -> Start:

@@ -87,7 +87,7 @@ def segment_series(
     first, *seeds = np.random.SeedSequence([seed]).spawn(config.chains + 1)
     problem = Problem.build(scaled, stops, config, unknown)
     if config.weight == 0.0:
-        problem = replace(problem, weight=sample_weight(problem, config.states, np.random.Generator(np.random.PCG64(first))))
+        problem = replace(problem, weight=sample_weight(problem, config, np.random.Generator(np.random.PCG64(first))))
     results = [_run(problem, config, index, stream) for index, stream in enumerate(seeds)]
     return pool([labels for labels, _ in results], [trace for _, trace in results], stops, problem.lead)
 
