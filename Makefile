@@ -6,7 +6,7 @@ READY := .venv/.ready
 .PHONY: demo test check bench install clean
 
 demo: $(READY)
-	$(BIN)/scenario-gen demo --out out/demo
+	$(BIN)/scenario-gen demo --ros --out out/demo
 
 test: $(READY)
 	$(BIN)/ruff check .

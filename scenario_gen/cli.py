@@ -1,22 +1,30 @@
 """The command line: `scenario-gen generate`, `scenario-gen demo`; a thin layer over the pipeline."""
 
+import json
 import sys
+import tempfile
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 import yaml
 from rich.console import Console
+from rich.markdown import Markdown
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+from msg_conventions.scenarios import encode_scenario
+from scenario_gen.bags import read_messages
+from scenario_gen.bags.evaluation import evaluate_bag
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError, ScenarioGenError
-from scenario_gen.evaluation import Case, summary
+from scenario_gen.evaluation import Case, comparison_table, read_evaluations, summary
+from scenario_gen.evaluation import compare as compare_sets
 from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
 from scenario_gen.parameters import flatten, updated
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.pipeline import generate as run_pipeline
-from scenario_gen.results import check_folder, provenance_of, write_results
+from scenario_gen.results import BAG, FIGURES, check_folder, namespaces, provenance_of, write_results
 
 app = typer.Typer(
     help="Turn recorded vehicle encounters into new, valid ones on other roads.",
@@ -25,6 +33,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 console = Console()
+
+DEMO = (("a", "t_intersection"), ("b", "t_intersection"), ("c", "straight"))
 
 LogArgument = Annotated[list[Path], typer.Argument(help="CSV, Parquet, SPMD files, or a rosbag2 bag (MCAP or SQLite)")]
 SetOption = Annotated[
@@ -123,6 +133,102 @@ def generate(
         provenance=provenance_of(log, seed, count, road, config),
     )
     conclude(cases, refusals, out)
+
+
+@app.command()
+def demo(
+    count: Annotated[int, typer.Option(min=1, help="scenarios per case and road")] = 50,
+    seed: Annotated[int, typer.Option(min=0, help="same seed, same scenarios")] = 7,
+    out: Annotated[Path, typer.Option(help="folder of the results")] = Path("out/demo"),
+    ros: Annotated[bool, typer.Option("--ros", help="generate with the ROS nodes, over DDS, into the bag")] = False,
+) -> None:
+    """Run the main job on the bundled synthetic log: the paper's three cases, on a T-intersection and a straight road."""
+    config = PipelineConfig()
+    check_folder(out)
+    logs = [bundled(case) for case, _ in DEMO]
+    roads = [road for _, road in DEMO]
+    found = [read_log(log, config.log) for log in logs]
+    with tempfile.TemporaryDirectory() as scratch:
+        bag = None
+        if ros:
+            bag = Path(scratch) / "bag"
+            run_nodes(list(zip(logs, roads, strict=True)), config, count, seed, bag)
+        cases: list[Case] = []
+        refusals: list[str] = []
+        for result, road in zip(found, roads, strict=True):
+            more, refused = run_all(list(result.encounters), [road], config, count=count, seed=seed)
+            cases, refusals = cases + more, refusals + refused
+        write_results(
+            out,
+            cases,
+            seed=seed,
+            title="Demo: new encounters from the bundled synthetic log",
+            quality=[line for result in found for line in result.quality.lines()],
+            provenance=provenance_of(logs, seed, count, roads, config),
+            bag=bag,
+        )
+        if bag is not None:
+            compare_with_nodes(cases, out / BAG)
+    conclude(cases, refusals, out)
+
+
+def run_nodes(jobs: list[tuple[Path, str]], config: PipelineConfig, count: int, seed: int, bag: Path) -> None:
+    """Run the ROS suite, one namespace per job, and record it to `bag`."""
+    try:
+        from scenario_gen.nodes.run_suite import Job, run_suite
+    except ImportError as error:
+        raise InputError(f"ROS 2 is not in this environment ({error}); run `make install`, or leave --ros out") from error
+
+    asked = [Job(namespace, log, road) for namespace, (log, road) in zip(namespaces(len(jobs)), jobs, strict=True)]
+    with console.status("starting the nodes") as status:
+        run_suite(asked, config, count=count, seed=seed, bag=bag, progress=status.update)
+
+
+def compare_with_nodes(cases: list[Case], bag: Path) -> None:
+    """Say whether the nodes' scenarios, over DDS, are those made in this process, byte for byte.
+
+    Raises:
+        ScenarioGenError: they differ, which is a fault of ours.
+    """
+    recorded: dict[str, list[bytes]] = {}
+    for message in read_messages(bag, lambda topic: topic.endswith("/scenarios")):
+        recorded.setdefault(message.topic, []).append(message.data)
+    total = 0
+    for case, namespace in zip(cases, namespaces(len(cases)), strict=True):
+        own = [encode_scenario(scenario, case.encounter.start_ns) for scenario in case.with_changepoints.scenarios]
+        if own != recorded.get(f"{namespace}/scenarios", []):
+            raise ScenarioGenError(f"the nodes' scenarios of {case.encounter.name} differ from those made in this process")
+        total += len(own)
+    console.print(f"{total} scenarios from the nodes, recorded over DDS: the same bytes as in this process")
+
+
+@app.command()
+def evaluate(
+    bag: Annotated[Path, typer.Argument(help="a bag with tracks and scenarios, ours or not")],
+    out: Annotated[Path | None, typer.Option(help="folder for evaluation.json and evaluation.md")] = None,
+    assignments: SetOption = None,
+    parameter_file: ParametersOption = None,
+) -> None:
+    """Measure the scenarios of a bag against the tracks in it, and check them anew."""
+    config = configured(parameter_file, assignments or [])
+    found = evaluate_bag(bag, config.evaluation, config.limits)
+    text = "\n\n".join(evaluation.to_markdown() for evaluation in found)
+    console.print(Markdown(text))
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "evaluation.md").write_text(text + "\n", encoding="utf-8")
+        figures = [json.loads(evaluation.to_json()) for evaluation in found]
+        (out / FIGURES).write_text(json.dumps({"cases": figures}, indent=2) + "\n", encoding="utf-8")
+
+
+@app.command()
+def compare(
+    first: Annotated[Path, typer.Argument(help="results folder, or its evaluation.json")],
+    second: Annotated[Path, typer.Argument(help="another one")],
+) -> None:
+    """Put two sets of scenarios side by side: two seeds, two parameters, two versions."""
+    differences = compare_sets(read_evaluations(first), read_evaluations(second))
+    console.print(Markdown(comparison_table(differences, (first.name, second.name))))
 
 
 def chosen(encounters: tuple[Encounter, ...], names: list[str]) -> list[Encounter]:

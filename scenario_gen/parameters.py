@@ -1,6 +1,5 @@
 """Parameters declared once: default, unit, range and meaning; the command line, the nodes and docs/ read them here."""
 
-import math
 from dataclasses import Field, field, fields, is_dataclass, replace
 from typing import Any, TypeVar
 
@@ -31,7 +30,7 @@ def check(config: Any) -> None:
 
 def check_value(name: str, entry: "Field[Any]", value: Any) -> None:
     """Raise InputError naming `name` if `value` does not suit the declaration `entry`."""
-    wanted = type(entry.default)
+    wanted: type[Any] = type(entry.default)
     if wanted is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     if not isinstance(value, wanted) or (wanted is int and isinstance(value, bool)):
@@ -40,7 +39,7 @@ def check_value(name: str, entry: "Field[Any]", value: Any) -> None:
     if meta["choices"] and value not in meta["choices"]:
         raise InputError(f"parameter {name} is {value!r}; choose one of {', '.join(meta['choices'])}")
     if wanted in (int, float):
-        if math.isnan(value):
+        if value != value:  # noqa: PLR0124 - true of NaN only
             raise InputError(f"parameter {name} is not a number")
         if meta["low"] is not None and value < meta["low"]:
             raise InputError(f"parameter {name} is {value}; it must be at least {meta['low']} {meta['unit']}".rstrip())

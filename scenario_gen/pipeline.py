@@ -126,7 +126,7 @@ def without_changepoints(segmentation: Segmentation) -> Segmentation:
     return replace(
         segmentation,
         labels=np.zeros_like(segmentation.labels),
-        changepoints=np.zeros(0),
+        changepoints=np.zeros(0, dtype=np.int64),
         descriptions=("the whole encounter as one primitive",),
     )
 

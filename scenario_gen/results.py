@@ -49,7 +49,7 @@ def write_results(
     try:
         if bag is None:
             write_run(
-                partial / BAG, [as_run(case, seed, namespace) for case, namespace in zip(cases, namespaces(cases), strict=True)]
+                partial / BAG, [as_run(case, seed, namespace) for case, namespace in zip(cases, namespaces(len(cases)), strict=True)]
             )
         else:
             shutil.copytree(bag, partial / BAG)
@@ -82,9 +82,9 @@ def as_run(case: Case, seed: int, namespace: str = "") -> Run:
     )
 
 
-def namespaces(cases: Sequence[Case]) -> list[str]:
+def namespaces(count: int) -> list[str]:
     """Return one ROS namespace per case; a single case needs none."""
-    return [""] if len(cases) == 1 else [f"/case_{k + 1}" for k in range(len(cases))]
+    return [""] if count == 1 else [f"/case_{k + 1}" for k in range(count)]
 
 
 def provenance_of(logs: Sequence[Path], seed: int, count: int, roads: Sequence[str], config: PipelineConfig) -> dict[str, str]:

@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Sequence
 
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from scenario_gen.evaluation.report import WITH, WITHOUT, Case
@@ -14,34 +13,36 @@ from scenario_gen.scenario import Cause
 
 
 def summary(cases: Sequence[Case]) -> RenderableType:
-    """Return a table with one line per case, and what was refused, for rich to print."""
-    table = Table(caption="K changepoints; E: relative distance to the template, with | without changepoints (lower is nearer)")
-    table.add_column("encounter", overflow="fold")
-    table.add_column("road", overflow="fold")
-    for heading in ("N", "s", "K", "valid", "of", "E position", "E speed", "order"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    for case in cases:
-        made = case.with_changepoints
-        found = case.evaluation.row(WITH)
-        order = formatted(found.values.get("order_kept"), "%", bounds=False) if found else "–"
-        table.add_row(
-            Text(case.encounter.name),
-            Text(case.road.name),
-            str(len(case.encounter.vehicles)),
-            f"{case.encounter.duration:.1f}",
-            str(len(case.segmentation.changepoints)),
-            Text(f"{len(made.scenarios)}/{made.requested}", style="green" if len(made.scenarios) >= made.requested else "red"),
-            str(made.candidates),
-            _errors(case, "e_position"),
-            _errors(case, "e_speed"),
-            order if order == "–" else f"{order} %",
-        )
+    """Return two lines per case and what was refused, for rich to print; names are long, so no table."""
+    lines = [line for case in cases for line in _case(case)]
     refused: Counter[Cause] = sum((case.with_changepoints.refused for case in cases), Counter())
     causes = ", ".join(
         f"{count} {cause.value.replace('_', ' ')}" for cause, count in sorted(refused.items(), key=lambda c: (-c[1], c[0]))
     )
-    line = Text(f"refused candidates: {causes}" if causes else "no candidate was refused")
-    return Group(table, line)
+    return Group(
+        *lines,
+        Text(f"refused candidates: {causes}" if causes else "no candidate was refused"),
+        Text("K: changepoints. E: distance to the template with | without changepoints, lower is nearer.", style="dim"),
+    )
+
+
+def _case(case: Case) -> tuple[Text, Text]:
+    """The name of a case, and its figures."""
+    made, found = case.with_changepoints, case.evaluation.row(WITH)
+    order = formatted(found.values.get("order_kept"), "%", bounds=False) if found else "–"
+    title = Text.assemble((case.encounter.name, "bold"), " on ", (case.road.name, "bold"))
+    title.append(f"  {len(case.encounter.vehicles)} vehicles, {case.encounter.duration:.1f} s", style="dim")
+    complete = len(made.scenarios) >= made.requested
+    figures = Text.assemble(
+        "  ",
+        (f"{len(made.scenarios)}/{made.requested} valid", "green" if complete else "red"),
+        f" of {made.candidates}   K {len(case.segmentation.changepoints)}   E position ",
+        _errors(case, "e_position"),
+        "   speed ",
+        _errors(case, "e_speed"),
+        f"   order {order if order == '–' else order + ' %'}",
+    )
+    return title, figures
 
 
 def _errors(case: Case, metric: str) -> Text:
