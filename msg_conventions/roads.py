@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
-from msg_conventions.yaw import quaternion, yaw
+from msg_conventions.yaw import half_angle, yaw
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 
@@ -28,7 +28,7 @@ def pose_rows(poses: Floats) -> Floats:
     """Return (M, 7) position and quaternion, as geometry_msgs/Pose lays them out, of (M, 3) x, y, yaw."""
     rows = np.zeros((len(poses), 7))
     rows[:, :2] = poses[:, :2]
-    rows[:, 3:] = quaternion(poses[:, 2])
+    rows[:, 5], rows[:, 6] = half_angle(poses[:, 2])
     return rows
 
 

@@ -5,20 +5,28 @@ import numpy as np
 from scenario_gen.arrays import Floats
 
 TWO_PI = 2.0 * np.pi
+NEAR_PI = np.pi - 1e-8
 
 
-def quaternion(heading: Floats) -> Floats:
-    """Return (..., 4) x, y, z, w of canonical headings [rad], any shape, unwrapped or not; w >= 0 up to rounding.
+def half_angle(heading: Floats) -> tuple[Floats, Floats]:
+    """Return sine and cosine of half the canonical headings [rad], any shape, unwrapped or not: z and w of the quaternion.
 
     A canonical angle is a multiple of a nanoradian plus turns. Next to ±pi two of them differ by less than a
     nanoradian; the one that lies on the nanoradian grid is the one meant.
     """
     turn = heading - TWO_PI * np.rint(heading / TWO_PI)
-    other = turn - np.copysign(TWO_PI, turn)
-    nearer = np.abs(other - np.round(other, 9)) < np.abs(turn - np.round(turn, 9))
-    half = 0.5 * np.where((np.abs(other) < np.pi + 1e-9) & nearer, other, turn)
-    zero = np.zeros_like(half)
-    return np.stack([zero, zero, np.sin(half), np.cos(half)], axis=-1)
+    if (np.abs(turn) > NEAR_PI).any():
+        other = turn - np.copysign(TWO_PI, turn)
+        nearer = np.abs(other - np.round(other, 9)) < np.abs(turn - np.round(turn, 9))
+        turn = np.where((np.abs(other) < np.pi + 1e-9) & nearer, other, turn)
+    return np.sin(0.5 * turn), np.cos(0.5 * turn)
+
+
+def quaternion(heading: Floats) -> Floats:
+    """Return (..., 4) x, y, z, w of canonical headings [rad]; w >= 0 up to rounding."""
+    result = np.zeros((*np.shape(heading), 4))
+    result[..., 2], result[..., 3] = half_angle(heading)
+    return result
 
 
 def yaw(quaternions: Floats) -> Floats:
