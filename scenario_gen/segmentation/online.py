@@ -22,6 +22,7 @@ class OnlineConfig:
 
     window: float = parameter(30.0, "past that is kept at most", unit="s", low=5.0, high=600.0)
     delay: float = parameter(1.0, "least age at which a changepoint is confirmed", unit="s", low=0.3, high=10.0)
+    look_back: float = parameter(6.0, "age beyond which no changepoint is looked for any more", unit="s", low=1.0, high=60.0)
     every: int = parameter(2, "samples between two looks", low=1, high=100)
     chance_alone: float = parameter(1e-6, "probability with which noise alone looks like a changepoint", low=1e-12, high=0.5)
     min_segment: float = parameter(0.5, "least distance between changepoints", unit="s", low=0.2, high=10.0)
@@ -80,7 +81,7 @@ class OnlineSegmenter:
         least = trends.threshold(config.chance_alone)
         gap = max(2, round(config.min_segment / self._dt))
         fixed = [c - first for c in self._confirmed if c - first >= gap]
-        start = (fixed[-1] if fixed else 0) + gap
+        start = max((fixed[-1] if fixed else 0) + gap, trends.samples - round(config.look_back / self._dt))
         free = np.arange(start, trends.samples - gap)
         points = trends.add(fixed, free, least, gap)
         points = fixed + trends.settle(points, gap, gap)[len(fixed) :]

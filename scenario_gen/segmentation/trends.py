@@ -98,7 +98,10 @@ class Trends:
             weights.append(np.full(len(v), 1.0 / noise))
             angle, pace = course(xy, v, dt)
             signals.append(angle)
-            weights.append(np.where(pace > LEAST_SPEED, pace / COURSE_NOISE, 0.0))
+            sure = np.where(pace > LEAST_SPEED, pace / COURSE_NOISE, 0.0)
+            edge = round(COURSE_WINDOW / dt) // 2
+            sure[:edge] = sure[len(sure) - edge :] = 0.0  # half a window has three times the noise
+            weights.append(sure)
         stack = np.array(signals)
         return cls(np.ascontiguousarray(stack - stack.mean(axis=1, keepdims=True)), np.array(weights))
 

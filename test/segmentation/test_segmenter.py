@@ -5,32 +5,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenario_gen.encounter import Encounter, Vehicle
+from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.segmentation import SegmentationConfig, segment
 
 
-def encounter_of(speeds: np.ndarray, noise: float = 0.0, seed: int = 0) -> Encounter:
-    """Vehicles that drive straight east with the given speeds (N, T)."""
-    rng = np.random.default_rng(seed)
-    speeds = np.asarray(speeds, dtype=float)
-    x = np.cumsum(speeds, axis=1) * 0.1
-    position = np.stack([x, np.arange(len(speeds))[:, None] * 10.0 + np.zeros_like(x)], axis=2)
-    position += rng.normal(size=position.shape) * noise
-    measured = np.maximum(speeds + rng.normal(size=speeds.shape) * noise, 0.0)
-    vehicles = tuple(Vehicle(str(i)) for i in range(len(speeds)))
-    return Encounter("made", vehicles, 0, 100_000_000, position, np.zeros_like(speeds), measured)
-
-
-def wait_and_brake() -> Encounter:
+def wait_and_brake(encounter_of) -> Encounter:
     """The paper's case (a): one stands; the other brakes for 7 s to a stop; both stand; the second pulls away."""
     t = np.arange(200) * 0.1
     other = np.interp(t, [0, 7, 11, 20], [10, 0, 0, 12])
     return encounter_of(np.array([np.zeros(200), other]), noise=0.05)
 
 
-def test_paper_case_a():
-    found = segment(wait_and_brake(), seed=1)
+def test_paper_case_a(encounter_of):
+    found = segment(wait_and_brake(encounter_of), seed=1)
     assert len(found.changepoints) == 2
     assert np.abs(found.changepoints - [70, 110]).max() <= 5
     assert found.descriptions[0].startswith("vehicle 0 stands, vehicle 1 brakes to a stop from 10")
@@ -38,14 +26,14 @@ def test_paper_case_a():
     assert "vehicle 1 pulls away" in found.descriptions[2]
 
 
-def test_steady_drive_is_one_primitive():
+def test_steady_drive_is_one_primitive(encounter_of):
     found = segment(encounter_of(np.full((2, 200), 10.0), noise=0.1))
     assert found.n_primitives == 1
     assert "drives at 10.0 m/s" in found.descriptions[0]
 
 
-def test_deterministic():
-    encounter = wait_and_brake()
+def test_deterministic(encounter_of):
+    encounter = wait_and_brake(encounter_of)
     a, b = segment(encounter, seed=4), segment(encounter, seed=4)
     assert a.labels.tobytes() == b.labels.tobytes()
     assert a.changepoint_probability.tobytes() == b.changepoint_probability.tobytes()
@@ -53,20 +41,20 @@ def test_deterministic():
 
 @pytest.mark.parametrize("preset", ["driving", "paper"])
 @pytest.mark.parametrize("samples", [4, 7, 30, 200])
-def test_short_encounters(preset, samples):
+def test_short_encounters(encounter_of, preset, samples):
     rng = np.random.default_rng(samples)
     found = segment(encounter_of(np.abs(rng.normal(5.0, 2.0, (3, samples)))), SegmentationConfig(preset=preset))
     assert found.labels.shape == (samples,)
 
 
-def test_too_short():
+def test_too_short(encounter_of):
     with pytest.raises(InputError, match="at least 4 samples"):
         segment(encounter_of(np.ones((2, 3))))
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(10, 120), st.integers(2, 4), st.integers(0, 10_000), st.sampled_from([0.1, 0.5, 2.0]))
-def test_rules_of_the_result(samples, vehicles, seed, rate):
+def test_rules_of_the_result(encounter_of, samples, vehicles, seed, rate):
     rng = np.random.default_rng(seed)
     knots = np.linspace(0, samples, 6)
     speeds = np.array([np.interp(np.arange(samples), knots, np.abs(rng.normal(4.0, 5.0, 6))) for _ in range(vehicles)])
