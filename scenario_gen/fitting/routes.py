@@ -12,7 +12,7 @@ _ARC_STEP = 0.5
 _PARALLEL = np.radians(8.0)
 _STEEPEST_SHIFT = 0.05  # 1/m, curvature of a change of lanes on the way
 _WIDEST_SHIFT = 12.0  # metres sideways
-_TIGHTEST_U_TURN = 4.6  # metres
+_TIGHTEST_U_TURN = 6.0  # metres
 
 Fits = Callable[[Floats], bool]
 

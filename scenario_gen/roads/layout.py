@@ -13,7 +13,7 @@ from scenario_gen.roads.unrolled import Unrolled, unroll
 _ROOM = 6.0  # metres kept free behind the first and before the last footprint
 _SLACK = 12.0  # metres by which a junction's geometry may differ from the template's
 _SHORTEST = 30.0
-_U_TURN = 9.3  # metres between the lanes of a U-turn
+_U_TURN = 12.0  # metres between the lanes of a U-turn
 _SAME_WAY = np.radians(25.0)
 _LANE_GAP = 2.0  # metres sideways that make another lane
 _WIDEST = 12.0

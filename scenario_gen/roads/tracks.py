@@ -18,9 +18,10 @@ from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.roads.curve import Curve
 
 _WAVELENGTHS = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)  # metres at which the filter halves an oscillation
-_MAX_CURVATURE = 0.18  # 1/m
+_MAX_CURVATURE = 0.17  # 1/m
 _MAX_LATERAL = 4.0  # m/s²
 _MAX_DEVIATION = 0.6  # metres from the record
+_WEIGHT = (10.0, 1.0, 1.0)  # how bad it is to exceed each; what no vehicle can steer is worst
 _TURN = math.radians(45.0)
 _U_TURN = math.radians(140.0)
 _STILL = 0.5  # metres: less path than this in a whole log is no path
@@ -103,16 +104,46 @@ def _clean(encounter: Encounter, i: int) -> Track:
         curvature = np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)
         lateral = curvature * np.interp((grid[1:] + grid[:-1]) / 2.0, *_increasing(claimed, speed)) ** 2
         excess = (curvature.max() / _MAX_CURVATURE, lateral.max() / _MAX_LATERAL, deviation / _MAX_DEVIATION)
-        badness = float(sum(max(e - 1.0, 0.0) for e in excess))
+        badness = float(sum(w * max(e - 1.0, 0.0) for w, e in zip(_WEIGHT, excess, strict=True)))
         if best is None or badness < best[0]:
             best = (badness, curve, progress, deviation)
         if badness == 0.0:
             break
     assert best is not None
     _, curve, progress, deviation = best
+    if (np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)).max() > _MAX_CURVATURE:
+        share = progress / curve.length
+        curve = _eased(curve)
+        progress = share * curve.length
+        deviation = float(np.hypot(*(curve.at(progress)[:, :2] - position).T).max())
     return Track(
         encounter.vehicles[i], _aligned(curve, encounter.heading[i], speed, progress), frozen(progress), speed, False, deviation
     )
+
+
+def _eased(curve: Curve) -> Curve:
+    """The curve with its sharpest bends spread out until no curvature is above the limit.
+
+    What a bend has too much is handed on to its neighbours, so it turns as far as before, over a longer way; the path is
+    then integrated anew and put where it is nearest to the old one on average.
+    """
+    count = max(round(curve.length / 0.5), 1)
+    step = curve.length / count
+    even = curve.at(np.linspace(0.0, curve.length, count + 1))
+    bend = np.diff(even[:, 2])
+    most = 0.95 * _MAX_CURVATURE * step
+    for _ in range(2000):
+        excess = np.sign(bend) * np.maximum(np.abs(bend) - most, 0.0)
+        if not excess.any():
+            break
+        bend = bend - excess
+        bend[1:] += excess[:-1] / 2.0
+        bend[:-1] += excess[1:] / 2.0
+    yaw = even[0, 2] + np.concatenate(([0.0], np.cumsum(bend)))
+    middle = (yaw[1:] + yaw[:-1]) / 2.0
+    xy = np.vstack(([0.0, 0.0], np.cumsum(step * np.column_stack((np.cos(middle), np.sin(middle))), axis=0)))
+    xy += (even[:, :2] - xy).mean(axis=0)
+    return Curve(np.column_stack((xy, yaw)))
 
 
 def _aligned(curve: Curve, heading: Floats, speed: Floats, progress: Floats) -> Curve:
