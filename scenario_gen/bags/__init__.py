@@ -2,7 +2,7 @@
 
 from scenario_gen.bags.reader import BagMessage, BagTopic, bag_topics, read_messages
 from scenario_gen.bags.reindex import reindex
-from scenario_gen.bags.run import Run, run_messages, write_run
+from scenario_gen.bags.run import Run, read_scenario_set, run_messages, write_run
 from scenario_gen.bags.writer import AtomicBag, BagWriter, Split
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "Split",
     "bag_topics",
     "read_messages",
+    "read_scenario_set",
     "reindex",
     "run_messages",
     "write_run",

@@ -9,8 +9,10 @@ from msg_conventions.changepoints import encode_changepoints, encode_posterior
 from msg_conventions.diagnostics import (
     Level,
     Status,
+    decode_diagnostics,
     encode_diagnostics,
     fit_statuses,
+    read_request,
     request_status,
     scenario_status,
 )
@@ -19,10 +21,11 @@ from msg_conventions.names import tokens
 from msg_conventions.paths import encode_route
 from msg_conventions.pictures import encode_footprint, scenario_markers
 from msg_conventions.roads import encode_map, encode_poses
-from msg_conventions.scenarios import encode_scenario
+from msg_conventions.scenarios import decode_scenario, digest, encode_scenario
 from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.bags.metadata import qos_yaml
+from scenario_gen.bags.reader import read_messages
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
@@ -109,3 +112,33 @@ def write_run(folder: Path, runs: Run | Sequence[Run]) -> Path:
                 bag.add_topic(name, kind, qos_yaml(quality))
                 bag.write(name, data, stamp_ns)
     return folder
+
+
+def read_scenario_set(folder: Path, namespace: str = "") -> ScenarioSet:
+    """Return the last request's scenarios and its account from a bag, whoever recorded it.
+
+    Raises:
+        InputError: the bag cannot be read, no request was closed in it, or a scenario of the request is missing.
+    """
+    wanted = (f"{namespace}/scenarios", f"{namespace}/scenarios/info")
+    by_digest: dict[str, bytes] = {}
+    entries: list[Status] = []
+    for message in read_messages(folder, lambda topic: topic in wanted):
+        if message.topic == wanted[0]:
+            by_digest[digest(message.data)] = message.data
+        else:
+            entries += decode_diagnostics(message.data, wanted[1])[1]
+    closing = next((entry for entry in reversed(entries) if "published" in entry.values), None)
+    if closing is None:
+        raise InputError(f"{folder}: no request was closed on {wanted[1]}")
+    scenarios = []
+    for entry in entries:
+        values = entry.values
+        if "sha256" in values and values["request"] == closing.values["request"]:
+            if values["sha256"] not in by_digest:
+                raise InputError(f"{folder}: scenario {values['index']} of request {values['request']} is not on {wanted[0]}")
+            data = by_digest[values["sha256"]]
+            scenarios.append(decode_scenario(data, seed=int(values["seed"]), index=int(values["index"]))[1])
+    if len(scenarios) != int(closing.values["published"]):
+        raise InputError(f"{folder}: {closing.values['published']} scenarios were published, {len(scenarios)} are on {wanted[0]}")
+    return read_request(closing, tuple(scenarios))

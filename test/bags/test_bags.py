@@ -22,7 +22,7 @@ from msg_conventions.paths import decode_route
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.bags import BagWriter, Run, Split, bag_topics, read_messages, reindex, write_run
+from scenario_gen.bags import BagWriter, Run, Split, bag_topics, read_messages, read_scenario_set, reindex, write_run
 from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import InputError
 from scenario_gen.fitting.result import Fit, FittedVehicle
@@ -128,6 +128,18 @@ def test_a_run_is_read_back_from_its_bag(run, tmp_path):
     assert [s.position.tobytes() for s in scenarios] == [s.position.tobytes() for s in run.result.scenarios]
     account = read_request(infos[-1])
     assert (account.requested, account.candidates, account.refused) == (5, 8, run.result.refused)
+
+
+def test_the_scenarios_of_a_request_are_read_with_their_account(run, tmp_path):
+    other = replace(run, namespace="/b", result=replace(run.result, requested=6, scenarios=run.result.scenarios[:2]))
+    folder = write_run(tmp_path / "bag", [run, other])
+    for sent in (run, other):
+        got = read_scenario_set(folder, sent.namespace)
+        assert (got.requested, got.candidates, got.refused) == (sent.result.requested, 8, run.result.refused)
+        assert [(s.index, s.seed) for s in got.scenarios] == [(s.index, s.seed) for s in sent.result.scenarios]
+        assert [s.position.tobytes() for s in got.scenarios] == [s.position.tobytes() for s in sent.result.scenarios]
+    with pytest.raises(InputError, match="no request"):
+        read_scenario_set(folder, "/c")
 
 
 def test_same_run_same_bytes(run, tmp_path):
