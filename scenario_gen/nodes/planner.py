@@ -1,19 +1,32 @@
-"""planner: `map`, `tracks` and `changepoints` of one template in; `fit` and a `vehicle_<id>/route` each out."""
+"""planner: `map`, `tracks` and `changepoints` of one template in; `fit` and a `vehicle_<id>/route` each out.
+
+`~/get_plan` (nav_msgs/GetPlan) plans on the newest map for anyone; a plan that cannot be is empty, and /diagnostics says why.
+"""
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, field
+
+import numpy as np
+from nav_msgs.msg import Path
+from nav_msgs.srv import GetPlan
+from rclpy.serialization import deserialize_message
+from rclpy.task import Future
+from rclpy.time import Time
 
 from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.diagnostics import fit_statuses
 from msg_conventions.fits import anchor_stamps, encode_fit
 from msg_conventions.names import tokens
-from msg_conventions.paths import encode_route
+from msg_conventions.paths import encode_path, encode_route
 from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
+from scenario_gen.errors import RefusedError
 from scenario_gen.fitting import FittingConfig, fit_template
 from scenario_gen.nodes.base import StageNode, run_nodes
 from scenario_gen.nodes.inputs import Inputs
+from scenario_gen.nodes.plan_request import plan_poses, query_of
 from scenario_gen.parameters import check, parameter
 from scenario_gen.planning import PlanningConfig, plan_routes
 
@@ -27,6 +40,7 @@ class Config:
     fitting: FittingConfig = field(default_factory=FittingConfig)
     planning: PlanningConfig = field(default_factory=PlanningConfig)
     seed: int = parameter(0, "seed of the planner", low=0)
+    radius: float = parameter(1.0, "radius of the disc that ~/get_plan plans for", unit="m", low=0.0, high=20.0)
     pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
 
     def __post_init__(self) -> None:
@@ -42,7 +56,9 @@ class Planner(StageNode):
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("planner", Config(), namespace)
+        self.create_service(GetPlan, "~/get_plan", self._get_plan)
         paired = self.config.pair_map
+        self._asked = 0
         self._inputs_seen = Inputs(("tracks", "changepoints", *(ROAD if paired else ())), () if paired else ("map",))
 
     def received(self, topic: str, data: bytes) -> None:
@@ -65,6 +81,33 @@ class Planner(StageNode):
         self.send("fit", encode_fit(encounter, fit, road.frame_id))
         self.get_logger().info(f"planned {len(routes)} routes through {len(anchors)} anchors")
         self.report(*fit_statuses(fit, self.get_fully_qualified_name()), stamp_ns=encounter.start_ns)
+
+    async def _get_plan(self, request: GetPlan.Request, response: GetPlan.Response) -> GetPlan.Response:
+        """Plan for a caller, off the executor's thread."""
+        answer, executor, grid = Future(), self.executor, self._inputs_seen.get("map")
+        stamp = Time.from_msg(request.start.header.stamp).nanoseconds
+        self._asked += 1
+        name = f"get_plan {self._asked}"
+
+        def job(cancelled: Callable[[], bool]) -> None:
+            plan = b""
+            try:
+                if grid is None or cancelled():
+                    raise RefusedError("there is no map yet" if grid is None else "cancelled")
+                _, road = decode_map(grid)
+                query = query_of(request, road.frame_id, self.config.radius)
+                poses = plan_poses(road, query, self.config.planning, self.config.seed)
+                plan = encode_path(poses, np.full(len(poses), stamp), road.frame_id, stamp)
+            finally:
+                answer.set_result(plan)
+                executor.wake()
+
+        response.plan.header.stamp = request.start.header.stamp
+        if self.active:
+            self.work(name, job)
+            if plan := await answer:
+                response.plan = deserialize_message(plan, Path)
+        return response
 
 
 def main() -> None:

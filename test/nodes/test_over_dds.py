@@ -8,6 +8,7 @@ import pytest
 from conftest import RESOURCES, Client, Processes
 
 from msg_conventions.diagnostics import Level, decode_diagnostics
+from msg_conventions.fits import decode_fit
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest, encode_scenario
 from scenario_gen.bags import read_messages
@@ -132,6 +133,44 @@ def test_maps_are_served_and_bad_ones_refused(suite, client):
     )
 
 
+def test_anyone_may_ask_for_a_plan(suite, client):
+    from nav_msgs.srv import GetPlan
+
+    client.hear("/diagnostics", "/fit")
+    asked = decode_fit(client.wait("/fit")[0])[2]
+    request = GetPlan.Request()
+    request.start.header.frame_id, request.start.header.stamp.sec = "map", 123
+    request.start.pose.position.x, request.start.pose.position.y = asked.start[0, :2]
+    request.goal.pose.position.x, request.goal.pose.position.y = asked.end[0, :2]
+    plan = client.call(GetPlan, "/planner/get_plan", request).plan
+    assert len(plan.poses) >= 2
+    assert plan.header.stamp.sec == 123
+    assert plan.poses[0].pose.position.x == request.start.pose.position.x
+    assert plan.poses[-1].pose.position.y == request.goal.pose.position.y
+    for field, value, reason in (
+        ("tolerance", -1.0, "tolerance"),
+        ("frame", "elsewhere", "elsewhere"),
+        ("x", math.nan, "finite"),
+    ):
+        bad = GetPlan.Request(start=request.start, goal=request.goal)
+        if field == "tolerance":
+            bad.tolerance = value
+        elif field == "frame":
+            bad.start.header.frame_id = value
+        else:
+            bad.start.header.frame_id = "map"
+            bad.start.pose.position.x = value
+        assert not client.call(GetPlan, "/planner/get_plan", bad).plan.poses
+        client.until(
+            lambda reason=reason: any(
+                s.name.startswith("/planner") and reason in s.message
+                for data in client.heard["/diagnostics"]
+                for s in decode_diagnostics(data)[1]
+            ),
+            f"{reason} on /diagnostics",
+        )
+
+
 def test_a_damaged_message_is_said_and_survived(suite, client):
     """Garbage under the right type: the segmenter complains and goes on."""
     from std_srvs.srv import Trigger
@@ -143,7 +182,6 @@ def test_a_damaged_message_is_said_and_survived(suite, client):
         statuses = [s for data in client.heard["/diagnostics"] for s in decode_diagnostics(data)[1]]
         return any(s.level is Level.ERROR and s.name.startswith("/segmenter") for s in statuses)
 
-    client.node.create_publisher  # noqa: B018
     deadline = time.monotonic() + 30.0
     while not complained() and time.monotonic() < deadline:
         client.say("/tracks", b"\x00\x01\x00\x00" + bytes(40))

@@ -1,0 +1,44 @@
+"""nav_msgs/GetPlan as the planner serves it: a checked request in, a free path for a disc out."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.errors import InputError
+from scenario_gen.planning.config import PlanningConfig
+from scenario_gen.planning.plan import make_planner
+from scenario_gen.planning.planner import Budget, Query
+from scenario_gen.roads import Road
+
+
+def query_of(request: Any, frame_id: str, radius: float) -> Query:
+    """Return the query of a nav_msgs/srv/GetPlan request.
+
+    Raises:
+        InputError: a pose is not finite, in another frame than the map, or the tolerance is negative.
+    """
+    if not (math.isfinite(request.tolerance) and request.tolerance >= 0.0):
+        raise InputError(f"tolerance is {request.tolerance}; it must be at least 0 m")
+    ends = []
+    for name, stamped in (("start", request.start), ("goal", request.goal)):
+        position = stamped.pose.position
+        if stamped.header.frame_id not in ("", frame_id):
+            raise InputError(f"{name} is in frame {stamped.header.frame_id!r}; the map is in {frame_id!r}")
+        if not (math.isfinite(position.x) and math.isfinite(position.y)):
+            raise InputError(f"{name} is not finite ({position.x}, {position.y})")
+        ends.append(np.array([position.x, position.y]))
+    return Query(ends[0], ends[1], radius)
+
+
+def plan_poses(road: Road, query: Query, config: PlanningConfig, seed: int) -> Floats:
+    """Return (M, 3) x, y, yaw along the path found; the heading is that of the piece ahead.
+
+    Raises:
+        RefusedError: the start or goal is blocked, there is no way, or the budget is spent.
+    """
+    path = make_planner(config).plan(road, query, Budget(iterations=config.iterations), seed).path
+    ahead = np.diff(path, axis=0) if len(path) > 1 else np.zeros((1, 2))
+    heading = np.arctan2(ahead[:, 1], ahead[:, 0])
+    return np.column_stack([path, np.append(heading, heading[-1])[: len(path)]])
