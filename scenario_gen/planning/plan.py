@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.arrays import Bools, Floats, Ints
+from scenario_gen.arrays import Bools, Floats
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.result import Fit, FittedVehicle
@@ -198,7 +198,7 @@ def _joined(legs: list[Guess]) -> Guess:
 def _sampled(task: _Task, poses_at: Callable[[Floats], Floats], total: float) -> Route:
     """A curve of length `total` at points at most `spacing` apart, one of them beside every anchor."""
     dense = np.linspace(0.0, total, int(np.ceil(total / 0.05)) + 1)
-    stops = dense[_beside_anchors(task, poses_at(dense))]
+    stops = _stops(task, dense, poses_at(dense))
     for k in range(1, len(stops)):  # what hardly moves is a dwell
         if stops[k] - stops[k - 1] < SHORTEST:
             stops[k] = stops[k - 1]
@@ -214,15 +214,28 @@ def _sampled(task: _Task, poses_at: Callable[[Floats], Floats], total: float) ->
     return Route(points, np.array(anchor), length)
 
 
-def _beside_anchors(task: _Task, poses: Floats) -> Ints:
-    """The pose (of a dense curve) that stands for each anchor, never going back; a dwell has one for both its ends."""
+def _stops(task: _Task, length: Floats, poses: Floats) -> Floats:
+    """Arc length (A,) at which the curve passes each anchor, never going back; a dwell has one for both its ends.
+
+    Args:
+        task: the vehicle.
+        length: (M,) arc lengths of a dense curve.
+        poses: (M, 3) the curve there.
+    """
     group = np.concatenate(([0], np.cumsum(~task.fitted.stands)))
     square = ((poses[None, :, :2] - task.anchors[:, None, :2]) ** 2).sum(axis=-1)
     per_group = np.zeros((group[-1] + 1, len(poses)))
     np.add.at(per_group, group, square)
     per_group[0, 1:] = np.inf
     per_group[-1, :-1] = np.inf
-    return monotone_matching(per_group)[group]
+    nearest = monotone_matching(per_group)
+    offset = task.anchors[:, :2] - poses[nearest[group], :2]
+    yaw = poses[nearest[group], 2]
+    ahead = np.bincount(group, offset[:, 0] * np.cos(yaw) + offset[:, 1] * np.sin(yaw)) / np.bincount(group)
+    step = length[1] if len(length) > 1 else 0.0
+    refined = length[nearest] + np.clip(ahead, -step, step)  # between the dense points
+    refined[0], refined[-1] = 0.0, length[-1]
+    return np.maximum.accumulate(np.clip(refined, 0.0, length[-1]))[group]
 
 
 def _polyline(task: _Task, waypoints: list[int]) -> Route:

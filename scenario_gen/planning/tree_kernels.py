@@ -177,7 +177,7 @@ def _ancestor_in_sight(parent: int, x: float, y: float, clearance: Floats, node:
 
 
 @kernel(inline=True)
-def _extend(
+def _extend(  # noqa: PLR0912
     tree: int, qx: float, qy: float, ends: Floats, clearance: Floats, node: Floats, link: Ints, chunk: Ints, head: Ints,
     counter: Ints, setting: Floats, columns: int, near: Ints, gap: Floats,
 ) -> tuple[int, int]:  # fmt: skip
@@ -323,27 +323,24 @@ def grow(
             x, y = _sample(ends, free_cells, corner_cells, clearance, setting[BOUND], setting[CORNERS], random)
         counter[ITERATION] += 1
         known = setting[BEST]
-        status, new = _extend(
-            tree, x, y, ends, clearance, node, link, chunk, head, counter, setting, columns, near, gap
-        )  # fmt: skip
-        while setting[GREEDY] > 0.0 and status == ADVANCED and known == np.inf and counter[CHUNKS] + 8 < chunk.shape[0]:
-            last = new
-            status, new = _extend(
-                tree, x, y, ends, clearance, node, link, chunk, head, counter, setting, columns, near, gap
+        which, new, ready = tree, -1, False
+        while counter[CHUNKS] + 1 < chunk.shape[0]:
+            status, m = _extend(
+                which, x, y, ends, clearance, node, link, chunk, head, counter, setting, columns, near, gap
             )  # fmt: skip
-            if status == TRAPPED:
-                status, new = ADVANCED, last
+            if ready:  # Algorithm 3: connect the other tree to the new node
+                if status == ADVANCED:
+                    continue
+                if status == REACHED:
+                    link[new, PARTNER], link[m, PARTNER] = m, new
+                    _settle(new, node, link, counter, setting)
                 break
-        if status != TRAPPED:
-            x, y = node[new, X], node[new, Y]
-            status = ADVANCED
-            while status == ADVANCED and counter[CHUNKS] + 1 < chunk.shape[0]:  # Algorithm 3
-                status, other = _extend(
-                    1 - tree, x, y, ends, clearance, node, link, chunk, head, counter, setting, columns, near, gap
-                )  # fmt: skip
-            if status == REACHED:
-                link[new, PARTNER], link[other, PARTNER] = other, new
-                _settle(new, node, link, counter, setting)
+            new = m if status != TRAPPED else new
+            if new < 0:
+                break
+            greedy = setting[GREEDY] > 0.0 and known == np.inf and status == ADVANCED
+            if not greedy:
+                which, x, y, ready = 1 - tree, node[new, X], node[new, Y], True
         if setting[BEST] < known:
             setting[BOUND] = min(setting[BOUND], setting[BEST])
             history[counter[HISTORY], 0], history[counter[HISTORY], 1] = counter[ITERATION], setting[BEST]
