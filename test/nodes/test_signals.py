@@ -1,0 +1,69 @@
+"""Every executable ends without a traceback, whenever it is asked to."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from conftest import RESOURCES
+
+from scenario_gen.bags import read_messages
+
+pytestmark = pytest.mark.dds
+
+
+def _started(node: str, domain: int, *arguments: str) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, "-m", "scenario_gen.nodes.start", node, "--ros-args", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"},
+    )
+
+
+@pytest.mark.parametrize("signals", [(signal.SIGINT,), (signal.SIGINT, signal.SIGINT), (signal.SIGTERM,)], ids=str)
+def test_a_recorder_closes_its_bag(signals, domain, tmp_path):
+    player = _started("player", domain, "-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "rate:=1000.0", "-p", "loop:=true")
+    process = _started("recorder", domain, "-p", f"bag:={tmp_path / 'bag'}", "-p", "topics:=.*", "-p", "compress:=false")
+    try:
+        deadline = time.monotonic() + 60.0
+        files = tmp_path / "bag" / "bag_0.mcap"
+        while not (files.is_file() and files.stat().st_size > 100_000):
+            assert time.monotonic() < deadline, "nothing was recorded"
+            time.sleep(0.1)
+        for number in signals:
+            process.send_signal(number)
+            time.sleep(0.05)
+        output, _ = process.communicate(timeout=20.0)
+        assert "Traceback" not in output, output
+        assert process.returncode == 0
+    finally:
+        player.send_signal(signal.SIGTERM)
+        output, _ = player.communicate(timeout=20.0)
+        process.kill()
+    assert "Traceback" not in output, output
+    assert len(list(read_messages(tmp_path / "bag"))) > 100
+
+
+def test_ctrl_c_while_the_libraries_load(domain):
+    process = _started("gp_sampler", domain)
+    time.sleep(0.7)
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=20.0)
+    assert "Traceback" not in output
+    assert process.returncode in (0, 130, -2)
+
+
+def test_a_bad_start_is_one_message_and_exit_code_2(domain, tmp_path):
+    (tmp_path / "text.mcap").write_text("no bag")
+    for node, arguments, words in (
+        ("road_server", ("-p", "road.lane_width:=-1.0"), "lane_width"),
+        ("player", ("-p", f"bag:={tmp_path / 'text.mcap'}"), "text.mcap"),
+        ("recorder", ("-p", f"bag:={tmp_path}"), "exists"),
+    ):
+        output, _ = _started(node, domain, *arguments).communicate(timeout=60.0)
+        assert words in output
+        assert "Traceback" not in output, output
