@@ -177,6 +177,9 @@ class _Solver:
                 lost += found is None
                 system.extend(found or ())
         start = _least_squares(members, system)
+        if not start:  # nobody is tied down: who turns most is placed by its turn, the others beside it
+            i = max(members, key=lambda i: (abs(self._turn(i)), self.driven[i, -1], -i))
+            start[i] = self._start_by_turn(i, ways[i].curve)
         rotation, shift, yaw = self._align(ways, start, members)
         untied = [i for i in members if i not in start]
         for i in untied:  # who has no equation is placed by its relative position
@@ -193,15 +196,21 @@ class _Solver:
             self.cache[key] = equations(relation, one.curve, two.curve, self.scale)
         return self.cache[key]
 
+    def _turn(self, i: int) -> float:
+        return float(self.poses[i][-1, 2] - self.poses[i][0, 2])
+
+    def _start_by_turn(self, i: int, curve: Curve) -> float:
+        """The start on a way that makes the vehicle turn where the way turns; on a straight one, its middle."""
+        most = max(curve.length - float(self.driven[i, -1]), 0.0)
+        starts = np.linspace(0.0, most, int(np.ceil(most)) + 1)
+        off = curve.at((starts[:, None] + self.driven[i]).ravel())[:, 2].reshape(len(starts), -1) - self.poses[i][:, 2]
+        alike = np.abs(np.exp(1j * off).mean(axis=1))  # 1 where way and template differ by one rotation throughout
+        best = starts[alike >= alike.max() - 1e-3]
+        return float(best[np.argmin(np.abs(best - most / 2.0))])
+
     def _align(self, ways: dict[int, _Way], start: dict[int, float], members: list[int]) -> tuple[Floats, Floats, float]:
         """The rigid motion (Umeyama 1991, det R = +1, scale fixed) from the template to the vehicles placed so far."""
         known = [i for i in members if i in start]
-        if not known:  # nobody is tied down: turn the first one's heading onto its way, at the way's middle
-            i = members[0]
-            middle = ways[i].curve.at(ways[i].curve.length / 2.0)
-            yaw = float(middle[2] - self.poses[i][_INSTANTS // 2, 2])
-            rotation = _rotation(yaw)
-            return rotation, middle[:2] - rotation @ (self.scale * self.poses[i][_INSTANTS // 2, :2]), yaw
         source = np.concatenate([self.poses[i] for i in known])
         target = np.concatenate([ways[i].curve.at(start[i] + self.driven[i]) for i in known])
         a, b = self.scale * source[:, :2], target[:, :2]
