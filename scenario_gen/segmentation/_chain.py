@@ -69,7 +69,10 @@ def backward_messages(vt: Floats, coef: Floats, logdet: Floats, weight: float, p
     block = np.empty((BLOCK, states))
     work = np.empty((2, BLOCK))
     message = np.ones(states)
-    columns = np.ascontiguousarray(pi[:states].T)
+    columns = np.empty((states, states))
+    for j in range(states):
+        for k in range(states):
+            columns[k, j] = pi[j, k]
     last = len(ends) - 1
     stop = w.shape[0]
     while stop > 0:
@@ -112,7 +115,9 @@ def sample_labels(state: State, w: Floats, pi: Floats, ends: Ints, labels: Ints)
 def count_transitions(labels: Ints, ends: Ints, n: Ints) -> None:
     """Fill n (L + 1, L) with transition counts; the last row counts the first labels of the sequences."""
     states = n.shape[1]
-    n[:] = 0
+    for j in range(states + 1):
+        for k in range(states):
+            n[j, k] = 0
     sequence = 0
     previous = states
     for t in range(len(labels)):
@@ -138,7 +143,7 @@ def seat(state: State, n: Ints, top: Floats, beta: Floats, tables: Floats, sums:
     states = n.shape[1]
     total, rho = top[1], top[2]
     alpha, kappa = (1.0 - rho) * total, rho * total
-    sums[:] = 0.0
+    sums[0] = sums[1] = sums[2] = 0.0
     for k in range(states):
         tables[k] = tables_draw(state, n[states, k], alpha * beta[k])
     for j in range(states):
@@ -184,7 +189,10 @@ def sample_transitions(state: State, n: Ints, hyper: Floats, top: Floats, beta: 
         dishes = 0
         for k in range(states):
             dishes += tables_draw(state, int(tables[k]), top[0] / states)
-        log_eta = log_beta_draw(state, top[0], tables.sum())
+        considered = 0.0
+        for k in range(states):
+            considered += tables[k]
+        log_eta = log_beta_draw(state, top[0], considered)
         top[0] = math.exp(log_gamma_draw(state, hyper[0] + dishes)) / (hyper[1] - log_eta)
     if hyper[2] > 0.0:
         top[1] = math.exp(log_gamma_draw(state, hyper[2] + sums[0])) / (hyper[3] - sums[2])
@@ -291,4 +299,5 @@ def run_chain(
             trace[sweep, 0], trace[sweep, 1] = score, occupied
             trace[sweep, 2], trace[sweep, 3], trace[sweep, 4] = top[0], top[1], top[2]
         if sweep >= burn:
-            samples[sweep - burn] = labels
+            for t in range(t_max):
+                samples[sweep - burn, t] = labels[t]

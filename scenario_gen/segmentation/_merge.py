@@ -37,6 +37,14 @@ def merge_gain(n: Ints, i: int, j: int, stay: float, move: float) -> float:
 
 
 @kernel(inline=True)
+def join(a: Floats, b: Floats, g0: Floats, out: Floats) -> None:
+    """Fill `out` with a + b - g0, lower triangles: what two states together know."""
+    for i in range(len(g0)):
+        for j in range(i + 1):
+            out[i, j] = a[i, j] + b[i, j] - g0[i, j]
+
+
+@kernel(inline=True)
 def best_merge(data: Floats, own: Floats, counts: Ints, n: Ints, stay: float, move: float) -> tuple[int, int]:
     """Return the pair of states (i > j) whose merge gains most, or (-1, -1) if none gains anything."""
     best, best_i, best_j = 0.0, -1, -1
@@ -70,7 +78,9 @@ def merge_states(
     """
     m = v.shape[1]
     nu, weight, blur = hyper[6], hyper[7], hyper[8:]
-    states = labels.max() + 1
+    states = 0
+    for t in range(len(labels)):
+        states = max(states, labels[t] + 1)
     g = np.empty((states, m, m))
     counts = np.empty(states, np.int64)
     n = np.empty((states + 1, states), np.int64)
@@ -81,7 +91,7 @@ def merge_states(
     data = np.full((states, states), np.nan)
     accumulate(v, labels, g0, weight, blur, g, counts)
     for k in range(states):
-        factor[:] = g[k]
+        join(g[k], g0, g0, factor)
         cholesky(factor)
         own[k] = log_marginal(factor, weight * counts[k], regressors, nu) - base
     while True:
@@ -89,19 +99,22 @@ def merge_states(
         for i in range(states):
             for j in range(i):
                 if counts[i] > 0 and counts[j] > 0 and np.isnan(data[i, j]):
-                    factor[:] = g[i] + g[j] - g0
+                    join(g[i], g[j], g0, factor)
                     cholesky(factor)
                     data[i, j] = log_marginal(factor, weight * (counts[i] + counts[j]), regressors, nu) - base
         i, j = best_merge(data, own, counts, n, stay, move)
         if i < 0:
             break
         own[j], own[i] = data[i, j], 0.0
-        g[j] += g[i] - g0
+        join(g[i], g[j], g0, g[j])
         counts[j] += counts[i]
         counts[i] = 0
         for t in range(len(labels)):
             if labels[t] == i:
                 labels[t] = j
-        data[j, :] = np.nan
-        data[:, j] = np.nan
-    score[0] = own.sum()
+        for k in range(states):
+            data[j, k] = np.nan
+            data[k, j] = np.nan
+    score[0] = 0.0
+    for k in range(states):
+        score[0] += own[k]

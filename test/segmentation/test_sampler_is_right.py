@@ -87,6 +87,7 @@ def statistics(labels, v, top, d):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [0, 1])
 def test_geweke(order):
     """Prior draws and the chain (labels, parameters | series) <-> (series | labels, parameters) have the same moments."""
