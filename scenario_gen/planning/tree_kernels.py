@@ -198,6 +198,8 @@ def _extend(  # noqa: PLR0912
         return TRAPPED, -1
     n = float(max(counter[tree], 2))
     reach = min(setting[GAMMA] * np.sqrt(np.log(n) / n), setting[ZETA])  # eq 10 with exponent 1/d, d = 2
+    if setting[GREEDY] > 0.0 and setting[BEST] == np.inf:
+        reach = 0.0  # haste first: what was not rewired now is later
     count = _near(tree, x, y, reach, node, chunk, head, side, columns, near, gap)
     parent, cost = nearest, node[nearest, COST] + edge
     while True:  # Algorithm 4: the cheapest near node with a free edge, cheapest first

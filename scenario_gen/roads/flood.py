@@ -13,7 +13,7 @@ import numpy as np
 
 from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.kernels import B2, OUTI2, kernel
-from scenario_gen.roads.clearance import clearance_in_cells, segments_free, to_metres
+from scenario_gen.roads.clearance import clearance_in_cells, segment_free, segments_free, to_metres
 from scenario_gen.roads.road import Road
 
 _labels: "WeakKeyDictionary[Road, dict[float, Ints]]" = WeakKeyDictionary()
@@ -58,6 +58,13 @@ def _cells_of(road: Road, radius: float, label: int) -> tuple[Ints, Ints]:
 
 def component_at(road: Road, xy: Floats, radius: float) -> int:
     """The component that a disc of `radius` [m] at `xy` (2,) [m] can move to at once; 0 if it collides or is walled in."""
+    u, v = (float(xy[axis] - road.origin[axis]) / road.resolution for axis in range(2))
+    column, row = math.floor(u), math.floor(v)
+    labels = components(road, radius)
+    if 0 <= row < labels.shape[0] and 0 <= column < labels.shape[1] and labels[row, column] > 0:
+        field = clearance_in_cells(road)  # nearly always the cell's own centre will do
+        if segment_free(field, u, v, column + 0.5, row + 0.5, radius / road.resolution):
+            return int(labels[row, column])
     return next(_reachable(road, np.asarray(xy, dtype=np.float64), radius), 0)
 
 
@@ -76,19 +83,16 @@ def _reachable(road: Road, xy: Floats, radius: float) -> Iterator[int]:
     """Labels of the cell centres near `xy` that a straight move leads to, nearest first."""
     labels = components(road, radius)
     height, width = labels.shape
-    column, row = (math.floor((xy[axis] - road.origin[axis]) / road.resolution) for axis in range(2))
-    i, j = np.array([row]), np.array([column])
-    for reach in (0, 2):  # nearly always the cell's own centre will do
-        if reach:
-            i, j = np.mgrid[row - reach : row + reach + 1, column - reach : column + reach + 1].reshape(2, -1)
-        inside = (i >= 0) & (j >= 0) & (i < height) & (j < width)
-        i, j = i[inside], j[inside]
-        i, j = i[labels[i, j] > 0], j[labels[i, j] > 0]
-        centres = to_metres(road, np.stack((j + 0.5, i + 0.5), axis=-1))
-        free = segments_free(road, np.broadcast_to(xy, centres.shape), centres, radius)
-        for k in np.argsort(np.hypot(*(centres - xy).T), kind="stable"):
-            if free[k]:
-                yield int(labels[i[k], j[k]])
+    column, row = np.floor((xy - road.origin) / road.resolution).astype(int)
+    i, j = np.mgrid[row - 2 : row + 3, column - 2 : column + 3].reshape(2, -1)
+    inside = (i >= 0) & (j >= 0) & (i < height) & (j < width)
+    i, j = i[inside], j[inside]
+    i, j = i[labels[i, j] > 0], j[labels[i, j] > 0]
+    centres = to_metres(road, np.stack((j + 0.5, i + 0.5), axis=-1))
+    free = segments_free(road, np.broadcast_to(xy, centres.shape), centres, radius)
+    for k in np.argsort(np.hypot(*(centres - xy).T), kind="stable"):
+        if free[k]:
+            yield int(labels[i[k], j[k]])
 
 
 @kernel(B2, OUTI2)
