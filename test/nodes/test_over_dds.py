@@ -201,6 +201,7 @@ def test_ctrl_c_ends_everything_cleanly_and_the_bag_is_whole(suite):
     assert {"/map", "/tracks", "/changepoints", "/fit", "/vehicle_1/route", "/scenarios", "/scenarios/info"} <= recorded
 
 
+@pytest.mark.slow
 def test_a_played_back_bag_gives_the_same_scenarios(suite, tmp_path, domain, client):
     """Tracks and road from the bag, into a fresh segmenter, planner and sampler."""
     if suite.process.poll() is None:
@@ -235,6 +236,7 @@ def test_a_played_back_bag_gives_the_same_scenarios(suite, tmp_path, domain, cli
         made.end()
 
 
+@pytest.mark.slow
 def test_the_suite_records_several_jobs_in_their_namespaces(tmp_path):
     jobs = [Job("/case_1", LOG, "straight"), Job("/case_2", RESOURCES / "synthetic_b", "t_intersection")]
     bag = run_suite(jobs, PipelineConfig(), count=3, seed=7, bag=tmp_path / "bag", timeout=120.0)
@@ -246,6 +248,7 @@ def test_the_suite_records_several_jobs_in_their_namespaces(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["bag"]
 
 
+@pytest.mark.slow
 def test_a_job_that_cannot_be_done_names_the_stage_and_leaves_nothing(tmp_path):
     with pytest.raises(RefusedError, match="/x/planner: plan: the template does not fit"):
         run_suite([Job("/x", RESOURCES / "synthetic_b", "straight")], PipelineConfig(), count=3, seed=7, bag=tmp_path / "bag")
