@@ -9,7 +9,9 @@ from scenario_gen.sampling.gp import Features, Observations, Regression, combine
 
 DT = 0.1  # s, the grid of published scenarios
 SLOWEST, FASTEST = 1.35, 0.75  # longest and shortest a primitive may become, as a share of its own duration
-_LENGTH_SHARE = 0.5  # length scale of the clock's deviation as a share of the encounter's duration
+_LENGTH_SHARE = 1.5
+"""Length scale of the clock's deviation as a share of the encounter's duration: longer than the encounter, so that a sample
+is quicker or slower as a whole. A shorter one squeezes single primitives, whose speeds then are nobody's (E grows fourfold)."""
 
 
 class Clock:

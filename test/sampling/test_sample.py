@@ -206,7 +206,7 @@ def test_deviations_have_the_stated_standard_deviation():
     model, some = batch(4000, lateral_sigma=0.4, observation_sigma=10.0)
     middle = len(model.vehicles[0].path.node) // 2
     assert some.curve[0][:, middle, 1].std() == pytest.approx(0.4, rel=0.05)
-    assert some.clock[:, 2].std() == pytest.approx(np.sqrt(1.0 - np.exp(-((9.0 / 10.0) ** 2))), rel=0.1)
+    assert some.clock[:, 2].std() == pytest.approx(np.sqrt(1.0 - np.exp(-((9.0 / 30.0) ** 2))), rel=0.1)
 
 
 def test_clocks_are_monotone_and_shared():
