@@ -3,18 +3,20 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test check bench install clean
+.PHONY: demo test bench install browser clean
 
 demo: $(READY)
 	$(BIN)/scenario-gen demo --ros --out out/demo
 
-test: $(READY)
+test: $(READY) browser
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest
 
+# Peers that are not on this machine give no row.
 bench: $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-bench.lock
 	$(BIN)/python -m benchmarks all
 
 install: $(READY)
@@ -27,6 +29,13 @@ $(READY): requirements.lock setup.py
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	$(BIN)/python -m scenario_gen.kernels
 	@touch $(READY)
+
+# The report's tests drive Chromium; where it is missing and cannot be installed here, they skip with that reason.
+browser:
+	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || { \
+	  [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && \
+	  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq chromium >/dev/null; } || \
+	  echo "Chromium is not here: the tests of the report in a browser will be skipped"
 
 clean:
 	rm -rf .venv build install log out

@@ -48,9 +48,8 @@ def write_results(
     partial.mkdir(parents=True)
     try:
         if bag is None:
-            write_run(
-                partial / BAG, [as_run(case, seed, namespace) for case, namespace in zip(cases, namespaces(len(cases)), strict=True)]
-            )
+            names = namespaces(len(cases))
+            write_run(partial / BAG, [as_run(case, seed, name) for case, name in zip(cases, names, strict=True)])
         else:
             shutil.copytree(bag, partial / BAG)
         write_report(partial / REPORT, ReportInput(cases, title, quality, provenance))
