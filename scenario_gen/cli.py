@@ -11,10 +11,12 @@ import yaml
 from rich.console import Console
 from rich.markdown import Markdown
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.table import Table
 
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags import read_messages
 from scenario_gen.bags.evaluation import evaluate_bag
+from scenario_gen.bags.validation import validate_bag
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.evaluation import Case, comparison_table, read_evaluations, summary
@@ -219,6 +221,29 @@ def evaluate(
         (out / "evaluation.md").write_text(text + "\n", encoding="utf-8")
         figures = [json.loads(evaluation.to_json()) for evaluation in found]
         (out / FIGURES).write_text(json.dumps({"cases": figures}, indent=2) + "\n", encoding="utf-8")
+
+
+@app.command()
+def validate(
+    bag: Annotated[Path, typer.Argument(help="a bag with scenarios, ours or not")],
+    assignments: SetOption = None,
+    parameter_file: ParametersOption = None,
+) -> None:
+    """Check every scenario of a bag at every instant; exit code 1 if one is invalid."""
+    found = validate_bag(bag, configured(parameter_file, assignments or []).limits)
+    for one in found:
+        console.print(
+            f"{one.namespace or '/'}: {one.scenarios - one.invalid} of {one.scenarios} scenarios are valid", highlight=False
+        )
+        table = Table("cause", "scenarios", "first", "what")
+        for cause, entry in one.found.items():
+            table.add_row(cause, str(entry.count), str(entry.scenario), entry.message)
+        if one.found:
+            console.print(table)
+        for sentence, count in one.left_out.items():
+            console.print(f"  not applicable to {count}: {sentence}", highlight=False)
+    if any(one.invalid for one in found):
+        raise typer.Exit(1)
 
 
 @app.command()

@@ -1,6 +1,5 @@
 """The evaluation of any bag that keeps the conventions of the suite, ours or not."""
 
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.bags.reader import read_messages
+from scenario_gen.bags.contents import read_namespaces
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import CheckCounts, Evaluation, EvaluationConfig, evaluate
@@ -33,11 +32,8 @@ def evaluate_bag(
     Raises:
         InputError: the bag is missing or damaged, or no namespace has both topics.
     """
-    found: dict[str, dict[str, list[bytes]]] = defaultdict(lambda: defaultdict(list))
-    for message in read_messages(path, lambda topic: topic.rpartition("/")[2] in TOPICS):
-        namespace, _, topic = message.topic.rpartition("/")
-        found[namespace][topic].append(message.data)
-    whole = {name: topics for name, topics in sorted(found.items()) if topics["tracks"] and topics[SCENARIOS]}
+    found = read_namespaces(path, TOPICS)
+    whole = {name: topics for name, topics in found.items() if topics["tracks"] and topics[SCENARIOS]}
     if not whole:
         raise InputError(f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare")
     return tuple(

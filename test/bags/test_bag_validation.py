@@ -1,0 +1,108 @@
+"""Every scenario of a bag is checked anew, against what the bag itself says of its request."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from msg_conventions.scenarios import encode_scenario
+from msg_conventions.topics import topic_entry
+from scenario_gen.bags import AtomicBag, Run, read_messages, write_run
+from scenario_gen.bags.metadata import qos_yaml
+from scenario_gen.bags.validation import UNUSABLE, validate_bag
+from scenario_gen.cli import app
+from scenario_gen.errors import InputError
+from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
+from scenario_gen.pipeline import PipelineConfig, run_arm
+from scenario_gen.roads import build_road
+from scenario_gen.segmentation import segment
+
+
+@pytest.fixture(scope="module")
+def run():
+    """A real run: the synthetic merging case on a straight road."""
+    (encounter,) = read_log([bundled("c")]).encounters
+    config = PipelineConfig()
+    road = build_road("straight", encounter, config.road)
+    arm = run_arm(encounter, segment(encounter, config.segmentation, 7), road, config, count=4, seed=7)
+    return Run(encounter, road, arm.segmentation, arm.fit, arm.routes, arm.scenarios, 7, "1", "/here")
+
+
+def rewritten(bag, target, change, without=()):
+    """Copy a bag; `change(k, scenario bytes)` gives the bytes of scenario k."""
+    index = 0
+    with AtomicBag(target) as writer:
+        for message in read_messages(bag):
+            if message.topic.rpartition("/")[2] in without:
+                continue
+            kind, quality = topic_entry(message.topic)
+            writer.add_topic(message.topic, kind, qos_yaml(quality))
+            data = message.data
+            if message.topic.endswith("/scenarios"):
+                data, index = change(index, data), index + 1
+            writer.write(message.topic, data, message.stamp_ns)
+    return target
+
+
+def test_what_is_published_is_valid(run, tmp_path):
+    (found,) = validate_bag(write_run(tmp_path / "run", run))
+    assert (found.namespace, found.scenarios, found.invalid) == ("/here", 4, 0)
+    assert found.left_out == {} and found.found == {}
+
+
+def test_each_fault_is_found_with_its_cause_and_place(run, tmp_path):
+    good = run.result.scenarios
+    moved = [s.position.copy() for s in good]
+    moved[1][:] += (0.0, 400.0)  # far off the road, and off what was asked
+    moved[2][1] = moved[2][0]  # one on top of the other
+    bad = [replace(scenario, position=position) for scenario, position in zip(good, moved, strict=True)]
+    elsewhere = replace(good[3], frame_id="elsewhere")
+    stamp = run.encounter.start_ns
+    messages = [encode_scenario(s, stamp) for s in (*bad[:3], elsewhere)]
+    bag = rewritten(write_run(tmp_path / "run", run), tmp_path / "bad", lambda k, _: messages[k])
+    (found,) = validate_bag(bag)
+    assert (found.scenarios, found.invalid) == (4, 3)
+    assert found.found["off_road"].scenario == 1
+    assert found.found["boundary_state"].count == 2
+    assert found.found["overlap"].scenario == 2
+    assert found.found[UNUSABLE].scenario == 3
+    assert "elsewhere" in found.found[UNUSABLE].message
+
+
+def test_what_the_bag_does_not_say_is_said(run, tmp_path):
+    bag = rewritten(write_run(tmp_path / "run", run), tmp_path / "bare", lambda _, data: data, ("tracks", "map", "fit"))
+    (found,) = validate_bag(bag)
+    assert found.invalid == 0
+    assert sorted(sentence.partition(":")[0] for sentence in found.left_out) == [
+        "boundary_state",
+        "moving_wait",
+        "off_road",
+        "passing_order",
+    ]
+    assert set(found.left_out.values()) == {4}
+
+
+def test_a_vehicle_may_be_left_out_and_the_order_of_the_others_is_free(run, tmp_path):
+    def swapped(k, _data):
+        scenario, order = run.result.scenarios[k], [1, 0] if k else [1]
+        arrays = {name: getattr(scenario, name)[order] for name in ("position", "heading", "speed", "acceleration")}
+        vehicles = tuple(np.array(scenario.vehicles, dtype=object)[order])
+        return encode_scenario(replace(scenario, vehicles=vehicles, **arrays), run.encounter.start_ns)
+
+    (found,) = validate_bag(rewritten(write_run(tmp_path / "run", run), tmp_path / "ego", swapped))
+    assert found.found == {} and found.left_out == {}
+
+
+def test_the_command_answers_with_its_exit_code(run, tmp_path):
+    bag = write_run(tmp_path / "run", run)
+    assert CliRunner().invoke(app, ["validate", str(bag)]).exit_code == 0
+    cut = rewritten(bag, tmp_path / "cut", lambda k, data: data[:200] if k == 2 else data)
+    answer = CliRunner().invoke(app, ["validate", str(cut)])
+    assert answer.exit_code == 1
+    assert "3 of 4" in answer.output and UNUSABLE in answer.output
+    with pytest.raises(InputError, match="no such bag"):
+        validate_bag(tmp_path / "none")
+    with pytest.raises(InputError, match="nothing to check"):
+        validate_bag(rewritten(bag, tmp_path / "empty", lambda _, data: data, ("scenarios",)))
