@@ -2,16 +2,14 @@
 
 
 class ScenarioGenError(Exception):
-    """Base of every error this project raises on purpose; the command line prints it without a traceback."""
+    """Base of every error this project raises on purpose; the command line prints it without a traceback and exits with 2."""
 
     exit_code = 2
 
 
 class InputError(ScenarioGenError):
-    """A file, row, topic or parameter cannot be used as it is (exit code 2)."""
+    """A file, row, topic or parameter cannot be used as it is."""
 
 
 class RefusedError(ScenarioGenError):
-    """The input is sound but what was asked cannot be done with it, e.g. a template that fits no road (exit code 3)."""
-
-    exit_code = 3
+    """The input is sound but what was asked cannot be done with it, e.g. a template that fits no road."""
