@@ -10,7 +10,7 @@ from time import process_time
 
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.evaluation import ORACLE, WITH, Case, Evaluation, ReportInput, evaluate, render, replay
+from scenario_gen.evaluation import ORACLE, UNIFORM, WITH, WITHOUT, Case, Evaluation, ReportInput, evaluate, render, replay
 from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import Arm, PipelineConfig, run_arm, without_changepoints
@@ -19,7 +19,7 @@ from scenario_gen.segmentation import Segmentation, segment
 
 COUNT, SEED = 50, 7
 OTHER_ROADS = ("t_intersection", "four_way", "straight")
-UNIFORM, LINEAR = "uniform changepoints", "best linear pieces"
+LINEAR = "best linear pieces"
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def _measure(
         say(f"{encounter.name} on {Path(name).stem}: {error}")
         return None
     makers: dict[str, Callable[[], Segmentation]] = {
-        "without changepoints": partial(without_changepoints, segmentation),
+        WITHOUT: partial(without_changepoints, segmentation),
         UNIFORM: partial(uniform_changepoints, segmentation),
         LINEAR: partial(linear_changepoints, encounter, segmentation),
     }
@@ -91,7 +91,7 @@ def _measure(
     oracle = replay(encounter, arms[WITH].fit, road.frame_id)
     rows = {arm: made.scenarios.scenarios for arm, made in arms.items()} | {ORACLE: (oracle,)}
     evaluation = evaluate(encounter, segmentation, rows, road=road.name)
-    with_, without = arms[WITH], arms.get("without changepoints")
+    with_, without = arms[WITH], arms.get(WITHOUT)
     made = without.scenarios if without else None
     case = Case(encounter, segmentation, road, with_.fit, with_.routes, with_.scenarios, made, evaluation, oracle)
     render(ReportInput([case]))

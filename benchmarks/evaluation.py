@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from benchmarks._figure5 import LINEAR, UNIFORM, Measured, measure
+from benchmarks._figure5 import LINEAR, Measured, measure
 from benchmarks.row import Row
-from scenario_gen.evaluation import WITH, WITHOUT, dtw_distance, feature_matrix
+from scenario_gen.evaluation import UNIFORM, WITH, WITHOUT, dtw_distance, feature_matrix
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 STEPS = 3000

@@ -7,7 +7,18 @@ import numpy as np
 
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import RefusedError
-from scenario_gen.evaluation import ORACLE, WITH, WITHOUT, Case, CheckCounts, EvaluationConfig, evaluate, replay
+from scenario_gen.evaluation import (
+    ORACLE,
+    UNIFORM,
+    WITH,
+    WITHOUT,
+    Case,
+    CheckCounts,
+    EvaluationConfig,
+    evaluate,
+    replay,
+    uniform_changepoints,
+)
 from scenario_gen.fitting import Fit, FittingConfig, fit_template
 from scenario_gen.interaction import find_conflicts, find_waits
 from scenario_gen.logs import LogConfig
@@ -132,19 +143,26 @@ def without_changepoints(segmentation: Segmentation) -> Segmentation:
 
 
 def with_ablation(encounter: Encounter, road: Road, arm: Arm, config: PipelineConfig, *, count: int, seed: int) -> Case:
-    """Run the chain once more without changepoints, and evaluate both arms beside the fitted template (the oracle row)."""
-    without, refused = None, ""
-    try:
-        without = run_arm(encounter, without_changepoints(arm.segmentation), road, config, count=count, seed=seed)
-    except RefusedError as error:
-        refused = str(error)
-    arms = {WITH: arm} | ({WITHOUT: without} if without else {})
+    """Run the chain again without changepoints and, unless `evaluation.uniform` is off, with uniform ones; evaluate all.
+
+    Beside them stands the fitted template (the oracle row).
+    """
+    others = {WITHOUT: without_changepoints(arm.segmentation)}
+    if config.evaluation.uniform and arm.segmentation.changepoints.size:
+        others[UNIFORM] = uniform_changepoints(arm.segmentation)
+    arms, refused = {WITH: arm}, {}
+    for name, segmentation in others.items():
+        try:
+            arms[name] = run_arm(encounter, segmentation, road, config, count=count, seed=seed)
+        except RefusedError as error:
+            refused[name] = str(error)
+    made = {name: one.scenarios for name, one in arms.items()}
     oracle = replay(encounter, arm.fit, road.frame_id)
     evaluation = evaluate(
         encounter,
         arm.segmentation,
-        {name: one.scenarios.scenarios for name, one in arms.items()} | {ORACLE: (oracle,)},
-        checks={name: CheckCounts.of_set(one.scenarios) for name, one in arms.items()},
+        {name: one.scenarios for name, one in made.items()} | {ORACLE: (oracle,)},
+        checks={name: CheckCounts.of_set(one) for name, one in made.items()},
         oracle=ORACLE,
         road=road.name,
         config=config.evaluation,
@@ -157,8 +175,10 @@ def with_ablation(encounter: Encounter, road: Road, arm: Arm, config: PipelineCo
         fit=arm.fit,
         routes=arm.routes,
         with_changepoints=arm.scenarios,
-        without_changepoints=without.scenarios if without else None,
+        without_changepoints=made.get(WITHOUT),
         evaluation=evaluation,
         oracle=oracle,
-        without_refused=refused,
+        without_refused=refused.get(WITHOUT, ""),
+        uniform=made.get(UNIFORM),
+        uniform_refused=refused.get(UNIFORM, ""),
     )

@@ -5,12 +5,13 @@ from scenario_gen.evaluation.dtw import Alignment, dtw, dtw_distance, feature_ma
 from scenario_gen.evaluation.evaluate import EvaluationConfig, evaluate
 from scenario_gen.evaluation.oracle import replay
 from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints
-from scenario_gen.evaluation.report import ORACLE, WITH, WITHOUT, Case, ReportInput, render, write_report
+from scenario_gen.evaluation.report import ORACLE, UNIFORM, WITH, WITHOUT, Case, ReportInput, render, write_report
 from scenario_gen.evaluation.result import CheckCounts, Evaluation, Metric, Row
 from scenario_gen.evaluation.summary import summary
 
 __all__ = [
     "ORACLE",
+    "UNIFORM",
     "WITH",
     "WITHOUT",
     "Alignment",

@@ -30,6 +30,7 @@ class EvaluationConfig:
     max_steps: int = parameter(600, "most instants in a feature matrix; a longer template is resampled", low=10, high=5000)
     period: float = parameter(0.1, "sampling period of distributions and criticality", unit="s", low=0.01, high=1.0)
     ttc_horizon: float = parameter(10.0, "times to collision above this count as this", unit="s", low=1.0, high=100.0)
+    uniform: bool = parameter(True, "command line: generate also with as many changepoints evenly spaced in time, a row to beat")
 
     def __post_init__(self) -> None:
         check(self)

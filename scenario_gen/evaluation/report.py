@@ -21,7 +21,7 @@ from scenario_gen.roads.road import Road
 from scenario_gen.scenario import Scenario, ScenarioSet
 from scenario_gen.segmentation.result import Segmentation
 
-WITH, WITHOUT, ORACLE = "with changepoints", "without changepoints", "oracle"
+WITH, WITHOUT, UNIFORM, ORACLE = "with changepoints", "without changepoints", "uniform changepoints", "oracle"
 """Names of the rows that the report looks for in an evaluation."""
 SIGNIFICANT = 0.03
 """Below this, E without changepoints leaves nothing to gain and the case is not counted."""
@@ -44,6 +44,8 @@ class Case:
         evaluation: of these sets.
         oracle: the fitted template replayed.
         without_refused: why there is no ablation.
+        uniform: generated with as many changepoints, evenly spaced in time; None if not asked for or refused.
+        uniform_refused: why it was refused, "" if it was not.
     """
 
     encounter: Encounter
@@ -56,6 +58,8 @@ class Case:
     evaluation: Evaluation
     oracle: Scenario | None = None
     without_refused: str = ""
+    uniform: ScenarioSet | None = None
+    uniform_refused: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +122,7 @@ def _is_parameter(name: str) -> bool:
 
 def _view(index: int, case: Case) -> dict[str, Any]:
     """Return what the page's tables say about one case."""
-    arms = [(WITH, case.with_changepoints), (WITHOUT, case.without_changepoints)]
+    arms = [(WITH, case.with_changepoints), (WITHOUT, case.without_changepoints), (UNIFORM, case.uniform)]
     evaluation = case.evaluation
     duration = case.encounter.duration
     bounds = [*(float(case.encounter.time[i]) for i in (0, *case.segmentation.changepoints)), duration]
@@ -133,7 +137,9 @@ def _view(index: int, case: Case) -> dict[str, Any]:
         "k": len(case.segmentation.changepoints),
         "rate": len(case.segmentation.changepoints) / duration,
         "errors": {
-            (arm, key): _found(evaluation, arm, key) for arm in (WITH, WITHOUT, ORACLE) for key in ("e_position", "e_speed")
+            (arm, key): _found(evaluation, arm, key)
+            for arm in (WITH, WITHOUT, UNIFORM, ORACLE)
+            for key in ("e_position", "e_speed")
         },
         "segments": [
             {"from": bounds[k], "to": bounds[k + 1], "label": int(case.segmentation.labels[start]), "text": text}

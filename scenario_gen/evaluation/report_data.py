@@ -30,6 +30,8 @@ def case_data(case: "Case", samples: int) -> dict[str, Any]:
     arms = {"with": case.with_changepoints.scenarios[:samples]}
     if case.without_changepoints is not None:
         arms["without"] = case.without_changepoints.scenarios[:samples]
+    if case.uniform is not None:
+        arms["uniform"] = case.uniform.scenarios[:samples]
     if case.oracle is not None:
         arms["oracle"] = (case.oracle,)
     longest = max([case.encounter.duration, *(float(s.time[-1]) for group in arms.values() for s in group)])

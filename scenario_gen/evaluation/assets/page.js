@@ -2,7 +2,7 @@
 // The page: which case is shown, and the player.
 
 const CASES = JSON.parse(document.getElementById("data").textContent);
-const ARM_NAMES = { oracle: "fitted template", with: "with changepoints", without: "without changepoints" };
+const ARM_NAMES = { oracle: "fitted template", with: "with changepoints", without: "without changepoints", uniform: "uniform changepoints" };
 
 function option(value, text) {
   const element = document.createElement("option");
