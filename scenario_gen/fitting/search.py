@@ -9,7 +9,6 @@ where and when, is kept.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import fftconvolve
 
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.errors import RefusedError
@@ -119,6 +118,8 @@ def _penalty(clearance: Floats, need: float) -> Floats:
 
 def _coarse(discs: Floats, road: Road, need: float, scale: float) -> list[_Motion]:
     """The best translation of each rotation."""
+    from scipy.signal import fftconvolve  # slow to import, and most roads need no search
+
     every = max(round(_CELL / road.resolution), 1)
     cell = every * road.resolution
     field = _penalty(clearance_field(road)[every // 2 :: every, every // 2 :: every], need)

@@ -5,7 +5,7 @@ import threading
 import time
 
 import pytest
-from conftest import RESOURCES, Client, Processes
+from suite_processes import RESOURCES, Client, Processes
 
 from msg_conventions.diagnostics import Level, decode_diagnostics
 from msg_conventions.fits import decode_fit

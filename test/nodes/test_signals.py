@@ -7,7 +7,7 @@ import sys
 import time
 
 import pytest
-from conftest import RESOURCES
+from suite_processes import RESOURCES
 
 from scenario_gen.bags import read_messages
 

@@ -1,0 +1,109 @@
+"""Real nodes in real processes, and a client to talk to them."""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections import defaultdict
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+RESOURCES = ROOT / "scenario_gen" / "resources"
+os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+
+class Processes:
+    """Nodes as forked processes, as the demo runs them; `arguments` are ROS arguments."""
+
+    def __init__(self, folder: Path, domain: int, nodes: dict[str, list[str]], namespaces: tuple[str, ...] = ()):
+        self.folder = folder
+        spaces = [word for name in namespaces for word in ("--namespace", name)]
+        specification = [
+            {"node": node, "arguments": [*spaces, "--ros-args", *arguments], "log": str(folder / f"{node}.log")}
+            for node, arguments in nodes.items()
+        ]
+        (folder / "suite.json").write_text(json.dumps(specification))
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "scenario_gen.nodes.suite", str(folder / "suite.json")],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"ROS_DOMAIN_ID": str(domain), "RCUTILS_COLORIZED_OUTPUT": "0", "ROS_LOG_DIR": str(folder)},
+        )
+        assert json.loads(self.process.stdout.readline())["event"] == "loaded"
+
+    def end(self) -> dict[str, int]:
+        """End all nodes as Ctrl-C does; return their exit codes."""
+        self.process.stdin.close()
+        events = [json.loads(line) for line in self.process.stdout]
+        self.process.wait(20.0)
+        return {event["node"]: event["code"] for event in events if event["event"] == "exited"}
+
+    def log(self, node: str) -> str:
+        return (self.folder / f"{node}.log").read_text()
+
+
+class Client:
+    """A node of the test's own that hears topics raw and calls services."""
+
+    def __init__(self, domain: int):
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = rclpy.create_node("test_client", context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.heard: dict[str, list[bytes]] = defaultdict(list)
+        self._publishers = {}
+        self.thread = threading.Thread(target=self.executor.spin, daemon=True)
+        self.thread.start()
+
+    def hear(self, *topics: str) -> None:
+        from msg_conventions.topics import topic_entry
+        from scenario_gen.nodes.base import qos
+        from scenario_gen.nodes.message_classes import message_class
+
+        for topic in topics:
+            kind, quality = topic_entry(topic)
+            self.node.create_subscription(message_class(kind), topic, self.heard[topic].append, qos(quality), raw=True)
+
+    def say(self, topic: str, data: bytes) -> None:
+        from msg_conventions.topics import topic_entry
+        from scenario_gen.nodes.base import qos
+        from scenario_gen.nodes.message_classes import message_class
+
+        kind, quality = topic_entry(topic)
+        if topic not in self._publishers:
+            self._publishers[topic] = self.node.create_publisher(message_class(kind), topic, qos(quality))
+        self._publishers[topic].publish(data)
+
+    def wait(self, topic: str, count: int = 1, timeout: float = 60.0) -> list[bytes]:
+        self.until(lambda: len(self.heard[topic]) >= count, f"{count} messages on {topic}", timeout)
+        return self.heard[topic]
+
+    def until(self, condition, what: str, timeout: float = 60.0) -> None:
+        deadline = time.monotonic() + timeout
+        while not condition():
+            assert time.monotonic() < deadline, f"waited {timeout} s for {what}"
+            time.sleep(0.02)
+
+    def call_later(self, kind, name: str, request):
+        client = self.node.create_client(kind, name)
+        assert client.wait_for_service(30.0), name
+        return client.call_async(request)
+
+    def call(self, kind, name: str, request, timeout: float = 60.0):
+        future = self.call_later(kind, name, request)
+        self.until(future.done, f"an answer of {name}", timeout)
+        return future.result()
+
+    def close(self) -> None:
+        self.executor.shutdown(timeout_sec=2.0)
+        self.thread.join(2.0)
+        self.node.destroy_node()
+        self.context.try_shutdown()
