@@ -247,6 +247,14 @@ def validate(
 
 
 @app.command()
+def doctor() -> None:
+    """Say what is wrong with this environment: Python, packages, ROS, DDS, QoS of visible topics, kernels."""
+    from scenario_gen.nodes.doctor import main as examined
+
+    raise typer.Exit(examined())
+
+
+@app.command()
 def compare(
     first: Annotated[Path, typer.Argument(help="results folder, or its evaluation.json")],
     second: Annotated[Path, typer.Argument(help="another one")],
