@@ -28,9 +28,11 @@ def free_domain() -> Iterator[int]:
         RefusedError: none is free.
     """
     for domain in reversed(DOMAINS):
-        path = Path(tempfile.gettempdir()) / f"scenario_gen_domain_{domain}.lock"
-        with suppress(OSError), path.open("a") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        with (Path(tempfile.gettempdir()) / f"scenario_gen_domain_{domain}.lock").open("a") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue  # another run of ours holds it
             if _quiet(domain):
                 yield domain
                 return
