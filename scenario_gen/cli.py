@@ -3,6 +3,7 @@
 import json
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -26,6 +27,7 @@ from scenario_gen.logs.synthetic import bundled
 from scenario_gen.parameters import flatten, updated
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.pipeline import generate as run_pipeline
+from scenario_gen.reproduce import reproduce as reproduce_figures
 from scenario_gen.results import BAG, FIGURES, check_folder, namespaces, provenance_of, write_results
 
 app = typer.Typer(
@@ -202,6 +204,20 @@ def compare_with_nodes(cases: list[Case], bag: Path) -> None:
             raise ScenarioGenError(f"the nodes' scenarios of {case.encounter.name} differ from those made in this process")
         total += len(own)
     console.print(f"{total} scenarios from the nodes, recorded over DDS: the same bytes as in this process")
+
+
+@app.command()
+def reproduce(
+    log: Annotated[list[Path] | None, typer.Argument(help="as for generate; without one, the three bundled cases")] = None,
+    count: Annotated[int, typer.Option(min=2, help="scenarios per encounter, with and without changepoints")] = 50,
+    seed: Annotated[int, typer.Option(min=0, help="same seed, same page")] = 7,
+    out: Annotated[Path, typer.Option(help="folder of reproduce.html and reproduce.json")] = Path("out/reproduced"),
+) -> None:
+    """Draw figures 2 to 5 of the paper with its own settings, each beside its claim and what is measured for it."""
+    logs = [log] if log else [[bundled(case)] for case, _ in DEMO]
+    reproduce_figures(
+        logs, out, count=count, seed=seed, say=partial(console.print, highlight=False, markup=False, soft_wrap=True)
+    )
 
 
 @app.command()

@@ -24,7 +24,7 @@ ORDER = (
     ("evaluation",),
     ("pipeline",),
     ("bags",),
-    ("results",),
+    ("results", "reproduce"),
     ("nodes", "cli"),
 )
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}

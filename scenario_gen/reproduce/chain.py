@@ -1,0 +1,200 @@
+"""The paper's own chain, in cells: placed by given ends (eqs 7-9), RRT*-Connect with step 5, y as a function of x (eqs 11-15).
+
+What the paper leaves open is settled here: y is a function of x in the frame of the vehicle's own chord, since a turn has
+no y(x) along the grid's axes; and the time law has one interior knot per primitive (see docs/method.md).
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, wrap_angle
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError, RefusedError
+from scenario_gen.fitting import Fit, FittingConfig, fit_template
+from scenario_gen.interaction import Wait, find_waits
+from scenario_gen.planning import PlanningConfig, Route, plan_routes
+from scenario_gen.planning.rrt_star_connect import PAPER
+from scenario_gen.roads import Road, RoadConfig, build_road
+from scenario_gen.sampling.candidates import knots_on
+from scenario_gen.sampling.config import SamplingConfig
+from scenario_gen.sampling.ordinate import ordinate_samples
+from scenario_gen.sampling.time_law import SpeedBounds, SpeedProfile, TimeLaw, layout
+from scenario_gen.segmentation import Segmentation
+
+ROADS = ("straight", "t_intersection")
+"""The paper's roads (IV-B), in the order in which they are tried: a road along which, else a junction."""
+SIDE, HALF_ROAD, VERGE = 1000.0, 100.0, 20.0
+"""Cells: side of the grid, half the width of a road, room kept to the grid's edge."""
+TRAINING_PERIOD = 1.0
+"""Seconds between the training points on the planned path."""
+ITERATIONS = 3000
+END_SPEEDS, KNOTS = (1.0, 0.75, 0.5, 0.25, 0.0), (0.5, None, 0.3, 0.7, 0.1, 0.9)
+"""Shares of the asked end speeds, and places of a primitive's knot, that are tried in this order until a time law exists."""
+FITTING = FittingConfig(scale_low=0.01, scale_high=1000.0, max_move=100.0, clearance=0.0)
+PLANNING = PlanningConfig(iterations=ITERATIONS, drivable=False, rrt_star_connect=PAPER)
+UNLIMITED = SamplingConfig(max_speed=1e6, max_acceleration=1e6, max_deceleration=1e6, max_lateral_acceleration=1e6)
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """S samples of N vehicles at the template's T instants.
+
+    Attributes:
+        fit: the template on the paper's road, in cells.
+        routes: planned, in cells.
+        position: (S, N, T, 2) cells.
+        speed: (S, N, T) cells/s, by Euler differentiation (eq 16).
+        notes: where the asked end speeds could not be kept.
+    """
+
+    fit: Fit
+    routes: tuple[Route, ...]
+    position: Floats
+    speed: Floats
+    notes: tuple[str, ...] = ()
+
+
+def place(encounter: Encounter, segmentation: Segmentation) -> tuple[Road, Floats, Floats]:
+    """Choose the road, and start and goal of every vehicle on it: (N, 3) x, y, yaw in cells.
+
+    The metric fitting says which lanes the template takes and how far from the junction it begins and ends; the paper's
+    road has the same lanes, 100 cells wide.
+
+    Raises:
+        RefusedError: it fits none of the paper's roads; the message has the reason for each.
+    """
+    reasons = []
+    for name in ROADS:
+        try:
+            metric = build_road(name, encounter, RoadConfig())
+            fit = fit_template(encounter, segmentation, metric)
+        except RefusedError as error:
+            reasons.append(f"{name}: {error}")
+            continue
+        road = build_road(name, encounter, RoadConfig(paper=True))
+        return road, *_ends_on(road, metric, fit)
+    raise RefusedError("it fits none of the paper's roads; " + "; ".join(reasons))
+
+
+def _ends_on(road: Road, metric: Road, fit: Fit) -> tuple[Floats, Floats]:
+    """Bring start and end states from the metric road to the same lanes of the paper's."""
+    lanes = len(metric.entries) // len(road.entries)
+    centre = metric.entries[: 2 * lanes, :2].mean(axis=0)
+    found = [[_on_lane(metric, pose, centre) for pose in side[:, :3]] for side in (fit.asked.start, fit.asked.end)]
+    junction = 0.0 if road.name == "straight" else 3.5 * lanes
+    farthest = max(abs(distance) for side in found for _, _, distance in side)
+    cells = (SIDE / 2.0 - VERGE - (HALF_ROAD if junction else 0.0)) / max(farthest - junction, 1.0)
+    states = []
+    for side in found:
+        rows = []
+        for leaves, lane, distance in side:
+            gate = (road.exits if leaves else road.entries)[lane // lanes]
+            outside = abs(distance) - junction
+            reach = HALF_ROAD + cells * outside if junction and outside > 0.0 else abs(distance) * (
+                HALF_ROAD / junction if junction else cells
+            )  # fmt: skip
+            back = (SIDE / 2.0 - np.sign(distance) * reach) * (-1.0 if leaves else 1.0)
+            heading = gate[2]
+            rows.append([*(gate[:2] + back * np.array([np.cos(heading), np.sin(heading)])), heading])
+        states.append(np.array(rows))
+    still = np.array([fitted.stands.all() for fitted in fit.fitted])
+    states[1][still] = states[0][still]
+    return states[0], states[1]
+
+
+def _on_lane(road: Road, pose: Floats, centre: Floats) -> tuple[bool, int, float]:
+    """Which lane a pose is on: whether it leaves, its number, and the distance from the centre outwards along it."""
+    best, answer = np.inf, (False, 0, 0.0)
+    for leaves, gates in ((False, road.entries), (True, road.exits)):
+        for lane, gate in enumerate(gates):
+            along = np.array([np.cos(gate[2]), np.sin(gate[2])])
+            outward = along if leaves else -along
+            offset = pose[:2] - gate[:2]
+            distance = float((pose[:2] - centre) @ outward)
+            off = abs(offset @ np.array([-along[1], along[0]])) + 10.0 * abs(float(wrap_angle(np.asarray(pose[2] - gate[2]))))
+            cost = float(off) + (0.0 if distance >= 0.0 else 1.0)
+            if cost < best:
+                best, answer = cost, (leaves, lane, distance)
+    return answer
+
+
+def sample(
+    encounter: Encounter, segmentation: Segmentation, road: Road, ends: tuple[Floats, Floats], *, count: int, seed: int
+) -> Sampled:
+    """Fit, plan and sample with these changepoints.
+
+    Raises:
+        RefusedError: it cannot be placed, planned or timed.
+    """
+    try:
+        fit = fit_template(encounter, segmentation, road, FITTING, starts=ends[0], goals=ends[1])
+        routes = plan_routes(road, fit, PLANNING, seed)
+        waits = find_waits(encounter) if segmentation.changepoints.size else ()
+        drawn = [_vehicle(encounter, fit, n, route, waits=waits, count=count, seed=seed) for n, route in enumerate(routes)]
+    except InputError as error:  # no y(x), e.g. a vehicle that returns to where it started
+        raise RefusedError(str(error)) from error
+    position = np.stack([found for found, _ in drawn], axis=1)
+    notes = tuple(
+        f"vehicle {vehicle.id}: no piecewise constant acceleration meets length, duration and end speeds; "
+        f"the end speeds were lowered to {factor:.0%}"
+        for vehicle, (_, factor) in zip(encounter.vehicles, drawn, strict=True)
+        if factor < 1.0
+    )
+    step = np.diff(position, axis=2)
+    speed = np.hypot(step[..., 0], step[..., 1]) / encounter.dt  # eq 16
+    return Sampled(fit, routes, position, np.concatenate([speed, speed[..., -1:]], axis=-1), notes)
+
+
+def _vehicle(
+    encounter: Encounter, fit: Fit, n: int, route: Route, *, waits: tuple[Wait, ...], count: int, seed: int
+) -> tuple[Floats, float]:
+    """(S, T, 2) positions of one vehicle, and the share of its end speeds that could be kept."""
+    if len(route.points) == 1:
+        return np.broadcast_to(route.points[0, :2], (count, len(encounter.time), 2)).copy(), 1.0
+    times = encounter.time[fit.anchor_index]
+    profile, factor = _profile(encounter, fit, n, route, waits)
+    clock = np.unique(np.concatenate([np.arange(0.0, times[-1], TRAINING_PERIOD), times]))
+    training, wanted = (_along(route, profile.state(t)[0]) for t in (clock, encounter.time))
+    chord = training[-1] - training[0]
+    turn = np.arctan2(chord[1], chord[0])
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    x = (wanted @ rotation)[:, 0]
+    there, back = np.unique(x, return_inverse=True)
+    y = ordinate_samples(training @ rotation, there, count, seed + 7919 * n)[:, back]
+    return np.stack([np.broadcast_to(x, y.shape), y], axis=-1) @ rotation.T, factor
+
+
+def _profile(encounter: Encounter, fit: Fit, n: int, route: Route, waits: tuple[Wait, ...]) -> tuple[SpeedProfile, float]:
+    """The time law along the planned path: piecewise constant acceleration (IV-B); the share of the end speeds it keeps."""
+    times = encounter.time[fit.anchor_index]
+    own = [(wait.start, wait.end) for wait in waits if wait.vehicle == n]
+    dwells = route.anchor[:-1] == route.anchor[1:]
+    speeds = encounter.speed[n] * route.length[-1] / max(_driven(encounter, n), 1e-6)
+    for factor, share in product(END_SPEEDS, KNOTS):
+        asked = (factor * float(speeds[0]), factor * float(speeds[-1]))
+        plan = layout(times, dwells, own, encounter.time, speeds, asked, share)
+        law = TimeLaw(plan, UNLIMITED, SpeedBounds.none())
+        knot = knots_on(times[None], times, plan)
+        reached = route.length[route.anchor]
+        lengths = (reached[plan.bounds[:, 1]] - reached[plan.bounds[:, 0]])[None]
+        speed, ok = law.solve(knot, lengths)
+        if not ok[0]:
+            speed, ok, _ = law.slide(knot, lengths)
+        if ok[0]:
+            return SpeedProfile(knot[0], speed[0]), factor
+    raise RefusedError(
+        f"vehicle {encounter.vehicles[n].id}: no piecewise constant acceleration drives its route in {times[-1]:.1f} s"
+    )
+
+
+def _driven(encounter: Encounter, n: int) -> float:
+    """Metres that vehicle n drives in the template."""
+    speed = encounter.speed[n]
+    return float(0.5 * (speed[:-1] + speed[1:]).sum() * encounter.dt)
+
+
+def _along(route: Route, station: Floats) -> Floats:
+    """(m, 2) positions at arc lengths along the planned path."""
+    return np.column_stack([np.interp(station, route.length, route.points[:, axis]) for axis in (0, 1)])
