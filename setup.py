@@ -26,6 +26,7 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", [str(path) for path in sorted(Path("config").glob("*.*"))]),
         (f"share/{NAME}/launch", [str(path) for path in sorted(Path("launch").glob("*.launch.py"))]),
+        (f"share/{NAME}/examples", [str(path) for path in sorted(Path("examples").glob("*.*"))]),
     ],
     install_requires=[line for line in NEEDED if not line.startswith("ros-jazzy")],
     extras_require={"ros": [line for line in NEEDED if line.startswith("ros-jazzy")], "test": ["pytest"]},

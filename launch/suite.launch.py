@@ -55,6 +55,13 @@ def generate_launch_description():
             node("gp_sampler", seed=seed, count=argument("count", int)),
             node("evaluator"),
             node("log_player", log_path=argument("log", str), encounter=argument("encounter", int)),
+            # tracks lie in local_enu: shown on the map's origin, so that RViz can show both
+            Node(
+                package="tf2_ros",
+                executable="static_transform_publisher",
+                arguments=["--frame-id", "map", "--child-frame-id", "local_enu"],
+                condition=IfCondition(LaunchConfiguration("rviz")),
+            ),
             Node(
                 package="rviz2",
                 executable="rviz2",
