@@ -108,6 +108,7 @@ def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str 
     if tuple(names) != POINT.names or point_step != POINT.itemsize or size != n * samples * POINT.itemsize or size == 0:
         raise InputError(f"{what}: expected a cloud of vehicles by samples with the fields {', '.join(POINT.names or ())}")
     cloud = reader.array(POINT, n * samples, 1).reshape(n, samples)
+    _is_dense = reader.one("B")
     labels = cloud["primitive"][0].astype(np.int64)
     return Segmentation(
         labels=labels,
