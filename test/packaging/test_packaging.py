@@ -1,6 +1,7 @@
 """What colcon and pip install: the files they need say the same things."""
 
 import importlib
+import os
 import re
 import subprocess
 import sys
@@ -53,3 +54,28 @@ def test_script_directories_suit_ros2_run():
     text = (ROOT / "setup.cfg").read_text()
     assert "[develop]\nscript_dir=$base/lib/scenario_gen" in text
     assert "[install]\ninstall_scripts=$base/lib/scenario_gen" in text
+
+
+def test_colcon_builds_what_ros2_run_needs(tmp_path):
+    """A real colcon build: executables in lib/, the ament index entry, and an executable that runs from there."""
+    command = [Path(sys.executable).with_name("colcon"), "--log-base", tmp_path / "log", "build", "--base-paths", ROOT]
+    command += ["--build-base", tmp_path / "build", "--install-base", tmp_path / "install"]
+    built = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    prefix = tmp_path / "install" / "scenario_gen"
+    nodes = {"segmenter", "planner", "gp_sampler", "road_server", "log_player", "evaluator", "recorder", "player", "scenario-gen"}
+    assert nodes <= {path.name for path in (prefix / "lib" / "scenario_gen").iterdir()}
+    assert (prefix / "share" / "ament_index" / "resource_index" / "packages" / "scenario_gen").is_file()
+    for file in ("package.xml", "config/default.yaml", "launch/suite.launch.py"):
+        assert (prefix / "share" / "scenario_gen" / file).is_file()
+    (packages,) = prefix.glob("lib/python3*/site-packages")
+    assert (packages / "scenario_gen" / "resources" / "synthetic_a").is_dir()
+    ran = subprocess.run(
+        [sys.executable, prefix / "lib" / "scenario_gen" / "scenario-gen", "parameters"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(packages)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ran.returncode == 0 and "sampling.lateral_sigma" in ran.stdout, ran.stderr
