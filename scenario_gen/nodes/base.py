@@ -32,6 +32,9 @@ def qos(quality: Quality) -> QoSProfile:
     )
 
 
+REQUESTS = QoSProfile(depth=1000)  # ROS's own 10 would drop the oldest of many requests that come at once
+
+
 class StageNode(LifecycleNode):  # type: ignore[misc]
     """A lifecycle node around a stage.
 
@@ -109,7 +112,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
                 self._failed(name, error)
                 return response
 
-        self.create_service(kind, name, guarded)
+        self.create_service(kind, name, guarded, qos_profile=REQUESTS)
 
     def work(self, name: str, job: Job) -> None:
         """Run a job off the executor's thread; a waiting one of the same name is replaced, a running one cancelled."""

@@ -19,7 +19,7 @@ from msg_conventions.scenarios import encode_scenario
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import InputError, RefusedError, ScenarioGenError
-from scenario_gen.nodes.base import StageNode, run_nodes
+from scenario_gen.nodes.base import REQUESTS, StageNode, run_nodes
 from scenario_gen.nodes.inputs import Inputs
 from scenario_gen.nodes.ros_parameters import with_values
 from scenario_gen.nodes.template import Template, read_template
@@ -58,7 +58,7 @@ class GpSampler(StageNode):
         self._seen = Inputs(paired, () if self.config.pair_map else ("map",))
         self._routes: set[str] = set()
         self._requests = 0
-        self.create_service(SetParametersAtomically, "~/generate", self._generate_for_caller)
+        self.create_service(SetParametersAtomically, "~/generate", self._generate_for_caller, qos_profile=REQUESTS)
         self.serve(Trigger, "~/cancel", self._cancel)
 
     def received(self, topic: str, data: bytes) -> None:

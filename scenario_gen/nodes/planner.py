@@ -24,7 +24,7 @@ from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting import FittingConfig, fit_template
-from scenario_gen.nodes.base import StageNode, run_nodes
+from scenario_gen.nodes.base import REQUESTS, StageNode, run_nodes
 from scenario_gen.nodes.inputs import Inputs
 from scenario_gen.nodes.plan_request import plan_poses, query_of
 from scenario_gen.parameters import check, parameter
@@ -56,7 +56,7 @@ class Planner(StageNode):
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("planner", Config(), namespace)
-        self.create_service(GetPlan, "~/get_plan", self._get_plan)
+        self.create_service(GetPlan, "~/get_plan", self._get_plan, qos_profile=REQUESTS)
         paired = self.config.pair_map
         self._asked = 0
         self._inputs_seen = Inputs(("tracks", "changepoints", *(ROAD if paired else ())), () if paired else ("map",))

@@ -5,6 +5,7 @@ its stamp. Without tracks it publishes the road in its plain size, stamp 0 (`cor
 """
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote, urlparse
@@ -13,12 +14,13 @@ from ament_index_python.packages import PackageNotFoundError, get_package_share_
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, LoadMap
 from rclpy.serialization import deserialize_message
+from rclpy.task import Future
 
 from msg_conventions.diagnostics import Level
 from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import InputError, ScenarioGenError
-from scenario_gen.nodes.base import StageNode, run_nodes
+from scenario_gen.nodes.base import REQUESTS, StageNode, run_nodes
 from scenario_gen.parameters import check, parameter
 from scenario_gen.roads import Road, RoadConfig, build_road
 
@@ -67,7 +69,8 @@ class RoadServer(StageNode):
         self._name = self.config.road_name
         self._grid: bytes | None = None
         self.serve(GetMap, "~/get_map", self._get_map)
-        self.serve(LoadMap, "~/load_map", self._load_map)
+        self._asked = 0
+        self.create_service(LoadMap, "~/load_map", self._load_map, qos_profile=REQUESTS)
 
     def started(self) -> None:
         """Publish the plain road until tracks come."""
@@ -97,23 +100,33 @@ class RoadServer(StageNode):
             response.map = deserialize_message(self._grid, OccupancyGrid)
         return response
 
-    def _load_map(self, request: LoadMap.Request, response: LoadMap.Response) -> LoadMap.Response:
-        """Load another road; it stays until the next request or restart."""
-        try:
-            name = road_of_url(request.map_url)
-            if self.active:
-                road, stamp_ns = self._build(name)
-                self._name = name
-                self._publish(road, stamp_ns)
-                response.map = deserialize_message(self._grid, OccupancyGrid)
-                response.result = LoadMap.Response.RESULT_SUCCESS
-            else:
-                response.result = LoadMap.Response.RESULT_UNDEFINED_FAILURE
-        except ScenarioGenError as error:
-            missing = not Path(request.map_url.removeprefix("file://")).exists()
-            codes = LoadMap.Response
-            response.result = codes.RESULT_MAP_DOES_NOT_EXIST if missing else codes.RESULT_INVALID_MAP_METADATA
-            self.status(Level.ERROR, f"load_map {request.map_url!r}: {error}", "load_map", error=type(error).__name__)
+    async def _load_map(self, request: LoadMap.Request, response: LoadMap.Response) -> LoadMap.Response:
+        """Load another road, off the executor's thread; it stays until the next request or restart."""
+        answer, executor, codes = Future(), self.executor, LoadMap.Response
+        self._asked += 1
+
+        def job(cancelled: Callable[[], bool]) -> None:
+            result = codes.RESULT_UNDEFINED_FAILURE
+            try:
+                if not cancelled():
+                    name = road_of_url(request.map_url)
+                    self._publish(*self._build(name))
+                    self._name, result = name, codes.RESULT_SUCCESS
+            except ScenarioGenError as reason:
+                missing = not Path(request.map_url.removeprefix("file://")).exists()
+                result = codes.RESULT_MAP_DOES_NOT_EXIST if missing else codes.RESULT_INVALID_MAP_METADATA
+                words = f"load_map {request.map_url!r}: {reason}"
+                self.status(Level.ERROR, words, "load_map", error=type(reason).__name__)
+            finally:
+                answer.set_result((result, self._grid))
+                executor.wake()
+
+        response.result = codes.RESULT_UNDEFINED_FAILURE
+        if self.active:
+            self.work(f"load_map {self._asked}", job)
+            response.result, grid = await answer
+            if response.result == codes.RESULT_SUCCESS:
+                response.map = deserialize_message(grid, OccupancyGrid)
         return response
 
 
