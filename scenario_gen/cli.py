@@ -16,19 +16,18 @@ from rich.table import Table
 
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags import read_messages
-from scenario_gen.bags.evaluation import evaluate_bag
+from scenario_gen.bags.evaluation import bag_cases
 from scenario_gen.bags.validation import validate_bag
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError, ScenarioGenError
-from scenario_gen.evaluation import Case, comparison_table, read_evaluations, summary
+from scenario_gen.evaluation import Case, ReportInput, comparison_table, read_evaluations, summary, write_report
 from scenario_gen.evaluation import compare as compare_sets
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.parameters import flatten, updated
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.pipeline import generate as run_pipeline
-from scenario_gen.reproduce import reproduce as reproduce_figures
-from scenario_gen.results import BAG, FIGURES, check_folder, namespaces, provenance_of, write_results
+from scenario_gen.results import BAG, FIGURES, REPORT, check_folder, namespaces, provenance_of, sha256_of, write_results
 
 app = typer.Typer(
     help="Turn recorded vehicle encounters into new, valid ones on other roads.",
@@ -215,6 +214,8 @@ def reproduce(
 ) -> None:
     """Draw figures 2 to 5 of the paper with its own settings, each beside its claim and what is measured for it."""
     logs = [log] if log else [[bundled(case)] for case, _ in DEMO]
+    from scenario_gen.reproduce import reproduce as reproduce_figures  # its charting library takes a second to import
+
     reproduce_figures(
         logs, out, count=count, seed=seed, say=partial(console.print, highlight=False, markup=False, soft_wrap=True)
     )
@@ -223,13 +224,14 @@ def reproduce(
 @app.command()
 def evaluate(
     bag: Annotated[Path, typer.Argument(help="a bag with tracks and scenarios, ours or not")],
-    out: Annotated[Path | None, typer.Option(help="folder for evaluation.json and evaluation.md")] = None,
+    out: Annotated[Path | None, typer.Option(help="folder for report.html, evaluation.json and evaluation.md")] = None,
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
     """Measure the scenarios of a bag against the tracks in it, and check them anew."""
     config = configured(parameter_file, assignments or [])
-    found = evaluate_bag(bag, config.evaluation, config.limits)
+    cases = bag_cases(bag, config.evaluation, config.limits)
+    found = [case.evaluation for case in cases]
     text = "\n\n".join(evaluation.to_markdown() for evaluation in found)
     console.print(Markdown(text))
     if out is not None:
@@ -237,6 +239,8 @@ def evaluate(
         (out / "evaluation.md").write_text(text + "\n", encoding="utf-8")
         figures = [json.loads(evaluation.to_json()) for evaluation in found]
         (out / FIGURES).write_text(json.dumps({"cases": figures}, indent=2) + "\n", encoding="utf-8")
+        facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"}
+        write_report(out / REPORT, ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts))
 
 
 @app.command()

@@ -68,7 +68,13 @@ def check_folder(folder: Path) -> None:
 
 
 def as_run(case: Case, seed: int, namespace: str = "") -> Run:
-    """Return the case as the bag writer takes it."""
+    """Return the case as the bag writer takes it.
+
+    Raises:
+        InputError: its road or its fit is not known.
+    """
+    if case.road is None or case.fit is None:
+        raise InputError(f"{case.title}: without a road and a fit it cannot be written as a run")
     return Run(
         encounter=case.encounter,
         road=case.road,

@@ -1,5 +1,6 @@
 """The evaluation of any bag that keeps the conventions of the suite, ours or not."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -12,8 +13,9 @@ from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags.contents import read_namespaces
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import CheckCounts, Evaluation, EvaluationConfig, evaluate
+from scenario_gen.evaluation import Case, CheckCounts, Evaluation, EvaluationConfig, evaluate
 from scenario_gen.interaction import find_conflicts, find_waits
+from scenario_gen.scenario import ScenarioSet
 from scenario_gen.segmentation import Segmentation
 from scenario_gen.validity import Checker, Limits
 
@@ -24,10 +26,17 @@ SCENARIOS = "scenarios"
 def evaluate_bag(
     path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0
 ) -> tuple[Evaluation, ...]:
-    """Evaluate every namespace of a bag that holds both `tracks` and `scenarios`.
+    """Evaluate every namespace of a bag, as `bag_cases` does, and return the figures alone."""
+    return tuple(case.evaluation for case in bag_cases(path, config, limits, seed))
+
+
+def bag_cases(
+    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0
+) -> tuple[Case, ...]:
+    """Evaluate every namespace of a bag that holds both `tracks` and `scenarios`, ready for the report.
 
     The scenarios are checked anew, on the bag's map if it has one. What the bag does not say is left out: without
-    `changepoints` K counts as 0; start and end states are not asked.
+    `changepoints` K counts as 0; start and end states are not asked; fit and routes are not shown.
 
     Raises:
         InputError: the bag is missing or damaged, or no namespace has both topics.
@@ -37,14 +46,13 @@ def evaluate_bag(
     if not whole:
         raise InputError(f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare")
     return tuple(
-        _evaluate(f"{path.stem}{name}", name, topics, config or EvaluationConfig(), limits, seed)
-        for name, topics in whole.items()
+        _case(f"{path.stem}{name}", name, topics, config or EvaluationConfig(), limits, seed) for name, topics in whole.items()
     )
 
 
-def _evaluate(
+def _case(
     name: str, namespace: str, topics: Mapping[str, Sequence[bytes]], config: EvaluationConfig, limits: Limits | None, seed: int
-) -> Evaluation:
+) -> Case:
     encounter = decode_tracks(topics["tracks"][-1], name)
     segmentation = _segmentation(encounter, topics["changepoints"], f"{namespace}/changepoints")
     road = decode_map(topics["map"][-1], name=f"{namespace}/map")[1] if topics["map"] else None
@@ -52,8 +60,39 @@ def _evaluate(
     conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
     waits = find_waits(encounter) if segmentation.changepoints.size else ()
     counts = CheckCounts.of_verdicts(Checker(road, None, conflicts, waits, limits).check(scenarios))
-    rows, checks = {SCENARIOS: scenarios}, {SCENARIOS: counts}
-    return evaluate(encounter, segmentation, rows, checks=checks, road=road.name if road else "", config=config, seed=seed)
+    evaluation = evaluate(
+        encounter,
+        segmentation,
+        {SCENARIOS: scenarios},
+        checks={SCENARIOS: counts},
+        road=road.name if road else "",
+        config=config,
+        seed=seed,
+    )
+    everything = ScenarioSet(len(scenarios), tuple(scenarios), counts.candidates, Counter(counts.refused), _left_out(topics))
+    return Case(
+        encounter,
+        segmentation,
+        road,
+        fit=None,
+        routes=(),
+        with_changepoints=everything,
+        without_changepoints=None,
+        evaluation=evaluation,
+        without_refused="the bag holds one set of scenarios",
+        row=SCENARIOS,
+        valid=counts.candidates - sum(counts.refused.values()),
+    )
+
+
+def _left_out(topics: Mapping[str, Sequence[bytes]]) -> tuple[str, ...]:
+    """Say what the bag has not, and what follows from it."""
+    said = ["all scenarios of the bag are shown and measured, valid or not; start and end states were not asked"]
+    if not topics["map"]:
+        said.append("the bag has no map: whether vehicles leave the road was not checked")
+    if not topics["changepoints"]:
+        said.append("the bag has no changepoints: the template counts as one primitive, and its waits were not asked")
+    return tuple(said)
 
 
 def _segmentation(encounter: Encounter, messages: Sequence[bytes], what: str) -> Segmentation:

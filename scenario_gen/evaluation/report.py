@@ -36,9 +36,9 @@ class Case:
     Attributes:
         encounter: the recorded template.
         segmentation: its primitives.
-        road: the target road.
-        fit: the template on it.
-        routes: one for each vehicle.
+        road: the target road, None if it is not known (a bag without a map).
+        fit: the template on it, None if it is not known.
+        routes: one for each vehicle, or none.
         with_changepoints: what was generated.
         without_changepoints: the paper's ablation, None if it was refused.
         evaluation: of these sets.
@@ -46,12 +46,14 @@ class Case:
         without_refused: why there is no ablation.
         uniform: generated with as many changepoints, evenly spaced in time; None if not asked for or refused.
         uniform_refused: why it was refused, "" if it was not.
+        row: name of the evaluation's row of `with_changepoints`.
+        valid: how many of those scenarios are valid, where all of a bag's are shown; None: all of them are.
     """
 
     encounter: Encounter
     segmentation: Segmentation
-    road: Road
-    fit: Fit
+    road: Road | None
+    fit: Fit | None
     routes: Sequence[Route]
     with_changepoints: ScenarioSet
     without_changepoints: ScenarioSet | None
@@ -60,6 +62,18 @@ class Case:
     without_refused: str = ""
     uniform: ScenarioSet | None = None
     uniform_refused: str = ""
+    row: str = WITH
+    valid: int | None = None
+
+    @property
+    def title(self) -> str:
+        """Encounter and road, as a heading."""
+        return f"{self.encounter.name} on {self.road.name}" if self.road else self.encounter.name
+
+    @property
+    def published(self) -> int:
+        """Number of valid scenarios."""
+        return len(self.with_changepoints.scenarios) if self.valid is None else self.valid
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,22 +136,22 @@ def _is_parameter(name: str) -> bool:
 
 def _view(index: int, case: Case) -> dict[str, Any]:
     """Return what the page's tables say about one case."""
-    arms = [(WITH, case.with_changepoints), (WITHOUT, case.without_changepoints), (UNIFORM, case.uniform)]
+    arms = [(case.row, case.with_changepoints), (WITHOUT, case.without_changepoints), (UNIFORM, case.uniform)]
     evaluation = case.evaluation
     duration = case.encounter.duration
     bounds = [*(float(case.encounter.time[i]) for i in (0, *case.segmentation.changepoints)), duration]
-    vehicles = zip(case.encounter.vehicles, case.fit.fitted, strict=True)
+    vehicles = zip(case.encounter.vehicles, case.fit.fitted, strict=True) if case.fit else ()
     return {
         "index": index,
         "case": case,
-        "title": f"{case.encounter.name} on {case.road.name}",
+        "title": case.title,
         "arms": [(name, made, _causes(made)) for name, made in arms if made is not None],
         "rows": [*evaluation.rows[1:], evaluation.rows[0]],
         "metrics": evaluation.metrics,
         "k": len(case.segmentation.changepoints),
         "rate": len(case.segmentation.changepoints) / duration,
         "errors": {
-            (arm, key): _found(evaluation, arm, key)
+            (arm, key): _found(evaluation, case.row if arm == WITH else arm, key)
             for arm in (WITH, WITHOUT, UNIFORM, ORACLE)
             for key in ("e_position", "e_speed")
         },
@@ -176,7 +190,7 @@ def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
                 found.append(one.value < other.value)
     sets = [view["case"].with_changepoints for view in views]
     return {
-        "published": sum(len(made.scenarios) for made in sets),
+        "published": sum(view["case"].published for view in views),
         "requested": sum(made.requested for made in sets),
         "candidates": sum(made.candidates for made in sets),
         "position": (sum(better["e_position"]), len(better["e_position"])),

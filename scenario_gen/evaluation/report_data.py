@@ -37,10 +37,11 @@ def case_data(case: "Case", samples: int) -> dict[str, Any]:
     longest = max([case.encounter.duration, *(float(s.time[-1]) for group in arms.values() for s in group)])
     frames = min(MAX_FRAMES, int(np.ceil(longest / FRAME_PERIOD)) + 1)
     return {
+        "row": case.row,
         "vehicles": [{"id": v.id, "length": _short(v.length), "width": _short(v.width)} for v in case.encounter.vehicles],
-        "road": _road(case.road),
+        "road": _road(case.road) if case.road else None,
         "template": _template(case.encounter, case.segmentation, frames),
-        "fit": _fit(case.fit, case.routes),
+        "fit": _fit(case.fit, case.routes) if case.fit else [],
         "arms": {name: _trajectories(group, frames) for name, group in arms.items() if group},
         "features": _features(case.encounter, arms),
     }

@@ -30,7 +30,7 @@ def _case(case: Case) -> tuple[Text, Text]:
     """The name of a case, and its figures."""
     made, found = case.with_changepoints, case.evaluation.row(WITH)
     order = formatted(found.values.get("order_kept"), "%", bounds=False) if found else "–"
-    title = Text.assemble((case.encounter.name, "bold"), " on ", (case.road.name, "bold"))
+    title = Text(case.title, style="bold")
     title.append(f"  {len(case.encounter.vehicles)} vehicles, {case.encounter.duration:.1f} s", style="dim")
     complete = len(made.scenarios) >= made.requested
     figures = Text.assemble(

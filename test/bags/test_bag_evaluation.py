@@ -9,10 +9,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "evaluation"))
 
 from evaluation_worlds import report_case
 
-from scenario_gen.bags import Run, write_run
-from scenario_gen.bags.evaluation import evaluate_bag
+from msg_conventions.topics import topic_entry
+from scenario_gen.bags import Run, read_messages, write_run
+from scenario_gen.bags.evaluation import bag_cases, evaluate_bag
+from scenario_gen.bags.metadata import qos_yaml
+from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import EvaluationConfig
+from scenario_gen.evaluation import EvaluationConfig, ReportInput, render
+from scenario_gen.validity import Limits
 
 QUICK = EvaluationConfig(resamples=50)
 
@@ -45,3 +49,33 @@ def test_a_bag_without_scenarios_is_refused(tmp_path):
         evaluate_bag(write_run(tmp_path / "run", empty), QUICK)
     with pytest.raises(InputError, match="no such bag"):
         evaluate_bag(tmp_path / "missing", QUICK)
+
+
+def only(bag, folder, topics):
+    """Copy the messages of these topics to another bag, as somebody else might have recorded it."""
+    with AtomicBag(folder) as copy:
+        for name in topics:
+            kind, quality = topic_entry(name)
+            copy.add_topic(f"/{name}", kind, qos_yaml(quality))
+        for message in read_messages(bag, lambda topic: topic.strip("/") in topics):
+            copy.write(message.topic, message.data, message.stamp_ns)
+    return folder
+
+
+def test_a_bag_becomes_a_page_with_all_its_scenarios_valid_or_not(tmp_path):
+    bag = write_run(tmp_path / "run", as_run(report_case(5)))
+    (case,) = bag_cases(bag, QUICK, Limits(max_speed=9.0))
+    assert case.valid == 0 and case.published == 0 and len(case.with_changepoints.scenarios) == 5
+    page = render(ReportInput([case]))
+    assert "<b>0</b> of 5 scenarios asked for" in page and ">0 / 5</td>" in page
+    assert "the bag holds one set of scenarios" in page and "Fitted to the road" not in page
+    assert "<h3>Scenarios</h3>" in page
+
+
+def test_what_a_bag_does_not_hold_is_left_out_and_said(tmp_path):
+    bag = only(write_run(tmp_path / "run", as_run(report_case(5))), tmp_path / "bare", ("tracks", "scenarios"))
+    (case,) = bag_cases(bag, QUICK)
+    assert case.road is None and case.evaluation.changepoints == 0
+    page = render(ReportInput([case]))
+    assert "whether vehicles leave the road was not checked" in page and "counts as one primitive" in page
+    assert '"road":null,' in page

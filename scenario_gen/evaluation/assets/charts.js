@@ -84,9 +84,9 @@ function drawFeature(place, text, duration, vehicles) {
   const bytes = bytesOf(text);
   const side = Math.round(Math.sqrt(bytes.length));
   const z = Array.from({ length: side }, (_, i) => Array.from(bytes.subarray(i * side, (i + 1) * side), (v) => +(v / 255).toFixed(3)));
-  const time = Array.from({ length: side }, (_, i) => +((duration * i) / (side - 1)).toFixed(2));
+  const step = duration / (side - 1);
   const trace = {
-    type: "heatmap", x: time, y: time, z, zmin: 0, zmax: 1, colorscale: HEAT, zsmooth: "fast", showscale: false,
+    type: "heatmap", x0: 0, dx: step, y0: 0, dy: step, z, zmin: 0, zmax: 1, colorscale: HEAT, zsmooth: "fast", showscale: false,
     hovertemplate: "%{y:.1f} s, %{x:.1f} s: %{z:.2f}<extra></extra>",
   };
   const short = (name) => (name.length > 9 ? `${name.slice(0, 8)}…` : name);

@@ -33,7 +33,7 @@ class Player {
     this.time = 0;
     this.playing = false;
     this.arm = sets.with ? "with" : Object.keys(sets)[0];
-    Object.keys(ARM_NAMES).filter((arm) => sets[arm]).forEach((arm) => this.find("arm").append(option(arm, ARM_NAMES[arm])));
+    Object.keys(ARM_NAMES).filter((arm) => sets[arm]).forEach((arm) => this.find("arm").append(option(arm, arm === "with" ? data.row : ARM_NAMES[arm])));
     this.find("arm").value = this.arm;
     this.listSamples();
     this.find("arm").addEventListener("change", (event) => { this.arm = event.target.value; this.listSamples(); this.draw(); });
@@ -156,7 +156,7 @@ class Player {
 function open(section, data) {
   const template = new Trajectories(data.template);
   const sets = Object.fromEntries(Object.entries(data.arms).map(([arm, packed]) => [arm, new Trajectories(packed)]));
-  const picture = roadPicture(data.road);
+  const picture = data.road && roadPicture(data.road);
   const box = Object.values(sets).reduce((grown, set) => set.grow(grown), [Infinity, Infinity, -Infinity, -Infinity]);
   data.fit.forEach((vehicle) => vehicle.route.forEach(([x, y]) => {
     box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y);
@@ -166,8 +166,8 @@ function open(section, data) {
   const ground = template.grow([Infinity, Infinity, -Infinity, -Infinity]);
   const maps = [
     [new View(find("template-map"), ground, 6), (view) => drawTemplateMap(view, data, template)],
-    [new View(find("routes"), box, 8), (view) => drawRoutes(view, data, picture)],
   ];
+  if (find("routes")) maps.push([new View(find("routes"), box, 8), (view) => drawRoutes(view, data, picture)]);
   let top = 1;
   [template, ...Object.values(sets)].forEach((set) => { for (let i = 3; i < set.values.length; i += 4) top = Math.max(top, set.values[i]); });
   ["with", "without"].filter((arm) => sets[arm]).forEach((arm) => {

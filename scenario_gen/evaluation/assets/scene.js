@@ -119,6 +119,7 @@ class View {
   }
 
   road(road, picture) {
+    if (!road) return;
     const side = road.cell * this.scale;
     const top = this.y(road.origin[1] + road.size[1] * road.cell);
     this.context.imageSmoothingEnabled = true;
