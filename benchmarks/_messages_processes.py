@@ -1,0 +1,84 @@
+"""Processes of the messages benchmark: the suite's nodes, a publisher, a caller; each on a ROS domain of its own.
+
+`python -m benchmarks._messages_processes publish TOPIC SIZE COUNT RATE` publishes COUNT messages, RATE a second (0: unpaced).
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+
+def environment(domain: int) -> dict[str, str]:
+    """Return the environment of a process on `domain`, this host only."""
+    own = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "RCUTILS_COLORIZED_OUTPUT": "0"}
+    return os.environ | own
+
+
+@contextmanager
+def nodes(folder: Path, domain: int, arguments: Mapping[str, Sequence[str]]) -> Iterator["subprocess.Popen[str]"]:
+    """Run nodes, each with its ROS arguments, as the demo does; they are ended at the end."""
+    specification = [
+        {"node": node, "arguments": ["--ros-args", *own], "log": str(folder / f"{node}.log")} for node, own in arguments.items()
+    ]
+    (folder / "suite.json").write_text(json.dumps(specification), encoding="utf-8")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "scenario_gen.nodes.suite", str(folder / "suite.json")],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=environment(domain) | {"ROS_LOG_DIR": str(folder)},
+    )
+    try:
+        assert process.stdout is not None
+        process.stdout.readline()  # loaded
+        yield process
+    finally:
+        end(process)
+
+
+def end(process: "subprocess.Popen[str]") -> float:
+    """End the nodes as Ctrl-C does; return the seconds until all have gone."""
+    started = time.perf_counter()
+    if process.stdin is not None and not process.stdin.closed:
+        process.stdin.close()
+    process.wait(30.0)
+    return time.perf_counter() - started
+
+
+def publisher(domain: int, topic: str, size: int, count: int, rate: float) -> "subprocess.Popen[str]":
+    """Start a publisher; it waits for a subscription, and for a second more."""
+    words = ["publish", topic, str(size), str(count), str(rate)]
+    return subprocess.Popen([sys.executable, "-m", "benchmarks._messages_processes", *words], text=True, env=environment(domain))
+
+
+def publish(topic: str, size: int, count: int, rate: float) -> None:
+    """Publish `count` strings of `size` bytes, numbered, raw; stay until they have been taken."""
+    import rclpy
+    from rclpy.qos import QoSProfile
+    from std_msgs.msg import String
+
+    import scenario_gen.nodes  # noqa: F401  (what the wheels need)
+    from msg_conventions.cdr import CdrWriter
+
+    rclpy.init()
+    node = rclpy.create_node("benchmark_publisher")
+    sender = node.create_publisher(String, topic, QoSProfile(depth=1000))
+    while sender.get_subscription_count() == 0:
+        time.sleep(0.05)
+    time.sleep(1.0)
+    data = CdrWriter().string("x" * max(0, size - 9)).finish()
+    started = time.perf_counter()
+    for k in range(count):
+        if rate:
+            time.sleep(max(0.0, started + k / rate - time.perf_counter()))
+        sender.publish(data)
+    time.sleep(5.0)
+
+
+if __name__ == "__main__":
+    publish(sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), float(sys.argv[5]))
