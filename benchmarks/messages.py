@@ -42,12 +42,12 @@ def run() -> list[Row]:
 
 
 def _scenario(n: int) -> Scenario:
-    time_s = np.arange(POINTS) * 0.1
+    clock = np.arange(POINTS, dtype=np.float64) * np.float64(0.1)
     rng = np.random.Generator(np.random.PCG64(1))
     heading = np.cumsum(rng.normal(0.0, 0.02, (n, POINTS)), axis=1)
     speed = np.full((n, POINTS), 8.0)
     position: Floats = np.cumsum(0.8 * np.stack([np.cos(heading), np.sin(heading)], axis=-1), axis=1)
-    return Scenario(tuple(Vehicle(str(k)) for k in range(n)), time_s, position, heading, speed, np.zeros_like(speed))
+    return Scenario(tuple(Vehicle(str(k)) for k in range(n)), clock, position, heading, speed, np.zeros_like(speed))
 
 
 def _cpu(work: Callable[[], object], rounds: int) -> float:

@@ -6,13 +6,16 @@ QoS: reliable, transient_local, depth 1.
 Arc length does not travel; it is the sum of the chords, and `canonical_route` gives it to a route that stays in process.
 """
 
+import struct
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msg_conventions.cdr import NANOSECONDS, CdrReader, CdrWriter
-from msg_conventions.roads import pose_rows, poses_of
+from msg_conventions.cdr import HEADER, NANOSECONDS, CdrReader, CdrWriter
+from msg_conventions.roads import poses_of
+from msg_conventions.yaw import half_angle
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import InputError
 
@@ -25,21 +28,42 @@ TYPE = "nav_msgs/msg/Path"
 def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) -> bytes:
     """Return (M, 3) x, y, yaw with their (M,) stamps as CDR bytes of a nav_msgs/Path."""
     count = len(poses)
-    writer = CdrWriter().header(stamp_ns, frame_id).pack("I", count)
     if not count:
-        return writer.finish()
+        return CdrWriter().header(stamp_ns, frame_id).pack("I", 0).finish()
     if not np.isfinite(poses).all():
         raise InputError("a path with a value that is not finite cannot be sent")
-    rows = pose_rows(poses)
-    writer.header(int(stamps_ns[0]), frame_id).align(8).raw(rows[0].tobytes())  # from here on at a multiple of 8
-    frame = frame_id.encode() + b"\x00"
-    padding = -(12 + len(frame)) % 8
-    kind = [("sec", "<i4"), ("nanosec", "<u4"), ("size", "<u4"), ("frame", f"V{len(frame) + padding}"), ("pose", "<f8", (7,))]
-    rest = np.zeros(count - 1, dtype=kind)
-    rest["sec"], rest["nanosec"] = np.divmod(stamps_ns[1:], NANOSECONDS)
-    rest["size"], rest["frame"] = len(frame), np.void(frame + bytes(padding))
-    rest["pose"] = rows[1:]
-    return writer.raw(rest.tobytes()).finish()
+    first, kind, blank, text = _layout(frame_id)
+    seconds = stamps_ns // NANOSECONDS
+    nanoseconds = stamps_ns - seconds * NANOSECONDS
+    z, w = half_angle(poses[:, 2])
+    body = bytearray(blank * (count - 1))
+    rest = np.frombuffer(body, dtype=kind)
+    rest["sec"], rest["nanosec"] = seconds[1:], nanoseconds[1:]
+    pose = rest["pose"]
+    pose[:, :2], pose[:, 5], pose[:, 6] = poses[1:, :2], z[1:], w[1:]
+    stamp, begin, size = divmod(stamp_ns, NANOSECONDS), (seconds[0], nanoseconds[0]), len(text)
+    x, y = poses[0, :2]
+    try:
+        head = first.pack(*stamp, size, text, count, *begin, size, text, x, y, 0.0, 0.0, 0.0, z[0], w[0])
+    except struct.error as error:
+        raise InputError(f"a path of stamp {stamp_ns} ns cannot be sent: {error}") from None
+    return b"".join((HEADER, head, body))
+
+
+@lru_cache(maxsize=16)
+def _layout(frame_id: str) -> tuple[struct.Struct, np.dtype[np.void], bytes, bytes]:
+    """Return how a path begins, up to its first pose; the layout of each further pose, blank but for its frame; the frame.
+
+    A pose ends at a multiple of 8 bytes, so all after the first are laid out alike. Padding bytes are zero.
+    """
+    text = frame_id.encode() + b"\x00"
+    size = len(text)
+    to_count = -(12 + size) % 4
+    to_pose = -(12 + size + to_count + 4 + 12 + size) % 8
+    first = struct.Struct(f"<iII{size}s{to_count}xIiII{size}s{to_pose}x7d")
+    pad = -(12 + size) % 8
+    kind = [("sec", "<i4"), ("nanosec", "<u4"), ("size", "<u4"), ("frame", f"V{size + pad}"), ("pose", "<f8", (7,))]
+    return first, np.dtype(kind), struct.pack(f"<8xI{size}s{pad}x56x", size, text), text
 
 
 def decode_path(data: bytes, what: str = "path") -> tuple[int, str, Floats, Ints]:

@@ -14,6 +14,9 @@ def half_angle(heading: Floats) -> tuple[Floats, Floats]:
     A canonical angle is a multiple of a nanoradian plus turns. Next to ±pi two of them differ by less than a
     nanoradian; the one that lies on the nanoradian grid is the one meant.
     """
+    if heading.size == 0 or max(heading.max(), -heading.min()) <= NEAR_PI:  # nothing to turn back: the usual case
+        half = 0.5 * heading
+        return np.sin(half), np.cos(half)
     turn = heading - TWO_PI * np.rint(heading / TWO_PI)
     if (np.abs(turn) > NEAR_PI).any():
         other = turn - np.copysign(TWO_PI, turn)
