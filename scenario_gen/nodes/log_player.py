@@ -1,17 +1,31 @@
-"""log_player: a log in, one of its encounters out as latched `tracks`; `~/play` reads it again."""
+"""log_player: a log in, one of its encounters out as latched `tracks`; `~/play` reads it again.
+
+With `stream`, the encounter is then played as every vehicle's own `vehicle_<id>/fix` and `vehicle_<id>/speed`, and `/clock`.
+"""
 
 import sys
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
+from msg_conventions.cdr import CdrWriter
 from msg_conventions.diagnostics import Level
+from msg_conventions.names import tokens
+from msg_conventions.streams import encode_fix, encode_speed, geodetic
+from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import encode_tracks
+from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.nodes.base import StageNode, run_nodes
 from scenario_gen.parameters import check, parameter
+
+
+HEAD_START = 1.0  # seconds in which listeners find the streams, which are not latched
 
 
 @dataclass(frozen=True)
@@ -20,6 +34,8 @@ class Config:
 
     log_path: str = parameter("", "log to read: a file, a bag or a folder of files")
     encounter: int = parameter(0, "which encounter of the log, from 0", low=0)
+    stream: bool = parameter(False, "play the encounter as fixes and speeds of each vehicle, too")
+    rate: float = parameter(1.0, "how many times as fast as it was recorded the stream is", low=0.01, high=1000.0)
     log: LogConfig = field(default_factory=LogConfig)
 
     def __post_init__(self) -> None:
@@ -38,9 +54,9 @@ class LogPlayer(StageNode):
     def started(self) -> None:
         """Read the log, if one is named."""
         if self.config.log_path:
-            self.work("play", lambda cancelled: None if cancelled() else self._play())
+            self.work("play", lambda cancelled: None if cancelled() else self._play(cancelled))
 
-    def _play(self) -> None:
+    def _play(self, cancelled: Callable[[], bool]) -> None:
         config = self.config
         result = read_log(Path(config.log_path), config.log)
         if config.encounter >= len(result.encounters):
@@ -53,6 +69,32 @@ class LogPlayer(StageNode):
         message = f"{encounter.name}: {n} vehicles, {samples} samples over {encounter.duration:.1f} s"
         notes = {f"note.{k}": note for k, note in enumerate(result.quality.notes)}
         self.status(Level.OK, message, "encounter", encounter.start_ns, **notes)
+        if config.stream:
+            self._stream(encounter, config.rate, cancelled)
+
+    def _stream(self, encounter: Encounter, rate: float, cancelled: Callable[[], bool]) -> None:
+        """Publish sample after sample, at `rate`, until the end or until cancelled; the clock runs ahead of none of them."""
+        names, places = tokens(vehicle.id for vehicle in encounter.vehicles), geodetic(encounter)
+        clock = self.create_publisher(Clock, "/clock", 10)
+        for topic in (vehicle_topic(name, kind) for name in names for kind in ("fix", "speed")):
+            self._announce(topic)
+        started = time.monotonic() + HEAD_START
+        for k in range(encounter.speed.shape[1]):
+            while (ahead := started + k * encounter.dt / rate - time.monotonic()) > 0.0 and not cancelled():
+                time.sleep(min(ahead, 0.1))
+            if cancelled() or not self.context.ok():
+                break
+            stamp = encounter.start_ns + k * encounter.dt_ns
+            clock.publish(CdrWriter().stamp(stamp).finish())
+            for i, name in enumerate(names):
+                self.send(
+                    vehicle_topic(name, "fix"),
+                    encode_fix(float(places[i, k, 0]), float(places[i, k, 1]), stamp, f"vehicle_{name}"),
+                )
+                self.send(vehicle_topic(name, "speed"), encode_speed(float(encounter.speed[i, k]), stamp, f"vehicle_{name}"))
+        else:
+            self.status(Level.OK, f"{encounter.name}: streamed", "stream", encounter.start_ns)
+        self.destroy_publisher(clock)
 
     def _play_again(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success = self.active and bool(self.config.log_path)

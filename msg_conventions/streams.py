@@ -1,0 +1,41 @@
+"""One vehicle's state at one instant → `vehicle_<id>/fix` (NavSatFix) and `vehicle_<id>/speed` (TwistStamped).
+
+Stamp: the sample's, on the template's clock. Frame: `vehicle_<id>`. Speed: linear.x, m/s, of the body frame.
+QoS: reliable, volatile, depth 1000.
+"""
+
+import numpy as np
+import pyproj
+
+from msg_conventions.cdr import CdrWriter
+from scenario_gen.arrays import Floats
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+
+FIXED, GPS, COVARIANCE_UNKNOWN = 0, 1, 0  # of NavSatStatus and NavSatFix
+
+
+def geodetic(encounter: Encounter) -> Floats:
+    """Return latitude and longitude (N, T, 2) [degrees] of an encounter's positions.
+
+    Raises:
+        InputError: its log came in metres, so it has no place on the globe.
+    """
+    if encounter.origin is None:
+        raise InputError(f"encounter {encounter.name!r} came in metres without an origin; it cannot be streamed as NavSatFix")
+    latitude, longitude = encounter.origin
+    frame = pyproj.Proj(proj="aeqd", lat_0=latitude, lon_0=longitude, ellps="WGS84")
+    east, north = np.moveaxis(encounter.position, -1, 0)
+    lon, lat = frame(east, north, inverse=True)
+    return np.stack([lat, lon], axis=-1)
+
+
+def encode_fix(latitude: float, longitude: float, stamp_ns: int, frame_id: str) -> bytes:
+    """Return a NavSatFix of degrees as CDR bytes."""
+    writer = CdrWriter().header(stamp_ns, frame_id).pack("b", FIXED).pack("H", GPS)
+    return writer.pack("d", latitude, longitude, 0.0, *[0.0] * 9).pack("B", COVARIANCE_UNKNOWN).finish()
+
+
+def encode_speed(speed: float, stamp_ns: int, frame_id: str) -> bytes:
+    """Return a TwistStamped of m/s along the vehicle as CDR bytes."""
+    return CdrWriter().header(stamp_ns, frame_id).pack("d", speed, *[0.0] * 5).finish()
