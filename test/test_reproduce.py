@@ -19,7 +19,9 @@ from scenario_gen.evaluation import UNIFORM, WITH, WITHOUT
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.reproduce import claims_of, refusals, reproduce, run_case, write_page
+from scenario_gen.reproduce.chain import place, sample
 from scenario_gen.reproduce.measure import line_error, off_road
+from scenario_gen.segmentation import SegmentationConfig, segment
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +45,17 @@ def test_the_stop_is_kept_with_changepoints_and_lost_without(case):
         assert case.likeness[WITH].values[kind].high < 0.5 * case.likeness[WITHOUT].values[kind].low
     assert UNIFORM in case.likeness
     assert case.off_road[WITH] == 0.0
+
+
+def test_all_vehicles_get_one_scale():
+    """Else differences of speed between vehicles would not survive eq 9."""
+    encounter = read_log(Path(bundled("b"))).encounters[0]
+    segmentation = segment(encounter, SegmentationConfig(preset="paper"), 7)
+    road, *ends = place(encounter, segmentation)
+    found = sample(encounter, segmentation, road, (ends[0], ends[1]), count=3, seed=7)
+    scales = [fitted.scale for fitted in found.fit.fitted]
+    assert scales[0] == pytest.approx(scales[1], rel=1e-3) and scales[0] > 2.0
+    assert off_road(road, found.position) == 0.0
 
 
 def test_priors_are_compared_on_a_path_that_bends(case):
@@ -80,6 +93,8 @@ def test_what_fits_no_road_of_the_paper_says_so_on_the_page(tmp_path):
 def test_a_claim_that_fails_is_said_to(case):
     swapped = type(case)(**{**vars(case), "likeness": {WITH: case.likeness[WITHOUT], WITHOUT: case.likeness[WITH]}})
     claims = {claim.number: claim.holds for claim in claims_of(swapped)}
+    strayed = type(case)(**{**vars(case), "off_road": {WITH: 0.1}})
+    assert {claim.number: claim.holds for claim in claims_of(strayed)}[4] is False
     assert claims[5] is False and {claim.number: claim.holds for claim in claims_of(case)}[5] is True
 
 

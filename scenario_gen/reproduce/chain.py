@@ -9,11 +9,12 @@ from itertools import product
 
 import numpy as np
 
-from scenario_gen.arrays import Floats, wrap_angle
+from scenario_gen.arrays import Bools, Floats, wrap_angle
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.fitting import Fit, FittingConfig, fit_template
 from scenario_gen.interaction import Wait, find_waits
+from scenario_gen.pipeline import without_changepoints
 from scenario_gen.planning import PlanningConfig, Route, plan_routes
 from scenario_gen.planning.rrt_star_connect import PAPER
 from scenario_gen.roads import Road, RoadConfig, build_road
@@ -74,34 +75,81 @@ def place(encounter: Encounter, segmentation: Segmentation) -> tuple[Road, Float
             reasons.append(f"{name}: {error}")
             continue
         road = build_road(name, encounter, RoadConfig(paper=True))
-        return road, *_ends_on(road, metric, fit)
+        try:
+            return road, *_evenly_scaled(encounter, segmentation, road, _Lanes.of(road, metric, fit))
+        except RefusedError as error:
+            reasons.append(f"{name}: {error}")
     raise RefusedError("it fits none of the paper's roads; " + "; ".join(reasons))
 
 
-def _ends_on(road: Road, metric: Road, fit: Fit) -> tuple[Floats, Floats]:
-    """Bring start and end states from the metric road to the same lanes of the paper's."""
-    lanes = len(metric.entries) // len(road.entries)
-    centre = metric.entries[: 2 * lanes, :2].mean(axis=0)
-    found = [[_on_lane(metric, pose, centre) for pose in side[:, :3]] for side in (fit.asked.start, fit.asked.end)]
-    junction = 0.0 if road.name == "straight" else 3.5 * lanes
-    farthest = max(abs(distance) for side in found for _, _, distance in side)
-    cells = (SIDE / 2.0 - VERGE - (HALF_ROAD if junction else 0.0)) / max(farthest - junction, 1.0)
-    states = []
-    for side in found:
-        rows = []
-        for leaves, lane, distance in side:
-            gate = (road.exits if leaves else road.entries)[lane // lanes]
-            outside = abs(distance) - junction
-            reach = HALF_ROAD + cells * outside if junction and outside > 0.0 else abs(distance) * (
-                HALF_ROAD / junction if junction else cells
-            )  # fmt: skip
-            back = (SIDE / 2.0 - np.sign(distance) * reach) * (-1.0 if leaves else 1.0)
-            heading = gate[2]
-            rows.append([*(gate[:2] + back * np.array([np.cos(heading), np.sin(heading)])), heading])
-        states.append(np.array(rows))
-    still = np.array([fitted.stands.all() for fitted in fit.fitted])
-    states[1][still] = states[0][still]
-    return states[0], states[1]
+@dataclass(frozen=True, eq=False)
+class _Lanes:
+    """Where starts and ends are on a road's lanes.
+
+    Attributes:
+        found: for starts and for ends, per vehicle: whether the lane leaves, its arm, and metres outwards from the centre.
+        junction: metres from the centre to the junction's edge, 0 on a road without one.
+        still: vehicles that stand throughout.
+    """
+
+    found: tuple[list[tuple[bool, int, float]], list[tuple[bool, int, float]]]
+    junction: float
+    still: Bools
+
+    @classmethod
+    def of(cls, road: Road, metric: Road, fit: Fit) -> "_Lanes":
+        """Read them off a fit to the metric road that has the arms of `road`."""
+        lanes = len(metric.entries) // len(road.entries)
+        centre = metric.entries[: 2 * lanes, :2].mean(axis=0)
+        found = []
+        for side in (fit.asked.start, fit.asked.end):
+            poses = [_on_lane(metric, pose, centre) for pose in side[:, :3]]
+            found.append([(leaves, lane // lanes, distance) for leaves, lane, distance in poses])
+        junction = 0.0 if road.name == "straight" else 3.5 * lanes
+        return cls((found[0], found[1]), junction, np.array([fitted.stands.all() for fitted in fit.fitted]))
+
+    def most_cells(self) -> float:
+        """Cells per metre outside the junction with which the farthest start or end is just on the grid."""
+        farthest = max(abs(distance) for side in self.found for _, _, distance in side)
+        room = SIDE / 2.0 - VERGE - (HALF_ROAD if self.junction else 0.0)
+        return room / max(farthest - self.junction, 1.0)
+
+    def ends(self, road: Road, cells: Floats) -> tuple[Floats, Floats]:
+        """Starts and goals (N, 3) on the paper's road with so many cells (N,) per metre outside the junction."""
+        states = [
+            np.array([self._pose(road, *lane, float(c)) for lane, c in zip(side, cells, strict=True)]) for side in self.found
+        ]
+        states[1][self.still] = states[0][self.still]
+        return states[0], states[1]
+
+    def _pose(self, road: Road, leaves: bool, arm: int, distance: float, cells: float) -> list[float]:
+        x, y, heading = (road.exits if leaves else road.entries)[arm]
+        outside = abs(distance) - self.junction
+        reach = cells * outside + (HALF_ROAD if self.junction else 0.0)
+        if outside < 0.0:
+            reach = abs(distance) * HALF_ROAD / self.junction
+        back = (SIDE / 2.0 - np.sign(distance) * reach) * (-1.0 if leaves else 1.0)
+        return [x + back * np.cos(heading), y + back * np.sin(heading), heading]
+
+
+def _evenly_scaled(encounter: Encounter, segmentation: Segmentation, road: Road, lanes: _Lanes) -> tuple[Floats, Floats]:
+    """Starts and goals with which eq 9 has, as nearly as the junction allows, one scale s for all vehicles.
+
+    s is linear in the cells per metre outside the junction, so that two fits tell where it is the least vehicle's.
+    """
+
+    def scales(cells: Floats) -> Floats:
+        starts, goals = lanes.ends(road, cells)
+        fit = fit_template(encounter, without_changepoints(segmentation), road, FITTING, starts=starts, goals=goals)
+        return np.array([fitted.scale for fitted in fit.fitted])
+
+    most = np.full(len(encounter.vehicles), lanes.most_cells())
+    wide, narrow = scales(most), scales(0.5 * most)
+    target = wide[~lanes.still].min(initial=np.inf)
+    slope = 2.0 * (wide - narrow) / most
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cells = np.where(slope > 0.0, most - (wide - target) / slope, most)
+    return lanes.ends(road, np.clip(np.where(lanes.still, most, cells), 0.05 * most, most))
 
 
 def _on_lane(road: Road, pose: Floats, centre: Floats) -> tuple[bool, int, float]:
