@@ -8,22 +8,20 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.parameter import Parameter
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from msg_conventions.diagnostics import Level, encode_diagnostics, request_status, scenario_status
+from msg_conventions.diagnostics import Level, request_status
 from msg_conventions.names import tokens
-from msg_conventions.pictures import encode_footprint, scenario_markers
-from msg_conventions.scenarios import encode_scenario
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.errors import InputError, RefusedError, ScenarioGenError
+from scenario_gen.errors import RefusedError, ScenarioGenError
 from scenario_gen.nodes.base import REQUESTS, StageNode, run_nodes
 from scenario_gen.nodes.inputs import Inputs
-from scenario_gen.nodes.ros_parameters import with_values
-from scenario_gen.nodes.template import Template, read_template
-from scenario_gen.parameters import check, flatten, parameter
+from scenario_gen.nodes.ros_parameters import values_of_call
+from scenario_gen.nodes.sample_messages import sample_messages
+from scenario_gen.nodes.template import read_template
+from scenario_gen.parameters import check, parameter
 from scenario_gen.pipeline import PipelineConfig, sample_checked
 from scenario_gen.sampling import SamplingConfig
 from scenario_gen.scenario import ScenarioSet
@@ -108,23 +106,12 @@ class GpSampler(StageNode):
         if cancelled():
             self.status(Level.WARN, f"request {request} was cancelled", f"request {request}", stamp)
             return None
-        self._publish(template, result, request, config)
-        closing = request_status(result, request, self.get_fully_qualified_name(), config.seed)
-        self.send("scenarios/info", encode_diagnostics([closing], stamp))
+        node = self.get_fully_qualified_name()
+        closing = request_status(result, request, node, config.seed)
+        for topic, data in sample_messages(template, result, closing, node):
+            self.send(topic, data)
         self.status(closing.level, closing.message, f"request {request}", stamp)
         return result
-
-    def _publish(self, template: Template, result: ScenarioSet, request: str, config: Config) -> None:
-        stamp, node = template.encounter.start_ns, self.get_fully_qualified_name()
-        for vehicle, name in zip(template.encounter.vehicles, tokens(v.id for v in template.encounter.vehicles), strict=True):
-            self.send(vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}"))
-        for scenario in result.scenarios:
-            data = encode_scenario(scenario, stamp)
-            self.send("scenarios", data)
-            status = scenario_status(scenario, data, request, node, sigma_seed=str(config.seed))
-            self.send("scenarios/info", encode_diagnostics([status], stamp))
-        if result.scenarios:
-            self.send("markers", scenario_markers(result.scenarios[0], stamp))
 
     def _progress(self, request: str, done: int, total: int, stamp_ns: int) -> None:
         if done == total or done % max(1, total // 10) == 0:
@@ -165,10 +152,7 @@ class GpSampler(StageNode):
         messages = self._seen.complete()
         if messages is None:
             raise RefusedError(f"nothing to generate from yet: waiting for {', '.join(self._seen.missing())}")
-        parameters = [Parameter.from_parameter_msg(message) for message in request.parameters]
-        if unknown := sorted({p.name for p in parameters} - set(flatten(self.config))):
-            raise InputError(f"unknown parameter {', '.join(unknown)}")
-        config: Config = with_values(self.config, parameters)
+        config: Config = values_of_call(self.config, request.parameters)
         return config, messages
 
     def _cancel(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

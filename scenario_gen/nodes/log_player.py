@@ -24,7 +24,6 @@ from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.nodes.base import StageNode, run_nodes
 from scenario_gen.parameters import check, parameter
 
-
 HEAD_START = 1.0  # seconds in which listeners find the streams, which are not latched
 
 

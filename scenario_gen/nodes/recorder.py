@@ -12,17 +12,17 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.time import Time
 from std_srvs.srv import Trigger
 
 from msg_conventions.diagnostics import Level, Status, encode_diagnostics
-from msg_conventions.topics import Quality, topic_entry
+from msg_conventions.topics import topic_entry
 from scenario_gen.bags import BagWriter, Split
 from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.errors import InputError
 from scenario_gen.nodes.base import qos, run_nodes
 from scenario_gen.nodes.message_classes import message_class
+from scenario_gen.nodes.offered import offered
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.parameters import check, parameter
 
@@ -30,7 +30,6 @@ DEFAULT_TOPICS = (
     r".*(/map|/road/(entries|exits)|/tracks|/changepoints|/posterior|/fit|/vehicle_\w+/(route|footprint|fix|speed)"
     r"|/scenarios|/scenarios/info|/markers|/report|/diagnostics)"
 )
-DEPTH = 1000
 
 
 @dataclass(frozen=True)
@@ -113,19 +112,10 @@ class Recorder(Node):  # type: ignore[misc]
         publishers = self.get_publishers_info_by_topic(topic)
         if not publishers or self._bag is None:
             return
-        offered = [publisher.qos_profile for publisher in publishers]
-        quality = Quality(
-            depth=max(DEPTH, *(profile.depth for profile in offered)),
-            reliable=all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in offered),
-            transient_local=all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in offered),
-        )
+        quality, recorded = offered(topic, [publisher.qos_profile for publisher in publishers])
         try:
             message = message_class(kind)
-            depth = max(profile.depth for profile in offered) or (
-                DEPTH if topic.endswith(("/scenarios", "/scenarios/info")) else 1
-            )
-            profile = qos_yaml(Quality(depth, quality.reliable, quality.transient_local))
-            self._bag.add_topic(topic, kind, profile, str(publishers[0].topic_type_hash))
+            self._bag.add_topic(topic, kind, qos_yaml(recorded), str(publishers[0].topic_type_hash))
         except InputError as error:
             self._refused.add(topic)
             self.get_logger().error(f"{topic} is not recorded: {error}")
@@ -155,14 +145,6 @@ class Recorder(Node):  # type: ignore[misc]
         folder = self.stop()
         response.success, response.message = bool(folder), folder or "nothing is being recorded"
         return response
-
-
-def depth_of(topic: str) -> int:
-    """Return the depth to offer at replay; discovery does not tell the publisher's."""
-    try:
-        return topic_entry(topic)[1].depth
-    except KeyError:
-        return DEPTH
 
 
 def main() -> None:

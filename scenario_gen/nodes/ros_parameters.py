@@ -43,6 +43,18 @@ def with_values(config: Config, parameters: Sequence[Parameter]) -> Config:
     return updated(config, {p.name: p.value for p in parameters if p.name in known})
 
 
+def values_of_call(config: Config, messages: Sequence[Any]) -> Config:
+    """Return `config` with the rcl_interfaces/Parameter messages of a caller.
+
+    Raises:
+        InputError: one is unknown, has the wrong type or is out of range.
+    """
+    parameters = [Parameter.from_parameter_msg(message) for message in messages]
+    if unknown := sorted({p.name for p in parameters} - set(flatten(config))):
+        raise InputError(f"unknown parameter {', '.join(unknown)}")
+    return with_values(config, parameters)
+
+
 class ConfigParameters:
     """Keeps a configuration and the ROS parameters of a node the same."""
 

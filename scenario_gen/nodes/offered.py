@@ -1,0 +1,21 @@
+"""What a topic's publishers offer decides how the recorder subscribes, and what it writes into the bag for the player."""
+
+from collections.abc import Sequence
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from msg_conventions.topics import Quality
+
+DEPTH = 1000
+
+
+def offered(topic: str, profiles: Sequence[QoSProfile]) -> tuple[Quality, Quality]:
+    """Return the quality to subscribe with, which suits every publisher, and the one to offer at replay.
+
+    Discovery does not always tell a publisher's depth; then it is that of the topic's kind.
+    """
+    reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in profiles)
+    transient_local = all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in profiles)
+    told = max(profile.depth for profile in profiles)
+    depth = told or (DEPTH if topic.endswith(("/scenarios", "/scenarios/info")) else 1)
+    return Quality(max(DEPTH, told), reliable, transient_local), Quality(depth, reliable, transient_local)
