@@ -219,8 +219,8 @@ def _calls(domain: int, folder: Path) -> list[Row]:
         while not _done(generate.call_async(request)).result.successful:
             time.sleep(0.5)
         plan = GetPlan.Request()
-        plan.start.pose.position.x, plan.goal.pose.position.x = _ends(client)
-        plan.start.pose.position.y = plan.goal.pose.position.y = -1.75
+        plan.start.pose.position.x, plan.goal.pose.position.x, plan.start.pose.position.y = _ends(client)
+        plan.goal.pose.position.y = plan.start.pose.position.y
         for kind, name, call in ((GetMap, "road_server/get_map", GetMap.Request()), (GetPlan, "planner/get_plan", plan)):
             service = client.node.create_client(kind, name)
             service.wait_for_service(30.0)
@@ -241,14 +241,15 @@ def _calls(domain: int, folder: Path) -> list[Row]:
     return rows
 
 
-def _ends(client: _Client) -> tuple[float, float]:
-    """Return x of two places 10 m inside the ends of the straight road."""
+def _ends(client: _Client) -> tuple[float, float, float]:
+    """Return x of two places 10 m inside the ends of the straight road, and y of its right lane."""
     from nav_msgs.srv import GetMap
 
     service = client.node.create_client(GetMap, "road_server/get_map")
     service.wait_for_service(30.0)
     info = _done(service.call_async(GetMap.Request())).map.info
-    return info.origin.position.x + 10.0, info.origin.position.x + info.width * info.resolution - 10.0
+    west, south = info.origin.position.x, info.origin.position.y
+    return west + 10.0, west + info.width * info.resolution - 10.0, south + 0.5 * info.height * info.resolution - 1.75
 
 
 def _high(values: list[float]) -> float:
