@@ -19,6 +19,7 @@ from msg_conventions.diagnostics import Level, Status, encode_diagnostics
 from msg_conventions.topics import Quality, topic_entry
 from scenario_gen.errors import ScenarioGenError
 from scenario_gen.nodes.message_classes import message_class
+from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.worker import Job, Worker
 
@@ -94,8 +95,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     def send(self, topic: str, data: bytes) -> None:
         """Publish the CDR bytes of a topic of the suite."""
         self._announce(topic)
-        if self.context.ok():
-            self._raw_publishers[topic].publish(data)
+        publish(self, self._raw_publishers[topic], data)
 
     def _announce(self, topic: str) -> None:
         if topic not in self._raw_publishers:

@@ -23,6 +23,7 @@ from scenario_gen.bags import BagMessage, bag_topics, read_messages
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.nodes.base import qos, run_nodes
 from scenario_gen.nodes.message_classes import message_class
+from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.parameters import check, parameter
 
@@ -101,7 +102,7 @@ class Player(Node):  # type: ignore[misc]
             elapsed = self._wait_until((message.stamp_ns - first) * 1e-9 + config.start_offset, elapsed, config, first)
             if self._ended.is_set():
                 return
-            self._offered[message.topic][0].publish(message.data)
+            publish(self, self._offered[message.topic][0], message.data)
 
     def _from_offset(self, config: Config) -> Iterator[BagMessage]:
         """Yield the messages from the offset on; before the first, publish what latched topics hold by then."""
@@ -116,7 +117,7 @@ class Player(Node):  # type: ignore[misc]
                 continue
             for topic in list(latched):
                 for data in latched.pop(topic):
-                    self._offered[topic][0].publish(data)
+                    publish(self, self._offered[topic][0], data)
             yield message
 
     def _wait_until(self, due: float, elapsed: float, config: Config, first_ns: int) -> float:
@@ -132,8 +133,8 @@ class Player(Node):  # type: ignore[misc]
         return max(elapsed, due) if elapsed < due + 1.0 else due
 
     def _tell_time(self, stamp_ns: int) -> None:
-        if self._clock_publisher is not None and self.context.ok():
-            self._clock_publisher.publish(CdrWriter().stamp(stamp_ns).finish())
+        if self._clock_publisher is not None:
+            publish(self, self._clock_publisher, CdrWriter().stamp(stamp_ns).finish())
 
     def _set_running(self, response: Trigger.Response, *, running: bool) -> Trigger.Response:
         response.success = running != self._running.is_set()
