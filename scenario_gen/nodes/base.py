@@ -230,7 +230,9 @@ def run_nodes(make: Callable[[str | None], Any], arguments: Sequence[str] | None
     arguments = sys.argv if arguments is None else arguments
     where = namespaces(arguments)
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)  # rclpy calls it after its own: both end as KeyboardInterrupt
+        # rclpy's own handler, which runs first, shuts the context down, and spin ends between two callbacks. A
+        # KeyboardInterrupt would strike anywhere: in the middle of a record that a bag is being given, for one.
+        signal.signal(number, lambda *_: None)
     rclpy.init(args=list(arguments))
     executor = SingleThreadedExecutor()
     nodes: list[Any] = []
@@ -242,11 +244,14 @@ def run_nodes(make: Callable[[str | None], Any], arguments: Sequence[str] | None
         for node in nodes:
             node.autostart()
         executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except ExternalShutdownException:
         pass
     except ScenarioGenError as error:
         print(f"error: {error}", file=sys.stderr)
         code = error.exit_code
+    except Exception:
+        if rclpy.ok():  # else a signal came while the nodes were being made
+            raise
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)  # a second Ctrl-C does not disturb the clean end
