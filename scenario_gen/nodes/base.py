@@ -18,6 +18,7 @@ from rclpy.utilities import remove_ros_args
 from msg_conventions.diagnostics import Level, Status, encode_diagnostics
 from msg_conventions.topics import Quality, topic_entry
 from scenario_gen.errors import ScenarioGenError
+from scenario_gen.nodes.interrupts import interrupt
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.ros_parameters import ConfigParameters
@@ -230,9 +231,7 @@ def run_nodes(make: Callable[[str | None], Any], arguments: Sequence[str] | None
     arguments = sys.argv if arguments is None else arguments
     where = namespaces(arguments)
     for number in (signal.SIGINT, signal.SIGTERM):
-        # rclpy's own handler, which runs first, shuts the context down, and spin ends between two callbacks. A
-        # KeyboardInterrupt would strike anywhere: in the middle of a record that a bag is being given, for one.
-        signal.signal(number, lambda *_: None)
+        signal.signal(number, interrupt)  # rclpy calls it after its own handler
     rclpy.init(args=list(arguments))
     executor = SingleThreadedExecutor()
     nodes: list[Any] = []
@@ -244,14 +243,11 @@ def run_nodes(make: Callable[[str | None], Any], arguments: Sequence[str] | None
         for node in nodes:
             node.autostart()
         executor.spin()
-    except ExternalShutdownException:
+    except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except ScenarioGenError as error:
         print(f"error: {error}", file=sys.stderr)
         code = error.exit_code
-    except Exception:
-        if rclpy.ok():  # else a signal came while the nodes were being made
-            raise
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)  # a second Ctrl-C does not disturb the clean end

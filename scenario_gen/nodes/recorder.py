@@ -21,6 +21,7 @@ from scenario_gen.bags import BagWriter, Split
 from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.errors import InputError
 from scenario_gen.nodes.base import qos, run_nodes
+from scenario_gen.nodes.interrupts import uninterrupted
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.offered import offered
 from scenario_gen.nodes.ros_parameters import ConfigParameters
@@ -127,7 +128,8 @@ class Recorder(Node):  # type: ignore[misc]
     def _write(self, topic: str, data: bytes) -> None:
         if self._bag is not None:
             now: Time = self.get_clock().now()
-            self._bag.write(topic, data, now.nanoseconds)
+            with uninterrupted():
+                self._bag.write(topic, data, now.nanoseconds)
 
     def _start_service(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         now = self.get_clock().now().nanoseconds
