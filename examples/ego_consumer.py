@@ -120,10 +120,11 @@ class EgoConsumer(Node):
         super().__init__("ego_consumer")
         self.ego = self.declare_parameter("ego", "").value  # id of the vehicle to replace; empty: the first one
         self.driver = Driver(self.declare_parameter("speed", 8.0).value, self.declare_parameter("brake_ttc", 2.0).value)
-        self._plans: dict[bytes, rclpy.task.Future] = {}  # by start and goal
+        self._plans: dict[bytes, tuple[GetPlan.Request, rclpy.task.Future]] = {}  # by start and goal
         self._count = 0
         answers = ReentrantCallbackGroup()  # the answer comes while the callback that asked still waits
         self._planner = self.create_client(GetPlan, "planner/get_plan", callback_group=answers)
+        self.create_timer(2.0, self._ask_again, callback_group=answers)
         self._report = self.create_publisher(DiagnosticArray, "~/report", LATCHED)
         self.create_subscription(MultiDOFJointTrajectory, "scenarios", self._hear, LATCHED)
 
@@ -158,9 +159,23 @@ class EgoConsumer(Node):
                 stamped.header.frame_id = frame
                 stamped.pose.position.x, stamped.pose.position.y = float(state[0]), float(state[1])
                 stamped.pose.orientation.z, stamped.pose.orientation.w = math.sin(0.5 * state[2]), math.cos(0.5 * state[2])
-            self._planner.wait_for_service(timeout_sec=10.0)
-            self._plans[key] = self._planner.call_async(request)
-        return self._plans[key]
+            self._plans[key] = request, rclpy.task.Future(executor=self.executor)
+            self._ask(*self._plans[key])
+        return self._plans[key][1]
+
+    def _ask(self, request: GetPlan.Request, plan: rclpy.task.Future) -> None:
+        def answered(answer: rclpy.task.Future) -> None:
+            if not plan.done():
+                plan.set_result(answer.result())
+
+        if self._planner.service_is_ready():
+            self._planner.call_async(request).add_done_callback(answered)
+
+    def _ask_again(self) -> None:
+        """Ask for plans that are still missing: the planner was not there yet, or it answered before it knew this client."""
+        for request, plan in self._plans.values():
+            if not plan.done():
+                self._ask(request, plan)
 
     def _tell(self, message: MultiDOFJointTrajectory, number: int, level: bytes, words: str, values: dict[str, float]) -> None:
         self.get_logger().info(f"scenario {number}: {words}")
