@@ -86,7 +86,7 @@ def test_it_drives_among_the_scenarios_of_the_suite(tmp_path):
         try:
             TOPICS["ego_consumer/report"] = TOPICS["scenarios/info"]
             client.hear("/ego_consumer/report", "/scenarios", "/tracks")
-            reports = client.wait("/ego_consumer/report", 4, timeout=120.0)
+            reports = client.wait("/ego_consumer/report", 4, timeout=180.0)
             decoded = [decode_diagnostics(data) for data in reports]
             for stamp, (status,) in decoded:
                 assert stamp > 0
@@ -97,7 +97,7 @@ def test_it_drives_among_the_scenarios_of_the_suite(tmp_path):
             TOPICS.pop("ego_consumer/report", None)
             client.close()
             ego.send_signal(signal.SIGINT)
-            output, _ = ego.communicate(timeout=20.0)
+            output, _ = ego.communicate(timeout=60.0)
             print(output)  # pytest shows it where the test fails
             suite.end()
     assert "Traceback" not in output, output

@@ -39,7 +39,7 @@ class Processes:
         """End all nodes as Ctrl-C does; return their exit codes."""
         self.process.stdin.close()
         events = [json.loads(line) for line in self.process.stdout]
-        self.process.wait(20.0)
+        self.process.wait(60.0)
         return {event["node"]: event["code"] for event in events if event["event"] == "exited"}
 
     def log(self, node: str) -> str:
@@ -82,11 +82,11 @@ class Client:
             self._publishers[topic] = self.node.create_publisher(message_class(kind), topic, qos(quality))
         self._publishers[topic].publish(data)
 
-    def wait(self, topic: str, count: int = 1, timeout: float = 60.0) -> list[bytes]:
+    def wait(self, topic: str, count: int = 1, timeout: float = 180.0) -> list[bytes]:
         self.until(lambda: len(self.heard[topic]) >= count, f"{count} messages on {topic}", timeout)
         return self.heard[topic]
 
-    def until(self, condition, what: str, timeout: float = 60.0) -> None:
+    def until(self, condition, what: str, timeout: float = 180.0) -> None:
         deadline = time.monotonic() + timeout
         while not condition():
             assert time.monotonic() < deadline, f"waited {timeout} s for {what}"
@@ -94,10 +94,10 @@ class Client:
 
     def call_later(self, kind, name: str, request):
         client = self.node.create_client(kind, name)
-        assert client.wait_for_service(30.0), name
+        assert client.wait_for_service(120.0), name
         return client.call_async(request)
 
-    def call(self, kind, name: str, request, timeout: float = 60.0):
+    def call(self, kind, name: str, request, timeout: float = 180.0):
         future = self.call_later(kind, name, request)
         self.until(future.done, f"an answer of {name}", timeout)
         return future.result()
