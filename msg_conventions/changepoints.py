@@ -5,6 +5,8 @@ frame. It is all that the stages after the segmenter need, so another segmenter 
 `posterior` (sensor_msgs/PointCloud2, frame as tracks) has one row per vehicle and one column per sample: x, y, z [m, float32],
 vehicle, primitive [uint16], t [s since the stamp, float64], p [posterior probability of a changepoint, float64].
 Both bear the stamp of their tracks. QoS: reliable, transient_local, depth 1.
+`changepoints/live` has what one sample of the vehicles' streams confirmed, while they run; its stamp is that of the stretch's
+first sample, since when the same vehicles have been there. QoS: reliable, transient_local, depth 1000.
 """
 
 from typing import TYPE_CHECKING
@@ -19,9 +21,18 @@ from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 
 if TYPE_CHECKING:
+    from scenario_gen.segmentation.live import LiveChangepoints
     from scenario_gen.segmentation.result import Segmentation
 
-__all__ = ["POSTERIOR_TYPE", "TYPE", "decode_changepoints", "decode_posterior", "encode_changepoints", "encode_posterior"]
+__all__ = [
+    "POSTERIOR_TYPE",
+    "TYPE",
+    "decode_changepoints",
+    "decode_posterior",
+    "encode_changepoints",
+    "encode_live_changepoints",
+    "encode_posterior",
+]
 
 POSTERIOR_TYPE = "sensor_msgs/msg/PointCloud2"
 UINT16, FLOAT32, FLOAT64 = 4, 7, 8  # sensor_msgs/PointField datatypes
@@ -42,6 +53,22 @@ def encode_changepoints(encounter: Encounter, segmentation: "Segmentation") -> b
             heading=encounter.heading[:, at],
             speed=encounter.speed[:, at],
             acceleration=np.gradient(encounter.speed, encounter.dt, axis=1)[:, at],
+        )
+    )
+
+
+def encode_live_changepoints(found: "LiveChangepoints") -> bytes:
+    """Return newly confirmed changepoints as CDR bytes; accelerations are not known yet: 0."""
+    return trajectory.encode(
+        Trajectory(
+            stamp_ns=found.start_ns,
+            frame_id=FRAME,
+            vehicles=found.vehicles,
+            time_ns=found.time_ns,
+            position=found.position,
+            heading=found.heading,
+            speed=found.speed,
+            acceleration=np.zeros_like(found.speed),
         )
     )
 
@@ -103,12 +130,15 @@ def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str 
     names = []
     for _ in range(reader.count()):
         names.append(reader.string())
-        _offset, _datatype, _count = reader.number(), reader.one("B"), reader.number()
-    _big_endian, point_step, _row_step, size = reader.one("B"), reader.number(), reader.number(), reader.count()
+        reader.number(), reader.one("B"), reader.number()  # offset, datatype, count
+    reader.one("B")  # is_bigendian
+    point_step = reader.number()
+    reader.number()  # row_step
+    size = reader.count()
     if tuple(names) != POINT.names or point_step != POINT.itemsize or size != n * samples * POINT.itemsize or size == 0:
         raise InputError(f"{what}: expected a cloud of vehicles by samples with the fields {', '.join(POINT.names or ())}")
     cloud = reader.array(POINT, n * samples, 1).reshape(n, samples)
-    _is_dense = reader.one("B")
+    reader.one("B")  # is_dense
     labels = cloud["primitive"][0].astype(np.int64)
     return Segmentation(
         labels=labels,

@@ -29,6 +29,7 @@ TOPICS: dict[str, tuple[str, Quality]] = {
     "road/exits": (roads.POSES_TYPE, LATCHED),
     "tracks": (trajectory.TYPE, LATCHED),
     "changepoints": (trajectory.TYPE, LATCHED),
+    "changepoints/live": (trajectory.TYPE, MANY),
     "posterior": ("sensor_msgs/msg/PointCloud2", LATCHED),
     "fit": (trajectory.TYPE, LATCHED),
     "vehicle_*/route": (paths.TYPE, LATCHED),
@@ -50,12 +51,12 @@ def vehicle_topic(token: str, name: str) -> str:
 
 
 def topic_entry(topic: str) -> tuple[str, Quality]:
-    """Return type and quality of a topic of the suite, with or without namespace before it.
+    """Return type and quality of a topic of the suite, with or without namespace before it; the longest name that fits counts.
 
     Raises:
         KeyError: it is no topic of the suite.
     """
-    for pattern, entry in TOPICS.items():
+    for pattern in sorted(TOPICS, key=len, reverse=True):
         if re.search(rf"(^|/){re.escape(pattern).replace(re.escape('*'), '[0-9A-Za-z_]+')}$", topic):
-            return entry
+            return TOPICS[pattern]
     raise KeyError(topic)

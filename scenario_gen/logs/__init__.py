@@ -2,6 +2,7 @@
 
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.quality import Quality
-from scenario_gen.logs.read import LogResult, read_log
+from scenario_gen.logs.read import LogResult, encounters_of, read_log
+from scenario_gen.logs.streams import Sample, Streams
 
-__all__ = ["LogConfig", "LogResult", "Quality", "read_log"]
+__all__ = ["LogConfig", "LogResult", "Quality", "Sample", "Streams", "encounters_of", "read_log"]

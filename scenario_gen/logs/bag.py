@@ -11,13 +11,14 @@ from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from msg_conventions import trajectory
+from msg_conventions.streams import speed_of
 from msg_conventions.tracks import decode_tracks
 from msg_conventions.yaw import yaw
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.files import bag_files
-from scenario_gen.logs.raw import Observations, RawLog, Segment
+from scenario_gen.logs.raw import RawLog, Rows, Segment
 
 FIX = "sensor_msgs/msg/NavSatFix"
 TWIST = "geometry_msgs/msg/TwistStamped"
@@ -34,14 +35,6 @@ class Topic:
     type: str
     stamps: list[int] = field(default_factory=list)
     data: list[bytes] = field(default_factory=list)
-
-
-@dataclass
-class Vehicle:
-    """Rows of one vehicle as they come: (stamp, row, values…)."""
-
-    fixes: list[tuple[int, int, float, float, float]] = field(default_factory=list)
-    speeds: list[tuple[int, int, float]] = field(default_factory=list)
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
@@ -114,14 +107,14 @@ def read_streams(topics: list[Topic], name: str, label: str) -> RawLog:
     if len({topic.type == ODOMETRY for topic in topics if topic.type != TWIST}) > 1:
         mixed = listing({topic.name: topic.type for topic in topics})
         raise InputError(f"{label} has both {FIX} and {ODOMETRY} ({mixed}); choose with the parameter topics")
-    vehicles: dict[str, Vehicle] = {}
+    vehicles: dict[str, Rows] = {}
     segments: list[Segment] = []
     unstamped: list[str] = []
     owners = own(topics, label)
     row = 0
     for topic in topics:
         segments.append(Segment(row, f"{label}, topic {topic.name}", "message", 1))
-        vehicle = vehicles.setdefault(owners[topic.name], Vehicle())
+        vehicle = vehicles.setdefault(owners[topic.name], Rows())
         take = {FIX: take_fix, TWIST: take_twist, ODOMETRY: take_odometry}[topic.type]
         if collect(topic, take, vehicle, row, label):
             unstamped.append(topic.name)
@@ -136,7 +129,7 @@ def read_streams(topics: list[Topic], name: str, label: str) -> RawLog:
     return RawLog(
         name=name,
         geographic=any(topic.type == FIX for topic in topics),
-        vehicles=tuple(as_observations(vehicle_name, vehicle) for vehicle_name, vehicle in vehicles.items()),
+        vehicles=tuple(vehicle.observations(vehicle_name) for vehicle_name, vehicle in vehicles.items()),
         rows=row,
         segments=tuple(segments),
         notes=tuple(notes if unstamped else notes[1:]),
@@ -161,7 +154,7 @@ def own(topics: list[Topic], label: str) -> dict[str, str]:
     return owners
 
 
-def collect(topic: Topic, take: Callable[[Any, Vehicle, int, int], None], vehicle: Vehicle, row: int, label: str) -> bool:
+def collect(topic: Topic, take: Callable[[Any, Rows, int, int], None], vehicle: Rows, row: int, label: str) -> bool:
     """Decode the messages of a topic; return whether their headers bear no stamps."""
     unstamped = False
     for number, (received, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
@@ -176,41 +169,25 @@ def collect(topic: Topic, take: Callable[[Any, Vehicle, int, int], None], vehicl
     return unstamped
 
 
-def take_fix(message: Any, vehicle: Vehicle, stamp: int, row: int) -> None:
+def take_fix(message: Any, vehicle: Rows, stamp: int, row: int) -> None:
     """A NavSatFix; one without a fix (status below 0) has no position."""
     known = message.status.status >= 0
     position = (message.latitude, message.longitude) if known else (math.nan, math.nan)
     vehicle.fixes.append((stamp, row, *position, math.nan))
 
 
-def take_twist(message: Any, vehicle: Vehicle, stamp: int, row: int) -> None:
-    """A TwistStamped: the speed is linear.x of the body frame, or the length of the horizontal vector."""
-    linear = message.twist.linear
-    vehicle.speeds.append((stamp, row, linear.x if linear.y == 0.0 else math.hypot(linear.x, linear.y)))
+def take_twist(message: Any, vehicle: Rows, stamp: int, row: int) -> None:
+    """A TwistStamped."""
+    vehicle.speeds.append((stamp, row, speed_of(message.twist.linear.x, message.twist.linear.y)))
 
 
-def take_odometry(message: Any, vehicle: Vehicle, stamp: int, row: int) -> None:
+def take_odometry(message: Any, vehicle: Rows, stamp: int, row: int) -> None:
     """An Odometry: pose in its frame, speed in the body frame."""
     pose, linear = message.pose.pose, message.twist.twist.linear
     turn = pose.orientation
     heading = float(yaw(np.array([turn.x, turn.y, turn.z, turn.w])))
     vehicle.fixes.append((stamp, row, pose.position.x, pose.position.y, heading))
     vehicle.speeds.append((stamp, row, math.hypot(linear.x, linear.y)))
-
-
-def as_observations(name: str, vehicle: Vehicle) -> Observations:
-    """Rows as arrays."""
-    fixes = np.array([values for _, _, *values in vehicle.fixes], dtype=float).reshape(-1, 3)
-    return Observations(
-        id=name,
-        fix_ns=np.array([stamp for stamp, *_ in vehicle.fixes], dtype=np.int64),
-        fix=fixes[:, :2],
-        fix_row=np.array([row for _, row, *_ in vehicle.fixes], dtype=np.int64),
-        heading=fixes[:, 2],
-        speed_ns=np.array([stamp for stamp, *_ in vehicle.speeds], dtype=np.int64),
-        speed=np.array([speed for _, _, speed in vehicle.speeds], dtype=float),
-        speed_row=np.array([row for _, row, _ in vehicle.speeds], dtype=np.int64),
-    )
 
 
 def read_tracks(topics: list[Topic], name: str, label: str, others: list[str]) -> RawLog:

@@ -33,7 +33,7 @@ def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Pie
     """
     seconds = np.diff(track.fix_ns) * 1e-9
     usual = float(np.median(seconds))
-    longest = max(config.longest_gap, 2.5 * usual) + 1e-6
+    longest = longest_bridge(seconds, config)
     step = np.hypot(*np.diff(track.fix, axis=0).T)
     gaps = (seconds > longest) | (step > JUMP_SLACK + FASTEST * seconds)
     back = reversals(track, config)
@@ -67,6 +67,11 @@ def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Pie
         moved_most=max((float(smooth.moved.max()) for smooth in smooths), default=0.0),
     )
     return pieces, quality
+
+
+def longest_bridge(seconds: Floats, config: LogConfig) -> float:
+    """Return the longest gap [s] that is bridged in a track whose fixes are `seconds` apart."""
+    return max(config.longest_gap, 2.5 * float(np.median(seconds))) + 1e-6
 
 
 def reversals(track: Track, config: LogConfig) -> Bools:

@@ -2,7 +2,7 @@
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
@@ -40,6 +40,28 @@ class Observations:
     speed_row: Ints
     length: float = np.nan
     width: float = np.nan
+
+
+@dataclass
+class Rows:
+    """Messages of one vehicle as they come: (stamp [ns], row, values…); values as in `Observations`."""
+
+    fixes: list[tuple[int, int, float, float, float]] = field(default_factory=list)
+    speeds: list[tuple[int, int, float]] = field(default_factory=list)
+
+    def observations(self, name: str) -> Observations:
+        """Return the rows as arrays."""
+        fixes = np.array([values for _, _, *values in self.fixes], dtype=float).reshape(-1, 3)
+        return Observations(
+            id=name,
+            fix_ns=np.array([stamp for stamp, *_ in self.fixes], dtype=np.int64),
+            fix=fixes[:, :2],
+            fix_row=np.array([row for _, row, *_ in self.fixes], dtype=np.int64),
+            heading=fixes[:, 2],
+            speed_ns=np.array([stamp for stamp, *_ in self.speeds], dtype=np.int64),
+            speed=np.array([speed for *_, speed in self.speeds], dtype=float),
+            speed_row=np.array([row for _, row, _ in self.speeds], dtype=np.int64),
+        )
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,15 @@ def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogCon
     Raises:
         InputError: the log cannot be used; the message names the file and the row or topic, and what to do.
     """
-    log = read_raw([Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)], config)
+    return encounters_of(read_raw([Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)], config), config)
+
+
+def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
+    """Cut what was read, or heard, into encounters; as `read_log` does.
+
+    Raises:
+        InputError: there is no encounter in it; the message says why.
+    """
     if log.encounters:
         return as_recorded(log, config)
     tracks, drops, origin = clean(log, config)

@@ -33,7 +33,7 @@ def uniform(state: State) -> float:
 
 @kernel(inline=True)
 def normal(state: State) -> float:
-    """Standard normal (Box-Muller)."""
+    """Return a standard normal number (Box-Muller)."""
     return math.sqrt(-2.0 * math.log(uniform(state))) * math.cos(6.283185307179586 * uniform(state))
 
 

@@ -1,0 +1,205 @@
+"""Fixes and speeds as they come → samples on the common clock, and the log that they amount to.
+
+There is no second way to read here: the last seconds of the streams are a small `RawLog` and cleaned like any other, and all
+that was buffered is one too, which `encounters_of` reads as if it came from a file.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.encounter import Vehicle
+from scenario_gen.errors import InputError
+from scenario_gen.logs.cleaning import RELOCATED, Track, clean
+from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.pieces import longest_bridge
+from scenario_gen.logs.raw import RawLog, Rows, Segment, natural
+from scenario_gen.logs.smoothing import speed_of_fixes
+
+WINDOW_NS = 3_000_000_000  # of the past that is cleaned again for every sample: enough to tell a jump from a new place
+FAR_NS = 10_000_000_000  # a stamp this far from the newest one belongs to another time, or is wrong
+MOST = 100  # messages of one kind per vehicle and second that are kept
+EVERY = 2  # ticks that are made at once: one cleaning serves them all
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """The vehicles that are there at one tick of the common clock.
+
+    Attributes:
+        stamp_ns: the tick, a whole multiple of the period.
+        vehicles: N >= 2, in the natural order of their ids.
+        position: (N, 2) metres east and north of the streams' origin.
+        speed: (N,) m/s.
+    """
+
+    stamp_ns: int
+    vehicles: tuple[Vehicle, ...]
+    position: Floats
+    speed: Floats
+
+
+class Streams:
+    """Buffers the newest `longest` seconds of streams and samples them; memory does not grow with time.
+
+    Messages may come in any order, twice, or not at all, as long as they are less than `late` seconds behind the newest one;
+    the samples are then those of messages in order. (Later ones still count in `take`.)
+    """
+
+    def __init__(self, config: LogConfig = LogConfig(), late: float = 0.5) -> None:  # noqa: B008 - frozen
+        """Start empty; `config` is that of a log, `start`, `end` and `strict` do not apply."""
+        self.origin = config.origin
+        self._config = replace(config, start=0.0, end=0.0, strict=False, vehicles="")
+        self._dt_ns = round(config.period * 1e9)
+        self._late_ns = round(late * 1e9)
+        self._clear()
+
+    def _clear(self) -> None:
+        self._whole: dict[str, Rows] = {}
+        self._recent: dict[str, Rows] = {}
+        self._count = 0
+        self._first = self._newest = -1  # stamps
+        self._next = -1  # number of the next tick, once there were any
+        self._strange = 0
+
+    @property
+    def config(self) -> LogConfig:
+        """How the log of `take` is to be read: all of it, in the frame of the samples."""
+        return replace(self._config, origin=self.origin)
+
+    @property
+    def seconds(self) -> float:
+        """From the first message to the newest one that is buffered; 0.0 if there is none."""
+        return (self._newest - self._first) * 1e-9
+
+    def breaks(self, stamp_ns: int) -> bool:
+        """Say whether the clock was set: several messages in a row are far from those before, this one being the last.
+
+        A single such message is a wrong one, and `put_fix` and `put_speed` leave it out.
+        """
+        if self._newest < 0 or abs(stamp_ns - self._newest) <= FAR_NS:
+            self._strange = 0
+            return False
+        self._strange += 1
+        return self._strange >= RELOCATED
+
+    def put_fix(self, vehicle: str, stamp_ns: int, latitude: float, longitude: float) -> None:
+        """Take a position in [degrees]; NaN where there is no fix."""
+        if self._counts(stamp_ns):
+            for rows in self._of(vehicle):
+                rows.fixes.append((stamp_ns, self._count, latitude, longitude, np.nan))
+                del rows.fixes[: -round(MOST * self._config.longest)]
+
+    def put_speed(self, vehicle: str, stamp_ns: int, speed: float) -> None:
+        """Take a speed in [m/s]."""
+        if self._counts(stamp_ns):
+            for rows in self._of(vehicle):
+                rows.speeds.append((stamp_ns, self._count, speed))
+                del rows.speeds[: -round(MOST * self._config.longest)]
+
+    def _of(self, vehicle: str) -> tuple[Rows, Rows]:
+        return self._whole.setdefault(vehicle, Rows()), self._recent.setdefault(vehicle, Rows())
+
+    def _counts(self, stamp_ns: int) -> bool:
+        """Number the message, unless it is of another time."""
+        if self._newest < 0:
+            self._first = self._newest = stamp_ns
+        if abs(stamp_ns - self._newest) > FAR_NS:
+            return False
+        self._count += 1
+        self._first, self._newest = min(self._first, stamp_ns), max(self._newest, stamp_ns)
+        return True
+
+    def samples(self) -> list[Sample]:
+        """Return the samples that have become complete; a tick at which fewer than two vehicles are there has none.
+
+        Raises:
+            InputError: a clock stands or runs backwards; what came lately is forgotten.
+        """
+        last = (self._newest - self._late_ns) // self._dt_ns // EVERY * EVERY
+        following = self._first // self._dt_ns if self._next < 0 else self._next
+        if self._newest < 0 or last < following:
+            return []
+        self._next = following
+        try:
+            tracks = self._tracks()
+        except InputError:
+            self._recent, self._next = {}, last + 1
+            raise
+        found: list[Sample] = []
+        while self._next <= last:
+            tick = self._next * self._dt_ns
+            if any(self._awaited(track, tick) for track in tracks):
+                break
+            self._next += 1
+            if (sample := sample_at(tracks, tick, self._config)) is None:
+                continue
+            if not self.origin:
+                self.origin = self._place(sample.vehicles[0].id)
+                self._next -= 1
+                return self.samples()
+            found.append(sample)
+        self._forget(self._next * self._dt_ns - WINDOW_NS)
+        return found
+
+    def _tracks(self) -> tuple[Track, ...]:
+        """Clean the last seconds."""
+        names = sorted((name for name, rows in self._recent.items() if len(rows.fixes) >= 2), key=natural)
+        log = self._log("streams", {name: self._recent[name] for name in names})
+        if not any(np.isfinite(vehicle.fix).all(axis=1).any() for vehicle in log.vehicles):
+            return ()
+        return clean(log, self.config)[0]
+
+    def _awaited(self, track: Track, tick: int) -> bool:
+        """Say whether a vehicle's next fix may still come: it has been there, and is slower than the others."""
+        silent = (self._newest - self._late_ns - int(track.fix_ns[-1])) * 1e-9
+        return bool(track.fix_ns[-1] < tick) and silent <= longest_bridge(np.diff(track.fix_ns) * 1e-9, self._config)
+
+    def _place(self, vehicle: str) -> str:
+        """The first sound fix of a vehicle, to about a metre, as an origin for all that follows."""
+        _, _, latitude, longitude, _ = min(row for row in self._recent[vehicle].fixes if np.isfinite(row[2:4]).all())
+        return f"{latitude:.5f},{longitude:.5f}"
+
+    def _forget(self, before: int) -> None:
+        for name, rows in list(self._recent.items()):
+            rows.fixes[:] = [row for row in rows.fixes if row[0] >= before]
+            rows.speeds[:] = [row for row in rows.speeds if row[0] >= before]
+            if not rows.fixes and not rows.speeds:
+                del self._recent[name]
+
+    def _log(self, name: str, rows: dict[str, Rows]) -> RawLog:
+        return RawLog(
+            name=name,
+            geographic=True,
+            vehicles=tuple(own.observations(vehicle) for vehicle, own in rows.items()),
+            rows=self._count,
+            segments=(Segment(1, "the streams", "message", 1),),
+        )
+
+    def take(self, name: str) -> RawLog | None:
+        """Return all that is buffered as a log, and start anew; None if no position came."""
+        whole = {vehicle: rows for vehicle, rows in self._whole.items() if rows.fixes}
+        log = self._log(name, whole) if whole else None
+        self._clear()
+        return log
+
+
+def sample_at(tracks: Sequence[Track], stamp_ns: int, config: LogConfig) -> Sample | None:
+    """Return who is where at an instant; between two fixes that are not too far apart; None for fewer than two vehicles."""
+    vehicles, position, speed = [], [], []
+    for track in tracks:
+        after = int(np.searchsorted(track.fix_ns, stamp_ns))
+        before = after if after < len(track.fix_ns) and track.fix_ns[after] == stamp_ns else after - 1
+        seconds = np.diff(track.fix_ns) * 1e-9
+        if before < 0 or after == len(track.fix_ns) or seconds[before:after].sum() > longest_bridge(seconds, config):
+            continue
+        vehicles.append(Vehicle(track.id, track.length, track.width))
+        position.append([np.interp(stamp_ns, track.fix_ns, axis) for axis in track.fix.T])
+        if len(track.speed_ns):
+            speed.append(np.interp(stamp_ns, track.speed_ns, track.speed))
+        else:
+            clock = (track.fix_ns - track.fix_ns[0]) * 1e-9
+            speed.append(np.interp((stamp_ns - int(track.fix_ns[0])) * 1e-9, clock, speed_of_fixes(clock, track.fix)))
+    return Sample(stamp_ns, tuple(vehicles), np.array(position), np.array(speed)) if len(vehicles) >= 2 else None

@@ -1,0 +1,69 @@
+"""Samples as they come → changepoints as they are confirmed, for whoever is there."""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.encounter import Vehicle
+from scenario_gen.logs.streams import Sample
+from scenario_gen.segmentation.online import OnlineConfig, OnlineSegmenter
+from scenario_gen.segmentation.trends import course
+
+
+@dataclass(frozen=True, eq=False)
+class LiveChangepoints:
+    """Changepoints that one sample confirmed, with the vehicles' states there.
+
+    Attributes:
+        start_ns: stamp of the stretch's first sample: since then the same vehicles have been there at every tick.
+        vehicles: N identities and footprints.
+        time_ns: (K,) since `start_ns`, increasing.
+        position: (N, K, 2) m.
+        heading: (N, K) rad: the course over ground.
+        speed: (N, K) m/s.
+    """
+
+    start_ns: int
+    vehicles: tuple[Vehicle, ...]
+    time_ns: Ints
+    position: Floats
+    heading: Floats
+    speed: Floats
+
+
+class LiveSegmenter:
+    """An `OnlineSegmenter` for vehicles that come and go: each change of who is there begins a new stretch."""
+
+    def __init__(self, dt_ns: int, config: OnlineConfig = OnlineConfig()) -> None:  # noqa: B008 - frozen
+        """Start with no samples; they will be `dt_ns` nanoseconds apart."""
+        self._dt_ns = dt_ns
+        self._config = config
+        self._past: deque[Sample] = deque(maxlen=round(config.window * 1e9 / dt_ns))
+        self._online: OnlineSegmenter | None = None
+        self._start_ns = 0
+
+    def push(self, sample: Sample) -> LiveChangepoints | None:
+        """Take the next sample and return the changepoints it confirms, if any."""
+        last = self._past[-1] if self._past else None
+        if self._online is None or last is None or not self._follows(last, sample):
+            self._past.clear()
+            self._online = OnlineSegmenter(len(sample.vehicles), self._dt_ns * 1e-9, self._config)
+            self._start_ns = sample.stamp_ns
+        self._past.append(sample)
+        found = self._online.push(sample.position, sample.speed)
+        return self._states([changepoint.sample for changepoint in found]) if found else None
+
+    def _follows(self, last: Sample, sample: Sample) -> bool:
+        return sample.stamp_ns == last.stamp_ns + self._dt_ns and sample.vehicles == last.vehicles
+
+    def _states(self, samples: Sequence[int]) -> LiveChangepoints:
+        time_ns = np.array(samples, dtype=np.int64) * self._dt_ns
+        at = (self._start_ns + time_ns - self._past[0].stamp_ns) // self._dt_ns
+        position = np.stack([sample.position for sample in self._past], axis=1)
+        speed = np.stack([sample.speed for sample in self._past], axis=1)
+        heading = np.array([course(xy, v, self._dt_ns * 1e-9)[0] for xy, v in zip(position, speed, strict=True)])
+        vehicles = self._past[-1].vehicles
+        return LiveChangepoints(self._start_ns, vehicles, time_ns, position[:, at], heading[:, at], speed[:, at])
