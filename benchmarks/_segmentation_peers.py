@@ -42,7 +42,8 @@ def jax_moseq(x: Floats, sweeps: int, seed: int = 0, states: int = 20) -> tuple[
     @jax.jit  # type: ignore[untyped-decorator]
     def emissions(key: Any, z: Any) -> Any:
         members = jnp.eye(states)[:, z]
-        step = lambda args: _resample_regression_params(ones, y, d + 2.0, s0, jnp.zeros((d, 1)), 10.0 * jnp.eye(1), args)  # noqa: E731
+        prior = (d + 2.0, s0, jnp.zeros((d, 1)), 10.0 * jnp.eye(1))
+        step = lambda args: _resample_regression_params(ones, y, *prior, args)  # noqa: E731
         return jax.lax.map(step, (jr.split(key, states), members))
 
     @jax.jit  # type: ignore[untyped-decorator]

@@ -52,7 +52,7 @@ def _warm(road: Road, ends: Floats) -> None:
 
 
 def _ompl(road: Road, ends: Floats, name: str, seconds: float, step: float | None = None, *, simplify: bool = True) -> Floats:
-    """OMPL's path (P, 2) after so much CPU time (or its first one, for RRTConnect)."""
+    """Return OMPL's path (P, 2) after so much CPU time (or its first one, for RRTConnect)."""
     started = process_time()
     answer = solve(
         clearance_in_cells(road), ends, 0.0, name, lambda _: process_time() - started > seconds, step=step, simplify=simplify

@@ -57,7 +57,7 @@ def read_scenario(message: MultiDOFJointTrajectory) -> Traffic:
 
 
 def overlap(one: np.ndarray, size_one: np.ndarray, other: np.ndarray, size_other: np.ndarray) -> np.ndarray:
-    """Say for each of K instants whether two oriented rectangles overlap (separating axes); poses (K, 3) as x, y, yaw."""
+    """Say for each of K instants whether two oriented rectangles, poses (K, 3) as x, y, yaw, meet: separating axes."""
     apart = np.zeros(len(one), dtype=bool)
     offset = other[:, :2] - one[:, :2]
     for yaw in (one[:, 2], one[:, 2] + 0.5 * np.pi, other[:, 2], other[:, 2] + 0.5 * np.pi):

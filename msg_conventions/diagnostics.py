@@ -12,9 +12,11 @@ from enum import IntEnum
 from typing import TYPE_CHECKING
 
 from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.ego import ego_values
 from msg_conventions.scenarios import digest
+from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
-from scenario_gen.scenario import Cause, Scenario, ScenarioSet
+from scenario_gen.scenario import BoundaryStates, Cause, Scenario, ScenarioSet
 
 if TYPE_CHECKING:
     from scenario_gen.fitting.result import Fit
@@ -61,7 +63,8 @@ def decode_diagnostics(data: bytes, what: str = "diagnostics") -> tuple[int, tup
     stamp_ns, _ = reader.header()
     statuses = []
     for _ in range(reader.count()):
-        level, name, message, _hardware = reader.one("B"), reader.string(), reader.string(), reader.string()
+        level, name, message = reader.one("B"), reader.string(), reader.string()
+        reader.string()  # hardware id
         values = {}
         for _ in range(reader.count()):
             key = reader.string()
@@ -76,6 +79,13 @@ def states_text(scenario: Scenario, at: int) -> str:
     return json.dumps([[*map(float, position), float(heading), float(speed)] for position, heading, speed in rows])
 
 
+def asked_values(asked: BoundaryStates, template: Sequence[Vehicle], scenario: Scenario) -> dict[str, str]:
+    """Return what `scenarios/info` says of the states asked of a scenario's vehicles; `asked` is in the template's order."""
+    ids = [vehicle.id for vehicle in template]
+    rows = [ids.index(vehicle.id) for vehicle in scenario.vehicles]
+    return {"asked_start": json.dumps(asked.start[rows].tolist()), "asked_end": json.dumps(asked.end[rows].tolist())}
+
+
 def scenario_status(scenario: Scenario, data: bytes, request: str, node: str, **more: str) -> Status:
     """Return the `scenarios/info` entry of one scenario whose CDR bytes are `data`.
 
@@ -84,7 +94,7 @@ def scenario_status(scenario: Scenario, data: bytes, request: str, node: str, **
         data: its CDR bytes.
         request: the request's id.
         node: full name of the publishing node.
-        more: what else a reader wants to know (template, road, asked states).
+        more: what else a reader wants to know (template, road, asked states, ego).
     """
     values = {
         "request": request,
@@ -98,10 +108,14 @@ def scenario_status(scenario: Scenario, data: bytes, request: str, node: str, **
     return Status(f"{node}: scenario", Level.OK, f"scenario {scenario.index} of request {request}", values)
 
 
-def request_status(result: ScenarioSet, request: str, node: str, seed: int) -> Status:
-    """Return the closing `scenarios/info` entry of a request."""
+def request_status(
+    result: ScenarioSet, request: str, node: str, seed: int, provenance: Mapping[str, str] | None = None
+) -> Status:
+    """Return the closing `scenarios/info` entry of a request; `provenance` is what is needed to do it again."""
     complete = len(result.scenarios) == result.requested
     values = {
+        **(provenance or {}),
+        **ego_values(result.ego),
         "request": request,
         "seed": str(seed),
         "requested": str(result.requested),

@@ -8,9 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parent / "evaluation"))
-
 from evaluation_worlds import crossing
 
 from scenario_gen import cli

@@ -44,7 +44,7 @@ class Bootstrap:
         return cls(generator.multinomial(samples, shares, size=resamples).astype(np.float64), level)
 
     def interval(self, statistic: Statistic) -> Interval:
-        """Return the statistic of the whole set with its percentile interval (Efron 1979), widened to hold the value.
+        """Return the statistic of the whole set with its percentile bounds (Efron 1979), widened to hold the value.
 
         Distances such as E cannot fall below zero, and resampling raises them. Correcting for that bias makes intervals too
         short near zero (docs/evaluation.md has the figures), so it is left in.

@@ -38,7 +38,7 @@ class PairLikeness:
         return np.sqrt(np.maximum(square, 0.0) / norm) if norm > 0.0 else np.full(len(weights), np.nan)
 
     def correlation(self, weights: Floats) -> Floats:
-        """Return Pearson's correlation (B,) of the mean matrix and T; NaN if one of them is constant."""
+        """Return Pearson's r (B,) of the mean matrix and T; NaN if one of them is constant."""
         shares = weights / weights.sum(axis=1, keepdims=True)
         count, first, second = self.template
         variance = second - first * first / count

@@ -23,7 +23,7 @@ class Curve:
 
     @classmethod
     def through(cls, xy: Floats) -> "Curve":
-        """A curve through (M, 2) points; the yaw of each is the mean direction of its two neighbouring edges."""
+        """Lay a curve on points (M, 2); the yaw of each is the mean direction of its two neighbouring edges."""
         step = np.diff(xy, axis=0)
         keep = np.concatenate(([True], np.hypot(step[:, 0], step[:, 1]) > 1e-9))
         xy = xy[keep]

@@ -61,7 +61,7 @@ class VehicleModel:
         return int(self.factor.shape[1] + self.along.shape[1])
 
     def deviations(self, z: Floats) -> Floats:
-        """Lateral deviations (S, G) [m]."""
+        """Return how far each sample is to the side (S, G) [m]."""
         return kept_within(combine(z, self.factor), self.room)
 
 

@@ -1,12 +1,6 @@
 """A bag evaluated from its messages alone gives the figures of the scenarios that were put into it."""
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "evaluation"))
-
 from evaluation_worlds import report_case
 
 from msg_conventions.topics import topic_entry

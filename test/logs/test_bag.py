@@ -30,7 +30,7 @@ def header(stamp):
 
 
 def streams(rows, stamped=True, prefix=""):
-    """NavSatFix and TwistStamped per vehicle."""
+    """One NavSatFix and one TwistStamped per vehicle."""
     lines = []
     for row in geographic(rows).itertuples():
         stamp = round(row.t_s * 1e9)

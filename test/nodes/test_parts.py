@@ -140,7 +140,7 @@ def test_nodes_are_thin():
 
 
 def test_the_launch_file_names_nodes_and_parameters_that_exist():
-    """launch itself is not among the wheels, so its text is checked against the entry points and the declared parameters."""
+    """The launch package is not among the wheels, so its file is read: entry points and declared parameters."""
     tree = ast.parse((ROOT / "launch" / "suite.launch.py").read_text())
     calls = [call for call in ast.walk(tree) if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "node"]
     assert len(calls) == 7
