@@ -15,7 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 
 from msg_conventions.scenarios import encode_scenario
-from scenario_gen.bags import read_messages
+from scenario_gen.bags import read_messages, reindex
 from scenario_gen.bags.evaluation import bag_cases
 from scenario_gen.bags.validation import validate_bag
 from scenario_gen.encounter import Encounter
@@ -264,6 +264,16 @@ def validate(
             console.print(f"  not applicable to {count}: {sentence}", highlight=False)
     if any(one.invalid for one in found):
         raise typer.Exit(1)
+
+
+@app.command("reindex")
+def save_bag(
+    bag: Annotated[Path, typer.Argument(help="folder of a bag whose recorder was killed: MCAP files without metadata.yaml")],
+    out: Annotated[Path | None, typer.Option(help="folder of the new bag; BAG_reindexed if not given")] = None,
+) -> None:
+    """Save the messages that are whole in a bag that was not closed, and index them; the old files stay as they are."""
+    target = out or bag.with_name(f"{bag.name}_reindexed")
+    console.print(f"{reindex(bag, target)} messages: {target}", highlight=False, soft_wrap=True)
 
 
 @app.command()

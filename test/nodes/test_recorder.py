@@ -1,0 +1,161 @@
+"""The recorder and the player as processes: types of no concern to the suite, a kill, and bags of genuine rosbag2."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from mcap.reader import make_reader
+from rosbags.rosbag2 import Reader
+from suite_processes import Client
+from typer.testing import CliRunner
+
+from scenario_gen.bags import bag_topics, read_messages
+from scenario_gen.cli import app
+
+pytestmark = pytest.mark.dds
+
+QUEUE = 1000
+
+
+@pytest.fixture
+def start(domain):
+    """Start a node as its executable does; what is still running at the end is killed."""
+    started = []
+
+    def run(node: str, **parameters: object) -> "subprocess.Popen[str]":
+        words = [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
+        process = subprocess.Popen(
+            [sys.executable, "-m", "scenario_gen.nodes.start", node, "--ros-args", *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"},
+        )
+        started.append(process)
+        return process
+
+    yield run
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def publisher(client: Client, kind: type, topic: str):
+    """A publisher that somebody hears already."""
+    made = client.node.create_publisher(kind, topic, QUEUE)
+    client.until(lambda: client.node.count_subscribers(topic) > 0, f"a subscriber of {topic}")
+    return made
+
+
+def size(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.glob("*.mcap"))
+
+
+def ended(process: "subprocess.Popen[str]") -> None:
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=60.0)
+    assert process.returncode == 0 and "Traceback" not in output, output
+
+
+def test_any_type_is_recorded_as_it_was_sent(start, client, tmp_path):
+    from geometry_msgs.msg import Point32, PolygonStamped
+    from rclpy.serialization import serialize_message
+    from sensor_msgs.msg import Imu
+
+    bag = tmp_path / "bag"
+    recorder = start("recorder", bag=bag, topics="/(imu|area)", compress=False)
+    imu, area = publisher(client, Imu, "/imu"), publisher(client, PolygonStamped, "/area")
+    sent = {"/imu": [], "/area": []}
+    for k in range(50):
+        reading = Imu(orientation_covariance=[float(k)] * 9)
+        reading.angular_velocity.z = 0.1 * k
+        outline = PolygonStamped()
+        outline.header.frame_id = "map"
+        outline.polygon.points = [Point32(x=float(n)) for n in range(k)]
+        for topic, out, message in (("/imu", imu, reading), ("/area", area, outline)):
+            sent[topic].append(serialize_message(message))
+            out.publish(message)
+    whole = sum(len(data) for messages in sent.values() for data in messages)
+    client.until(lambda: counted(client, "/area") == 50 and counted(client, "/imu") == 50, f"{whole} bytes in the bag")
+    ended(recorder)
+    assert {topic.name: topic.type for topic in bag_topics(bag)} == {
+        "/imu": "sensor_msgs/msg/Imu",
+        "/area": "geometry_msgs/msg/PolygonStamped",
+    }
+    for topic, messages in sent.items():
+        assert [m.data for m in read_messages(bag, lambda name, topic=topic: name == topic)] == messages
+    with (bag / "bag_0.mcap").open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    texts = {schema.name: schema.data.decode() for schema in summary.schemas.values()}
+    assert (
+        "orientation_covariance" in texts["sensor_msgs/msg/Imu"] and "MSG: geometry_msgs/Vector3" in texts["sensor_msgs/msg/Imu"]
+    )
+    assert all(c.metadata["topic_type_hash"].startswith("RIHS01_") for c in summary.channels.values())
+
+
+def counted(client: Client, topic: str) -> int:
+    """How many messages of a topic the recorder says are in the bag."""
+    from msg_conventions.diagnostics import decode_diagnostics
+
+    if "/diagnostics" not in client.heard:
+        client.heard["/diagnostics"] = []
+        client.hear("/diagnostics")
+    said = [status.values for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
+    return max((int(values[topic]) for values in said if topic in values), default=0)
+
+
+def test_a_killed_recorder_loses_its_last_chunk_only(start, client, tmp_path):
+    """`kill -9` in the midst of it; `scenario-gen reindex` makes a bag of it that other readers open."""
+    from sensor_msgs.msg import CompressedImage
+
+    bag, saved = tmp_path / "bag", tmp_path / "saved"
+    recorder = start("recorder", bag=bag, topics="/picture", compress=False)
+    picture = publisher(client, CompressedImage, "/picture")
+    data = bytes(50_000)
+    sent = 0
+    while size(bag) < 3_000_000:  # chunks hold 1 MiB
+        assert sent < 1000, f"{size(bag)} bytes after {sent} messages of {len(data)}"
+        message = CompressedImage(format=str(sent), data=data)
+        picture.publish(message)
+        sent += 1
+        client.until(lambda due=sent - 40: counted(client, "/picture") >= due, "the recorder to keep up")
+    written = size(bag)
+    recorder.send_signal(signal.SIGKILL)
+    assert recorder.wait(20.0) == -signal.SIGKILL
+    assert not (bag / "metadata.yaml").exists()
+    answer = CliRunner().invoke(app, ["reindex", str(bag), "--out", str(saved)])
+    assert answer.exit_code == 0, answer.output
+    with Reader(saved) as reader:
+        formats = [bytes(raw) for _, _, raw in reader.messages()]
+        assert reader.message_count == len(formats)
+    with (saved / "saved_0.mcap").open("rb") as stream:
+        assert sum(1 for _ in make_reader(stream).iter_messages()) == len(formats)
+    assert written // len(data) - 1 <= len(formats) <= sent
+    assert f"{len(formats)} messages" in answer.output
+    for k, raw in enumerate(formats):  # none is missing before the end
+        assert str(k).encode() + b"\0" in raw[:40]
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_bag_of_genuine_rosbag2_is_played_and_recorded_again(start, client, data, tmp_path, storage):
+    """What `ros2 bag record` wrote goes through the player and the recorder unchanged, and is split by size."""
+    from std_srvs.srv import Trigger
+
+    source, copy = data / "bags" / storage / "talker", tmp_path / "copy"
+    player = start("player", bag=source, topics="/topic", paused=True, rate=100.0)
+    recorder = start("recorder", bag=copy, topics="/topic", split_bytes=100)
+    client.until(lambda: client.node.count_subscribers("/topic") > 0, "a subscriber of /topic")
+    client.until(lambda: client.node.count_publishers("/topic") > 0, "a publisher of /topic")
+    assert client.call(Trigger, "/player/resume", Trigger.Request()).success
+    client.until(lambda: counted(client, "/topic") == 10, "ten messages in the bag")
+    ended(recorder)
+    ended(player)
+    played = [m.data for m in read_messages(source, lambda name: name == "/topic")]
+    assert [m.data for m in read_messages(copy)] == played
+    info = yaml.safe_load((copy / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert info["message_count"] == 10 and len(info["relative_file_paths"]) > 1
