@@ -3,7 +3,7 @@
 Frame: the road's. `header.stamp`: the template's. A pose's stamp is the planned time: the template's stamp at every anchor
 (start, changepoints, end), between anchors in proportion to arc length. Equal consecutive poses are a dwell.
 QoS: reliable, transient_local, depth 1.
-Arc length does not travel; it is the sum of the chords, and `canonical_route` gives it to a route that stays in process.
+Arc length does not travel; it is the sum of the chords.
 """
 
 import struct
@@ -87,13 +87,6 @@ def decode_path(data: bytes, what: str = "path") -> tuple[int, str, Floats, Ints
 def chord_length(points: Floats) -> Floats:
     """Return (M,) metres along (M, 2+) points."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
-
-
-def canonical_route(route: "Route") -> "Route":
-    """Return the route as the other side of a message sees it."""
-    from scenario_gen.planning.route import Route
-
-    return Route(points=route.points, anchor=route.anchor, length=chord_length(route.points))
 
 
 def encode_route(route: "Route", anchors_ns: Sequence[int], frame_id: str) -> bytes:

@@ -8,12 +8,12 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-import yaml
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader, ReaderError
 
 from msg_conventions.topics import Quality
 from scenario_gen.errors import InputError
+from scenario_gen.logs.files import bag_files
 
 
 @dataclass(frozen=True)
@@ -36,27 +36,17 @@ class BagMessage:
     stamp_ns: int
 
 
-def _parts(path: Path) -> list[Path]:
-    """Return what rosbags is to open one by one: the files of a bag, or its folder where files or messages are compressed.
-
-    Through the folder rosbags 0.11 passes over messages whose QoS reads differently in metadata.yaml and in the file, as in
-    bags of older distributions.
-    """
-    metadata = path / "metadata.yaml"
-    if not metadata.is_file():
-        return [path]
-    info = yaml.safe_load(metadata.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
-    return [path] if info.get("compression_mode") else [path / Path(name).name for name in info["relative_file_paths"]]
-
-
 @contextmanager
 def _opened(path: Path) -> Iterator[list[Any]]:
     if not path.exists():
         raise InputError(f"{path}: no such bag")
+    files = bag_files(path)
+    if not files:
+        raise InputError(f"{path}: no bag; name a folder that holds .mcap or .db3 files, or one of them")
     try:
         with ExitStack() as stack:
-            yield [stack.enter_context(Reader(part)) for part in _parts(path)]
-    except (ReaderError, OSError, sqlite3.Error, yaml.YAMLError, ValueError, TypeError, KeyError, EOFError) as error:
+            yield [stack.enter_context(Reader(file)) for file in files]
+    except (ReaderError, OSError, sqlite3.Error, ValueError, TypeError, KeyError, EOFError) as error:
         raise InputError(f"{path}: cannot be read as a bag ({error}); `reindex` saves what is whole in an MCAP file") from error
 
 
