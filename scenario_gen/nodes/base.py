@@ -10,6 +10,7 @@ from time import perf_counter
 from typing import Any
 
 import rclpy
+from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -80,12 +81,15 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     def started(self) -> None:
         """Begin what needs no input; called at activation."""
 
-    def listen(self, topic: str) -> None:
-        """Subscribe to a topic of the suite, raw; `received` gets its messages."""
+    def stopped(self) -> None:
+        """End what was begun and forget what was heard; called at deactivation, when no work runs any more."""
+
+    def listen(self, topic: str, quality: Quality | None = None) -> None:
+        """Subscribe to a topic of the suite, raw; `received` gets its messages. `quality`: another one than the suite's."""
         if topic not in self._inputs:
-            kind, quality = topic_entry(topic)
+            kind, own = topic_entry(topic)
             self._inputs[topic] = self.create_subscription(
-                message_class(kind), topic, lambda data: self._receive(topic, data), qos(quality), raw=True
+                message_class(kind), topic, lambda data: self._receive(topic, data), qos(quality or own), raw=True
             )
 
     def ignore(self, topic: str) -> None:
@@ -114,6 +118,17 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
                 return response
 
         self.create_service(kind, name, guarded, qos_profile=REQUESTS)
+
+    def every(self, seconds: float, name: str, callback: Callable[[], None]) -> Any:
+        """Return a timer that runs in real time, also where /clock stands; whatever goes wrong in it, the node lives on."""
+
+        def guarded() -> None:
+            try:
+                callback()
+            except Exception as error:
+                self._failed(name, error)
+
+        return self.create_timer(seconds, guarded, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def work(self, name: str, job: Job) -> None:
         """Run a job off the executor's thread; a waiting one of the same name is replaced, a running one cancelled."""
@@ -179,6 +194,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         if self._worker is not None:
             self._worker.close()
             self._worker = None
+            self.stopped()
 
     def destroy_node(self) -> None:
         """End the work, then the node."""

@@ -1,6 +1,6 @@
 """log_player: a log in, one of its encounters out as latched `tracks`; `~/play` reads it again.
 
-With `stream`, the encounter is then played as every vehicle's own `vehicle_<id>/fix` and `vehicle_<id>/speed`, and `/clock`.
+With `stream`, the encounter comes as every vehicle's own `vehicle_<id>/fix` and `vehicle_<id>/speed`, and `/clock`, instead.
 """
 
 import sys
@@ -33,8 +33,9 @@ class Config:
 
     log_path: str = parameter("", "log to read: a file, a bag or a folder of files")
     encounter: int = parameter(0, "which encounter of the log, from 0", low=0)
-    stream: bool = parameter(False, "play the encounter as fixes and speeds of each vehicle, too")
+    stream: bool = parameter(False, "play the encounter as fixes and speeds of each vehicle, and not as tracks")
     rate: float = parameter(1.0, "how many times as fast as it was recorded the stream is", low=0.01, high=1000.0)
+    wait_matching_subscriptions: int = parameter(0, "do not begin to stream before each stream has so many listeners", low=0)
     log: LogConfig = field(default_factory=LogConfig)
 
     def __post_init__(self) -> None:
@@ -63,23 +64,27 @@ class LogPlayer(StageNode):
                 f"parameter encounter is {config.encounter}; {config.log_path} holds {len(result.encounters)}, counted from 0"
             )
         encounter = result.encounters[config.encounter]
-        self.send("tracks", encode_tracks(encounter))
+        if not config.stream:
+            self.send("tracks", encode_tracks(encounter))
         n, samples = encounter.speed.shape
         message = f"{encounter.name}: {n} vehicles, {samples} samples over {encounter.duration:.1f} s"
         notes = {f"note.{k}": note for k, note in enumerate(result.quality.notes)}
         self.status(Level.OK, message, "encounter", encounter.start_ns, **notes)
         if config.stream:
-            self._stream(encounter, config.rate, cancelled)
+            self._stream(encounter, config, cancelled)
 
-    def _stream(self, encounter: Encounter, rate: float, cancelled: Callable[[], bool]) -> None:
-        """Publish sample after sample, at `rate`, until the end or until cancelled; the clock runs ahead of none of them."""
+    def _stream(self, encounter: Encounter, config: Config, cancelled: Callable[[], bool]) -> None:
+        """Publish sample after sample, at the rate, until the end or until cancelled; the clock runs ahead of none."""
         names, places = tokens(vehicle.id for vehicle in encounter.vehicles), geodetic(encounter)
         clock = self.create_publisher(Clock, "/clock", 10)
-        for topic in (vehicle_topic(name, kind) for name in names for kind in ("fix", "speed")):
+        topics = [vehicle_topic(name, kind) for name in names for kind in ("fix", "speed")]
+        for topic in topics:
             self._announce(topic)
+        while min(map(self.count_subscribers, topics)) < config.wait_matching_subscriptions and not cancelled():
+            time.sleep(0.05)
         started = time.monotonic() + HEAD_START
         for k in range(encounter.speed.shape[1]):
-            while (ahead := started + k * encounter.dt / rate - time.monotonic()) > 0.0 and not cancelled():
+            while (ahead := started + k * encounter.dt / config.rate - time.monotonic()) > 0.0 and not cancelled():
                 time.sleep(min(ahead, 0.1))
             if cancelled() or not self.context.ok():
                 break

@@ -64,23 +64,36 @@ class Client:
         self.thread.start()
 
     def hear(self, *topics: str) -> None:
-        from msg_conventions.topics import topic_entry
-        from scenario_gen.nodes.base import qos
-        from scenario_gen.nodes.message_classes import message_class
-
         for topic in topics:
-            kind, quality = topic_entry(topic)
-            self.node.create_subscription(message_class(kind), topic, self.heard[topic].append, qos(quality), raw=True)
+            self.also(topic, lambda _: None)
+
+    def also(self, topic: str, callback) -> None:
+        """Hear a topic, and call back after each message."""
+        message, quality = self._kind_of(topic)
+
+        def take(data: bytes) -> None:
+            self.heard[topic].append(data)
+            callback(data)
+
+        self.node.create_subscription(message, topic, take, quality, raw=True)
+
+    def announce(self, topic: str) -> None:
+        if topic not in self._publishers:
+            message, quality = self._kind_of(topic)
+            self._publishers[topic] = self.node.create_publisher(message, topic, quality)
 
     def say(self, topic: str, data: bytes) -> None:
+        self.announce(topic)
+        self._publishers[topic].publish(data)
+
+    @staticmethod
+    def _kind_of(topic: str):
         from msg_conventions.topics import topic_entry
         from scenario_gen.nodes.base import qos
         from scenario_gen.nodes.message_classes import message_class
 
         kind, quality = topic_entry(topic)
-        if topic not in self._publishers:
-            self._publishers[topic] = self.node.create_publisher(message_class(kind), topic, qos(quality))
-        self._publishers[topic].publish(data)
+        return message_class(kind), qos(quality)
 
     def wait(self, topic: str, count: int = 1, timeout: float = 180.0) -> list[bytes]:
         self.until(lambda: len(self.heard[topic]) >= count, f"{count} messages on {topic}", timeout)
