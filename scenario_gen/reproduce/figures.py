@@ -53,7 +53,10 @@ def figure_2(found: Regressions) -> go.Figure:
     panels.update_xaxes(title_text="x [cells]")
     panels.update_yaxes(title_text="y [cells]", col=1)
     room = max(0.4 * (high - low), 40.0)
-    panels.update_yaxes(range=[low - room, high + room])
+    for column, prior in enumerate([None, *found.priors.values()], start=1):
+        curves = [found.truth] if prior is None else [found.truth, *prior.samples]
+        least, most = min(float(curve.min()) for curve in curves), max(float(curve.max()) for curve in curves)
+        panels.update_yaxes(range=[min(low - room, least), max(high + room, most)], col=column)
     return _finished(panels, 320)
 
 

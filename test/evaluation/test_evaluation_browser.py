@@ -1,29 +1,20 @@
 """The report in headless Chromium: no errors, no requests, it plays, scrubs and switches; nothing is wider than a phone."""
 
 import io
-import shutil
 from base64 import b64decode
 
 import pytest
+from browser_tab import DESKTOP, PHONE, Tab, chromium
 from evaluation_worlds import report_case
 from PIL import Image
 
 from scenario_gen.evaluation import ReportInput, write_report
 
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (pip install playwright)")
-DESKTOP, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
-FLAGS = ["--disable-gpu", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"]
-
 
 @pytest.fixture(scope="module")
 def browser():
-    found = shutil.which("chromium") or shutil.which("chromium-browser")
-    if not found:
-        pytest.skip("chromium is not installed (apt-get install chromium)")
-    with playwright.sync_playwright() as driver:
-        instance = driver.chromium.launch(executable_path=found, args=FLAGS, chromium_sandbox=False)
+    with chromium() as instance:
         yield instance
-        instance.close()
 
 
 @pytest.fixture(scope="module")
@@ -38,18 +29,8 @@ def report(tmp_path_factory):
     return path
 
 
-class Tab:
-    """A page with a record of what went wrong and what was asked of the network."""
-
-    def __init__(self, browser, report, size):
-        self.page = browser.new_page(viewport=size)
-        self.troubles, self.requests = [], []
-        self.page.on(
-            "console", lambda message: self.troubles.append(message.text) if message.type in ("error", "warning") else None
-        )
-        self.page.on("pageerror", lambda error: self.troubles.append(str(error)))
-        self.page.on("request", lambda request: self.requests.append(request.url))
-        self.page.goto(report.as_uri())
+class Report(Tab):
+    """The report, its parts found by their roles."""
 
     def part(self, role, case=0):
         return self.page.locator(f'[data-case="{case}"] [data-role="{role}"]')
@@ -64,7 +45,7 @@ class Tab:
 
 @pytest.fixture
 def tab(browser, report):
-    tab = Tab(browser, report, DESKTOP)
+    tab = Report(browser, report, DESKTOP)
     yield tab
     tab.page.close()
 
@@ -72,8 +53,7 @@ def tab(browser, report):
 def test_it_loads_without_errors_or_requests(tab, report):
     tab.page.wait_for_timeout(300)
     assert tab.troubles == []
-    own = [url for url in tab.requests if not url.startswith(("data:", "blob:"))]
-    assert own == [report.as_uri()]
+    assert tab.asked() == [report.as_uri()]
     assert tab.page.locator('[data-case="0"] .js-plotly-plot').count() == 9  # template, two arms, six matrices
     for role in ("stage", "template-map", "routes", "samples-with", "samples-without"):
         pixels = Image.open(io.BytesIO(b64decode(tab.picture(role).partition(",")[2])))
@@ -146,7 +126,7 @@ def test_the_keyboard_drives_it(tab):
 
 
 def test_a_phone_shows_all_of_it(browser, report):
-    tab = Tab(browser, report, PHONE)
+    tab = Report(browser, report, PHONE)
     tab.page.wait_for_timeout(300)
     assert tab.troubles == []
     wide = "all => all.filter(e => e.getBoundingClientRect().right > innerWidth + 1).map(e => e.outerHTML.slice(0, 90))"
