@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from msg_conventions import diagnostics, paths, pictures, roads, trajectory
+from msg_conventions import diagnostics, odometry, paths, pictures, roads, trajectory
 
 CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
 FIX_TYPE = "sensor_msgs/msg/NavSatFix"
@@ -37,6 +37,9 @@ TOPICS: dict[str, tuple[str, Quality]] = {
     "vehicle_*/footprint": (pictures.FOOTPRINT_TYPE, LATCHED),
     "vehicle_*/fix": (FIX_TYPE, STREAM),
     "vehicle_*/speed": (TWIST_TYPE, STREAM),
+    "ego/start": (odometry.TYPE, LATCHED),
+    "ego/goal": (odometry.TYPE, LATCHED),
+    "ego/track": (trajectory.TYPE, LATCHED),
     "scenarios": (trajectory.TYPE, MANY),
     "scenarios/info": (diagnostics.TYPE, MANY),
     "markers": (pictures.MARKERS_TYPE, LATCHED),

@@ -17,6 +17,8 @@ from rich.table import Table
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags import read_messages, reindex
 from scenario_gen.bags.evaluation import bag_cases
+from scenario_gen.bags.provenance import sha256_of
+from scenario_gen.bags.regenerate import regenerate_scenario, write_regenerated
 from scenario_gen.bags.validation import validate_bag
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError, ScenarioGenError
@@ -27,7 +29,8 @@ from scenario_gen.logs.synthetic import bundled
 from scenario_gen.parameters import flatten, updated
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.pipeline import generate as run_pipeline
-from scenario_gen.results import BAG, FIGURES, REPORT, check_folder, namespaces, provenance_of, sha256_of, write_results
+from scenario_gen.requests import Request
+from scenario_gen.results import BAG, FIGURES, REPORT, check_folder, namespaces, provenance_of, write_results
 
 app = typer.Typer(
     help="Turn recorded vehicle encounters into new, valid ones on other roads.",
@@ -116,15 +119,24 @@ def generate(
     encounter: Annotated[
         list[str] | None, typer.Option(help="name of an encounter of the log (default: all); repeatable")
     ] = None,
+    ego: Annotated[
+        str,
+        typer.Option(help="id of a vehicle to leave out for a planner under test; its start, goal and track are given instead"),
+    ] = "",
+    start: Annotated[
+        list[str] | None, typer.Option(help="a vehicle's start state, 'id: x y yaw [speed]', on the road; repeatable")
+    ] = None,
+    goal: Annotated[list[str] | None, typer.Option(help="a vehicle's end state, likewise; repeatable")] = None,
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
     """Generate new encounters from a log: bag, report and figures in one folder."""
     config = configured(parameter_file, assignments or [])
+    request = Request(ego, "; ".join(start or []), "; ".join(goal or []))
     check_folder(out)
     found = read_log(log, config.log)
     templates = chosen(found.encounters, encounter or [])
-    cases, refusals = run_all(templates, road, config, count=count, seed=seed)
+    cases, refusals = run_all(templates, road, config, count=count, seed=seed, request=request)
     if not cases:
         raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
     write_results(
@@ -133,9 +145,27 @@ def generate(
         seed=seed,
         title=", ".join(path.stem for path in log),
         quality=(*found.quality.lines(), *refusals),
-        provenance=provenance_of(log, seed, count, road, config),
+        provenance=provenance_of(log, seed, count, road, config, request),
     )
     conclude(cases, refusals, out)
+
+
+@app.command()
+def regenerate(
+    bag: Annotated[Path, typer.Argument(help="a bag of this suite, written by generate or recorded from the nodes")],
+    index: Annotated[int, typer.Argument(help="the scenario's index, as in scenarios/info", min=0)],
+    out: Annotated[Path | None, typer.Option(help="folder of a bag for this one scenario, with its template and road")] = None,
+    namespace: Annotated[str | None, typer.Option(help="where several hold that index")] = None,
+    request: Annotated[str | None, typer.Option(help="id of the request, where several hold that index")] = None,
+    log: Annotated[
+        Path | None, typer.Option(help="make it from this raw log, not from the bag's tracks and changepoints")
+    ] = None,
+) -> None:
+    """Make one published scenario again, bit for bit, and compare it with its recorded SHA-256."""
+    made = regenerate_scenario(bag, index, namespace=namespace, request=request, log=log)
+    console.print(f"scenario {index}: the same {len(made.data)} bytes, sha256 {made.sha256}", highlight=False, soft_wrap=True)
+    if out is not None:
+        console.print(f"bag: {write_regenerated(made, out)}", highlight=False, soft_wrap=True)
 
 
 @app.command()
@@ -308,7 +338,13 @@ def chosen(encounters: tuple[Encounter, ...], names: list[str]) -> list[Encounte
 
 
 def run_all(
-    templates: list[Encounter], roads: list[str], config: PipelineConfig, *, count: int, seed: int
+    templates: list[Encounter],
+    roads: list[str],
+    config: PipelineConfig,
+    *,
+    count: int,
+    seed: int,
+    request: Request = Request(),  # noqa: B008 - frozen
 ) -> tuple[list[Case], list[str]]:
     """Run every encounter on every road; return the cases, and a sentence for each that was refused."""
     cases: list[Case] = []
@@ -322,7 +358,7 @@ def run_all(
                     bar.update(task, completed=done, total=total)
 
                 try:
-                    case = run_pipeline(template, road, config, count=count, seed=seed, progress=advance)
+                    case = run_pipeline(template, road, config, count=count, seed=seed, request=request, progress=advance)
                 except RefusedError as error:
                     refusals.append(f"{template.name} on {road}: {error}")
                     continue

@@ -19,15 +19,15 @@ from scenario_gen.evaluation import (
     replay,
     uniform_changepoints,
 )
-from scenario_gen.fitting import Fit, FittingConfig, fit_template
-from scenario_gen.interaction import find_conflicts, find_waits
+from scenario_gen.fitting import Fit, FittingConfig
 from scenario_gen.logs import LogConfig
-from scenario_gen.planning import PlanningConfig, Route, plan_routes
+from scenario_gen.planning import PlanningConfig, Route
+from scenario_gen.requests import Chain, Request, run_request
 from scenario_gen.roads import Road, RoadConfig, build_road
-from scenario_gen.sampling import SamplingConfig, sample_scenarios
-from scenario_gen.scenario import BoundaryStates, ScenarioSet
+from scenario_gen.sampling import SamplingConfig
+from scenario_gen.scenario import ScenarioSet
 from scenario_gen.segmentation import Segmentation, SegmentationConfig, segment
-from scenario_gen.validity import Checker, Limits
+from scenario_gen.validity import Limits
 
 Progress = Callable[[int, int], None]
 
@@ -63,18 +63,21 @@ def generate(
     *,
     count: int,
     seed: int,
+    request: Request = Request(),  # noqa: B008 - frozen
     progress: Progress | None = None,
 ) -> Case:
     """Segment, fit, plan, sample, check and evaluate.
 
     Raises:
-        InputError: the road cannot be read.
-        RefusedError: the template does not fit the road, or there is no way; the message says why.
+        InputError: the road cannot be read, or a vehicle of the request does not exist.
+        RefusedError: the template does not fit the road, there is no way, or what the request asks cannot be had; the
+            message says why, and what nearby can.
     """
+    request.ego_of(encounter)
     road = build_road(road_name, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)
-    arm = run_arm(encounter, segmentation, road, config, count=count, seed=seed, progress=progress)
-    return with_ablation(encounter, road, arm, config, count=count, seed=seed)
+    arm = run_arm(encounter, segmentation, road, config, count=count, seed=seed, request=request, progress=progress)
+    return with_ablation(encounter, road, arm, config, count=count, seed=seed, request=request)
 
 
 def run_arm(
@@ -85,51 +88,13 @@ def run_arm(
     *,
     count: int,
     seed: int,
+    request: Request = Request(),  # noqa: B008 - frozen
     progress: Progress | None = None,
 ) -> Arm:
     """Fit the changepoints to the road, plan between them, sample and check."""
-    fit = fit_template(encounter, segmentation, road, config.fitting)
-    routes = plan_routes(road, fit, config.planning, seed)
-    scenarios = sample_checked(
-        encounter, segmentation, road, routes, fit.asked, config, count=count, seed=seed, progress=progress
-    )
-    return Arm(segmentation, fit, routes, scenarios)
-
-
-def sample_checked(
-    encounter: Encounter,
-    segmentation: Segmentation,
-    road: Road,
-    routes: tuple[Route, ...],
-    asked: BoundaryStates,
-    config: PipelineConfig,
-    *,
-    count: int,
-    seed: int,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> ScenarioSet:
-    """Sample candidates and publish those that the checker proves valid against the template's conflicts and waits.
-
-    A segmentation without changepoints has no dwell to hold, so its waits are not asked for (method: the ablation).
-    """
-    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
-    waits = find_waits(encounter) if segmentation.changepoints.size else ()
-    checker = Checker(road, asked, conflicts, waits, config.limits)
-    return sample_scenarios(
-        encounter,
-        segmentation,
-        road,
-        routes,
-        asked,
-        checker.check,
-        config.sampling,
-        count=count,
-        seed=seed,
-        waits=waits,
-        progress=progress,
-        cancelled=cancelled,
-    )
+    chain = Chain(encounter, segmentation, road, seed, config.fitting, config.planning, config.sampling, config.limits)
+    outcome = run_request(chain, request, count=count, progress=progress)
+    return Arm(segmentation, outcome.fit, outcome.routes, outcome.scenarios)
 
 
 def without_changepoints(segmentation: Segmentation) -> Segmentation:
@@ -142,7 +107,16 @@ def without_changepoints(segmentation: Segmentation) -> Segmentation:
     )
 
 
-def with_ablation(encounter: Encounter, road: Road, arm: Arm, config: PipelineConfig, *, count: int, seed: int) -> Case:
+def with_ablation(
+    encounter: Encounter,
+    road: Road,
+    arm: Arm,
+    config: PipelineConfig,
+    *,
+    count: int,
+    seed: int,
+    request: Request = Request(),  # noqa: B008 - frozen
+) -> Case:
     """Run the chain again without changepoints and, unless `evaluation.uniform` is off, with uniform ones; evaluate all.
 
     Beside them stands the fitted template (the oracle row).
@@ -153,7 +127,7 @@ def with_ablation(encounter: Encounter, road: Road, arm: Arm, config: PipelineCo
     arms, refused = {WITH: arm}, {}
     for name, segmentation in others.items():
         try:
-            arms[name] = run_arm(encounter, segmentation, road, config, count=count, seed=seed)
+            arms[name] = run_arm(encounter, segmentation, road, config, count=count, seed=seed, request=request)
         except RefusedError as error:
             refused[name] = str(error)
     made = {name: one.scenarios for name, one in arms.items()}

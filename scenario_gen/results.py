@@ -1,19 +1,17 @@
 """What a request leaves behind: a bag, a report and the figures, whole or not at all."""
 
-import hashlib
 import json
-import platform
 import shutil
 from collections.abc import Mapping, Sequence
-from importlib import metadata
 from pathlib import Path
 
-import scenario_gen
 from scenario_gen.bags import Run, write_run
+from scenario_gen.bags.provenance import parameter_texts, sha256_of, versions
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import Case, ReportInput, write_report
 from scenario_gen.parameters import flatten
 from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.requests import Request
 
 BAG, REPORT, FIGURES = "bag", "report.html", "evaluation.json"
 
@@ -49,7 +47,7 @@ def write_results(
     try:
         if bag is None:
             names = namespaces(len(cases))
-            write_run(partial / BAG, [as_run(case, seed, name) for case, name in zip(cases, names, strict=True)])
+            write_run(partial / BAG, [as_run(case, seed, name, provenance) for case, name in zip(cases, names, strict=True)])
         else:
             shutil.copytree(bag, partial / BAG)
         write_report(partial / REPORT, ReportInput(cases, title, quality, provenance))
@@ -67,7 +65,7 @@ def check_folder(folder: Path) -> None:
         raise InputError(f"{folder} exists and is not an earlier result; choose another --out")
 
 
-def as_run(case: Case, seed: int, namespace: str = "") -> Run:
+def as_run(case: Case, seed: int, namespace: str = "", provenance: Mapping[str, str] | None = None) -> Run:
     """Return the case as the bag writer takes it.
 
     Raises:
@@ -84,6 +82,7 @@ def as_run(case: Case, seed: int, namespace: str = "") -> Run:
         result=case.with_changepoints,
         seed=seed,
         namespace=namespace,
+        provenance=provenance or {},
     )
 
 
@@ -92,19 +91,16 @@ def namespaces(count: int) -> list[str]:
     return [""] if count == 1 else [f"/case_{k + 1}" for k in range(count)]
 
 
-def provenance_of(logs: Sequence[Path], seed: int, count: int, roads: Sequence[str], config: PipelineConfig) -> dict[str, str]:
-    """Return everything needed to do it again: log hashes, seed, versions and all parameters."""
+def provenance_of(
+    logs: Sequence[Path],
+    seed: int,
+    count: int,
+    roads: Sequence[str],
+    config: PipelineConfig,
+    request: Request = Request(),  # noqa: B008 - frozen
+) -> dict[str, str]:
+    """Return everything needed to do it again: log hashes, seed, versions, the request and all parameters."""
     facts = {f"log {path.name}": f"sha256 {sha256_of(path)}" for path in logs}
     facts |= {"roads": ", ".join(roads), "seed": str(seed), "count": str(count)}
-    facts |= {"scenario_gen": scenario_gen.__version__, "python": platform.python_version()}
-    facts |= {name: metadata.version(name) for name in ("numpy", "scipy", "numba")}
-    return facts | {name: str(value) for name, (_, value) in flatten(config).items()}
-
-
-def sha256_of(path: Path) -> str:
-    """Return the SHA-256 of a file, or of a folder's files in order of their names."""
-    digest = hashlib.sha256()
-    for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
-        if file.is_file():
-            digest.update(file.read_bytes())
-    return digest.hexdigest()
+    facts |= {name: value for name, (_, value) in flatten(request).items() if value}
+    return facts | versions() | parameter_texts(config)

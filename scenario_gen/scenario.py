@@ -105,7 +105,8 @@ class Verdict:
 class ScenarioSet:
     """What a request got: valid scenarios, and an account of every candidate.
 
-    `refused` counts refused candidates by their first cause; `adaptations` names what was changed to get there.
+    `refused` counts refused candidates by their first cause; `adaptations` names what was changed to get there. `ego` is the
+    template track of the vehicle that was left out for a planner under test, if one was: a scenario of that vehicle alone.
     """
 
     requested: int
@@ -113,6 +114,7 @@ class ScenarioSet:
     candidates: int
     refused: Counter[Cause] = field(default_factory=Counter)
     adaptations: Sequence[str] = ()
+    ego: Scenario | None = None
 
     @property
     def acceptance(self) -> float:

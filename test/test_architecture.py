@@ -21,6 +21,7 @@ ORDER = (
     ("planning",),
     ("sampling",),
     ("validity",),
+    ("requests",),
     ("evaluation",),
     ("pipeline",),
     ("bags",),

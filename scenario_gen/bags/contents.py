@@ -10,13 +10,18 @@ Contents = dict[str, list[bytes]]  # topic without its namespace -> messages, in
 
 
 def read_namespaces(path: Path, topics: Collection[str]) -> dict[str, Contents]:
-    """Return the messages of `topics` (names without a slash) of every namespace, by namespace, sorted.
+    """Return the messages of `topics` (one name may end with another, e.g. `scenarios/info`) by namespace, sorted.
 
     Raises:
         InputError: the bag is missing or damaged.
     """
     found: dict[str, Contents] = defaultdict(lambda: {topic: [] for topic in topics})
-    for message in read_messages(path, lambda topic: topic.rpartition("/")[2] in topics):
-        namespace, _, topic = message.topic.rpartition("/")
-        found[namespace][topic].append(message.data)
+    longest_first = sorted(topics, key=len, reverse=True)
+
+    def own(name: str) -> str | None:
+        return next((topic for topic in longest_first if f"/{name}".endswith(f"/{topic}")), None)
+
+    for message in read_messages(path, lambda name: own(name) is not None):
+        topic = own(message.topic) or ""
+        found[message.topic.removesuffix(topic).removesuffix("/")][topic].append(message.data)
     return dict(sorted(found.items()))

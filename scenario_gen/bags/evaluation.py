@@ -11,6 +11,7 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags.contents import read_namespaces
+from scenario_gen.bags.validation import Reference
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import Case, CheckCounts, Evaluation, EvaluationConfig, evaluate
@@ -19,7 +20,7 @@ from scenario_gen.scenario import ScenarioSet
 from scenario_gen.segmentation import Segmentation
 from scenario_gen.validity import Checker, Limits
 
-TOPICS = ("tracks", "changepoints", "map", "scenarios")
+TOPICS = ("tracks", "changepoints", "map", "ego/track", "scenarios")
 SCENARIOS = "scenarios"
 
 
@@ -59,7 +60,16 @@ def _case(
     scenarios = [decode_scenario(data, index=k, what=f"{namespace}/{SCENARIOS}")[1] for k, data in enumerate(topics[SCENARIOS])]
     conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
     waits = find_waits(encounter) if segmentation.changepoints.size else ()
-    counts = CheckCounts.of_verdicts(Checker(road, None, conflicts, waits, limits).check(scenarios))
+    names = tuple(vehicle.id for vehicle in encounter.vehicles)
+    reference = Reference(road, None, names, conflicts, waits)
+    checkers: dict[tuple[str, ...], Checker] = {}
+    verdicts = []
+    for scenario in scenarios:  # an ego may have been left out
+        ids = tuple(vehicle.id for vehicle in scenario.vehicles)
+        if ids not in checkers:
+            checkers[ids] = reference.checker(scenario, limits)
+        verdicts += checkers[ids].check([scenario])
+    counts = CheckCounts.of_verdicts(verdicts)
     evaluation = evaluate(
         encounter,
         segmentation,
@@ -69,7 +79,10 @@ def _case(
         config=config,
         seed=seed,
     )
-    everything = ScenarioSet(len(scenarios), tuple(scenarios), counts.candidates, Counter(counts.refused), _left_out(topics))
+    ego = decode_scenario(topics["ego/track"][-1], what=f"{namespace}/ego/track")[1] if topics["ego/track"] else None
+    if ego is not None and ego.vehicles[0].id in evaluation.vehicles:
+        ego = None  # of another request than these scenarios
+    everything = ScenarioSet(len(scenarios), tuple(scenarios), counts.candidates, Counter(counts.refused), _left_out(topics), ego)
     return Case(
         encounter,
         segmentation,

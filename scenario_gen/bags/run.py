@@ -1,7 +1,7 @@
 """One run as messages and as a bag: the same bytes that the nodes publish, in an order and at stamps that need no clock."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +9,7 @@ from msg_conventions.changepoints import encode_changepoints, encode_posterior
 from msg_conventions.diagnostics import (
     Level,
     Status,
+    asked_values,
     decode_diagnostics,
     encode_diagnostics,
     fit_statuses,
@@ -16,6 +17,7 @@ from msg_conventions.diagnostics import (
     request_status,
     scenario_status,
 )
+from msg_conventions.ego import ego_messages, ego_values
 from msg_conventions.fits import anchor_stamps, encode_fit
 from msg_conventions.names import tokens
 from msg_conventions.paths import encode_route
@@ -42,7 +44,10 @@ SCENARIO_STEP_NS = 100_000_000  # scenarios are logged this far apart, so that a
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """All that one request made of one template on one road; `namespace` stands before its topics, "" or e.g. "/case_a"."""
+    """All that one request made of one template on one road.
+
+    `namespace` stands before its topics, "" or e.g. "/case_a"; `provenance` is what is needed to make it again.
+    """
 
     encounter: Encounter
     road: "Road"
@@ -53,6 +58,7 @@ class Run:
     seed: int
     request: str = "1"
     namespace: str = ""
+    provenance: Mapping[str, str] = field(default_factory=dict)
 
 
 def run_messages(run: Run) -> Iterator[tuple[str, bytes, int]]:
@@ -75,14 +81,18 @@ def run_messages(run: Run) -> Iterator[tuple[str, bytes, int]]:
         encode_diagnostics((segmentation_status(run.segmentation), *fit_statuses(run.fit, "/planner")), stamp),
         stamp,
     )
+    for topic, data in () if run.result.ego is None else ego_messages(run.result.ego, stamp):
+        yield topic, data, stamp
+    ego = ego_values(run.result.ego)
     for k, scenario in enumerate(run.result.scenarios):
         logged = stamp + k * SCENARIO_STEP_NS
         data = encode_scenario(scenario, stamp)
-        status = scenario_status(scenario, data, run.request, "/gp_sampler", template=encounter.name, road=road.name)
+        more = {"template": encounter.name, "road": road.name, **ego, **asked_values(run.fit.asked, encounter.vehicles, scenario)}
+        status = scenario_status(scenario, data, run.request, "/gp_sampler", **more)
         yield "scenarios", data, logged
         yield "scenarios/info", encode_diagnostics([status], stamp), logged
         yield "markers", scenario_markers(scenario, stamp), logged
-    closing = request_status(run.result, run.request, "/gp_sampler", run.seed)
+    closing = request_status(run.result, run.request, "/gp_sampler", run.seed, run.provenance)
     yield "scenarios/info", encode_diagnostics([closing], stamp), stamp + len(run.result.scenarios) * SCENARIO_STEP_NS
 
 

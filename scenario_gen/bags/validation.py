@@ -1,10 +1,12 @@
 """Is every scenario of a bag valid? For any bag of the conventions, ours or not.
 
-A scenario is checked against what bears its stamp in its own namespace: the states asked of it (`fit`), the conflicts and waits
-of its template (`tracks`; waits if there are `changepoints`), and the road (`map`; the newest one where none bears the stamp).
-What is not there is not checked, and said. Vehicles are matched by id, so one may be left out for an ego.
+A scenario is checked against what bears its stamp in its own namespace: the states asked of it (its own in `scenarios/info`,
+else `fit`), the conflicts and waits of its template (`tracks`; waits if there are `changepoints`), and the road (`map`; the
+newest one where none bears the stamp). What is not there is not checked, and said. Vehicles are matched by id, so one may be
+left out for an ego. Where there are accounts on `scenarios/info`, each scenario's SHA-256 must be among them.
 """
 
+import json
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,9 +16,10 @@ import numpy as np
 from msg_conventions import trajectory
 from msg_conventions.cdr import CdrReader
 from msg_conventions.changepoints import decode_changepoints
+from msg_conventions.diagnostics import decode_diagnostics
 from msg_conventions.names import tokens
 from msg_conventions.roads import decode_map
-from msg_conventions.scenarios import decode_scenario
+from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.arrays import Floats
 from scenario_gen.bags.contents import Contents, read_namespaces
@@ -26,8 +29,10 @@ from scenario_gen.roads.road import Road
 from scenario_gen.scenario import BoundaryStates, Scenario
 from scenario_gen.validity import Checker, Limits
 
-TOPICS = ("tracks", "changepoints", "map", "fit", "scenarios")
+REFERENCES = ("tracks", "changepoints", "map", "fit")
+INFO = "scenarios/info"
 UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
+ALTERED = "altered_message"  # not the bytes that scenarios/info accounts for
 
 
 @dataclass
@@ -70,11 +75,10 @@ class Reference:
     conflicts: tuple[Conflict, ...]
     waits: tuple[Wait, ...] | None
 
-    def checker(self, scenario: Scenario, limits: Limits | None) -> Checker:
-        """Return the checker of scenarios with this one's vehicles."""
+    def checker(self, scenario: Scenario, limits: Limits | None, asked: BoundaryStates | None = None) -> Checker:
+        """Return the checker of scenarios with this one's vehicles; `asked` is in place of the template's states."""
         ids = tokens(vehicle.id for vehicle in scenario.vehicles)
-        asked = None
-        if self.asked is not None and all(name in self.asked for name in ids):
+        if asked is None and self.asked is not None and all(name in self.asked for name in ids):
             start, end = zip(*(self.asked[name] for name in ids), strict=True)
             asked = BoundaryStates(np.array(start), np.array(end))
         if self.template is None or not set(ids) <= set(self.template):
@@ -85,13 +89,34 @@ class Reference:
         return Checker(self.road, asked, conflicts, waits, limits)
 
 
+def asked_by_digest(infos: Sequence[tuple[str, bytes]]) -> dict[str, BoundaryStates]:
+    """Return the states that `scenarios/info` says were asked of each scenario, by its SHA-256; `infos` are (name, bytes).
+
+    Raises:
+        InputError: a message is damaged.
+    """
+    found = {}
+    for what, data in infos:
+        for status in decode_diagnostics(data, what)[1]:
+            values = status.values
+            if {"sha256", "asked_start", "asked_end"} <= set(values):
+                try:
+                    rows = (np.array(json.loads(values[key]), dtype=np.float64) for key in ("asked_start", "asked_end"))
+                    found[values["sha256"]] = BoundaryStates(*(row.reshape(-1, 4) for row in rows))
+                except ValueError as error:
+                    raise InputError(f"{what}: the asked states of {status.message} are no rows of numbers ({error})") from None
+    return found
+
+
 def validate_bag(path: Path, limits: Limits | None = None) -> tuple[Validation, ...]:
     """Check every scenario of every namespace that holds any.
 
     Raises:
         InputError: the bag is missing or damaged, holds no scenarios, or one of its tracks, maps, … cannot be read.
     """
-    found = {name: topics for name, topics in read_namespaces(path, TOPICS).items() if topics["scenarios"]}
+    found = {
+        name: topics for name, topics in read_namespaces(path, (*REFERENCES, "scenarios", INFO)).items() if topics["scenarios"]
+    }
     if not found:
         raise InputError(f"{path}: no topic `scenarios` in any namespace; there is nothing to check")
     return tuple(_validate(namespace, topics, limits) for namespace, topics in found.items())
@@ -99,28 +124,54 @@ def validate_bag(path: Path, limits: Limits | None = None) -> tuple[Validation, 
 
 def _validate(namespace: str, topics: Contents, limits: Limits | None) -> Validation:
     result = Validation(namespace)
+    asked = asked_by_digest([(f"{namespace}/{INFO}", data) for data in topics[INFO]])
+    accounts = _accounts(namespace, topics[INFO])
+    unaccounted = () if accounts else (f"sha256: there is no account on {INFO}",)
     references: dict[int, Reference] = {}
-    checkers: dict[tuple[int, tuple[str, ...]], Checker] = {}
+    checkers: dict[tuple[int, tuple[str, ...], bytes], Checker] = {}
     for index, data in enumerate(topics["scenarios"]):
+        altered = [(ALTERED, _altered(data, index, accounts))] if accounts and digest(data) not in accounts else []
         try:
             stamp, scenario = decode_scenario(data, index=index, what=f"{namespace}/scenarios, message {index}")
             if stamp not in references:
                 references[stamp] = _reference(namespace, topics, stamp)
-            key = (stamp, tuple(vehicle.id for vehicle in scenario.vehicles))
+            own = asked.get(digest(data))
+            states = b"" if own is None else own.start.tobytes() + own.end.tobytes()
+            key = (stamp, tuple(vehicle.id for vehicle in scenario.vehicles), states)
             if key not in checkers:
-                checkers[key] = references[stamp].checker(scenario, limits)
+                checkers[key] = references[stamp].checker(scenario, limits, own)
         except _ReferenceError as error:
             raise InputError(str(error)) from error
         except InputError as error:
-            result.add(index, [(UNUSABLE, str(error))], ())
+            result.add(index, [*altered, (UNUSABLE, str(error))], ())
             continue
         try:
             (verdict,) = checkers[key].check([scenario])
         except InputError as error:
-            result.add(index, [(UNUSABLE, str(error))], ())
+            result.add(index, [*altered, (UNUSABLE, str(error))], ())
             continue
-        result.add(index, [(v.cause.value, v.message) for v in verdict.violations], checkers[key].not_applicable)
+        violations = [(violation.cause.value, violation.message) for violation in verdict.violations]
+        result.add(index, [*altered, *violations], (*unaccounted, *checkers[key].not_applicable))
     return result
+
+
+def _accounts(namespace: str, messages: Sequence[bytes]) -> dict[str, str]:
+    """Return what `scenarios/info` accounts for: by SHA-256, the request and index of a scenario; in the order of the bag.
+
+    Raises:
+        InputError: a message of it is damaged.
+    """
+    what = f"{namespace}/{INFO}"
+    entries = [status.values for data in messages for status in decode_diagnostics(data, what)[1]]
+    known = [values for values in entries if "sha256" in values]
+    return {v["sha256"]: f"index {v.get('index', '?')} of request {v.get('request', '?')}" for v in known}
+
+
+def _altered(data: bytes, index: int, accounts: dict[str, str]) -> str:
+    """Return the sentence for a message whose SHA-256 is not accounted for; the account in its place says what it was."""
+    place = list(accounts.items())[index : index + 1]
+    published = "".join(f"; {name} was published as {known[:12]}…" for known, name in place)
+    return f"message {index} has SHA-256 {digest(data)[:12]}…, which {INFO} does not know{published}"
 
 
 class _ReferenceError(Exception):
@@ -134,7 +185,7 @@ def _reference(namespace: str, topics: Contents, stamp: int) -> Reference:
         _ReferenceError: a message of it is damaged.
     """
     try:
-        newest = {topic: _of_stamp(topics[topic], stamp, f"{namespace}/{topic}") for topic in TOPICS[:-1]}
+        newest = {topic: _of_stamp(topics[topic], stamp, f"{namespace}/{topic}") for topic in REFERENCES}
         grid = newest["map"] or (topics["map"][-1] if topics["map"] else None)
         road = decode_map(grid, name=f"{namespace}/map")[1] if grid else None
         asked, template, conflicts, waits = None, None, [], None

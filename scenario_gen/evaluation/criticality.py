@@ -15,8 +15,8 @@ class Criticality:
     """What one motion came to.
 
     Attributes:
-        min_distance: least distance between two footprints [m].
-        min_ttc: least time to collision [s], at most the horizon.
+        min_distance: least distance between two footprints [m]; NaN with one vehicle.
+        min_ttc: least time to collision [s], at most the horizon; likewise.
         pet: least post-encroachment time [s] over crossing conflicts: from the first vehicle's exit of the shared area to
             the second's entry; negative if both were inside; NaN without such a conflict.
         order: (pair, which of them went first) of every conflict, by vehicle index.
@@ -40,8 +40,8 @@ def criticality(motion: Motion, horizon: float) -> Criticality:
     conflicts = find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading)
     encroachments = [c.entry_second - c.exit_first for c in conflicts if not c.following]
     return Criticality(
-        min_distance=min(float(footprint_distance(motion, a, b).min()) for a, b in pairs),
-        min_ttc=min(horizon, *(float(time_to_collision(motion, a, b).min()) for a, b in pairs)),
+        min_distance=min((float(footprint_distance(motion, a, b).min()) for a, b in pairs), default=float("nan")),
+        min_ttc=min((horizon, *(float(time_to_collision(motion, a, b).min()) for a, b in pairs))) if pairs else float("nan"),
         pet=min(encroachments, default=float("nan")),
         order=tuple(((min(c.first, c.second), max(c.first, c.second)), c.first) for c in conflicts),
     )

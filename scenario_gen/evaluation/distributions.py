@@ -51,7 +51,9 @@ def values_of(motion: Motion) -> dict[str, Floats]:
         "acceleration": acceleration.ravel(),
         "jerk": (np.diff(smooth, axis=1) / motion.dt).ravel(),
         "yaw_rate": np.gradient(motion.heading, motion.dt, axis=1).ravel(),
-        "gap": np.concatenate([footprint_distance(motion, a, b) for a, b in combinations(range(len(motion.vehicles)), 2)]),
+        "gap": np.concatenate(
+            [np.zeros(0), *(footprint_distance(motion, a, b) for a, b in combinations(range(len(motion.vehicles)), 2))]
+        ),
     }
 
 

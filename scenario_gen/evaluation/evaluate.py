@@ -13,7 +13,7 @@ from scenario_gen.evaluation.bootstrap import Bootstrap, Interval, wilson
 from scenario_gen.evaluation.criticality import Criticality, criticality
 from scenario_gen.evaluation.distributions import QUANTITIES, compare, values_of
 from scenario_gen.evaluation.metrics import LIMIT_CAUSES, METRICS
-from scenario_gen.evaluation.motion import Motion, at_count, at_period, stacked
+from scenario_gen.evaluation.motion import Motion, at_count, at_period, of_vehicles, stacked
 from scenario_gen.evaluation.result import TEMPLATE, CheckCounts, Evaluation, Row
 from scenario_gen.parameters import check, parameter
 from scenario_gen.scenario import Cause, Scenario
@@ -75,30 +75,28 @@ def evaluate(
         config: how to measure.
         seed: of the bootstrap.
 
+    A vehicle that a scenario lacks (one left out for an ego) is left out of every row, the template's too; with one vehicle
+    left, what needs two is not a number.
+
     Returns:
         One row for the recorded template and one for each set.
 
     Raises:
-        InputError: a scenario has another number of vehicles than the encounter.
+        InputError: a scenario has a vehicle that the encounter has not.
     """
     steps = min(encounter.speed.shape[1], config.max_steps)
-    clocked = at_period(encounter, config.period)
-    for name, scenarios in rows.items():
-        for scenario in scenarios:
-            if len(scenario.vehicles) != len(encounter.vehicles):
-                raise InputError(
-                    f"row {name!r}: scenario {scenario.index} has {len(scenario.vehicles)} vehicles, "
-                    f"the encounter {encounter.name!r} has {len(encounter.vehicles)}"
-                )
-    fitted = at_count(rows[oracle][0], steps) if rows.get(oracle) else None
+    ids = shared_vehicles(encounter, rows)
+    clocked = chosen(at_period(encounter, config.period), ids)
+    fitted = chosen(at_count(rows[oracle][0], steps), ids) if rows.get(oracle) else None
     critical = criticality(clocked, config.ttc_horizon)
-    reference = _Reference(at_count(encounter, steps), values_of(clocked), critical, fitted, config, seed)
+    motion = chosen(at_count(encounter, steps), ids)
+    reference = _Reference(motion, values_of(clocked), critical, fitted, config, seed)
     counts = checks or {}
     measured = [_measure(name, scenarios, reference, counts.get(name)) for name, scenarios in rows.items()]
     return Evaluation(
         encounter=encounter.name,
         road=road,
-        vehicles=tuple(vehicle.id for vehicle in encounter.vehicles),
+        vehicles=ids,
         duration=encounter.duration,
         changepoints=len(segmentation.changepoints),
         level=config.level,
@@ -107,6 +105,34 @@ def evaluate(
         metrics=METRICS,
         rows=(_template_row(reference, steps < encounter.speed.shape[1], steps), *measured),
     )
+
+
+def shared_vehicles(encounter: Encounter, rows: Mapping[str, Sequence[Scenario]]) -> tuple[str, ...]:
+    """Return the ids of the vehicles that every scenario has, in the encounter's order.
+
+    Raises:
+        InputError: a scenario has a vehicle that the encounter has not, or none is left.
+    """
+    ids = [vehicle.id for vehicle in encounter.vehicles]
+    shared = ids
+    for name, scenarios in rows.items():
+        for scenario in scenarios:
+            own = {vehicle.id for vehicle in scenario.vehicles}
+            if len(own) != len(scenario.vehicles) or not own <= set(ids):
+                raise InputError(
+                    f"row {name!r}: scenario {scenario.index} has {len(scenario.vehicles)} vehicles ({', '.join(sorted(own))}), "
+                    f"the encounter {encounter.name!r} has {len(ids)} ({', '.join(ids)})"
+                )
+            shared = [known for known in shared if known in own]
+    if not shared:
+        raise InputError(f"no vehicle of {encounter.name!r} is in all scenarios")
+    return tuple(shared)
+
+
+def chosen(motion: Motion, ids: Sequence[str]) -> Motion:
+    """Return the motion of the vehicles with these ids, in their order."""
+    own = [vehicle.id for vehicle in motion.vehicles]
+    return of_vehicles(motion, [own.index(known) for known in ids])
 
 
 def _template_row(reference: _Reference, resampled: bool, steps: int) -> Row:
@@ -123,8 +149,9 @@ def _measure(name: str, scenarios: Sequence[Scenario], reference: _Reference, co
         return Row(name, 0, values, ("there is no scenario in this row",))
     bootstrap = Bootstrap.draw(len(scenarios), config.resamples, config.level, reference.seed)
     steps = reference.motion.speed.shape[1]
-    position, speed = stacked([at_count(scenario, steps) for scenario in scenarios])
-    clocked = [at_period(scenario, config.period) for scenario in scenarios]
+    ids = [vehicle.id for vehicle in reference.motion.vehicles]
+    position, speed = stacked([chosen(at_count(scenario, steps), ids) for scenario in scenarios])
+    clocked = [chosen(at_period(scenario, config.period), ids) for scenario in scenarios]
     values |= _likeness(reference, position, speed, bootstrap)
     values |= _distributions(reference, clocked, bootstrap)
     values |= _criticality(reference, clocked, bootstrap)
@@ -161,7 +188,8 @@ def _distributions(reference: _Reference, motions: Sequence[Motion], bootstrap: 
         result[f"wasserstein_{quantity.id}"] = Interval(
             exact, float(np.minimum(exact, near.low)), float(np.maximum(exact, near.high))
         )
-        covered.append(compared)
+        if reference.values[quantity.id].size:
+            covered.append(compared)
     result["coverage"] = bootstrap.interval(lambda weights: np.mean([one.coverage(weights) for one in covered], axis=0))
     return result
 
@@ -191,6 +219,8 @@ def _notes(samples: int, values: Mapping[str, Interval], config: EvaluationConfi
     notes = []
     if 1 < samples < config.enough:
         notes.append(f"few samples: every figure, E included, comes from {samples}, not {config.enough}")
+    if np.isnan(values["min_distance"].value):
+        return (*notes, "one vehicle is left: there is no pair to be measured")
     for key, what in (("e_position", "position"), ("e_speed", "speed")):
         if not np.isfinite(values[key].value):
             notes.append(f"E for {what} is undefined: the template's matrix is constant for every pair of vehicles")

@@ -96,6 +96,8 @@ def mean_correlation(pairs: list[PairLikeness], weights: Floats) -> Floats:
 
 
 def _mean_over_pairs(values: list[Floats]) -> Floats:
+    if not values:
+        return np.full(1, np.nan)
     table = np.stack(values)
     known = np.isfinite(table)
     count = known.sum(axis=0)

@@ -60,6 +60,14 @@ def _motion(source: Encounter | Scenario, time: Floats, dt: float) -> Motion:
     return Motion(source.vehicles, dt, frozen(position), interpolated(source.heading), interpolated(source.speed))
 
 
+def of_vehicles(motion: Motion, rows: Sequence[int]) -> Motion:
+    """Return the motion of some vehicles, in that order."""
+    if list(rows) == list(range(len(motion.vehicles))):
+        return motion
+    at = list(rows)
+    return Motion(tuple(motion.vehicles[n] for n in at), motion.dt, motion.position[at], motion.heading[at], motion.speed[at])
+
+
 def stacked(motions: Sequence[Motion]) -> tuple[Floats, Floats]:
     """Stack S motions of equal T: positions (S, N, T, 2) and speeds (S, N, T)."""
     return np.stack([motion.position for motion in motions]), np.stack([motion.speed for motion in motions])

@@ -148,6 +148,7 @@ def _view(index: int, case: Case) -> dict[str, Any]:
         "arms": [(name, made, _causes(made)) for name, made in arms if made is not None],
         "rows": [*evaluation.rows[1:], evaluation.rows[0]],
         "metrics": evaluation.metrics,
+        "ego": case.with_changepoints.ego.vehicles[0].id if case.with_changepoints.ego else "",
         "k": len(case.segmentation.changepoints),
         "rate": len(case.segmentation.changepoints) / duration,
         "errors": {

@@ -27,11 +27,10 @@ MAX_FRAMES, MAX_CELLS, MATRIX_SIZE, MAX_PAIRS, MAX_ROUTE_POINTS = 240, 900, 72, 
 
 def case_data(case: "Case", samples: int) -> dict[str, Any]:
     """Return all that one case draws, ready for JSON; at most `samples` scenarios of each arm."""
-    arms = {"with": case.with_changepoints.scenarios[:samples]}
-    if case.without_changepoints is not None:
-        arms["without"] = case.without_changepoints.scenarios[:samples]
-    if case.uniform is not None:
-        arms["uniform"] = case.uniform.scenarios[:samples]
+    sets = {"with": case.with_changepoints, "without": case.without_changepoints, "uniform": case.uniform}
+    arms = {name: made.scenarios[:samples] for name, made in sets.items() if made is not None}
+    egos = {name: made.ego for name, made in sets.items() if made is not None}
+    ids = [vehicle.id for vehicle in case.encounter.vehicles]
     if case.oracle is not None:
         arms["oracle"] = (case.oracle,)
     longest = max([case.encounter.duration, *(float(s.time[-1]) for group in arms.values() for s in group)])
@@ -39,11 +38,12 @@ def case_data(case: "Case", samples: int) -> dict[str, Any]:
     return {
         "row": case.row,
         "vehicles": [{"id": v.id, "length": _short(v.length), "width": _short(v.width)} for v in case.encounter.vehicles],
+        "left_out": [n for n, known in enumerate(ids) if known not in case.evaluation.vehicles],
         "road": _road(case.road) if case.road else None,
         "template": _template(case.encounter, case.segmentation, frames),
         "fit": _fit(case.fit, case.routes) if case.fit else [],
-        "arms": {name: _trajectories(group, frames) for name, group in arms.items() if group},
-        "features": _features(case.encounter, arms),
+        "arms": {name: _trajectories(group, frames, ids, egos.get(name)) for name, group in arms.items() if group},
+        "features": _features(case.encounter, arms, case.evaluation.vehicles),
     }
 
 
@@ -94,12 +94,22 @@ def _states(source: Encounter | Scenario, frames: int) -> Floats:
     return np.concatenate([motion.position, motion.heading[..., None], motion.speed[..., None]], axis=-1)
 
 
-def _trajectories(scenarios: Sequence[Scenario], frames: int) -> dict[str, Any]:
+def _trajectories(scenarios: Sequence[Scenario], frames: int, ids: Sequence[str], ego: Scenario | None) -> dict[str, Any]:
     return {
-        "states": pack(np.stack([_states(scenario, frames) for scenario in scenarios])),
+        "states": pack(np.stack([_whole(scenario, frames, ids, ego) for scenario in scenarios])),
         "durations": [_short(scenario.time[-1]) for scenario in scenarios],
         "index": [scenario.index for scenario in scenarios],
     }
+
+
+def _whole(scenario: Scenario, frames: int, ids: Sequence[str], ego: Scenario | None) -> Floats:
+    """Return the states of all vehicles; in place of one that was left out stands the ego's template track.
+
+    Without such a track it is drawn where the first vehicle is, underneath it.
+    """
+    own = {vehicle.id: state for vehicle, state in zip(scenario.vehicles, _states(scenario, frames), strict=True)}
+    track = next(iter(own.values())) if ego is None else _states(ego, frames)[0]
+    return np.stack([own.get(known, track) for known in ids])
 
 
 def _template(encounter: Encounter, segmentation: Segmentation, frames: int) -> dict[str, Any]:
@@ -132,16 +142,18 @@ def _fit(fit: Fit, routes: Sequence[Route]) -> list[dict[str, Any]]:
     return vehicles
 
 
-def _features(encounter: Encounter, arms: Mapping[str, Sequence[Scenario]]) -> list[dict[str, Any]]:
-    """Return the paper's figure 5 for each pair of vehicles: matrices of MATRIX_SIZE² bytes, 255 = 1."""
+def _features(encounter: Encounter, arms: Mapping[str, Sequence[Scenario]], shared: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the paper's figure 5 for each pair of the `shared` vehicles: matrices of MATRIX_SIZE² bytes, 255 = 1."""
     groups: dict[str, Sequence[Encounter | Scenario]] = {"template": [encounter], **arms}
     motions = {name: [at_count(source, MATRIX_SIZE) for source in group] for name, group in groups.items() if group}
     pairs = []
-    for a, b in list(combinations(range(len(encounter.vehicles)), 2))[:MAX_PAIRS]:
-        entry: dict[str, Any] = {"pair": [a, b], "position": {}, "speed": {}}
+    rows = [n for n, vehicle in enumerate(encounter.vehicles) if vehicle.id in shared]
+    for pair in list(combinations(rows, 2))[:MAX_PAIRS]:
+        entry: dict[str, Any] = {"pair": list(pair), "position": {}, "speed": {}}
         for name, group in motions.items():
-            place = [np.ascontiguousarray(np.stack([m.position[n].T for m in group])) for n in (a, b)]
-            pace = [np.stack([m.speed[n][None] for m in group]) for n in (a, b)]
+            at = [[[v.id for v in m.vehicles].index(encounter.vehicles[n].id) for n in pair] for m in group]
+            place = [np.ascontiguousarray(np.stack([m.position[i[k]].T for m, i in zip(group, at, strict=True)])) for k in (0, 1)]
+            pace = [np.stack([m.speed[i[k]][None] for m, i in zip(group, at, strict=True)]) for k in (0, 1)]
             entry["position"][name] = _bytes(mean_feature(place[0], place[1], "euclidean"))
             entry["speed"][name] = _bytes(mean_feature(pace[0], pace[1], "manhattan"))
         pairs.append(entry)

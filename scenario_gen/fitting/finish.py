@@ -17,7 +17,7 @@ from scenario_gen.scenario import BoundaryStates
 from scenario_gen.segmentation.result import Segmentation
 
 _STAND_LENGTH = 0.5  # metres
-_STAND_SPEED = 0.3  # m/s: slower is standing
+STAND_SPEED = 0.3  # m/s: slower is standing
 
 
 def finish(
@@ -28,7 +28,7 @@ def finish(
     config: FittingConfig,
     given: Floats | None = None,
 ) -> Fit:
-    """Read the anchors off a placement; `given` (N, 2, 4) are start and end states to be met exactly, if there are any.
+    """Read the anchors off a placement; `given` (N, 2, 4) are start and end states to be met exactly, if any; NaN: not given.
 
     Raises:
         RefusedError: an anchor is farther than `max_move` from the nearest pose with room.
@@ -41,10 +41,11 @@ def finish(
         stands = _stands(track, index)
         progress = _snapped(track, index, stands)
         anchors = track.curve.at(progress)
-        if given is not None:
+        wanted = np.zeros(2, dtype=np.bool_) if given is None else np.isfinite(given[i, :, 0])
+        if given is not None and wanted[0]:
             anchors[progress == progress[0]] = given[i, 0, :3]
-            if not track.still:
-                anchors[progress == progress[-1]] = given[i, 1, :3]
+        if given is not None and wanted[1] and not track.still:
+            anchors[progress == progress[-1]] = given[i, 1, :3]
         anchors, moved, said = _repaired(road, track, anchors, progress, [float(t) for t in index * encounter.dt], config)
         notes += said
         moved = moved + placement.moved[i]
@@ -62,8 +63,11 @@ def finish(
                 manoeuvre=placement.manoeuvre[i],
             )
         )
-        ends = encounter.speed[i, [0, last]] * placement.scale[i] if given is None else given[i, :, 3]
-        ends = np.where((ends < _STAND_SPEED) | track.still, 0.0, ends)
+        ends = encounter.speed[i, [0, last]] * placement.scale[i]
+        ends = np.where(ends < STAND_SPEED, 0.0, ends)
+        if given is not None:
+            ends = np.where(wanted, given[i, :, 3], ends)
+        ends = np.where(track.still, 0.0, ends)
         states.append(np.column_stack((anchors[[0, -1]], ends)))
     asked = BoundaryStates(start=np.stack([s[0] for s in states]), end=np.stack([s[1] for s in states]))
     return Fit(encounter.vehicles, tuple(fitted), index, asked, tuple(notes))
@@ -76,7 +80,7 @@ def _stands(track: Track, index: Ints) -> Bools:
     pieces = list(pairwise(index))
     driven = np.array([track.progress[b] - track.progress[a] for a, b in pieces])
     fastest = np.array([track.speed[a : b + 1].max() for a, b in pieces])
-    stands = (driven < _STAND_LENGTH) & (fastest < _STAND_SPEED) | (driven < 1e-3)
+    stands = (driven < _STAND_LENGTH) & (fastest < STAND_SPEED) | (driven < 1e-3)
     if stands.all():  # it does move, if only little by little
         stands[int(np.argmax(driven))] = False
     return np.asarray(stands)

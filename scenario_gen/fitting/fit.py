@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 
+import numpy as np
+
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import RefusedError
@@ -30,6 +32,7 @@ def fit_template(
     *,
     starts: Floats | None = None,
     goals: Floats | None = None,
+    partial: bool = False,
 ) -> Fit:
     """Place a template on a road (paper III-A, eqs 7-9 put right).
 
@@ -40,15 +43,22 @@ def fit_template(
         config: which way, and how far things may be scaled and moved.
         starts: (N, 3) or (N, 4) given start poses x [m], y [m], yaw [rad], and speeds [m/s]; with `goals`.
         goals: likewise the end.
+        partial: a row of NaN is not given but left to the road's own placement.
 
     Raises:
         RefusedError: it does not fit; the message says why, with figures.
         InputError: `starts` and `goals` disagree with the encounter.
     """
     if starts is not None or goals is not None:
-        placement, given = place_given(encounter, road, config, starts, goals)
+        base = _place(encounter, road, config) if partial and _has_gaps(starts, goals) else None
+        placement, given = place_given(encounter, road, config, starts, goals, base)
         return finish(encounter, segmentation, road, placement, config, given)
     return finish(encounter, segmentation, road, _place(encounter, road, config), config)
+
+
+def _has_gaps(*given: Floats | None) -> bool:
+    """Whether a state is left open."""
+    return any(rows is not None and bool(np.isnan(rows).any()) for rows in given)
 
 
 def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement:

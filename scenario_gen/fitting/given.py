@@ -8,6 +8,7 @@ from scenario_gen.arrays import Floats, frozen
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.fitting.config import FittingConfig
+from scenario_gen.fitting.finish import STAND_SPEED
 from scenario_gen.fitting.placement import Placement, check_scale
 from scenario_gen.fitting.routes import draw_route
 from scenario_gen.roads.clearance import footprint_fits
@@ -21,7 +22,12 @@ _TURN = np.radians(50.0)  # a drawn route may turn by this much more or less tha
 
 
 def place_given(
-    encounter: Encounter, road: Road, config: FittingConfig, starts: Floats | None, goals: Floats | None
+    encounter: Encounter,
+    road: Road,
+    config: FittingConfig,
+    starts: Floats | None,
+    goals: Floats | None,
+    base: Placement | None = None,
 ) -> tuple[Placement, Floats]:
     """Map every vehicle's start to the given start and its end to the given goal.
 
@@ -29,39 +35,65 @@ def place_given(
     template's arc lengths times s); elsewhere it is the similarity of the plane. A vehicle whose chord is too short for
     that takes rotation and scale from all vehicles together (Umeyama 1991).
 
+    With `base` a row of NaN is not given: it is as `base` has it, and a vehicle of which neither start nor goal is given
+    keeps its path there. A speed that is NaN is the template's.
+
     Returns:
-        The placement, and (N, 2, 4) the given start and end states, speeds filled in.
+        The placement, and (N, 2, 4) the start and end states, what was missing filled in; NaN for a vehicle left to `base`.
 
     Raises:
         InputError: shapes disagree with the encounter, or a value is not finite.
         RefusedError: a scale is out of range, or a vehicle that waits throughout is asked to move.
     """
     tracks = clean_tracks(encounter)
-    states = np.stack((_states("starts", starts, encounter, 0), _states("goals", goals, encounter, -1)), axis=1)
-    joint = _joint_similarity(tracks, states)
-    placed, scales, manoeuvres, notes = [], [], [], []
-    for track, ends in zip(tracks, states, strict=True):
-        moved, scale, how = _place(track, ends, joint, road, config)
+    states = np.stack((_states("starts", starts, encounter, 0, base), _states("goals", goals, encounter, -1, base)), axis=1)
+    wanted = np.asarray(np.isfinite(states[..., 0]))
+    ends = states if base is None else np.where(wanted[..., None], states, _ends_of(base, encounter))
+    given = np.where(np.any(wanted, axis=1, keepdims=True)[..., None], ends, np.nan)
+    joint = _joint_similarity(tracks, ends)
+    placed, scales, manoeuvres, moves, notes = [], [], [], [], []
+    for n, track in enumerate(tracks):
+        if base is not None and not wanted[n].any():
+            placed.append(base.tracks[n])
+            scales.append(float(base.scale[n]))
+            manoeuvres.append(base.manoeuvre[n])
+            moves.append(float(base.moved[n]))
+            continue
+        moved, scale, how = _place(track, ends[n], joint, road, config)
         placed.append(moved)
         scales.append(scale)
         manoeuvres.append("wait" if track.still else _name(moved))
-        notes.append(f"vehicle {track.vehicle.id}: start and goal as given, {how}")
-    n = len(tracks)
-    return Placement(tuple(placed), frozen(scales), tuple(manoeuvres), frozen(np.zeros(n)), tuple(notes)), states
+        moves.append(0.0)
+        which = "start and goal" if wanted[n].all() else "start" if wanted[n, 0] else "goal"
+        notes.append(f"vehicle {track.vehicle.id}: {which} as given, {how}")
+    said = (*(() if base is None else base.notes), *notes)
+    return Placement(tuple(placed), frozen(scales), tuple(manoeuvres), frozen(moves), said), given
 
 
-def _states(name: str, given: Floats | None, encounter: Encounter, sample: int) -> Floats:
-    """(N, 4) given states; a missing speed is the template's."""
+def _ends_of(base: Placement, encounter: Encounter) -> Floats:
+    """(N, 2, 4) start and end states of a placement."""
+    poses = np.stack([track.poses[[0, -1]] for track in base.tracks])
+    speed = encounter.speed[:, [0, -1]] * base.scale[:, None]
+    return np.concatenate((poses, np.where(speed < STAND_SPEED, 0.0, speed)[..., None]), axis=-1)
+
+
+def _states(name: str, given: Floats | None, encounter: Encounter, sample: int, base: Placement | None) -> Floats:
+    """(N, 4) given states; a missing speed is the template's, a row that is left to `base` is NaN."""
     n = len(encounter.vehicles)
     if given is None:
         raise InputError(f"{name} is missing; give both starts and goals, or neither")
     array = np.asarray(given, dtype=np.float64)
     if array.ndim != 2 or array.shape[0] != n or array.shape[1] not in (3, 4):
         raise InputError(f"{name} has shape {array.shape}; one row of x, y, yaw and optionally speed per vehicle ({n}) is needed")
-    if not np.isfinite(array).all() or (array[:, 3:] < 0.0).any():
-        raise InputError(f"{name} holds a value that is not finite, or a negative speed")
+    left = np.isnan(array).all(axis=1) if base is not None else np.zeros(n, dtype=np.bool_)
+    speed = np.where(encounter.speed[:, sample] < STAND_SPEED, 0.0, encounter.speed[:, sample])
     if array.shape[1] == 3:
-        array = np.column_stack((array, encounter.speed[:, sample]))
+        array = np.column_stack((array, speed))
+    elif base is not None:
+        array = np.column_stack((array[:, :3], np.where(np.isnan(array[:, 3]), speed, array[:, 3])))
+    if not np.isfinite(array[~left]).all() or (array[~left, 3] < 0.0).any():
+        raise InputError(f"{name} holds a value that is not finite, or a negative speed")
+    array[left] = np.nan
     return array
 
 

@@ -5,49 +5,31 @@ It generates when the inputs are complete, and on `~/generate`, whose parameters
 
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from functools import partial
 
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from msg_conventions.diagnostics import Level, request_status
+from msg_conventions.diagnostics import Level
 from msg_conventions.names import tokens
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import RefusedError, ScenarioGenError
 from scenario_gen.nodes.base import REQUESTS, StageNode, run_nodes
-from scenario_gen.nodes.inputs import Inputs
+from scenario_gen.nodes.inputs import Inputs, stamp_of
 from scenario_gen.nodes.ros_parameters import values_of_call
 from scenario_gen.nodes.sample_messages import sample_messages
-from scenario_gen.nodes.template import read_template
-from scenario_gen.parameters import check, parameter
-from scenario_gen.pipeline import PipelineConfig, sample_checked
-from scenario_gen.sampling import SamplingConfig
-from scenario_gen.scenario import ScenarioSet
-from scenario_gen.validity import Limits
+from scenario_gen.nodes.sample_request import Answer, Config, answer_request
 
-
-@dataclass(frozen=True)
-class Config:
-    """The sampler's parameters."""
-
-    count: int = parameter(50, "scenarios to generate", low=1, high=100_000)
-    seed: int = parameter(0, "seed of the samples", low=0)
-    generate_on_input: bool = parameter(True, "generate whenever the inputs are complete or change; false: on ~/generate only")
-    pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
-    sampling: SamplingConfig = field(default_factory=SamplingConfig)
-    limits: Limits = field(default_factory=Limits)
-
-    def __post_init__(self) -> None:
-        check(self)
+ENDS = ("road/entries", "road/exits")  # of use only where start or end states are asked for
 
 
 class GpSampler(StageNode):
     """Samples valid scenarios around the planned routes."""
 
-    INPUTS = ("map", "tracks", "changepoints", "fit")
-    STAGES = ("interaction", "roads", "sampling", "validity")
+    INPUTS = ("map", *ENDS, "tracks", "changepoints", "fit")
+    STAGES = ("interaction", "roads", "fitting", "planning", "sampling", "validity")
     OUTPUTS = ("scenarios", "scenarios/info", "markers")
 
     def __init__(self, namespace: str | None = None) -> None:
@@ -64,9 +46,26 @@ class GpSampler(StageNode):
         self._seen.put(topic, data)
         if topic == "tracks":
             self._follow(data)
-        messages = self._seen.complete()
-        if self.config.generate_on_input and messages is not None:
-            self.work("inputs", lambda cancelled: self._generate(messages, self._next_request(), self.config, cancelled))
+        config = self.config
+        if config.generate_on_input and (topic not in ENDS or config.moves) and not self._missing(config):
+            messages = self._messages()
+            self.work("inputs", lambda cancelled: self._generate(messages, self._next_request(), config, cancelled))
+
+    def _missing(self, config: Config) -> list[str]:
+        """The topics that a request still waits for."""
+        missing = self._seen.missing()
+        if config.moves and config.pair_map and not missing:
+            missing = [topic for topic in ENDS if topic not in self._messages()]
+        return missing
+
+    def _messages(self) -> dict[str, bytes]:
+        """The template's messages; entries and exits only if they are those of its road."""
+        messages = self._seen.complete() or {}
+        for topic in ENDS:
+            own = topic in messages and self.config.pair_map
+            if not own or stamp_of(messages[topic], topic) != stamp_of(messages["map"], "map"):
+                messages.pop(topic, None)
+        return messages
 
     def _follow(self, tracks: bytes) -> None:
         """Listen to the routes of the vehicles in the tracks, and no longer to those of others."""
@@ -85,33 +84,20 @@ class GpSampler(StageNode):
 
     def _generate(
         self, messages: Mapping[str, bytes], request: str, config: Config, cancelled: Callable[[], bool]
-    ) -> ScenarioSet | None:
+    ) -> Answer | None:
         """Sample, check and publish; the request's account closes `scenarios/info`. None if it was cancelled."""
         if cancelled():
             return None
-        template = read_template(messages)
-        stamp = template.encounter.start_ns
-        result = sample_checked(
-            template.encounter,
-            template.segmentation,
-            template.road,
-            template.routes,
-            template.asked,
-            PipelineConfig(sampling=config.sampling, limits=config.limits),
-            count=config.count,
-            seed=config.seed,
-            progress=lambda done, total: self._progress(request, done, total, stamp),
-            cancelled=cancelled,
-        )
+        node = self.get_fully_qualified_name()
+        answer = answer_request(messages, config, request, node, partial(self._progress, request), cancelled)
+        stamp = answer.template.encounter.start_ns
         if cancelled():
             self.status(Level.WARN, f"request {request} was cancelled", f"request {request}", stamp)
             return None
-        node = self.get_fully_qualified_name()
-        closing = request_status(result, request, node, config.seed)
-        for topic, data in sample_messages(template, result, closing, node):
+        for topic, data in sample_messages(answer.template.encounter, answer.asked, answer.result, answer.closing, node):
             self.send(topic, data)
-        self.status(closing.level, closing.message, f"request {request}", stamp)
-        return result
+        self.status(answer.closing.level, answer.closing.message, f"request {request}", stamp)
+        return answer
 
     def _progress(self, request: str, done: int, total: int, stamp_ns: int) -> None:
         if done == total or done % max(1, total // 10) == 0:
@@ -130,9 +116,9 @@ class GpSampler(StageNode):
 
         def job(cancelled: Callable[[], bool]) -> None:
             try:
-                result = self._generate(messages, name, config, cancelled)
-                message = request_status(result, name, "", config.seed).message if result else "cancelled"
-                answer.set_result((bool(result and result.scenarios), message))
+                made = self._generate(messages, name, config, cancelled)
+                message = made.closing.message if made else "cancelled"
+                answer.set_result((bool(made and made.result.scenarios), message))
             except ScenarioGenError as error:
                 answer.set_result((False, str(error)))
             except Exception as error:
@@ -149,11 +135,10 @@ class GpSampler(StageNode):
     def _config_of(self, request: SetParametersAtomically.Request) -> tuple[Config, Mapping[str, bytes]]:
         if not self.active:
             raise RefusedError("the node is not active; activate it first")
-        messages = self._seen.complete()
-        if messages is None:
-            raise RefusedError(f"nothing to generate from yet: waiting for {', '.join(self._seen.missing())}")
         config: Config = values_of_call(self.config, request.parameters)
-        return config, messages
+        if missing := self._missing(config):
+            raise RefusedError(f"nothing to generate from yet: waiting for {', '.join(missing)}")
+        return config, self._messages()
 
     def _cancel(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         names = self.cancel()

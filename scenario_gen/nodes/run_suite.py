@@ -28,7 +28,7 @@ SECTIONS = {
     "road_server": ("road",),
     "segmenter": ("segmentation",),
     "planner": ("fitting", "planning"),
-    "gp_sampler": ("sampling", "limits"),
+    "gp_sampler": ("fitting", "planning", "sampling", "limits"),
 }
 
 
@@ -155,7 +155,7 @@ def _run(
         "RCUTILS_COLORIZED_OUTPUT": "0",
     }
     suite = subprocess.Popen(
-        [sys.executable, "-m", "scenario_gen.nodes.suite", str(scratch / "suite.json")],
+        [sys.executable, "-m", "scenario_gen.nodes.forked", str(scratch / "suite.json")],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=(scratch / "suite.log").open("w"),
@@ -168,7 +168,7 @@ def _run(
         if suite.stdin is not None:
             suite.stdin.close()  # its end ends the suite, even where this process is killed
         try:
-            suite.wait(15.0)
+            suite.wait(30.0)
         except subprocess.TimeoutExpired:
             suite.kill()
             suite.wait()

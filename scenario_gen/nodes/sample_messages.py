@@ -1,25 +1,32 @@
-"""What gp_sampler publishes of a request: footprints, every scenario with its account, one to look at, and the account of all."""
+"""What gp_sampler publishes of a request: footprints, the ego's slot, every scenario with its account, and the account of all."""
 
 from collections.abc import Iterator
 
-from msg_conventions.diagnostics import Status, encode_diagnostics, scenario_status
+from msg_conventions.diagnostics import Status, asked_values, encode_diagnostics, scenario_status
+from msg_conventions.ego import ego_messages, ego_values
 from msg_conventions.names import tokens
 from msg_conventions.pictures import encode_footprint, scenario_markers
 from msg_conventions.scenarios import encode_scenario
 from msg_conventions.topics import vehicle_topic
-from scenario_gen.nodes.template import Template
-from scenario_gen.scenario import ScenarioSet
+from scenario_gen.encounter import Encounter
+from scenario_gen.scenario import BoundaryStates, ScenarioSet
 
 
-def sample_messages(template: Template, result: ScenarioSet, closing: Status, node: str) -> Iterator[tuple[str, bytes]]:
+def sample_messages(
+    encounter: Encounter, asked: BoundaryStates, result: ScenarioSet, closing: Status, node: str
+) -> Iterator[tuple[str, bytes]]:
     """Yield topic and CDR bytes of every message, in order; `closing` is the request's account, `node` the full name."""
-    stamp, vehicles = template.encounter.start_ns, template.encounter.vehicles
+    stamp, vehicles = encounter.start_ns, encounter.vehicles
     for vehicle, name in zip(vehicles, tokens(vehicle.id for vehicle in vehicles), strict=True):
         yield vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}")
+    if result.ego is not None:
+        yield from ego_messages(result.ego, stamp)
+    ego = ego_values(result.ego)
     for scenario in result.scenarios:
         data = encode_scenario(scenario, stamp)
         yield "scenarios", data
-        status = scenario_status(scenario, data, closing.values["request"], node, sigma_seed=closing.values["seed"])
+        more = ego | asked_values(asked, vehicles, scenario)
+        status = scenario_status(scenario, data, closing.values["request"], node, **more)
         yield "scenarios/info", encode_diagnostics([status], stamp)
     if result.scenarios:
         yield "markers", scenario_markers(result.scenarios[0], stamp)

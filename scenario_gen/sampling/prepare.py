@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from scenario_gen.arrays import Floats
-from scenario_gen.encounter import Encounter
+from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import InputError
 from scenario_gen.interaction import Wait
 from scenario_gen.planning.route import Route
@@ -17,6 +17,7 @@ from scenario_gen.sampling.along import along_factor
 from scenario_gen.sampling.candidates import CandidateModel, VehicleModel, knots_on, piece_lengths
 from scenario_gen.sampling.clock import FASTEST, Clock
 from scenario_gen.sampling.config import SamplingConfig
+from scenario_gen.sampling.ego import others
 from scenario_gen.sampling.lateral import MOST_SIGMAS, ROOM_SIGMAS, lateral_factor, lateral_room
 from scenario_gen.sampling.path import BasePath
 from scenario_gen.sampling.time_law import STAND, SpeedBounds, SpeedProfile, TimeLaw, TimeLayout, layout
@@ -59,8 +60,11 @@ def prepare(
     asked: BoundaryStates,
     waits: Sequence[Wait],
     config: SamplingConfig,
+    ego: int | None = None,
 ) -> Prepared:
     """Build the model: first on the template's clock, then with anchors slid by little, then with the clock stretched.
+
+    Vehicle `ego` is left out of it, with its waits.
 
     Raises:
         InputError: routes, segmentation and encounter disagree in their numbers.
@@ -68,8 +72,10 @@ def prepare(
     times = encounter.time[np.concatenate([[0], segmentation.changepoints, [encounter.speed.shape[1] - 1]]).astype(np.int64)]
     if len(routes) != len(encounter.vehicles) or any(len(route.anchor) != len(times) for route in routes):
         raise InputError(f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each")
-    paths = [BasePath.of(route) for route in routes]
-    lays = [partial(_layout, n, encounter, times, routes[n], asked, waits) for n in range(len(routes))]
+    driven = others(encounter, ego)
+    vehicles, waits = [encounter.vehicles[n] for n in driven], [wait for wait in waits if wait.vehicle != ego]
+    paths = [BasePath.of(routes[n]) for n in driven]
+    lays = [partial(_layout, n, encounter, times, routes[n], asked, waits) for n in driven]
     slide = SLIDE_SIGMAS * config.longitudinal_sigma
     stretches = np.linspace(1.0, 1.0 + config.max_stretch, _STRETCHES if config.max_stretch > 0.0 else 1)
     reasons: list[str] = []
@@ -77,10 +83,10 @@ def prepare(
         for stretch in factors.tolist():
             clock = stretch * times
             tried = [_nominal(path, lay, times, clock, most, config) for path, lay in zip(paths, lays, strict=True)]
-            reasons = [f"vehicle {v.id} {why}" for v, why in zip(encounter.vehicles, tried, strict=True) if isinstance(why, str)]
+            reasons = [f"vehicle {v.id} {why}" for v, why in zip(vehicles, tried, strict=True) if isinstance(why, str)]
             if not reasons:
                 found = [nominal for nominal in tried if isinstance(nominal, _Nominal)]
-                return _model(encounter, road, times, Clock(clock, config, _fastest(times, waits)), paths, found, config)
+                return _model(vehicles, road, times, Clock(clock, config, _fastest(times, waits)), paths, found, config)
     return Prepared(None, (), "; ".join(reasons))
 
 
@@ -201,7 +207,7 @@ def _curve_bounds(path: BasePath, profile: SpeedProfile, lay: TimeLayout, limit:
 
 
 def _model(
-    encounter: Encounter,
+    driven: Sequence[Vehicle],
     road: Road,
     times: Floats,
     clock: Clock,
@@ -215,7 +221,7 @@ def _model(
     if stretch > 1.0 + 1e-9:
         said.append(f"clock stretched by {100.0 * (stretch - 1.0):.1f} % so that every vehicle can keep to its limits")
     vehicles = []
-    for vehicle, path, nominal in zip(encounter.vehicles, paths, found, strict=True):
+    for vehicle, path, nominal in zip(driven, paths, found, strict=True):
         if nominal.slid > 1e-6:
             said.append(f"vehicle {vehicle.id} passes changepoints up to {nominal.slid:.2f} m from their place")
         room = lateral_room(path, vehicle, road, MOST_SIGMAS * config.lateral_sigma)

@@ -13,6 +13,7 @@ from scenario_gen.planning.route import Route
 from scenario_gen.roads.road import Road
 from scenario_gen.sampling.candidates import Batch, CandidateModel, Scale
 from scenario_gen.sampling.config import SamplingConfig
+from scenario_gen.sampling.ego import ego_track
 from scenario_gen.sampling.prepare import prepare
 from scenario_gen.scenario import BoundaryStates, Cause, Scenario, ScenarioSet, Verdict
 from scenario_gen.segmentation.result import Segmentation
@@ -70,6 +71,7 @@ def sample_scenarios(
     count: int,
     seed: int = 0,
     waits: tuple[Wait, ...],
+    ego: int | None = None,
     progress: Callable[[int, int], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> ScenarioSet:
@@ -86,6 +88,7 @@ def sample_scenarios(
         count: valid scenarios wanted.
         seed: of all randomness; with a scenario's index it gives that scenario again.
         waits: when a vehicle stands, on the template's clock.
+        ego: index of the vehicle that is left out of every scenario; its template track is given instead.
         progress: called with (valid so far, count).
         cancelled: asked now and then; if True, the set so far is returned.
 
@@ -96,12 +99,14 @@ def sample_scenarios(
         InputError: routes, segmentation and encounter disagree.
     """
     config = config or SamplingConfig()
-    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config)
+    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config, ego)
+    track = None if ego is None else ego_track(encounter, segmentation, routes[ego], asked, ego, road.frame_id)
     if prepared.model is None:
-        return ScenarioSet(count, (), 1, Counter({Cause.TIME_LAW: 1}), (prepared.refusal,))
+        return ScenarioSet(count, (), 1, Counter({Cause.TIME_LAW: 1}), (prepared.refusal,), track)
     loop = _Loop(Sampler(prepared.model, seed, road.frame_id), check, count, progress, cancelled)
     loop.run(config.attempts * count)
-    return ScenarioSet(count, tuple(loop.valid), loop.candidates, loop.refused, (*prepared.adaptations, *loop.adaptations))
+    said = (*prepared.adaptations, *loop.adaptations)
+    return ScenarioSet(count, tuple(loop.valid), loop.candidates, loop.refused, said, track)
 
 
 def regenerate(
@@ -115,9 +120,10 @@ def regenerate(
     seed: int,
     index: int,
     waits: tuple[Wait, ...],
+    ego: int | None = None,
 ) -> Scenario | None:
     """The scenario with this seed and index again, bit for bit, without the others; arguments as in `sample_scenarios`."""
-    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config or SamplingConfig())
+    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config or SamplingConfig(), ego)
     return None if prepared.model is None else Sampler(prepared.model, seed, road.frame_id).scenario(index)
 
 

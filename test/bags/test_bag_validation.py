@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from msg_conventions.scenarios import encode_scenario
+from msg_conventions.scenarios import digest, encode_scenario
 from msg_conventions.topics import topic_entry
 from scenario_gen.bags import AtomicBag, Run, read_messages, write_run
 from scenario_gen.bags.metadata import qos_yaml
-from scenario_gen.bags.validation import UNUSABLE, validate_bag
+from scenario_gen.bags.validation import ALTERED, UNUSABLE, validate_bag
 from scenario_gen.cli import app
 from scenario_gen.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.pipeline import PipelineConfig, run_arm
 from scenario_gen.roads import build_road
+from scenario_gen.scenario import BoundaryStates
 from scenario_gen.segmentation import segment
 
 
@@ -72,7 +73,8 @@ def test_each_fault_is_found_with_its_cause_and_place(run, tmp_path):
 
 
 def test_what_the_bag_does_not_say_is_said(run, tmp_path):
-    bag = rewritten(write_run(tmp_path / "run", run), tmp_path / "bare", lambda _, data: data, ("tracks", "map", "fit"))
+    silent = ("tracks", "map", "fit", "info")  # scenarios/info knows what was asked, too
+    bag = rewritten(write_run(tmp_path / "run", run), tmp_path / "bare", lambda _, data: data, silent)
     (found,) = validate_bag(bag)
     assert found.invalid == 0
     assert sorted(sentence.partition(":")[0] for sentence in found.left_out) == [
@@ -80,8 +82,20 @@ def test_what_the_bag_does_not_say_is_said(run, tmp_path):
         "moving_wait",
         "off_road",
         "passing_order",
+        "sha256",
     ]
     assert set(found.left_out.values()) == {4}
+
+
+def test_a_scenario_is_held_against_what_was_asked_of_itself(run, tmp_path):
+    """A request with states of its own does not change `fit`: its `scenarios/info` says what they were."""
+    fit = replace(run.fit, asked=BoundaryStates(run.fit.asked.start + np.array((0.0, 5.0, 0.0, 0.0)), run.fit.asked.end))
+    (found,) = validate_bag(write_run(tmp_path / "other", replace(run, fit=fit)))
+    assert found.found["boundary_state"].count == 4
+    without_fit = rewritten(tmp_path / "other", tmp_path / "info", lambda _, data: data, ("fit",))
+    assert validate_bag(without_fit)[0].found["boundary_state"].count == 4
+    own = rewritten(write_run(tmp_path / "run", run), tmp_path / "own", lambda _, data: data, ("fit",))
+    assert validate_bag(own)[0].found == {} and validate_bag(own)[0].left_out == {}
 
 
 def test_a_vehicle_may_be_left_out_and_the_order_of_the_others_is_free(run, tmp_path):
@@ -91,8 +105,26 @@ def test_a_vehicle_may_be_left_out_and_the_order_of_the_others_is_free(run, tmp_
         vehicles = tuple(np.array(scenario.vehicles, dtype=object)[order])
         return encode_scenario(replace(scenario, vehicles=vehicles, **arrays), run.encounter.start_ns)
 
-    (found,) = validate_bag(rewritten(write_run(tmp_path / "run", run), tmp_path / "ego", swapped))
-    assert found.found == {} and found.left_out == {}
+    (found,) = validate_bag(rewritten(write_run(tmp_path / "run", run), tmp_path / "ego", swapped, ("info",)))
+    assert found.found == {} and found.left_out == {"sha256: there is no account on scenarios/info": 4}
+
+
+def test_scenarios_that_are_not_as_published_are_named(run, tmp_path):
+    """A scenario moved by a nanometre is still valid by itself; only its account knows better."""
+    bag = write_run(tmp_path / "run", run)
+    other = replace(run.result.scenarios[2], position=run.result.scenarios[2].position + 1e-9)
+    changed = rewritten(
+        bag, tmp_path / "changed", lambda k, data: encode_scenario(other, run.encounter.start_ns) if k == 2 else data
+    )
+    (found,) = validate_bag(changed)
+    assert (found.scenarios, found.invalid) == (4, 1)
+    assert list(found.found) == [ALTERED]
+    assert (found.found[ALTERED].count, found.found[ALTERED].scenario) == (1, 2)
+    index = run.result.scenarios[2].index
+    assert f"message 2 has SHA-256 {digest(encode_scenario(other, run.encounter.start_ns))[:12]}" in found.found[ALTERED].message
+    assert f"index {index} of request 1 was published as" in found.found[ALTERED].message
+    answer = CliRunner().invoke(app, ["validate", str(changed)])
+    assert answer.exit_code == 1 and ALTERED in answer.output
 
 
 def test_the_command_answers_with_its_exit_code(run, tmp_path):

@@ -62,11 +62,11 @@ function drawSpeeds(place, data, set, template, top) {
   data.vehicles.forEach((_, n) => {
     const x = [];
     const y = [];
-    for (let s = 0; s < set.samples; s += 1) {
+    for (let s = 0; s < (isEgo(data, n) ? 1 : set.samples); s += 1) {
       x.push(...clock(set, s), null);
       y.push(...speeds(set, s, n), null);
     }
-    const line = { color: vehicleColour(n), width: 1 };
+    const line = { color: vehicleColour(n), width: isEgo(data, n) ? 2 : 1, dash: isEgo(data, n) ? "dash" : "solid" };
     traces.push({ x, y, mode: "lines", line, opacity: Math.max(0.3, 1 - set.samples / 30), hoverinfo: "skip" });
   });
   data.vehicles.forEach((_, n) => traces.push({
@@ -155,7 +155,13 @@ function drawSamples(view, data, picture, set, arm) {
     context.strokeStyle = vehicleColour(n);
     context.lineWidth = 1.2;
     context.globalAlpha = Math.max(0.18, Math.min(1, 8 / set.samples));
-    for (let s = 0; s < set.samples; s += 1) set.path(context, view, s, n);
+    if (isEgo(data, n)) {
+      context.globalAlpha = 1;
+      context.lineWidth = 2;
+      context.setLineDash([7, 5]);
+      set.path(context, view, 0, n);
+      context.setLineDash([]);
+    } else for (let s = 0; s < set.samples; s += 1) set.path(context, view, s, n);
   });
   data.fit.forEach((vehicle, n) => {
     const last = vehicle.anchors.length - 1;

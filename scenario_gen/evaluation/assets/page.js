@@ -121,18 +121,23 @@ class Player {
       context.globalAlpha = 0.35;
       context.lineWidth = 1.2;
       context.strokeStyle = vehicleColour(n);
+      context.setLineDash(isEgo(data, n) ? [7, 5] : []);
       set.path(context, view, sample, n);
+      context.setLineDash([]);
       context.globalAlpha = 0.9;
       context.lineWidth = 2.5;
       set.path(context, view, sample, n, Math.max(0, share - 3 / this.duration), share);
       if (ghosts) {
         for (let s = 0; s < set.samples; s += 1) {
-          if (s !== sample) view.footprint(set.state(s, n, this.time / set.durations[s]), vehicle, vehicleColour(n), 0.08, false);
+          if (s !== sample && !isEgo(data, n)) view.footprint(set.state(s, n, this.time / set.durations[s]), vehicle, vehicleColour(n), 0.08, false);
         }
       }
     });
     data.vehicles.forEach((vehicle, n) => {
-      view.footprint(states[n], vehicle, vehicleColour(n), 1, true);
+      if (isEgo(data, n)) {
+        view.outline(states[n], vehicle, vehicleColour(n));
+        view.label(states[n].x, states[n].y, "ego", vehicleColour(n));
+      } else view.footprint(states[n], vehicle, vehicleColour(n), 1, true);
       this.readouts[n].textContent = `${states[n].speed.toFixed(1)} m/s`;
     });
     view.ruler();
@@ -181,6 +186,7 @@ function open(section, data) {
   pairs.parentElement.hidden = data.features.length < 2;
   const features = () => {
     const feature = data.features[pairs.selectedIndex];
+    if (!feature) return; // one vehicle is left: there is no pair
     section.querySelectorAll("[data-feature]").forEach((place) => {
       const [kind, arm] = place.dataset.feature.split(" ");
       if (feature[kind][arm]) drawFeature(place, feature[kind][arm], template.durations[0], feature.pair.map((n) => data.vehicles[n].id));

@@ -4,6 +4,7 @@
 const VEHICLE_COLOURS = ["#2563eb", "#e2590c", "#0d9488", "#9333ea", "#c2185b", "#65780b", "#0e7490", "#7c4a21", "#4b5563"];
 const PRIMITIVE_COLOURS = ["#4e79a7", "#f28e2b", "#59a14f", "#e15759", "#b07aa1", "#edc948", "#76b7b2", "#ff9da7", "#9c755f", "#79706e"];
 const vehicleColour = (n) => VEHICLE_COLOURS[n % VEHICLE_COLOURS.length];
+const isEgo = (data, n) => data.left_out.includes(n);
 const primitiveColour = (label) => PRIMITIVE_COLOURS[label % PRIMITIVE_COLOURS.length];
 
 function bytesOf(text) {
@@ -164,6 +165,22 @@ class View {
       context.strokeStyle = "rgba(15,23,42,0.7)";
       context.stroke();
     }
+    context.restore();
+  }
+
+  /** Where an ego would be by its template: a dashed outline, for it is not part of the scenario. */
+  outline(state, vehicle, colour) {
+    const context = this.context;
+    context.save();
+    context.translate(this.x(state.x), this.y(state.y));
+    context.rotate(-state.yaw);
+    context.globalAlpha = 1;
+    context.lineWidth = 2;
+    context.strokeStyle = colour;
+    context.setLineDash([5, 3]);
+    const length = vehicle.length * this.scale;
+    const width = vehicle.width * this.scale;
+    context.strokeRect(-length / 2, -width / 2, length, width);
     context.restore();
   }
 

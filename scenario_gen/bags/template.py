@@ -1,4 +1,4 @@
-"""A fitted template as the sampler and the evaluator hear it."""
+"""A fitted template as its messages tell it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,14 +30,14 @@ class Template:
 
 
 def read_template(messages: Mapping[str, bytes]) -> Template:
-    """Return the template that the messages (by topic) describe.
+    """Return the template that the messages (by topic) describe; the road's entries and exits may be missing.
 
     Raises:
         InputError: a message is damaged, or in another frame than the map.
     """
     encounter = decode_tracks(messages["tracks"])
     segmentation = decode_changepoints(messages["changepoints"], encounter)
-    _, road = decode_map(messages["map"])
+    _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"))
     _, frame, asked, _ = decode_fit(messages["fit"])
     anchors = anchor_stamps(encounter, segmentation.changepoints)
     routes = []

@@ -1,0 +1,60 @@
+"""What is needed to make a scenario again, as texts in the account of its request: parameters and versions, out and in."""
+
+import hashlib
+import platform
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+
+import scenario_gen
+from scenario_gen.errors import InputError
+from scenario_gen.parameters import flatten, updated
+
+Config = TypeVar("Config")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions on which the last digit of a scenario may depend."""
+    own = {"scenario_gen": scenario_gen.__version__, "python": platform.python_version()}
+    return own | {name: metadata.version(name) for name in ("numpy", "scipy", "numba")}
+
+
+def parameter_texts(config: Any) -> dict[str, str]:
+    """Return {dotted name: text} of every parameter of a configuration; real numbers exact to the bit."""
+    return {name: str(value) for name, (_, value) in flatten(config).items()}
+
+
+def read_parameters(config: Config, texts: Mapping[str, str], prefix: str, what: str) -> Config:
+    """Return `config` with the values that `texts` has under `prefix`, e.g. "sampling.".
+
+    Raises:
+        InputError: a parameter is missing there, or its text is no such value; the message names `what`.
+    """
+    values: dict[str, Any] = {}
+    for name, (entry, _) in flatten(config).items():
+        text = texts.get(prefix + name)
+        if text is None:
+            raise InputError(f"{what}: parameter {prefix}{name} is not there, so it cannot be made again")
+        kind = type(entry.default)
+        values[name] = text if kind is str else yaml.safe_load(text.lower()) if kind is bool else _number(kind, text)
+    return updated(config, values)
+
+
+def _number(kind: type, text: str) -> Any:
+    """The number that the text says; the text itself if it is none, for `updated` to refuse."""
+    try:
+        return kind(text)
+    except ValueError:
+        return text
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file, or of a folder's files in order of their names."""
+    digest = hashlib.sha256()
+    for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+        if file.is_file():
+            digest.update(file.read_bytes())
+    return digest.hexdigest()

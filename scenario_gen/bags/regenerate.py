@@ -1,0 +1,215 @@
+"""One published scenario again, bit for bit, from what its bag says: template, road, parameters, seed and index."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from msg_conventions.cdr import CdrReader
+from msg_conventions.diagnostics import Status, decode_diagnostics, encode_diagnostics
+from msg_conventions.names import tokens
+from msg_conventions.scenarios import digest, encode_scenario
+from msg_conventions.topics import topic_entry, vehicle_topic
+from msg_conventions.tracks import decode_tracks, encode_tracks
+from scenario_gen.bags.metadata import qos_yaml
+from scenario_gen.bags.provenance import Config, read_parameters, sha256_of, versions
+from scenario_gen.bags.reader import BagMessage, read_messages
+from scenario_gen.bags.template import read_template
+from scenario_gen.bags.writer import AtomicBag
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError, ScenarioGenError
+from scenario_gen.fitting import FittingConfig
+from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.planning import PlanningConfig
+from scenario_gen.requests import Chain, Request
+from scenario_gen.sampling import SamplingConfig
+from scenario_gen.scenario import Scenario
+from scenario_gen.segmentation import Segmentation, SegmentationConfig, segment
+
+TEMPLATE = ("tracks", "changepoints", "map", "fit")
+ROAD_ENDS = ("road/entries", "road/exits")
+
+
+@dataclass(frozen=True, eq=False)
+class Regenerated:
+    """A scenario made again.
+
+    Attributes:
+        scenario: the same as in the bag; data: its CDR bytes, whose SHA-256 is that in `scenarios/info`.
+        messages: those of the bag that belong to it (template, road, routes, its own and its account), for a bag of its own.
+        sha256: of `data`.
+    """
+
+    scenario: Scenario
+    data: bytes
+    messages: tuple[BagMessage, ...]
+    sha256: str
+
+
+def regenerate_scenario(
+    bag: Path, index: int, *, namespace: str | None = None, request: str | None = None, log: Path | None = None
+) -> Regenerated:
+    """Make scenario `index` of a bag again and compare it with the recorded SHA-256.
+
+    Everything is taken from the bag; where `log` is given, tracks and changepoints are made from that file instead, so that
+    the whole chain is repeated.
+
+    Args:
+        bag: its folder.
+        index: as in `scenarios/info`.
+        namespace: where several hold such an index.
+        request: id, likewise.
+        log: the raw log.
+
+    Raises:
+        InputError: the bag, the index, or something that is needed is not there or ambiguous; the log is another one.
+        ScenarioGenError: it comes out differently (another version or processor); the message names what differs.
+    """
+    found = _find(bag, index, namespace, request)
+    what = f"{bag}: request {found.entry.values['request']}"
+    account, seed = found.account.values, int(found.entry.values["seed"])
+    asked = Request(**{name: account.get(name, "") for name in ("ego", "starts", "goals")})
+    template = read_template(found.template(what))
+    encounter, segmentation, routes, states = template.encounter, template.segmentation, template.routes, template.asked
+    if log is not None:
+        encounter, segmentation = _from_log(log, encounter, account, seed, what)
+    chain = Chain(encounter, segmentation, template.road, seed, sampling=_read(SamplingConfig(), "sampling.", account, what))
+    if asked.moves or log is not None:  # what the bag has on `fit` need not be this request's
+        fitting = _read(FittingConfig(), "fitting.", account, what)
+        planning = _read(PlanningConfig(), "planning.", account, what)
+        fit, routes = replace(chain, fitting=fitting, planning=planning).place(asked)
+        states = fit.asked
+    scenario = chain.scenario(asked, routes, states, index)
+    data = b"" if scenario is None else encode_scenario(scenario, encounter.start_ns)
+    if scenario is None or digest(data) != found.entry.values["sha256"]:
+        now = versions()
+        other = [f"{name} {account[name]} there, {now[name]} here" for name in now if account.get(name, now[name]) != now[name]]
+        why = ", ".join(other) or "the versions agree, so the bag was changed or another processor made it"
+        raise ScenarioGenError(f"{what}: scenario {index} comes out differently: {why}")
+    return Regenerated(scenario, data, found.messages, digest(data))
+
+
+def write_regenerated(made: Regenerated, folder: Path) -> Path:
+    """Write the scenario, its account and its template to a bag of its own; return `folder`.
+
+    Raises:
+        InputError: the folder is there and is no bag, or cannot be written.
+    """
+    with AtomicBag(folder) as bag:
+        for message in made.messages:
+            bag.add_topic(message.topic, message.type, qos_yaml(topic_entry(message.topic)[1]))
+            bag.write(message.topic, message.data, message.stamp_ns)
+    return folder
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A scenario's account in a bag, that of its request, and the messages that belong to it, its own among them."""
+
+    namespace: str
+    entry: Status
+    account: Status
+    messages: tuple[BagMessage, ...]
+
+    def template(self, what: str) -> dict[str, bytes]:
+        """The newest message of each topic of the template.
+
+        Raises:
+            InputError: one that is needed is not in the bag.
+        """
+        newest = {message.topic.removeprefix(f"{self.namespace}/"): message.data for message in self.messages}
+        needed = [topic for topic in TEMPLATE if topic not in newest]
+        if "tracks" in newest:
+            names = tokens(vehicle.id for vehicle in decode_tracks(newest["tracks"]).vehicles)
+            needed += [topic for name in names if (topic := vehicle_topic(name, "route")) not in newest]
+        if needed:
+            raise InputError(f"{what} cannot be made again: the bag has no {', '.join(needed)} with the scenario's stamp")
+        return newest
+
+
+def _find(bag: Path, index: int, namespace: str | None, request: str | None) -> _Found:
+    """Find the one scenario of that index.
+
+    Raises:
+        InputError: there is none, several, or its request was not closed.
+    """
+    entries, accounts = [], {}
+    for message in read_messages(bag, lambda topic: topic.endswith("/scenarios/info")):
+        where = message.topic.removesuffix("/scenarios/info")
+        for status in decode_diagnostics(message.data, message.topic)[1]:
+            if "published" in status.values:
+                accounts[where, status.values["request"]] = status
+            elif "sha256" in status.values:
+                entries.append((where, status, message))
+    if not entries:
+        raise InputError(
+            f"{bag}: no scenario has an account on `scenarios/info`; only what this suite published can be made again"
+        )
+    own = [e for e in entries if namespace in (None, e[0]) and request in (None, e[1].values["request"])]
+    same = [e for e in own if e[1].values["index"] == str(index)]
+    if not same:
+        known = sorted({int(status.values["index"]) for _, status, _ in own})
+        some = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")
+        raise InputError(f"{bag}: no scenario of index {index}; there are: {some or 'none in that namespace and request'}")
+    if len(same) > 1:
+        places = "; ".join(f"--namespace '{where}' --request {status.values['request']}" for where, status, _ in same)
+        raise InputError(f"{bag}: {len(same)} scenarios have index {index}; choose one: {places}")
+    where, entry, info = same[0]
+    account = accounts.get((where, entry.values["request"]))
+    if account is None:
+        raise InputError(
+            f"{bag}: request {entry.values['request']} was not closed on {where}/scenarios/info: its parameters are missing"
+        )
+    return _Found(where, entry, account, tuple(_belonging(bag, where, entry, info, account)))
+
+
+def _belonging(bag: Path, where: str, entry: Status, info: BagMessage, account: Status) -> Iterator[BagMessage]:
+    """What bears the scenario's stamp in its namespace: the newest of each topic, then the scenario and the two accounts.
+
+    Raises:
+        InputError: the scenario itself is not in the bag.
+    """
+    stamp = CdrReader(info.data, info.topic).stamp()
+    newest: dict[str, BagMessage] = {}
+    scenario = None
+    for message in read_messages(bag, lambda topic: topic.startswith(f"{where}/")):
+        topic = message.topic.removeprefix(f"{where}/")
+        if topic == "scenarios" and digest(message.data) == entry.values["sha256"]:
+            scenario = message
+        kept = topic in (*TEMPLATE, *ROAD_ENDS) or fnmatchcase(topic, "vehicle_*/route") or topic.startswith("ego/")
+        if kept and (topic == "map" or CdrReader(message.data, message.topic).stamp() == stamp):
+            if topic == "map" and topic in newest and CdrReader(message.data, message.topic).stamp() != stamp:
+                continue
+            newest[topic] = message
+    if scenario is None:
+        raise InputError(f"{bag}: the scenario with SHA-256 {entry.values['sha256']} is not on {where}/scenarios")
+    yield from newest.values()
+    yield scenario
+    yield info
+    closing = replace(account, values={**account.values, "published": "1", "requested": "1"})
+    yield replace(info, data=encode_diagnostics([closing], stamp))
+
+
+def _from_log(log: Path, recorded: Encounter, account: Mapping[str, str], seed: int, what: str) -> tuple[Encounter, Segmentation]:
+    """The template and its changepoints from the raw log.
+
+    Raises:
+        InputError: it is not the log that the bag was made from, or the bag does not say which that was.
+    """
+    known = {name: text.removeprefix("sha256 ") for name, text in account.items() if name.startswith("log ")}
+    if not known:
+        raise InputError(f"{what}: the bag does not say which log it was made from (nodes do not know it); leave --log out")
+    own = sha256_of(log) if log.exists() else ""
+    if own not in known.values():
+        there = ", ".join(f"{name.removeprefix('log ')} (sha256 {text})" for name, text in known.items())
+        is_missing = "is not there" if not own else f"has sha256 {own}: it is another file, or was changed"
+        raise InputError(f"{log} {is_missing}; the bag was made from {there}")
+    found = [e for e in read_log(log, _read(LogConfig(), "log.", account, what)).encounters if e.start_ns == recorded.start_ns]
+    same = [e for e in found if encode_tracks(e) == encode_tracks(recorded)]
+    if not same:
+        raise InputError(f"{log}: no encounter in it is the one on the bag's tracks, though the file is the same")
+    return same[0], segment(same[0], _read(SegmentationConfig(), "segmentation.", account, what), seed)
+
+
+def _read(config: Config, prefix: str, account: Mapping[str, str], what: str) -> Config:
+    return read_parameters(config, account, prefix, what)

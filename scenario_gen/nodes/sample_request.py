@@ -1,0 +1,91 @@
+"""One request as gp_sampler works it off: a template's messages and the caller's values in, scenarios and their account out."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from msg_conventions.diagnostics import Status, request_status
+from scenario_gen.bags.provenance import parameter_texts, versions
+from scenario_gen.bags.template import Template, read_template
+from scenario_gen.fitting import FittingConfig
+from scenario_gen.parameters import check, parameter
+from scenario_gen.planning import PlanningConfig
+from scenario_gen.requests import Chain, Request, run_request
+from scenario_gen.sampling import SamplingConfig
+from scenario_gen.scenario import BoundaryStates, ScenarioSet
+from scenario_gen.validity import Limits
+
+
+@dataclass(frozen=True)
+class Config(Request):
+    """The sampler's parameters; `fitting` and `planning` are used where start or end states are asked for."""
+
+    count: int = parameter(50, "scenarios to generate", low=1, high=100_000)
+    seed: int = parameter(0, "seed of the samples, and of the planner where states are asked for", low=0)
+    generate_on_input: bool = parameter(True, "generate whenever the inputs are complete or change; false: on ~/generate only")
+    pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
+    fitting: FittingConfig = field(default_factory=FittingConfig)
+    planning: PlanningConfig = field(default_factory=PlanningConfig)
+    sampling: SamplingConfig = field(default_factory=SamplingConfig)
+    limits: Limits = field(default_factory=Limits)
+
+    def __post_init__(self) -> None:
+        check(self)
+        super().__post_init__()
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a request came to: the template, the states asked of its scenarios, the scenarios and their account."""
+
+    template: Template
+    asked: BoundaryStates
+    result: ScenarioSet
+    closing: Status
+
+
+def answer_request(
+    messages: Mapping[str, bytes],
+    config: Config,
+    request: str,
+    node: str,
+    progress: Callable[[int, int, int], None],
+    cancelled: Callable[[], bool],
+) -> Answer:
+    """Sample and check; fit and plan anew if start or end states are asked for.
+
+    Args:
+        messages: of the template, by topic.
+        config: the values of this request.
+        request: its id.
+        node: the node's full name.
+        progress: called with scenarios done and wanted, and the template's stamp [ns].
+        cancelled: whether to stop early.
+
+    Raises:
+        InputError: a message is damaged, or a vehicle that is named does not exist.
+        RefusedError: what is asked cannot be had; the message says why, and what nearby can.
+    """
+    template = read_template(messages)
+    chain = Chain(
+        template.encounter,
+        template.segmentation,
+        template.road,
+        config.seed,
+        config.fitting,
+        config.planning,
+        config.sampling,
+        config.limits,
+    )
+
+    def advance(done: int, total: int) -> None:
+        progress(done, total, template.encounter.start_ns)
+
+    asked = template.asked
+    if config.moves:
+        outcome = run_request(chain, config, count=config.count, progress=advance, cancelled=cancelled)
+        asked, result = outcome.fit.asked, outcome.scenarios
+    else:
+        result = chain.sample(config, template.routes, asked, count=config.count, progress=advance, cancelled=cancelled)
+    return Answer(
+        template, asked, result, request_status(result, request, node, config.seed, parameter_texts(config) | versions())
+    )

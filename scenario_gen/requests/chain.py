@@ -1,0 +1,124 @@
+"""From a segmented template to its scenarios: fit, plan, sample, check; the ego left out, asked states met or refused."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import RefusedError
+from scenario_gen.fitting import Fit, FittingConfig, fit_template
+from scenario_gen.interaction import Wait, find_conflicts, find_waits
+from scenario_gen.planning import PlanningConfig, Route, plan_routes
+from scenario_gen.requests.asked import refuse_impossible, refuse_misfits
+from scenario_gen.requests.request import Request
+from scenario_gen.roads import Road
+from scenario_gen.sampling import SamplingConfig, regenerate, sample_scenarios
+from scenario_gen.sampling.ego import others
+from scenario_gen.scenario import BoundaryStates, Scenario, ScenarioSet
+from scenario_gen.segmentation import Segmentation
+from scenario_gen.validity import Checker, Limits
+
+Progress = Callable[[int, int], None]
+Cancelled = Callable[[], bool]
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A segmented template, a road, and the parameters of all that follows; `seed` is that of planning and sampling."""
+
+    encounter: Encounter
+    segmentation: Segmentation
+    road: Road
+    seed: int
+    fitting: FittingConfig = field(default_factory=FittingConfig)
+    planning: PlanningConfig = field(default_factory=PlanningConfig)
+    sampling: SamplingConfig = field(default_factory=SamplingConfig)
+    limits: Limits = field(default_factory=Limits)
+
+    def place(self, request: Request) -> tuple[Fit, tuple[Route, ...]]:
+        """Fit the template to the road and plan its routes, from and to the states that are asked for.
+
+        Raises:
+            InputError: a vehicle that is named does not exist.
+            RefusedError: it does not fit, there is no way, or a state cannot be had; the message says why.
+        """
+        if not request.moves:
+            fit = fit_template(self.encounter, self.segmentation, self.road, self.fitting)
+        else:
+            starts, goals = (request.rows(end, self.encounter) for end in ("starts", "goals"))
+            refuse_impossible(self.encounter, self.road, starts, goals, self.sampling.max_speed)
+            fit = fit_template(
+                self.encounter, self.segmentation, self.road, self.fitting, starts=starts, goals=goals, partial=True
+            )
+            refuse_misfits(fit, starts, goals)
+        return fit, plan_routes(self.road, fit, self.planning, self.seed)
+
+    def waits(self) -> tuple[Wait, ...]:
+        """Return the template's waits; without changepoints there is no dwell to hold, so none is asked for."""
+        return find_waits(self.encounter) if self.segmentation.changepoints.size else ()
+
+    def scenario(self, request: Request, routes: tuple[Route, ...], asked: BoundaryStates, index: int) -> Scenario | None:
+        """Return the candidate with this index, bit for bit as in a whole set; None if it has no speed profile."""
+        return regenerate(
+            self.encounter,
+            self.segmentation,
+            self.road,
+            routes,
+            asked,
+            self.sampling,
+            seed=self.seed,
+            index=index,
+            waits=self.waits(),
+            ego=request.ego_of(self.encounter),
+        )
+
+    def sample(
+        self,
+        request: Request,
+        routes: tuple[Route, ...],
+        asked: BoundaryStates,
+        *,
+        count: int,
+        progress: Progress | None = None,
+        cancelled: Cancelled | None = None,
+    ) -> ScenarioSet:
+        """Sample candidates and publish those that the checker proves valid against the template's conflicts and waits.
+
+        The ego takes part in neither. A segmentation without changepoints has no dwell to hold, so its waits are not asked
+        for (method: the ablation).
+
+        Raises:
+            InputError: the ego does not exist, or routes and template disagree.
+            RefusedError: states were asked for, and not one candidate that meets them is valid.
+        """
+        encounter, ego = self.encounter, request.ego_of(self.encounter)
+        kept = others(encounter, ego)
+        waits = self.waits()
+        checker = Checker(
+            self.road,
+            BoundaryStates(asked.start[kept], asked.end[kept]),
+            find_conflicts(
+                tuple(encounter.vehicles[n] for n in kept), encounter.time, encounter.position[kept], encounter.heading[kept]
+            ),
+            [replace(wait, vehicle=kept.index(wait.vehicle)) for wait in waits if wait.vehicle != ego],
+            self.limits,
+        )
+        made = sample_scenarios(
+            encounter,
+            self.segmentation,
+            self.road,
+            routes,
+            asked,
+            checker.check,
+            self.sampling,
+            count=count,
+            seed=self.seed,
+            waits=waits,
+            ego=ego,
+            progress=progress,
+            cancelled=cancelled,
+        )
+        if request.moves and not made.scenarios and not (cancelled and cancelled()):
+            causes = ", ".join(f"{number} × {cause.value}" for cause, number in made.refused.most_common())
+            said = f"; {'; '.join(made.adaptations)}" if made.adaptations else ""
+            raise RefusedError(f"none of {made.candidates} candidate(s) with the asked states is valid ({causes}{said})")
+        return made

@@ -1,0 +1,246 @@
+"""The nearest request that is possible: what an impossible one is answered with, each suggestion tried out before it is made.
+
+One thing that was asked is changed at a time (a pose, a speed; all of them only if no single one helps), as little as a
+bisection finds, and the clock's stretch is tried beside it. What is suggested has been through the whole chain: fitted,
+planned, sampled and checked.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, wrap_angle
+from scenario_gen.encounter import Vehicle
+from scenario_gen.errors import RefusedError, ScenarioGenError
+from scenario_gen.fitting.routes import draw_route
+from scenario_gen.requests.chain import Cancelled, Chain
+from scenario_gen.requests.request import ENDS, Request, State
+from scenario_gen.roads.clearance import footprint_fits
+from scenario_gen.roads.curve import Curve
+from scenario_gen.roads.repair import nearest_pose_with_room
+from scenario_gen.roads.separation import footprint_gap
+from scenario_gen.sampling.ego import vehicle_index
+
+FAR = 30.0  # m, how far a pose with room is looked for
+BISECTIONS = 7
+ENOUGH = 10  # valid scenarios by which a request counts as possible, if not fewer are wanted
+_FAR_ENDS = (1.0, 0.75, 0.5, 0.25)  # shares of a way at which a bisection may begin
+_STRETCHES = (0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+_OFFSETS = (0.25 * np.arange(1, 121)).tolist()  # m, by which an overlapping footprint is moved along its heading
+
+Path = Callable[[float], Request]
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A request that is possible, the stretch of the clock it needs (None: the one in effect), and the change in words."""
+
+    request: Request
+    said: str
+    max_stretch: float | None = None
+
+
+class ImpossibleError(RefusedError):
+    """What was asked cannot be had; `suggestions` can."""
+
+    def __init__(self, reason: str, suggestions: tuple[Suggestion, ...]) -> None:
+        offers = "; or ".join(one.said for one in suggestions)
+        super().__init__(f"{reason}. " + (f"Nearest possible: {offers}" if offers else "No nearby request was found possible"))
+        self.suggestions = suggestions
+
+
+def suggestions(chain: Chain, request: Request, count: int, cancelled: Cancelled | None = None) -> tuple[Suggestion, ...]:
+    """Return possible requests near one that is not; none if nothing nearby was found, or if it was cancelled."""
+    search = _Search(chain, request, count, cancelled or (lambda: False))
+    found = tuple(search.run())
+    return () if search.cancelled() else found
+
+
+class _Search:
+    """Everything that the suggestions for one request need."""
+
+    def __init__(self, chain: Chain, request: Request, count: int, cancelled: Cancelled) -> None:
+        self.chain, self.asked, self.cancelled = chain, request, cancelled
+        self.wanted = min(count, ENOUGH)
+        try:
+            fit, _ = chain.place(replace(request, starts="", goals=""))
+            self.base = {"starts": fit.asked.start, "goals": fit.asked.end}
+        except ScenarioGenError:
+            self.base = {}
+
+    def possible(self, request: Request, stretch: float | None = None) -> bool:
+        """Whether scenarios of the request can be had within its budget."""
+        if self.cancelled():
+            return False
+        longest = self.chain.sampling.max_stretch if stretch is None else stretch
+        chain = replace(self.chain, sampling=replace(self.chain.sampling, max_stretch=longest))
+        try:
+            fit, routes = chain.place(request)
+            return len(chain.sample(request, routes, fit.asked, count=self.wanted).scenarios) == self.wanted
+        except ScenarioGenError:
+            return False
+
+    def run(self) -> Iterator[Suggestion]:
+        """Yield suggestions: the plain repair alone if it suffices, else every single change that does, else all at once."""
+        start = self._apart(self._repaired(self.asked))
+        if start != self.asked and self.possible(start):
+            yield Suggestion(start, self._difference(start))
+            return
+        found = False
+        for end, name in self._elements(start):
+            for path in self._paths(start, end, name):
+                near = self._bisected(path)
+                if near is not None:
+                    found = True
+                    yield Suggestion(near, self._difference(near))
+                    break
+        stretched = self._stretched(start)
+        if stretched is not None:
+            yield stretched
+        elif not found and self.base:
+            near = self._bisected(lambda share: self._all_towards_base(start, share))
+            if near is not None:
+                yield Suggestion(near, self._difference(near))
+
+    # --- ways to change a request: each a function of the share of the way, 0 (as it is) to 1 ---------------------
+
+    def _paths(self, request: Request, end: str, name: str) -> Iterator[Path]:
+        """The speed towards the template's, the pose along the drawn route, the pose towards where the fitting has it."""
+        n = vehicle_index(self.chain.encounter, name, end)
+        state = request.states(end)[name]
+        base = self.base[end][n] if self.base else None
+        if len(state) == 4:
+            target = 0.0 if base is None else float(base[3])
+            yield lambda share: self._with(request, end, name, (*state[:3], round(state[3] + share * (target - state[3]), 2)))
+        route = self._route(request, n, name)
+        if route is not None:
+            yield lambda share: self._with(
+                request, end, name, _moved(state, route.at((1.0 - share if end == "goals" else share) * route.length))
+            )
+        if base is not None:
+            turn = float(wrap_angle(base[2:3] - state[2])[0])
+            step = np.array([base[0] - state[0], base[1] - state[1], turn])
+            yield lambda share: self._with(request, end, name, _moved(state, np.array(state[:3]) + share * step))
+
+    def _all_towards_base(self, request: Request, share: float) -> Request:
+        """Every asked state on its way to where the fitting has it."""
+        for end, name in self._elements(request):
+            *_, path = self._paths(request, end, name)
+            request = path(share)
+            *_, speed = (p for k, p in enumerate(self._paths(request, end, name)) if k == 0)
+            request = speed(share) if len(request.states(end)[name]) == 4 else request
+        return request
+
+    def _with(self, request: Request, end: str, name: str, state: State) -> Request:
+        return request.with_states(end, request.states(end) | {name: state})
+
+    def _route(self, request: Request, n: int, name: str) -> Curve | None:
+        """The route of line, arc and line from the vehicle's start to its goal, where there is one."""
+        ends = []
+        for end in ENDS:
+            asked = request.states(end).get(name)
+            if asked is None and not self.base:
+                return None
+            ends.append(self.base[end][n, :3] if asked is None else np.array(asked[:3]))
+        vehicle, road = self.chain.encounter.vehicles[n], self.chain.road
+        return draw_route(ends[0], ends[1], lambda poses: bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all()))
+
+    def _bisected(self, path: Path) -> Request | None:
+        """The least change along `path` that is possible, to 1/128 of it; None if even most of it is not enough."""
+        far = next((share for share in _FAR_ENDS if self.possible(path(share))), None)
+        if far is None:
+            return None
+        near, best = 0.0, far
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (near + best)
+            near, best = (near, middle) if self.possible(path(middle)) else (middle, best)
+        return path(best)
+
+    def _stretched(self, request: Request) -> Suggestion | None:
+        """The same states on a longer clock."""
+        for stretch in _STRETCHES:
+            if stretch > self.chain.sampling.max_stretch and self.possible(request, stretch):
+                before = self.chain.encounter.duration
+                said = f"sampling.max_stretch:={stretch:g} (up to {before * (1.0 + stretch):.1f} s instead of {before:.1f} s)"
+                other = "" if request == self.asked else f" with {self._difference(request)}"
+                return Suggestion(request, said + other, stretch)
+        return None
+
+    # --- repairs that need no search ------------------------------------------------------------------------------
+
+    def _elements(self, request: Request) -> list[tuple[str, str]]:
+        return [(end, name) for end in ENDS for name in request.states(end)]
+
+    def _repaired(self, request: Request) -> Request:
+        """Poses with room and speeds within the limit, as near as possible."""
+        for end, name in self._elements(request):
+            vehicle = self.chain.encounter.vehicles[vehicle_index(self.chain.encounter, name, end)]
+            state = request.states(end)[name]
+            pose = np.array(state[:3])
+            answer = nearest_pose_with_room(self.chain.road, pose, vehicle.length, vehicle.width, FAR)
+            if answer is not None and answer[1] > 0.0:
+                state = self._with_room(answer[0], pose, vehicle) + state[3:]
+            if len(state) == 4:
+                state = (*state[:3], min(state[3], self.chain.sampling.max_speed))
+            request = self._with(request, end, name, state)
+        return request
+
+    def _with_room(self, pose: Floats, asked: Floats, vehicle: Vehicle) -> State:
+        """The pose in whole centimetres, as little beyond the nearest one as its footprint then needs."""
+        away = (pose - asked)[:2] / np.hypot(*(pose - asked)[:2])
+        for margin in (0.0, 0.01, 0.02, 0.05, 0.1, 0.2):
+            tried = np.array([*np.round(pose[:2] + margin * away, 2), asked[2]])
+            if footprint_fits(self.chain.road, tried[None], vehicle.length, vehicle.width)[0]:
+                pose = tried
+                break
+        return tuple(pose.tolist())
+
+    def _apart(self, request: Request) -> Request:
+        """Where an asked footprint overlaps another one, it is moved along its heading until it no longer does."""
+        encounter = self.chain.encounter
+        for end, name in self._elements(request):
+            n = vehicle_index(encounter, name, end)
+            rows = request.rows(end, encounter)[:, :3]
+            if self.base:
+                rows = np.where(np.isnan(rows), self.base[end][:, :3], rows)
+            others = [m for m in range(len(rows)) if m != n and not np.isnan(rows[m, 0])]
+
+            def gap(pose: Floats, n: int = n, others: list[int] = others, rows: Floats = rows) -> float:
+                vehicles = encounter.vehicles
+                gaps = [footprint_gap(vehicles[n], pose[None], vehicles[m], rows[[m]])[0][0] for m in others]
+                return float(min(gaps, default=np.inf))
+
+            state = request.states(end)[name]
+            if gap(np.array(state[:3])) > 0.0:
+                continue
+            ahead = np.array([np.cos(state[2]), np.sin(state[2]), 0.0])
+            vehicle = encounter.vehicles[n]
+            for offset in (sign * step for step in _OFFSETS for sign in (1.0, -1.0)):
+                pose = np.array(_moved(state, np.array(state[:3]) + offset * ahead)[:3])
+                fits = footprint_fits(self.chain.road, pose[None], vehicle.length, vehicle.width)[0]
+                if fits and gap(pose) >= self.chain.fitting.clearance:
+                    request = self._with(request, end, name, (*pose.tolist(), *state[3:]))
+                    break
+        return request
+
+    def _difference(self, request: Request) -> str:
+        """What differs from what was asked, as parameters to be set, and by how much."""
+        said = []
+        for end in ENDS:
+            before, after = self.asked.states(end), request.states(end)
+            changes = []
+            for name in (name for name in after if after[name] != before[name]):
+                a, b = before[name], after[name]
+                if (distance := float(np.hypot(b[0] - a[0], b[1] - a[1]))) > 0.0:
+                    changes.append(f"vehicle {name} {distance:.2f} m away")
+                if a[3:] != b[3:]:
+                    changes.append(f"vehicle {name} {b[3] - a[3]:+.2f} m/s")
+            if changes:
+                said.append(f"{end}:='{getattr(request, end)}' ({', '.join(changes)})")
+        return " and ".join(said)
+
+
+def _moved(state: State, pose: Floats) -> State:
+    """The state at another pose, in whole centimetres and tenths of a milliradian, its speed as it was."""
+    return (*np.round(pose[:2], 2).tolist(), round(float(pose[2]), 4), *state[3:])

@@ -1,0 +1,41 @@
+"""A request from beginning to end: what can be had, or the reason why not with the nearest that can."""
+
+from dataclasses import dataclass
+
+from scenario_gen.errors import RefusedError
+from scenario_gen.fitting import Fit
+from scenario_gen.planning import Route
+from scenario_gen.requests.chain import Cancelled, Chain, Progress
+from scenario_gen.requests.nearest import ImpossibleError, suggestions
+from scenario_gen.requests.request import Request
+from scenario_gen.scenario import ScenarioSet
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a request came to."""
+
+    fit: Fit
+    routes: tuple[Route, ...]
+    scenarios: ScenarioSet
+
+
+def run_request(
+    chain: Chain, request: Request, *, count: int, progress: Progress | None = None, cancelled: Cancelled | None = None
+) -> Outcome:
+    """Fit, plan, sample and check.
+
+    Raises:
+        InputError: a vehicle that is named does not exist.
+        ImpossibleError: the asked states cannot be met; it says why, and what nearby can be.
+        RefusedError: without asked states: the template does not fit the road, or there is no way.
+    """
+    request.ego_of(chain.encounter)
+    try:
+        fit, routes = chain.place(request)
+        made = chain.sample(request, routes, fit.asked, count=count, progress=progress, cancelled=cancelled)
+    except RefusedError as error:
+        if not request.moves:
+            raise
+        raise ImpossibleError(str(error), suggestions(chain, request, count, cancelled)) from error
+    return Outcome(fit, routes, made)

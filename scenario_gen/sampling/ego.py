@@ -1,0 +1,65 @@
+"""The ego slot: one vehicle is left out of what is published, and its template track on the road is given instead."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from msg_conventions.names import tokens
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+from scenario_gen.planning.route import Route
+from scenario_gen.scenario import BoundaryStates, Scenario
+from scenario_gen.segmentation.result import Segmentation
+
+
+def vehicle_index(encounter: Encounter, name: str, what: str) -> int:
+    """Return the index of the vehicle with the id `name`, written as in the log or as a ROS name.
+
+    Raises:
+        InputError: there is no such vehicle; the message names the parameter `what` and lists the ids that there are.
+    """
+    ids = [vehicle.id for vehicle in encounter.vehicles]
+    for known in (ids, list(tokens(ids))):
+        if name in known:
+            return known.index(name)
+    raise InputError(f"{what}: no vehicle {name!r} in {encounter.name}; there are: {', '.join(ids)}")
+
+
+def others(encounter: Encounter, ego: int | None) -> list[int]:
+    """Return the indices of the vehicles that are published."""
+    return [n for n in range(len(encounter.vehicles)) if n != ego]
+
+
+def ego_track(
+    encounter: Encounter, segmentation: Segmentation, route: Route, asked: BoundaryStates, ego: int, frame_id: str
+) -> Scenario:
+    """Return how vehicle `ego` drove in the template, along its planned route: a scenario of one vehicle on the template's clock.
+
+    Between two anchors the share of the way is the template's at every sample, so a stand stays one, and the speed is the
+    template's times the ratio of the two lengths. Start and end have the asked states.
+    """
+    speed, steps = encounter.speed[ego], encounter.speed.shape[1]
+    driven = np.concatenate([[0.0], np.cumsum(0.5 * encounter.dt * (speed[1:] + speed[:-1]))])
+    index = [0, *segmentation.changepoints.tolist(), steps - 1]
+    at, pace = np.empty(steps), np.empty(steps)
+    for (first, last), (a, b) in zip(pairwise(index), pairwise(route.length[route.anchor].tolist()), strict=True):
+        piece = slice(first, last + 1)
+        length = driven[last] - driven[first]
+        if length > 1e-3:
+            at[piece] = a + (b - a) / length * (driven[piece] - driven[first])
+            pace[piece] = (b - a) / length * speed[piece]
+        else:  # where the template stands, the route hardly moves
+            at[piece] = np.linspace(a, b, last + 1 - first)
+            pace[piece] = (b - a) / (encounter.time[last] - encounter.time[first])
+    state = np.column_stack([np.interp(at, route.length, route.points[:, c]) for c in range(3)])
+    state[0], state[-1] = route.points[0], route.points[-1]
+    pace[0], pace[-1] = asked.start[ego, 3], asked.end[ego, 3]
+    return Scenario(
+        vehicles=(encounter.vehicles[ego],),
+        time=encounter.time,
+        position=state[None, :, :2],
+        heading=state[None, :, 2],
+        speed=pace[None],
+        acceleration=np.gradient(pace, encounter.dt)[None],
+        frame_id=frame_id,
+    )

@@ -1,0 +1,70 @@
+"""The ego slot: one vehicle is left out, the others are as valid as ever, and its template track is given."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scenario_gen.interaction import find_conflicts
+from scenario_gen.logs import read_log
+from scenario_gen.requests import Chain, Request, run_request
+from scenario_gen.roads import build_road
+from scenario_gen.roads.clearance import footprint_fits
+from scenario_gen.scenario import BoundaryStates
+from scenario_gen.segmentation import segment
+from scenario_gen.validity import Checker
+
+
+@pytest.mark.parametrize("ego", ["1", "2"])
+def test_of_two_vehicles_one_is_left(chain, plain, ego):
+    made = run_request(chain, Request(ego=ego), count=5).scenarios
+    index = int(ego) - 1
+    assert [v.id for s in made.scenarios for v in s.vehicles] == ["2" if ego == "1" else "1"] * 5
+    asked = plain.fit.asked
+    for s in made.scenarios:
+        assert s.position[0, 0] == pytest.approx(asked.start[1 - index, :2], abs=1e-5)
+        assert s.position[0, -1] == pytest.approx(asked.end[1 - index, :2], abs=1e-5)
+    track = made.ego
+    assert [v.id for v in track.vehicles] == [ego]
+    for k, state in ((0, asked.start[index]), (-1, asked.end[index])):
+        assert track.position[0, k] == pytest.approx(state[:2], abs=1e-9)
+        assert np.cos(track.heading[0, k] - state[2]) == pytest.approx(1.0)
+        assert track.speed[0, k] == state[3]
+    assert np.array_equal(track.time, np.round(chain.encounter.time, 9)), "stamps are the template's"
+
+
+def test_the_track_is_drivable_in_shape_and_on_the_road(chain):
+    track = run_request(chain, Request(ego="2"), count=1).scenarios.ego
+    poses = np.column_stack([track.position[0], track.heading[0]])
+    vehicle = track.vehicles[0]
+    assert footprint_fits(chain.road, poses, vehicle.length, vehicle.width).all()
+    step = np.hypot(*np.diff(track.position[0], axis=0).T)
+    assert np.abs(step / 0.1 - 0.5 * (track.speed[0, 1:] + track.speed[0, :-1]))[1:-1].max() < 1.5
+    along = np.cos(np.arctan2(*np.diff(track.position[0], axis=0).T[::-1]) - track.heading[0, :-1])
+    assert along[step > 0.2].min() > 0.99
+
+
+def test_leaving_one_out_does_not_wait_for_its_limits(chain):
+    """An ego that nobody could drive does not stand in the way of the others."""
+    slow = replace(chain, encounter=chain.encounter, sampling=replace(chain.sampling, max_speed=11.0, max_stretch=0.0))
+    fast = Request(ego="1", goals="1: 199.0 51.75 0.0 40.0")
+    assert run_request(replace(slow, sampling=replace(slow.sampling, max_speed=40.0)), fast, count=2).scenarios.scenarios
+    assert len(run_request(slow, Request(ego="1"), count=2).scenarios.scenarios) == 2
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("ego", range(3))
+def test_the_others_stay_valid_among_themselves(data, ego):
+    (log,) = (data / "trajectories" / "ngsim_commonroad").glob("encounter_3plus_*.csv")
+    encounter = read_log(log).encounters[0]
+    chain = Chain(encounter, segment(encounter), build_road("t_intersection", encounter), 0)
+    outcome = run_request(chain, Request(ego=encounter.vehicles[ego].id), count=3)
+    kept = [n for n in range(len(encounter.vehicles)) if n != ego]
+    assert len(outcome.scenarios.scenarios) == 3
+    vehicles = tuple(encounter.vehicles[n] for n in kept)
+    conflicts = find_conflicts(vehicles, encounter.time, encounter.position[kept], encounter.heading[kept])
+    waits = [replace(wait, vehicle=kept.index(wait.vehicle)) for wait in chain.waits() if wait.vehicle != ego]
+    asked = BoundaryStates(outcome.fit.asked.start[kept], outcome.fit.asked.end[kept])
+    checker = Checker(chain.road, asked, conflicts, waits)
+    assert all(verdict.valid for verdict in checker.check(outcome.scenarios.scenarios))
+    assert [v.id for v in outcome.scenarios.scenarios[0].vehicles] == [v.id for v in vehicles]

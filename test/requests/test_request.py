@@ -1,0 +1,35 @@
+"""The text of a request."""
+
+import numpy as np
+import pytest
+
+from scenario_gen.errors import InputError
+from scenario_gen.requests import Request
+
+
+def test_states_are_read_by_vehicle_and_written_back():
+    request = Request(starts="1: 10.5 -1.75 0.0 8.0; b 2: 3,4,1.57")
+    assert request.states("starts") == {"1": (10.5, -1.75, 0.0, 8.0), "b 2": (3.0, 4.0, 1.57)}
+    assert request.states("goals") == {}
+    assert request.moves and not Request(ego="1").moves
+    again = request.with_states("starts", request.states("starts"))
+    assert again.states("starts") == request.states("starts")
+
+
+@pytest.mark.parametrize(
+    "text", ["1", "1: 2 3", "1: 1 2 3 4 5", "1: a b c", ": 1 2 3", "1: nan 0 0", "1: 0 0 0 -1", "1: 0 0 0; 1: 1 1 1"]
+)
+def test_other_text_is_refused_and_named(text):
+    with pytest.raises(InputError, match="goals"):
+        Request(goals=text)
+
+
+def test_vehicles_are_found_by_id_and_by_ros_name_and_unknown_ones_listed(chain):
+    rows = Request(goals="2: 1 2 3").rows("goals", chain.encounter)
+    assert np.isnan(rows[0]).all() and rows[1, :3].tolist() == [1.0, 2.0, 3.0] and np.isnan(rows[1, 3])
+    assert Request(ego="2").ego_of(chain.encounter) == 1
+    assert Request().ego_of(chain.encounter) is None
+    with pytest.raises(InputError, match=r"ego: no vehicle 'x'.*there are: 1, 2"):
+        Request(ego="x").ego_of(chain.encounter)
+    with pytest.raises(InputError, match="starts: no vehicle '3'"):
+        Request(starts="3: 0 0 0").rows("starts", chain.encounter)
