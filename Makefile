@@ -3,12 +3,12 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test bench install browser clean
+.PHONY: demo test bench install tools clean
 
 demo: $(READY)
 	$(BIN)/scenario-gen demo --ros --out out/demo
 
-test: $(READY) browser
+test: $(READY) tools
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -30,12 +30,16 @@ $(READY): requirements.lock setup.py
 	$(BIN)/python -m scenario_gen.kernels
 	@touch $(READY)
 
-# The report's tests drive Chromium; where it is missing and cannot be installed here, they skip with that reason.
-browser:
-	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || { \
+# The report's tests drive Chromium, package.xml is checked by xmllint; where they are missing and cannot be installed here, those tests
+# skip with that reason.
+tools:
+	@need=""; \
+	command -v chromium >/dev/null || command -v chromium-browser >/dev/null || need="chromium"; \
+	command -v xmllint >/dev/null || need="$$need libxml2-utils"; \
+	[ -z "$$need" ] || { \
 	  [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && \
-	  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq chromium >/dev/null; } || \
-	  echo "Chromium is not here: the tests of the report in a browser will be skipped"
+	  apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq $$need >/dev/null; } || \
+	  echo "Not here, and the tests that need it will be skipped: $$need"
 
 clean:
 	rm -rf .venv build install log out

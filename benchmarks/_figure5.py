@@ -1,21 +1,35 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Figure 5 of the paper as numbers: every recorded encounter and the three bundled cases, on two or three roads each."""
 
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
+import re
 from time import process_time
 
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.evaluation import ORACLE, UNIFORM, WITH, WITHOUT, Case, Evaluation, ReportInput, evaluate, render, replay
+from scenario_gen.evaluation import Case, evaluate, Evaluation, ORACLE, render, replay, ReportInput, UNIFORM, WITH, WITHOUT
 from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import Arm, PipelineConfig, run_arm, without_changepoints
-from scenario_gen.roads import Road, build_road
-from scenario_gen.segmentation import Segmentation, segment
+from scenario_gen.roads import build_road, Road
+from scenario_gen.segmentation import segment, Segmentation
 
 COUNT, SEED = 50, 7
 OTHER_ROADS = ("t_intersection", "four_way", "straight")

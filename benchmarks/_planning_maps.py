@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Maps of the planning benchmark, the true optimum on them, and a rasteriser that shares no code with the planner."""
 
 import itertools
@@ -112,8 +126,8 @@ def enters_blocked(drivable: Bools, path: Floats) -> bool:
 
 def recorded_maps(folder: Path) -> list[Road]:
     """The occupancy grids in a folder of nav2 map_server files (trinary; only what is free is drivable)."""
-    import yaml
     from PIL import Image
+    import yaml
 
     roads = []
     for path in sorted(folder.glob("*.yaml")):

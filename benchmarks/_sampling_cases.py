@@ -1,8 +1,22 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The chain up to the sampler over every recorded encounter and several roads."""
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+import os
 from pathlib import Path
 
 import numpy as np
@@ -11,16 +25,16 @@ from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import ScenarioGenError
 from scenario_gen.evaluation import replay
-from scenario_gen.evaluation.distributions import QUANTITIES, compare, values_of
+from scenario_gen.evaluation.distributions import compare, QUANTITIES, values_of
 from scenario_gen.evaluation.motion import at_count, at_period
 from scenario_gen.fitting import Fit, fit_template
-from scenario_gen.interaction import Conflict, Wait, find_conflicts, find_waits, pair_conflict
+from scenario_gen.interaction import Conflict, find_conflicts, find_waits, pair_conflict, Wait
 from scenario_gen.logs import read_log
-from scenario_gen.planning import Route, plan_routes
-from scenario_gen.roads import Road, build_road
-from scenario_gen.sampling import SamplingConfig, sample_scenarios
+from scenario_gen.planning import plan_routes, Route
+from scenario_gen.roads import build_road, Road
+from scenario_gen.sampling import sample_scenarios, SamplingConfig
 from scenario_gen.scenario import Scenario, ScenarioSet, Verdict
-from scenario_gen.segmentation import Segmentation, segment
+from scenario_gen.segmentation import segment, Segmentation
 from scenario_gen.validity import Checker
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))

@@ -1,7 +1,21 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Gaussian-process regression against scikit-learn and against a dense float64 reference."""
 
-import warnings
 from time import process_time
+import warnings
 
 import numpy as np
 import scipy.linalg
@@ -56,7 +70,7 @@ def _ours(x: Floats, y: Floats, noise: Floats, at: Floats):  # type: ignore[no-u
 def _sklearn(x: Floats, y: Floats, at: Floats) -> None:
     """The same kernel with fixed hyperparameters, zero mean (it offers no other), the same noise everywhere."""
     from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel
+    from sklearn.gaussian_process.kernels import ConstantKernel, RBF
 
     kernel = ConstantKernel(SIGMA**2, "fixed") * RBF(LENGTH, "fixed")
     with warnings.catch_warnings():

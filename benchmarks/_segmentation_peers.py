@@ -1,9 +1,23 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The peers, each by its own public functions; None where one is not installed (`pip install jax-moseq hmmlearn ruptures`)."""
 
 import importlib.util
 import time
-import warnings
 from typing import Any
+import warnings
 
 import numpy as np
 
@@ -27,10 +41,10 @@ def jax_moseq(x: Floats, sweeps: int, seed: int = 0, states: int = 20) -> tuple[
     import jax
     import jax.numpy as jnp
     import jax.random as jr
-    import tensorflow_probability.substrates.jax.distributions as tfd  # type: ignore[import-not-found]
     from jax_moseq.models.arhmm.gibbs import _resample_regression_params
     from jax_moseq.utils.distributions import sample_hmm_stateseq
     from jax_moseq.utils.transitions import init_hdp_transitions, resample_hdp_transitions
+    import tensorflow_probability.substrates.jax.distributions as tfd  # type: ignore[import-not-found]
 
     jax.config.update("jax_enable_x64", True)
     y = jnp.asarray(standardised(x))

@@ -1,22 +1,36 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Evaluation: DTW beside dtaidistance, the feature matrix beside scipy, the report's cost, and figure 5 as numbers.
 
 Figure 5 needs the recorded encounters (SCENARIO_GEN_DATA); without them only the bundled cases are measured. It takes some
 minutes, and says on stderr what each case came to.
 """
 
-import os
-import sys
 from collections.abc import Callable, Sequence
+import os
 from pathlib import Path
+import sys
 from time import process_time
 from typing import Any
 
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from benchmarks._figure5 import LINEAR, Measured, measure
+from benchmarks._figure5 import LINEAR, measure, Measured
 from benchmarks.row import Row
-from scenario_gen.evaluation import UNIFORM, WITH, WITHOUT, dtw_distance, feature_matrix
+from scenario_gen.evaluation import dtw_distance, feature_matrix, UNIFORM, WITH, WITHOUT
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 STEPS = 3000

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Planning: RRT*-Connect against the true optimum and against OMPL's planners, in one process, seeds interleaved, CPU time.
 
 A query is timed whole, as a caller sees it: checks, trees, path and string pulling; OMPL likewise from its set-up to its
@@ -5,8 +19,8 @@ path. OMPL has our compiled exact edge check as its motion validator, and its si
 road are the clearance field and the cell lists made from it.
 """
 
-import os
 from collections import defaultdict
+import os
 from pathlib import Path
 from statistics import median
 from time import process_time
@@ -19,9 +33,9 @@ from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.result import Fit, FittedVehicle
-from scenario_gen.planning import PlanningConfig, plan_routes
+from scenario_gen.planning import plan_routes, PlanningConfig
 from scenario_gen.planning.ompl_solve import PLANNERS, solve
-from scenario_gen.planning.planner import Budget, BudgetSpentError, Query, path_length
+from scenario_gen.planning.planner import Budget, BudgetSpentError, path_length, Query
 from scenario_gen.planning.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig
 from scenario_gen.roads.clearance import clearance_in_cells, distance_transform
 from scenario_gen.roads.flood import component_at, components, connected

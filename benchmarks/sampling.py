@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Sampling: the Gaussian process against its peers, throughput, and acceptance, diversity and realism on recorded data."""
 
 from time import process_time
@@ -5,7 +19,7 @@ from time import process_time
 import numpy as np
 
 from benchmarks import _sampling_peers
-from benchmarks._sampling_cases import Prepared, arrival_spread, cases, displacement, divergences
+from benchmarks._sampling_cases import arrival_spread, cases, displacement, divergences, Prepared
 from benchmarks.row import Row
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Encounter, Vehicle

@@ -1,17 +1,31 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Segmentation: speed and accuracy on sequences with known states, on labelled recordings, and online, beside the peers.
 
 Every figure is the median over seeds that were not looked at while developing; the interquartile range stands beside it.
 Speed is the CPU time of exactly the configuration that is scored: features, starts, all chains, point estimate.
 """
 
+from collections.abc import Callable, Iterator
 import csv
 import os
+from pathlib import Path
 import pickle
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import numpy as np
 
@@ -24,9 +38,9 @@ from scenario_gen.arrays import Floats, Ints
 from scenario_gen.segmentation import (
     OnlineSegmenter,
     SamplerConfig,
-    SegmentationConfig,
     segment,
     segment_series,
+    SegmentationConfig,
 )
 
 SEEDS = range(9001, 9013)

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Throughput of the checker and of the conflict finder, CPU time of one core."""
 
 from collections.abc import Callable
@@ -8,7 +22,7 @@ import numpy as np
 from benchmarks.row import Row
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Vehicle
-from scenario_gen.interaction import Wait, find_conflicts
+from scenario_gen.interaction import find_conflicts, Wait
 from scenario_gen.roads.road import Road
 from scenario_gen.scenario import BoundaryStates, Scenario
 from scenario_gen.validity import Checker

@@ -1,17 +1,31 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A small downstream planner: it asks for a plan, drives an ego along it among the vehicles of every scenario, counts crashes.
 
 Only rclpy, numpy and standard messages: nothing of scenario_gen is imported. One vehicle of each scenario (parameter `ego`)
 is taken out, and the ego drives from that vehicle's start to its goal. Replace `Driver` by the planner that you want to test.
 """
 
+from dataclasses import dataclass
 import math
 import sys
-from dataclasses import dataclass
 
-import numpy as np
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from nav_msgs.srv import GetPlan
+import numpy as np
+import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node

@@ -1,14 +1,28 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Reports ⇄ diagnostic_msgs/DiagnosticArray: key-values with full node names, one status per subject.
 
 Used for `scenarios/info` (one per scenario, then one per request) and `/diagnostics`. `header.stamp` is the template's.
 QoS: reliable, transient_local; `scenarios/info` depth 1000, the others 10.
 """
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+import json
 from typing import TYPE_CHECKING
 
 from msg_conventions.cdr import CdrReader, CdrWriter

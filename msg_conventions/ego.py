@@ -1,11 +1,25 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The ego slot on the wire: `ego/start`, `ego/goal` (odometry.py) and `ego/track` (trajectory.py, one vehicle).
 
 They belong to the request whose `scenarios/info` names the vehicle as its `ego`; being latched, they are those of the last such
 request. `ego/track` is the vehicle's template along its planned route, on the template's clock, not a scenario's.
 """
 
-import json
 from collections.abc import Iterator
+import json
 
 import numpy as np
 

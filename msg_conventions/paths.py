@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Route ⇄ `vehicle_<id>/route`, and plain paths (nav_msgs/Path).
 
 Frame: the road's. `header.stamp`: the template's. A pose's stamp is the planned time: the template's stamp at every anchor
@@ -6,14 +20,14 @@ QoS: reliable, transient_local, depth 1.
 Arc length does not travel; it is the sum of the chords.
 """
 
-import struct
 from collections.abc import Sequence
 from functools import lru_cache
+import struct
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msg_conventions.cdr import HEADER, NANOSECONDS, CdrReader, CdrWriter
+from msg_conventions.cdr import CdrReader, CdrWriter, HEADER, NANOSECONDS
 from msg_conventions.roads import poses_of
 from msg_conventions.yaw import half_angle
 from scenario_gen.arrays import Floats, Ints

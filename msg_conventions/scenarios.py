@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Scenario ⇄ `scenarios` (conventions: trajectory.py).
 
 Frame: the road's. Stamp: the template's, so that the bytes depend on nothing but what was asked; a scenario's SHA-256 joins it
@@ -10,7 +24,7 @@ import numpy as np
 
 from msg_conventions import trajectory
 from msg_conventions.cdr import NANOSECONDS
-from msg_conventions.trajectory import TYPE, Trajectory
+from msg_conventions.trajectory import Trajectory, TYPE
 from scenario_gen.errors import InputError
 from scenario_gen.scenario import Scenario
 

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """One vehicle's state at one instant ⇄ `vehicle_<id>/fix` (NavSatFix) and `vehicle_<id>/speed` (TwistStamped).
 
 Stamp: the sample's, on the template's clock. Frame: `vehicle_<id>`. Speed: linear.x, m/s, of the body frame.
@@ -51,7 +65,8 @@ def decode_fix(data: bytes, what: str = "fix") -> tuple[int, float, float]:
     """
     reader = CdrReader(data, what)
     stamp_ns, _ = reader.header()
-    status, _service = reader.one("b"), reader.one("H")
+    status = reader.one("b")
+    reader.one("H")  # service
     latitude, longitude, _altitude = reader.floats(3).tolist()
     return (stamp_ns, latitude, longitude) if status >= FIXED else (stamp_ns, math.nan, math.nan)
 

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Encounter ⇄ `tracks`: a whole template in one message (conventions: trajectory.py).
 
 Frame `local_enu`: metres east and north of the log's origin. QoS: reliable, transient_local, depth 1.
@@ -8,7 +22,7 @@ The encounter's name and geodetic origin do not travel: nothing is computed from
 import numpy as np
 
 from msg_conventions import trajectory
-from msg_conventions.trajectory import TYPE, Trajectory
+from msg_conventions.trajectory import Trajectory, TYPE
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 

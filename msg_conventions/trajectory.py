@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """trajectory_msgs/MultiDOFJointTrajectory, the one message for tracks, changepoints, fits and scenarios.
 
 Frame: `header.frame_id`. `header.stamp`: the template's first sample; what derives from a template repeats it.
@@ -11,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from msg_conventions.cdr import NANOSECONDS, CdrReader, CdrWriter
+from msg_conventions.cdr import CdrReader, CdrWriter, NANOSECONDS
 from msg_conventions.names import joint_names, vehicle_of
 from msg_conventions.yaw import quaternion, yaw
 from scenario_gen.arrays import Floats, Ints

@@ -1,18 +1,32 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The command line: `scenario-gen generate`, `scenario-gen demo`; a thin layer over the pipeline."""
 
+from functools import partial
 import json
+from pathlib import Path
 import sys
 import tempfile
-from functools import partial
-from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-import yaml
 from rich.console import Console
 from rich.markdown import Markdown
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
+import typer
+import yaml
 
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags import read_messages, reindex
@@ -22,15 +36,15 @@ from scenario_gen.bags.regenerate import regenerate_scenario, write_regenerated
 from scenario_gen.bags.validation import validate_bag
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError, ScenarioGenError
-from scenario_gen.evaluation import Case, ReportInput, comparison_table, read_evaluations, summary, write_report
+from scenario_gen.evaluation import Case, comparison_table, read_evaluations, ReportInput, summary, write_report
 from scenario_gen.evaluation import compare as compare_sets
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.parameters import flatten, updated
-from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.pipeline import generate as run_pipeline
+from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.requests import Request
-from scenario_gen.results import BAG, FIGURES, REPORT, check_folder, namespaces, provenance_of, write_results
+from scenario_gen.results import BAG, check_folder, FIGURES, namespaces, provenance_of, REPORT, write_results
 
 app = typer.Typer(
     help="Turn recorded vehicle encounters into new, valid ones on other roads.",

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What drivers do to each other: waits, conflicts, and who goes first.
 
 A *wait* is a smoothed speed below 0.5 m/s for at least 1 s. A *conflict* is where the swept footprints of two vehicles'
@@ -15,7 +29,7 @@ from scipy.ndimage import uniform_filter1d
 
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.encounter import Encounter, Vehicle
-from scenario_gen.kernels import F1, F2, OUT1, kernel
+from scenario_gen.kernels import F1, F2, kernel, OUT1
 
 WAIT_SPEED = 0.5  # m/s
 WAIT_DURATION = 1.0  # s

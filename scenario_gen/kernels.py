@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Compiled kernels: one decorator, explicit types, compiled once and cached on disk.
 
 Every kernel names its argument types, so nothing is ever compiled by surprise in the middle of a call.
@@ -6,11 +20,11 @@ node while it configures. Inputs are declared read-only (`F1`, `F2`, …): numba
 while the arrays of our frozen dataclasses would not match a writable declaration. Outputs are `OUT1`, `OUT2`, ….
 """
 
+from collections.abc import Callable
 import importlib
 import pkgutil
-from collections.abc import Callable
 from time import perf_counter
-from typing import Any, TypeVar, cast
+from typing import Any, cast, TypeVar
 
 import numba
 from numba import types

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The whole method on one screen: an encounter and a road in, valid new scenarios and their evaluation out."""
 
 from collections.abc import Callable
@@ -8,25 +22,25 @@ import numpy as np
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import RefusedError
 from scenario_gen.evaluation import (
-    ORACLE,
-    UNIFORM,
-    WITH,
-    WITHOUT,
     Case,
     CheckCounts,
-    EvaluationConfig,
     evaluate,
+    EvaluationConfig,
+    ORACLE,
     replay,
+    UNIFORM,
     uniform_changepoints,
+    WITH,
+    WITHOUT,
 )
 from scenario_gen.fitting import Fit, FittingConfig
 from scenario_gen.logs import LogConfig
 from scenario_gen.planning import PlanningConfig, Route
 from scenario_gen.requests import Chain, Request, run_request
-from scenario_gen.roads import Road, RoadConfig, build_road
+from scenario_gen.roads import build_road, Road, RoadConfig
 from scenario_gen.sampling import SamplingConfig
 from scenario_gen.scenario import ScenarioSet
-from scenario_gen.segmentation import Segmentation, SegmentationConfig, segment
+from scenario_gen.segmentation import segment, Segmentation, SegmentationConfig
 from scenario_gen.validity import Limits
 
 Progress = Callable[[int, int], None]

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The command line as a person meets it: results that are whole, and errors that say what to do."""
 
 import json
@@ -7,9 +21,9 @@ import sys
 
 import numpy as np
 import pandas as pd
+from PIL import Image
 import pytest
 import yaml
-from PIL import Image
 
 from scenario_gen.bags import read_messages
 from scenario_gen.cli import main

@@ -1,16 +1,30 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Waits, conflicts and passing orders: known cases, and agreement with shapely on random ones."""
 
 import csv
 from pathlib import Path
 
+from hypothesis import given, settings
+from hypothesis import strategies as st
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from scenario_gen.encounter import Encounter, Vehicle
-from scenario_gen.interaction import Conflict, Wait, find_conflicts, find_waits
+from scenario_gen.interaction import Conflict, find_conflicts, find_waits, Wait
 
 CARS = (Vehicle("a"), Vehicle("b"))
 TIME = np.arange(101) * 0.1

@@ -1,16 +1,30 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The arms of a case: what the segmenter's changepoints are measured against, made by the same chain."""
 
-import json
 from dataclasses import replace
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from scenario_gen.evaluation import ORACLE, UNIFORM, WITH, WITHOUT, EvaluationConfig, ReportInput, render
+from scenario_gen.evaluation import EvaluationConfig, ORACLE, render, ReportInput, UNIFORM, WITH, WITHOUT
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.pipeline import PipelineConfig, generate
+from scenario_gen.pipeline import generate, PipelineConfig
 
 QUICK = EvaluationConfig(resamples=50)
 

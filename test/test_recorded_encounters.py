@@ -1,17 +1,31 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The main job on every recorded encounter: valid new scenarios on at least two roads, re-checked by independent means."""
 
 import os
 from pathlib import Path
 
 import numpy as np
-import pytest
 from oracle import oracle_violations
+import pytest
 
 from scenario_gen.errors import RefusedError
-from scenario_gen.evaluation import WITH, WITHOUT, Case
+from scenario_gen.evaluation import Case, WITH, WITHOUT
 from scenario_gen.interaction import find_conflicts, find_waits
 from scenario_gen.logs import read_log
-from scenario_gen.pipeline import PipelineConfig, generate
+from scenario_gen.pipeline import generate, PipelineConfig
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 ENCOUNTERS = sorted((DATA / "trajectories").glob("*/encounter_*.csv"))

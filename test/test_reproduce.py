@@ -1,14 +1,28 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The paper's figures: drawn on its own settings, measured beside its claims, and honest where they do not hold."""
 
 import json
 import math
+from pathlib import Path
 import re
 import sys
-from pathlib import Path
 
+from evaluation_worlds import crossing
 import numpy as np
 import pytest
-from evaluation_worlds import crossing
 
 from scenario_gen import cli
 from scenario_gen.errors import InputError
@@ -18,7 +32,7 @@ from scenario_gen.logs.synthetic import bundled
 from scenario_gen.reproduce import claims_of, refusals, reproduce, run_case, write_page
 from scenario_gen.reproduce.chain import place, sample
 from scenario_gen.reproduce.measure import line_error, off_road
-from scenario_gen.segmentation import SegmentationConfig, segment
+from scenario_gen.segmentation import segment, SegmentationConfig
 
 
 @pytest.fixture(scope="module")

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The evaluation of any bag that keeps the conventions of the suite, ours or not."""
 
 from collections import Counter
@@ -14,7 +28,7 @@ from scenario_gen.bags.contents import read_namespaces
 from scenario_gen.bags.validation import Reference
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import Case, CheckCounts, Evaluation, EvaluationConfig, evaluate
+from scenario_gen.evaluation import Case, CheckCounts, evaluate, Evaluation, EvaluationConfig
 from scenario_gen.interaction import find_conflicts, find_waits
 from scenario_gen.scenario import ScenarioSet
 from scenario_gen.segmentation import Segmentation

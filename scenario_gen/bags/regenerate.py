@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """One published scenario again, bit for bit, from what its bag says: template, road, parameters, seed and index."""
 
 from collections.abc import Iterator, Mapping
@@ -6,7 +20,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from msg_conventions.cdr import CdrReader
-from msg_conventions.diagnostics import Status, decode_diagnostics, encode_diagnostics
+from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Status
 from msg_conventions.names import tokens
 from msg_conventions.scenarios import digest, encode_scenario
 from msg_conventions.topics import topic_entry, vehicle_topic
@@ -24,7 +38,7 @@ from scenario_gen.planning import PlanningConfig
 from scenario_gen.requests import Chain, Request
 from scenario_gen.sampling import SamplingConfig
 from scenario_gen.scenario import Scenario
-from scenario_gen.segmentation import Segmentation, SegmentationConfig, segment
+from scenario_gen.segmentation import segment, Segmentation, SegmentationConfig
 
 TEMPLATE = ("tracks", "changepoints", "map", "fit")
 ROAD_ENDS = ("road/entries", "road/exits")

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """One run as messages and as a bag: the same bytes that the nodes publish, in an order and at stamps that need no clock."""
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -7,15 +21,15 @@ from typing import TYPE_CHECKING
 
 from msg_conventions.changepoints import encode_changepoints, encode_posterior
 from msg_conventions.diagnostics import (
-    Level,
-    Status,
     asked_values,
     decode_diagnostics,
     encode_diagnostics,
     fit_statuses,
+    Level,
     read_request,
     request_status,
     scenario_status,
+    Status,
 )
 from msg_conventions.ego import ego_messages, ego_values
 from msg_conventions.fits import anchor_stamps, encode_fit

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Is every scenario of a bag valid? For any bag of the conventions, ours or not.
 
 A scenario is checked against what bears its stamp in its own namespace: the states asked of it (its own in `scenarios/info`,
@@ -6,9 +20,9 @@ newest one where none bears the stamp). What is not there is not checked, and sa
 left out for an ego. Where there are accounts on `scenarios/info`, each scenario's SHA-256 must be among them.
 """
 
-import json
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
+import json
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +38,7 @@ from msg_conventions.tracks import decode_tracks
 from scenario_gen.arrays import Floats
 from scenario_gen.bags.contents import Contents, read_namespaces
 from scenario_gen.errors import InputError
-from scenario_gen.interaction import Conflict, Wait, find_conflicts, find_waits
+from scenario_gen.interaction import Conflict, find_conflicts, find_waits, Wait
 from scenario_gen.roads.road import Road
 from scenario_gen.scenario import BoundaryStates, Scenario
 from scenario_gen.validity import Checker, Limits

@@ -1,16 +1,30 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A bag as rosbag2 (Jazzy) writes it: MCAP files of raw CDR messages, and metadata.yaml."""
 
-import shutil
-import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+import shutil
+import tempfile
 from types import TracebackType
 from typing import Any, Self
 
 from mcap.writer import CompressionType, Writer
 
-from scenario_gen.bags.metadata import BagInfo, FileInfo, TopicInfo, metadata_yaml
+from scenario_gen.bags.metadata import BagInfo, FileInfo, metadata_yaml, TopicInfo
 from scenario_gen.bags.types import definition
 from scenario_gen.errors import InputError
 

@@ -1,11 +1,25 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """DTW features (paper V-B), realism, criticality and the report."""
 
-from scenario_gen.evaluation.compare import Difference, compare, comparison_table, read_evaluations
+from scenario_gen.evaluation.compare import compare, comparison_table, Difference, read_evaluations
 from scenario_gen.evaluation.dtw import Alignment, dtw, dtw_distance, feature_matrix
-from scenario_gen.evaluation.evaluate import EvaluationConfig, evaluate
+from scenario_gen.evaluation.evaluate import evaluate, EvaluationConfig
 from scenario_gen.evaluation.oracle import replay
 from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints
-from scenario_gen.evaluation.report import ORACLE, UNIFORM, WITH, WITHOUT, Case, ReportInput, render, write_report
+from scenario_gen.evaluation.report import Case, ORACLE, render, ReportInput, UNIFORM, WITH, WITHOUT, write_report
 from scenario_gen.evaluation.result import CheckCounts, Evaluation, Metric, Row
 from scenario_gen.evaluation.summary import summary
 

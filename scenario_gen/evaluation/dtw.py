@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Dynamic time warping and the paper's feature: the normalised matrix of pairwise distances (paper V-B, Fig. 5).
 
 Series are laid out (D, T): one row per channel, so that the inner loops run over contiguous time. D = 2 for position
@@ -10,9 +24,9 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from scenario_gen.arrays import Floats, Ints, frozen, frozen_ints
+from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints
 from scenario_gen.errors import InputError
-from scenario_gen.kernels import F2, F3, OUT1, OUT2, OUTI2, B, I, kernel
+from scenario_gen.kernels import B, F2, F3, I, kernel, OUT1, OUT2, OUTI2
 
 Distance = Literal["euclidean", "manhattan"]
 

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The evaluation of sets of scenarios against the encounter that they were generated from (paper V-B, method §7)."""
 
 from collections.abc import Mapping, Sequence
@@ -11,10 +25,10 @@ from scenario_gen.errors import InputError
 from scenario_gen.evaluation import likeness, variety
 from scenario_gen.evaluation.bootstrap import Bootstrap, Interval, wilson
 from scenario_gen.evaluation.criticality import Criticality, criticality
-from scenario_gen.evaluation.distributions import QUANTITIES, compare, values_of
+from scenario_gen.evaluation.distributions import compare, QUANTITIES, values_of
 from scenario_gen.evaluation.metrics import LIMIT_CAUSES, METRICS
-from scenario_gen.evaluation.motion import Motion, at_count, at_period, of_vehicles, stacked
-from scenario_gen.evaluation.result import TEMPLATE, CheckCounts, Evaluation, Row
+from scenario_gen.evaluation.motion import at_count, at_period, Motion, of_vehicles, stacked
+from scenario_gen.evaluation.result import CheckCounts, Evaluation, Row, TEMPLATE
 from scenario_gen.parameters import check, parameter
 from scenario_gen.scenario import Cause, Scenario
 from scenario_gen.segmentation.result import Segmentation

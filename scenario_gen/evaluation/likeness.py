@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """How like the template a set of scenarios is: the paper's figure 5 as numbers (method §7).
 
 For a pair of vehicles let M_s be the feature matrix of sample s and T the template's. E is the Frobenius norm of the mean
@@ -11,7 +25,7 @@ from itertools import combinations
 import numpy as np
 
 from scenario_gen.arrays import Floats
-from scenario_gen.evaluation.dtw import Distance, blocks, feature_extents, feature_rows
+from scenario_gen.evaluation.dtw import blocks, Distance, feature_extents, feature_rows
 
 
 @dataclass(frozen=True, eq=False)

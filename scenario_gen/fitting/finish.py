@@ -1,10 +1,24 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """From a placement to a fit: anchors at the changepoints, repaired where they have no room, and the states asked for."""
 
 from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.arrays import Bools, Floats, Ints, frozen_ints
+from scenario_gen.arrays import Bools, Floats, frozen_ints, Ints
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """One door to the fitting: which way of placing a template is tried on which road."""
 
 from collections.abc import Callable
@@ -17,7 +31,7 @@ from scenario_gen.fitting.placement import Placement
 from scenario_gen.fitting.result import Fit
 from scenario_gen.fitting.search import place_by_search
 from scenario_gen.roads.road import Road
-from scenario_gen.roads.tracks import Track, clean_tracks
+from scenario_gen.roads.tracks import clean_tracks, Track
 from scenario_gen.segmentation.result import Segmentation
 
 _AT_HOME = 0.98  # share of footprints with room at which any road is taken for the template's own

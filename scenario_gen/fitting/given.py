@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Start and goal given by the user: eqs 7-9, put right, one vehicle at a time."""
 
 from dataclasses import replace
@@ -9,12 +23,12 @@ from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.fitting.finish import STAND_SPEED
-from scenario_gen.fitting.placement import Placement, check_scale
+from scenario_gen.fitting.placement import check_scale, Placement
 from scenario_gen.fitting.routes import draw_route
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.roads.curve import Curve
 from scenario_gen.roads.road import Road
-from scenario_gen.roads.tracks import Track, clean_tracks
+from scenario_gen.roads.tracks import clean_tracks, Track
 
 _CHORD = 2.0  # metres: a shorter one gives no direction (eq 8) and no scale (eq 9)
 _SAME_PLACE = 0.5  # metres

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The template's own frame: a map recorded in it, or a corridor drawn around it."""
 
 import numpy as np
@@ -5,7 +19,7 @@ import numpy as np
 from scenario_gen.arrays import frozen
 from scenario_gen.encounter import Encounter
 from scenario_gen.fitting.config import FittingConfig
-from scenario_gen.fitting.placement import Placement, farthest_repair, room
+from scenario_gen.fitting.placement import farthest_repair, Placement, room
 from scenario_gen.roads.own_paths import own_paths
 from scenario_gen.roads.road import Road
 

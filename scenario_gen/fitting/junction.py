@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Placing a template through a junction: which entry and which exit for whom, and how far along.
 
 A search over assignments with a cost, deterministic: vehicles are assigned in turn (those with most relations first) and
@@ -13,8 +27,8 @@ from scenario_gen.arrays import Floats, frozen, wrap_angle
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
-from scenario_gen.fitting.placement import Placement, check_scale, kept_apart
-from scenario_gen.fitting.relations import Equation, Relation, equations, find_relations
+from scenario_gen.fitting.placement import check_scale, kept_apart, Placement
+from scenario_gen.fitting.relations import Equation, equations, find_relations, Relation
 from scenario_gen.fitting.routes import draw_route, draw_u_turn
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.roads.curve import Curve

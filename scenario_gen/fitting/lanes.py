@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Placing a template along a road's lanes: following, meeting, passing, changing lanes, on a line laid out straight.
 
 Eq 9 in path coordinates is one-dimensional: stations on the template's reference line, times s, are stations on the lane.
@@ -11,12 +25,12 @@ import numpy as np
 from scenario_gen.arrays import Floats, frozen, wrap_angle
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
-from scenario_gen.fitting.placement import Placement, check_scale, kept_apart
+from scenario_gen.fitting.placement import check_scale, kept_apart, Placement
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.roads.curve import Curve
 from scenario_gen.roads.road import Road
 from scenario_gen.roads.tracks import Track
-from scenario_gen.roads.unrolled import Unrolled, unroll
+from scenario_gen.roads.unrolled import unroll, Unrolled
 
 _COLLINEAR = 0.3  # metres
 _PARALLEL = np.radians(2.0)

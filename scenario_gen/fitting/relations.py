@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What the template's vehicles are to each other, as equations on where they stand along their routes.
 
 Vehicle i is at arc length A_i + s·l_i(t) of its route. Arrival times at a conflict are the interaction, so distances along
@@ -10,7 +24,7 @@ from enum import Enum
 import numpy as np
 
 from scenario_gen.arrays import Floats, wrap_angle
-from scenario_gen.roads.curve import Curve, crossings
+from scenario_gen.roads.curve import crossings, Curve
 from scenario_gen.roads.meeting import meeting
 from scenario_gen.roads.tracks import Track
 

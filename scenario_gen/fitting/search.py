@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Placing a template anywhere on a map: the similarity that gives all its footprints the most room.
 
 Coarse to fine and without chance. First, for each rotation, every translation at once: the cost of a placement is the
@@ -13,7 +27,7 @@ import numpy as np
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
-from scenario_gen.fitting.placement import Placement, farthest_repair, kept_apart, room
+from scenario_gen.fitting.placement import farthest_repair, kept_apart, Placement, room
 from scenario_gen.roads.clearance import clearance_field
 from scenario_gen.roads.curve import Curve
 from scenario_gen.roads.road import Road

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """From a path to encounters: choose the reader, clean, smooth, cut."""
 
 from collections.abc import Sequence
@@ -8,13 +22,13 @@ import numpy as np
 
 from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import InputError
-from scenario_gen.logs.cleaning import Drops, clean
+from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.encounters import Group, find_groups
+from scenario_gen.logs.encounters import find_groups, Group
 from scenario_gen.logs.overlaps import find_overlaps
 from scenario_gen.logs.pieces import Piece, pieces_of
 from scenario_gen.logs.quality import Dropped, EncounterQuality, Quality, VehicleQuality
-from scenario_gen.logs.raw import RawLog, natural
+from scenario_gen.logs.raw import natural, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
 from scenario_gen.logs.sources import read_raw
 

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Reconciling positions with measured speeds: a vehicle moves forward along a smooth path.
 
 A track becomes a path (a curve by arc length, `path.py`) and a motion along it (place and speed over time, `motion.py`),
@@ -17,7 +31,7 @@ from scenario_gen.logs.cleaning import Track
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.intervals import runs
 from scenario_gen.logs.motion import Motion
-from scenario_gen.logs.path import STRAIGHT, Path, fit_path, straight_path
+from scenario_gen.logs.path import fit_path, Path, STRAIGHT, straight_path
 
 STANDS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
 STILL = 0.1  # m/s: below this it is not on its way to or from standing

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Which reader reads a path."""
 
 from collections.abc import Sequence
@@ -5,7 +19,7 @@ from pathlib import Path
 
 from scenario_gen.errors import InputError
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.files import TABLES, is_bag, is_spmd, is_table
+from scenario_gen.logs.files import is_bag, is_spmd, is_table, TABLES
 from scenario_gen.logs.raw import LogSource, RawLog
 
 ACCEPTS = {"bag": is_bag, "spmd": is_spmd, "table": is_table}  # asked in this order

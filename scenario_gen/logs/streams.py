@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Fixes and speeds as they come → samples on the common clock, and the log that they amount to.
 
 There is no second way to read here: the last seconds of the streams are a small `RawLog` and cleaned like any other, and all
@@ -12,10 +26,10 @@ import numpy as np
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
-from scenario_gen.logs.cleaning import RELOCATED, Track, clean
+from scenario_gen.logs.cleaning import clean, RELOCATED, Track
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.pieces import longest_bridge
-from scenario_gen.logs.raw import RawLog, Rows, Segment, natural
+from scenario_gen.logs.raw import natural, RawLog, Rows, Segment
 from scenario_gen.logs.smoothing import speed_of_fixes
 
 WINDOW_NS = 3_000_000_000  # of the past that is cleaned again for every sample: enough to tell a jump from a new place

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The bundled log: the paper's three cases (V-A, Fig. 3), made up and named synthetic everywhere.
 
 Each case is a drive on roads with lanes of 3.5 m, right-hand traffic, with constant acceleration between known changepoints:
@@ -12,11 +26,11 @@ coloured GPS noise, a speed sensor off by a percent, jittered stamps, lost and r
     python -m scenario_gen.logs.synthetic [FOLDER]    # writes the three bags, the same bytes every time
 """
 
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+import sys
 
 import numpy as np
 import pyproj

@@ -1,18 +1,32 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """doctor: what is wrong with an environment, and what to do about it; works without ROS, and says so.
 
 Only the standard library is imported here: `python -m scenario_gen.nodes.doctor` still answers where `scenario-gen doctor` cannot
 start for want of a package. What needs rclpy or numba runs in processes of its own (doctor_probe.py): a crash there is a finding.
 """
 
-import importlib.util
-import json
-import os
-import subprocess
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import metadata
+import importlib.util
+import json
+import os
 from pathlib import Path
+import subprocess
+import sys
 from typing import Any
 
 OK, WARNING, ERROR = "ok", "warning", "error"

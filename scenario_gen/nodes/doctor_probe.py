@@ -1,11 +1,25 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The doctor's probes, each a process of its own: `speak TOPIC`, `listen TOPIC`, `kernels`. The answer is a line of JSON."""
 
+from collections.abc import Iterator
 import importlib
 import json
 import pkgutil
 import sys
 import time
-from collections.abc import Iterator
 from typing import Any
 
 import scenario_gen
@@ -58,7 +72,7 @@ def listen(topic: str) -> None:
 
 def faults(node: Any, topics: list[tuple[str, list[str]]]) -> Iterator[str]:
     """Yield a sentence for every publisher and subscription that do not suit each other."""
-    from rclpy.qos import QoSCompatibility, qos_check_compatible
+    from rclpy.qos import qos_check_compatible, QoSCompatibility
 
     for topic, kinds in topics:
         if len(kinds) > 1:

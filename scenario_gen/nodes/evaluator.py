@@ -1,17 +1,31 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """evaluator: `tracks`, `changepoints` and the `scenarios` of a request in; its figures out as `report`."""
 
-import math
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+import math
+import sys
 
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.diagnostics import Level, Status, decode_diagnostics, encode_diagnostics, read_request
+from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, read_request, Status
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import WITH, CheckCounts, EvaluationConfig, evaluate
-from scenario_gen.nodes.base import StageNode, run_nodes
+from scenario_gen.evaluation import CheckCounts, evaluate, EvaluationConfig, WITH
+from scenario_gen.nodes.base import run_nodes, StageNode
 from scenario_gen.parameters import check, parameter
 
 

@@ -1,11 +1,25 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """gp_sampler: road, tracks, changepoints, fit and routes of one template in; checked `scenarios` and their `scenarios/info` out.
 
 It generates when the inputs are complete, and on `~/generate`, whose parameters are the node's own, valid for that call only.
 """
 
-import sys
 from collections.abc import Callable, Mapping
 from functools import partial
+import sys
 
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.task import Future
@@ -16,11 +30,11 @@ from msg_conventions.names import tokens
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import RefusedError, ScenarioGenError
-from scenario_gen.nodes.base import REQUESTS, StageNode, run_nodes
+from scenario_gen.nodes.base import REQUESTS, run_nodes, StageNode
 from scenario_gen.nodes.inputs import Inputs, stamp_of
 from scenario_gen.nodes.ros_parameters import values_of_call
 from scenario_gen.nodes.sample_messages import sample_messages
-from scenario_gen.nodes.sample_request import Answer, Config, answer_request
+from scenario_gen.nodes.sample_request import Answer, answer_request, Config
 
 ENDS = ("road/entries", "road/exits")  # of use only where start or end states are asked for
 

@@ -1,13 +1,27 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """log_player: a log in, one of its encounters out as latched `tracks`; `~/play` reads it again.
 
 With `stream`, the encounter comes as every vehicle's own `vehicle_<id>/fix` and `vehicle_<id>/speed`, and `/clock`, instead.
 """
 
-import sys
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+import sys
+import time
 
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
@@ -21,7 +35,7 @@ from msg_conventions.tracks import encode_tracks
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.nodes.base import StageNode, run_nodes
+from scenario_gen.nodes.base import run_nodes, StageNode
 from scenario_gen.parameters import check, parameter
 
 HEAD_START = 1.0  # seconds in which listeners find the streams, which are not latched

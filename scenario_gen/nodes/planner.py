@@ -1,15 +1,29 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """planner: `map`, `tracks` and `changepoints` of one template in; `fit` and a `vehicle_<id>/route` each out.
 
 `~/get_plan` (nav_msgs/GetPlan) plans on the newest map for anyone; a plan that cannot be is empty, and /diagnostics says why.
 """
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
+import sys
 
-import numpy as np
 from nav_msgs.msg import Path
 from nav_msgs.srv import GetPlan
+import numpy as np
 from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 from rclpy.time import Time
@@ -23,12 +37,12 @@ from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import RefusedError
-from scenario_gen.fitting import FittingConfig, fit_template
-from scenario_gen.nodes.base import REQUESTS, StageNode, run_nodes
+from scenario_gen.fitting import fit_template, FittingConfig
+from scenario_gen.nodes.base import REQUESTS, run_nodes, StageNode
 from scenario_gen.nodes.inputs import Inputs
 from scenario_gen.nodes.plan_request import plan_poses, query_of
 from scenario_gen.parameters import check, parameter
-from scenario_gen.planning import PlanningConfig, plan_routes
+from scenario_gen.planning import plan_routes, PlanningConfig
 
 ROAD = ("map", "road/entries", "road/exits")
 

@@ -1,16 +1,30 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """player: a bag's messages as they were recorded, raw; `~/pause` and `~/resume`; any rosbag2 bag, MCAP or SQLite.
 
 Each topic is offered with the quality of service it was recorded with. With an offset, what latched topics had said before it is
 published first. With `clock`, the bag's time is published on /clock, so that nodes with `use_sim_time` follow it.
 """
 
-import re
-import sys
-import threading
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+import re
+import sys
+import threading
 from time import monotonic
 from typing import Any
 
@@ -19,7 +33,7 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from msg_conventions.cdr import CdrWriter
-from scenario_gen.bags import BagMessage, bag_topics, read_messages
+from scenario_gen.bags import bag_topics, BagMessage, read_messages
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.nodes.base import qos, run_nodes
 from scenario_gen.nodes.message_classes import message_class

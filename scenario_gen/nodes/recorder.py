@@ -1,13 +1,27 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """recorder: any topics of any type, as raw CDR, to a bag; `~/start` and `~/stop` begin and end one.
 
 What a publisher offers decides how it is subscribed, so latched topics are recorded from late on too. Messages are logged at the
 time they arrive. The bag is closed on `~/stop`, on Ctrl-C and on SIGTERM; a killed recorder leaves all but the last chunk.
 """
 
-import re
-import sys
 from dataclasses import dataclass
 from pathlib import Path
+import re
+import sys
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -15,7 +29,7 @@ from rclpy.node import Node
 from rclpy.time import Time
 from std_srvs.srv import Trigger
 
-from msg_conventions.diagnostics import Level, Status, encode_diagnostics
+from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.topics import topic_entry
 from scenario_gen.bags import BagWriter, Split
 from scenario_gen.bags.metadata import qos_yaml

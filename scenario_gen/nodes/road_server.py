@@ -1,16 +1,30 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """road_server: `map`, `road/entries`, `road/exits`; `~/get_map`, and `~/load_map` for another road.
 
 Built-in roads are sized to the template, so the node listens to `tracks` and publishes the road for each encounter it hears, with
 its stamp. Without tracks it publishes the road in its plain size, stamp 0 (`corridor` waits for tracks).
 """
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+import sys
 from urllib.parse import unquote, urlparse
 
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from ament_index_python.packages import get_package_share_directory, PackageNotFoundError
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, LoadMap
 from rclpy.serialization import deserialize_message
@@ -20,9 +34,9 @@ from msg_conventions.diagnostics import Level
 from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import InputError, ScenarioGenError
-from scenario_gen.nodes.base import REQUESTS, StageNode, run_nodes
+from scenario_gen.nodes.base import REQUESTS, run_nodes, StageNode
 from scenario_gen.parameters import check, parameter
-from scenario_gen.roads import Road, RoadConfig, build_road
+from scenario_gen.roads import build_road, Road, RoadConfig
 
 
 @dataclass(frozen=True)

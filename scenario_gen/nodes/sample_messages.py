@@ -1,8 +1,22 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What gp_sampler publishes of a request: footprints, the ego's slot, every scenario with its account, and the account of all."""
 
 from collections.abc import Iterator
 
-from msg_conventions.diagnostics import Status, asked_values, encode_diagnostics, scenario_status
+from msg_conventions.diagnostics import asked_values, encode_diagnostics, scenario_status, Status
 from msg_conventions.ego import ego_messages, ego_values
 from msg_conventions.names import tokens
 from msg_conventions.pictures import encode_footprint, scenario_markers

@@ -1,11 +1,25 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """One request as gp_sampler works it off: a template's messages and the caller's values in, scenarios and their account out."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from msg_conventions.diagnostics import Status, request_status
+from msg_conventions.diagnostics import request_status, Status
 from scenario_gen.bags.provenance import parameter_texts, versions
-from scenario_gen.bags.template import Template, read_template
+from scenario_gen.bags.template import read_template, Template
 from scenario_gen.fitting import FittingConfig
 from scenario_gen.parameters import check, parameter
 from scenario_gen.planning import PlanningConfig

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """segmenter: `tracks`, or the vehicles' streams, in; `changepoints` and `posterior` out; `~/segment` does it again.
 
 While `vehicle_<id>/fix` and `vehicle_<id>/speed` come in, changepoints are published on `changepoints/live` as they are
@@ -5,9 +19,9 @@ confirmed. At the end of the streams, or on `~/segment`, what was buffered is re
 this node as for all others.
 """
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
+import sys
 
 from std_srvs.srv import Trigger
 
@@ -15,12 +29,12 @@ from msg_conventions.changepoints import encode_changepoints, encode_live_change
 from msg_conventions.diagnostics import Level
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from scenario_gen.bags.run import segmentation_status
-from scenario_gen.logs import LogConfig, Sample, encounters_of
+from scenario_gen.logs import encounters_of, LogConfig, Sample
 from scenario_gen.logs.raw import RawLog
-from scenario_gen.nodes.base import StageNode, run_nodes
+from scenario_gen.nodes.base import run_nodes, StageNode
 from scenario_gen.nodes.live import LiveConfig, LiveStreams
 from scenario_gen.parameters import check, parameter
-from scenario_gen.segmentation import LiveSegmenter, OnlineConfig, SegmentationConfig, segment
+from scenario_gen.segmentation import LiveSegmenter, OnlineConfig, segment, SegmentationConfig
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.errors import RefusedError
 from scenario_gen.roads.clearance import segments_free
-from scenario_gen.roads.flood import connected
+from scenario_gen.roads.flood import common_component
 from scenario_gen.roads.road import Road
 
 
@@ -86,8 +86,15 @@ class Planner(Protocol):
         ...
 
 
-def check_query(road: Road, query: Query) -> None:
-    """Raise BlockedError or NoWayError if no search could succeed."""
+def check_query(road: Road, query: Query) -> int:
+    """Raise BlockedError or NoWayError if no search could succeed.
+
+    Returns:
+        The label of the component (see `roads.flood`) that joins start and goal; 0: only the straight way does.
+    """
+    label = common_component(road, query.start, query.goal, query.radius)
+    if label:  # both ends move freely to a cell of it
+        return label
     ends = np.stack((query.start, query.goal))
     for end, xy, free in zip(("start", "goal"), ends, segments_free(road, ends, ends, query.radius), strict=True):
         if not free:
@@ -96,12 +103,13 @@ def check_query(road: Road, query: Query) -> None:
                 f"the {end} ({xy[0]:.2f}, {xy[1]:.2f}) m is not drivable on road {road.name!r} for a disc of radius "
                 f"{query.radius:.2f} m",
             )
-    if not connected(road, query.start, query.goal, query.radius):
+    if label is None:
         (x0, y0), (x1, y1) = query.start, query.goal
         raise NoWayError(
             f"no way leads from ({x0:.2f}, {y0:.2f}) m to ({x1:.2f}, {y1:.2f}) m on road {road.name!r} "
             f"for a disc of radius {query.radius:.2f} m"
         )
+    return label
 
 
 def path_length(path: Floats) -> float:

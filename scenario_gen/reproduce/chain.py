@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The paper's own chain, in cells: placed by given ends (eqs 7-9), RRT*-Connect with step 5, y as a function of x (eqs 11-15).
 
 What the paper leaves open is settled here: y is a function of x in the frame of the vehicle's own chord, since a turn has
@@ -12,16 +26,16 @@ import numpy as np
 from scenario_gen.arrays import Bools, Floats, wrap_angle
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.fitting import Fit, FittingConfig, fit_template
-from scenario_gen.interaction import Wait, find_waits
+from scenario_gen.fitting import Fit, fit_template, FittingConfig
+from scenario_gen.interaction import find_waits, Wait
 from scenario_gen.pipeline import without_changepoints
-from scenario_gen.planning import PlanningConfig, Route, plan_routes
+from scenario_gen.planning import plan_routes, PlanningConfig, Route
 from scenario_gen.planning.rrt_star_connect import PAPER
-from scenario_gen.roads import Road, RoadConfig, build_road
+from scenario_gen.roads import build_road, Road, RoadConfig
 from scenario_gen.sampling.candidates import knots_on
 from scenario_gen.sampling.config import SamplingConfig
 from scenario_gen.sampling.ordinate import ordinate_samples
-from scenario_gen.sampling.time_law import SpeedBounds, SpeedProfile, TimeLaw, layout
+from scenario_gen.sampling.time_law import layout, SpeedBounds, SpeedProfile, TimeLaw
 from scenario_gen.segmentation import Segmentation
 
 ROADS = ("straight", "t_intersection")

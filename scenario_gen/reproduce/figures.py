@@ -1,12 +1,26 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Figures 2 to 5 of the paper, drawn with plotly."""
 
-import io
 from base64 import b64encode
+import io
 from itertools import pairwise
 
 import numpy as np
-import plotly.graph_objects as go
 from PIL import Image
+import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from scenario_gen.arrays import Floats

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What the paper claims of its figures 2 to 5, as numbers."""
 
 from dataclasses import dataclass, field
@@ -8,16 +22,16 @@ import numpy as np
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import RefusedError
-from scenario_gen.evaluation import UNIFORM, WITH, WITHOUT, linear_changepoints, uniform_changepoints
+from scenario_gen.evaluation import linear_changepoints, UNIFORM, uniform_changepoints, WITH, WITHOUT
 from scenario_gen.evaluation.bootstrap import Bootstrap, Interval
 from scenario_gen.evaluation.likeness import likeness, mean_correlation, mean_error
 from scenario_gen.interaction import find_waits
 from scenario_gen.pipeline import without_changepoints
 from scenario_gen.planning import Route
-from scenario_gen.reproduce.chain import Sampled, place, sample
+from scenario_gen.reproduce.chain import place, sample, Sampled
 from scenario_gen.roads import Road
 from scenario_gen.sampling.gp import Features, Observations, Regression
-from scenario_gen.segmentation import Segmentation, SegmentationConfig, segment
+from scenario_gen.segmentation import segment, Segmentation, SegmentationConfig
 
 SIGMA, LENGTH, NOISE = 10.0, 100.0, 10.0
 """σ_f, l and σ_ω of the paper, in cells."""

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """From logs to the page of the paper's figures."""
 
 from collections.abc import Callable, Sequence
@@ -10,7 +24,7 @@ from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.reproduce.chain import ROADS
 from scenario_gen.reproduce.claims import claims_of
 from scenario_gen.reproduce.measure import run_case
-from scenario_gen.reproduce.page import PAGE, check_place, refusals, write_page
+from scenario_gen.reproduce.page import check_place, PAGE, refusals, write_page
 from scenario_gen.results import provenance_of
 
 VERDICTS = {True: ", as claimed", False: ", not as claimed", None: ""}

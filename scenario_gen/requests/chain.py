@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """From a segmented template to its scenarios: fit, plan, sample, check; the ego left out, asked states met or refused."""
 
 from collections.abc import Callable
@@ -5,13 +19,13 @@ from dataclasses import dataclass, field, replace
 
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import RefusedError
-from scenario_gen.fitting import Fit, FittingConfig, fit_template
-from scenario_gen.interaction import Wait, find_conflicts, find_waits
-from scenario_gen.planning import PlanningConfig, Route, plan_routes
+from scenario_gen.fitting import Fit, fit_template, FittingConfig
+from scenario_gen.interaction import find_conflicts, find_waits, Wait
+from scenario_gen.planning import plan_routes, PlanningConfig, Route
 from scenario_gen.requests.asked import refuse_impossible, refuse_misfits
 from scenario_gen.requests.request import Request
 from scenario_gen.roads import Road
-from scenario_gen.sampling import SamplingConfig, regenerate, sample_scenarios
+from scenario_gen.sampling import regenerate, sample_scenarios, SamplingConfig
 from scenario_gen.sampling.ego import others
 from scenario_gen.scenario import BoundaryStates, Scenario, ScenarioSet
 from scenario_gen.segmentation import Segmentation

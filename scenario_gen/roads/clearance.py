@@ -190,8 +190,11 @@ def near_squares_free(clearance: Floats, ax: float, ay: float, bx: float, by: fl
 
 
 @kernel(F2, F, F, F, F, F)
-def segment_free(clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float) -> bool:
-    """Whether a disc can move from a to b, exactly: the field skips what is surely free, squares decide the rest."""
+def free_length(clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float) -> float:
+    """How far a disc can surely move from a towards b; infinity if all the way, exactly; else what is verified, to a cell.
+
+    The field skips what is surely free, squares decide the rest.
+    """
     height, width = clearance.shape
     dx, dy = bx - ax, by - ay
     length = np.sqrt(dx * dx + dy * dy)
@@ -202,19 +205,25 @@ def segment_free(clearance: Floats, ax: float, ay: float, bx: float, by: float, 
         x, y = ax + t * dx, ay + t * dy
         i, j = int(np.floor(y)), int(np.floor(x))
         if i < 0 or j < 0 or i >= height or j >= width:
-            return False
+            return t
         here = clearance[i, j]
         if here == 0.0 or here + 0.7072 <= radius:  # 0.7072: half a cell's diagonal, rounded up
-            return False
+            return t
         ex, ey = x - j - 0.5, y - i - 0.5
         room = here - np.sqrt(ex * ex + ey * ey) - radius  # a ball about (x, y) that is surely free
         if room < 0.5:
             room = min(1.0, length - t)
             if not near_squares_free(clearance, x, y, x + room * dx, y + room * dy, radius):
-                return False
+                return t
         t += room
         if t >= length:
-            return True
+            return np.inf
+
+
+@kernel(F2, F, F, F, F, F)
+def segment_free(clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float) -> bool:
+    """Whether a disc can move from a to b, exactly."""
+    return free_length(clearance, ax, ay, bx, by, radius) == np.inf
 
 
 @kernel(F2, F2, F2, F, OUTB1)

@@ -68,15 +68,25 @@ def component_at(road: Road, xy: Floats, radius: float) -> int:
     return next(_reachable(road, np.asarray(xy, dtype=np.float64), radius), 0)
 
 
+def common_component(road: Road, start_xy: Floats, goal_xy: Floats, radius: float) -> int | None:
+    """The component by which a disc of `radius` [m] can move from start (2,) [m] to goal (2,) [m].
+
+    Returns:
+        Its label; 0 where there is none, but the straight way is free; None where no way is known.
+    """
+    first, last = component_at(road, start_xy, radius), component_at(road, goal_xy, radius)
+    if first == last > 0:
+        return first
+    start, goal = np.asarray(start_xy, dtype=np.float64), np.asarray(goal_xy, dtype=np.float64)
+    if segments_free(road, start[None], goal[None], radius)[0]:
+        return first or last
+    theirs = set(_reachable(road, goal, radius))
+    return next((label for label in _reachable(road, start, radius) if label in theirs), None)
+
+
 def connected(road: Road, start_xy: Floats, goal_xy: Floats, radius: float) -> bool:
     """Whether a disc of `radius` [m] can move from start (2,) [m] to goal (2,) [m]."""
-    start, goal = np.asarray(start_xy, dtype=np.float64), np.asarray(goal_xy, dtype=np.float64)
-    first = component_at(road, start, radius)
-    if first > 0 and first == component_at(road, goal, radius):
-        return True
-    if segments_free(road, start[None], goal[None], radius)[0]:
-        return True
-    return not set(_reachable(road, start, radius)).isdisjoint(_reachable(road, goal, radius))
+    return common_component(road, start_xy, goal_xy, radius) is not None
 
 
 def _reachable(road: Road, xy: Floats, radius: float) -> Iterator[int]:

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """How large a built-in road must be for a template."""
 
 import numpy as np
@@ -8,7 +22,7 @@ from scenario_gen.roads.builtin import Layout
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.meeting import meeting
 from scenario_gen.roads.tracks import Track
-from scenario_gen.roads.unrolled import Unrolled, unroll
+from scenario_gen.roads.unrolled import unroll, Unrolled
 
 _ROOM = 6.0  # metres kept free behind the first and before the last footprint
 _SLACK = 12.0  # metres by which a junction's geometry may differ from the template's

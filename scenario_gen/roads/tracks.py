@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The template's own motion, cleaned: one smooth, drivable path per vehicle, and the progress along it.
 
 Positions carry noise (GPS staircases of a metre, kinks of a video tracker), speeds far less of it. So the position is
@@ -7,8 +21,8 @@ that weighs a path hard to drive least badly against one far from the record. St
 phases collapse to a point, time enters only through u(t), and no sample turns back.
 """
 
-import math
 from dataclasses import dataclass
+import math
 
 import numpy as np
 from scipy.linalg import solveh_banded

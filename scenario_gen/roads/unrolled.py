@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A template along one road, in path coordinates: a reference line, and every vehicle's station, offset and lanes.
 
 Vehicles that follow, meet or pass each other on one road, however it winds, are compared on *one* line. So the gaps
@@ -8,10 +22,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.arrays import Floats, Ints, frozen, frozen_ints, wrap_angle
+from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.errors import RefusedError
 from scenario_gen.roads.curve import Curve
-from scenario_gen.roads.tracks import Track, smoothing_spline
+from scenario_gen.roads.tracks import smoothing_spline, Track
 
 _ALONG = np.radians(50.0)  # a vehicle along the road is never turned from it by more
 _SAME_LANE = 1.75  # metres of offset within which two vehicles may share a lane

@@ -1,10 +1,24 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Where along its route a vehicle passes its anchors: a Gaussian process over time, so that speeds stay a driver's."""
 
 import numpy as np
 
 from scenario_gen.arrays import Floats
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.gp import Features, Observations, Regression, combine
+from scenario_gen.sampling.gp import combine, Features, Observations, Regression
 
 MOST_SHARE = 0.3  # an anchor moves by at most this share of the way to its neighbours
 

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Candidate scenarios, many at a time, from standard normal numbers.
 
 A candidate varies the planned encounter in three ways: across the routes (a Gaussian process per vehicle), along them
@@ -14,10 +28,10 @@ import numpy as np
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.encounter import Vehicle
 from scenario_gen.sampling.along import displaced_anchors
-from scenario_gen.sampling.clock import DT, Clock
+from scenario_gen.sampling.clock import Clock, DT
 from scenario_gen.sampling.gp import combine
 from scenario_gen.sampling.lateral import kept_within
-from scenario_gen.sampling.path import BasePath, arc_lengths, states
+from scenario_gen.sampling.path import arc_lengths, BasePath, states
 from scenario_gen.sampling.time_law import SpeedProfile, TimeLaw, TimeLayout
 from scenario_gen.scenario import Scenario
 

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The joint clock: when the changepoints come, for all vehicles alike, so that who goes first survives."""
 
 import numpy as np
@@ -5,7 +19,7 @@ from scipy.special import ndtr, ndtri
 
 from scenario_gen.arrays import Floats
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.gp import Features, Observations, Regression, combine
+from scenario_gen.sampling.gp import combine, Features, Observations, Regression
 
 DT = 0.1  # s, the grid of published scenarios
 SLOWEST, FASTEST = 1.35, 0.75  # longest and shortest a primitive may become, as a share of its own duration

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Gaussian-process regression with a squared-exponential kernel, in low-rank square-root form (paper III-C, eqs 11-15).
 
 The model is f(x) = h(x)ᵀβ + g(x), g ~ GP(0, k), with k the squared exponential of eq 14 and h(x) = (1, x, …, x^p).
@@ -13,12 +27,12 @@ none needs a jitter: mean and covariance agree with a dense reference to roundin
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 from numpy.polynomial import chebyshev
+import scipy.linalg
 
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
-from scenario_gen.kernels import F2, OUT2, kernel
+from scenario_gen.kernels import F2, kernel, OUT2
 
 _RANK_TOLERANCE = 1e-17  # eigenvalues below this share of the largest are rounding
 

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The path of a sample: the route displaced sideways, as a C2 cubic spline with its own arc length.
 
 A route is resampled at equal arc lengths u. A lateral deviation d(u) moves each node along the route's normal, and the
@@ -11,8 +25,8 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from scenario_gen.arrays import Floats, Ints, frozen
-from scenario_gen.kernels import F2, F3, I1, OUT2, OUT3, F, kernel
+from scenario_gen.arrays import Floats, frozen, Ints
+from scenario_gen.kernels import F, F2, F3, I1, kernel, OUT2, OUT3
 from scenario_gen.planning.route import Route
 
 NODE_SPACING = 1.0  # m; a cubic through nodes this far apart is within 0.1 mm of an arc of radius 5 m

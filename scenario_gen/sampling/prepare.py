@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """From an encounter and its routes to a model that draws candidates: knots, limits in curves, and a feasible clock."""
 
 from collections.abc import Callable, Sequence
@@ -14,13 +28,13 @@ from scenario_gen.interaction import Wait
 from scenario_gen.planning.route import Route
 from scenario_gen.roads.road import Road
 from scenario_gen.sampling.along import along_factor
-from scenario_gen.sampling.candidates import CandidateModel, VehicleModel, knots_on, piece_lengths
-from scenario_gen.sampling.clock import FASTEST, Clock
+from scenario_gen.sampling.candidates import CandidateModel, knots_on, piece_lengths, VehicleModel
+from scenario_gen.sampling.clock import Clock, FASTEST
 from scenario_gen.sampling.config import SamplingConfig
 from scenario_gen.sampling.ego import others
-from scenario_gen.sampling.lateral import MOST_SIGMAS, ROOM_SIGMAS, lateral_factor, lateral_room
+from scenario_gen.sampling.lateral import lateral_factor, lateral_room, MOST_SIGMAS, ROOM_SIGMAS
 from scenario_gen.sampling.path import BasePath
-from scenario_gen.sampling.time_law import STAND, SpeedBounds, SpeedProfile, TimeLaw, TimeLayout, layout
+from scenario_gen.sampling.time_law import layout, SpeedBounds, SpeedProfile, STAND, TimeLaw, TimeLayout
 from scenario_gen.scenario import BoundaryStates
 from scenario_gen.segmentation.result import Segmentation
 

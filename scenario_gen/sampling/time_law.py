@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The time law: when a vehicle is where, with piecewise constant acceleration (paper IV-B).
 
 With one constant acceleration per primitive, path lengths, durations and the two end speeds overdetermine the speeds at
@@ -18,8 +32,8 @@ import daqp
 import numpy as np
 import numpy.typing as npt
 
-from scenario_gen.arrays import Bools, Floats, Ints, frozen
-from scenario_gen.kernels import F1, F2, I1, OUT2, OUT3, kernel
+from scenario_gen.arrays import Bools, Floats, frozen, Ints
+from scenario_gen.kernels import F1, F2, I1, kernel, OUT2, OUT3
 from scenario_gen.sampling.config import SamplingConfig
 
 Marks = npt.NDArray[np.intc]

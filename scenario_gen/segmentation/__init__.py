@@ -1,11 +1,25 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Encounter -> primitives and changepoints, with their posterior (paper II-B)."""
 
-from scenario_gen.segmentation.library import Assignment, PrimitiveLibrary, assign, build_library
+from scenario_gen.segmentation.library import assign, Assignment, build_library, PrimitiveLibrary
 from scenario_gen.segmentation.live import LiveChangepoints, LiveSegmenter
 from scenario_gen.segmentation.online import Changepoint, OnlineConfig, OnlineSegmenter
 from scenario_gen.segmentation.posterior import Posterior
 from scenario_gen.segmentation.result import Segmentation
-from scenario_gen.segmentation.segmenter import SegmentationConfig, segment
+from scenario_gen.segmentation.segmenter import segment, SegmentationConfig
 from scenario_gen.segmentation.series import SamplerConfig, segment_series
 
 __all__ = [

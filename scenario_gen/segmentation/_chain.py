@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """One chain of the weak-limit blocked Gibbs sampler for the sticky HDP-HMM (Fox, Sudderth, Jordan, Willsky 2011)."""
 
 import math
@@ -5,20 +19,20 @@ import math
 import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.kernels import F1, F2, I1, OUT1, OUT2, OUT3, OUTI2, I, kernel
+from scenario_gen.kernels import F1, F2, I, I1, kernel, OUT1, OUT2, OUT3, OUTI2
 from scenario_gen.segmentation._emission import (
-    BLOCK,
     accumulate,
+    BLOCK,
     block_log_likelihood,
     cholesky,
     draw_emission,
     log_marginal,
 )
 from scenario_gen.segmentation._random import (
-    State,
     dirichlet_draw,
     log_beta_draw,
     log_gamma_draw,
+    State,
     tables_draw,
     uniform,
 )

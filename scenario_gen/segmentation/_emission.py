@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Emissions of all states at once: y = A z + noise, (A, Σ) ~ MNIW(M, K, ν0, S0), in one form for Gaussian and AR.
 
 With the regressor z = 1 this is the Gaussian-NIW emission (A is the mean, K its κ0); with z = (1, past samples) it is
@@ -12,7 +26,7 @@ import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import kernel
-from scenario_gen.segmentation._random import State, log_gamma_draw, normal
+from scenario_gen.segmentation._random import log_gamma_draw, normal, State
 
 BLOCK = 64
 

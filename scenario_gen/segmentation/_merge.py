@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Greedy merging of states by marginal likelihood: what Gibbs sampling alone does with difficulty."""
 
 import math
@@ -5,7 +19,7 @@ import math
 import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.kernels import F1, F2, I1, OUT1, OUTI1, F, I, kernel
+from scenario_gen.kernels import F, F1, F2, I, I1, kernel, OUT1, OUTI1
 from scenario_gen.segmentation._chain import count_transitions
 from scenario_gen.segmentation._emission import accumulate, cholesky, log_marginal
 

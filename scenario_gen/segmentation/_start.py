@@ -1,15 +1,29 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Where a chain starts, and the prior it runs under: k-means, a few sweeps, greedy merges; scales from the data."""
 
-import warnings
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+import warnings
 
 import numpy as np
 from scipy.cluster.vq import kmeans2
 from scipy.ndimage import uniform_filter1d
 
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.segmentation._problem import Prior, Problem, compact
+from scenario_gen.segmentation._problem import compact, Prior, Problem
 
 if TYPE_CHECKING:
     from scenario_gen.segmentation.series import SamplerConfig

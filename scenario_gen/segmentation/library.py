@@ -1,22 +1,36 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A library of primitives shared by many encounters: what the hierarchy of the HDP is for."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scenario_gen.arrays import Floats, Ints, frozen, frozen_ints
+from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.segmentation.descriptions import describe_accelerations, describe_segments
 from scenario_gen.segmentation.features import driving_features
 from scenario_gen.segmentation.posterior import in_order
 from scenario_gen.segmentation.result import Segmentation
-from scenario_gen.segmentation.segmenter import DEFAULT, SegmentationConfig, cut, on_trends, relabel
+from scenario_gen.segmentation.segmenter import cut, DEFAULT, on_trends, relabel, SegmentationConfig
 from scenario_gen.segmentation.series import segment_series
 
 FORMAT = "scenario_gen primitive library 1"

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Encounter -> Segmentation: features, sampler, and the few rules of the road."""
 
 from dataclasses import dataclass
@@ -10,7 +24,7 @@ from scenario_gen.encounter import Encounter
 from scenario_gen.parameters import check, parameter
 from scenario_gen.segmentation.descriptions import describe_segments
 from scenario_gen.segmentation.features import driving_features, paper_features
-from scenario_gen.segmentation.posterior import Posterior, in_order
+from scenario_gen.segmentation.posterior import in_order, Posterior
 from scenario_gen.segmentation.result import Segmentation
 from scenario_gen.segmentation.series import SamplerConfig, segment_series
 from scenario_gen.segmentation.trends import Trends

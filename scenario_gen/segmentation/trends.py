@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Changepoints as knots of a constant-acceleration, constant-turn-rate law: put them where the trends change.
 
 Within a primitive each vehicle's speed and course are nearly linear in time (paper IV-B). The sampler says how many
@@ -15,7 +29,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.special import gammainccinv
 
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.kernels import F2, I1, OUT1, I, kernel
+from scenario_gen.kernels import F2, I, I1, kernel, OUT1
 
 SPEED_NOISE = 0.1
 COURSE_NOISE = 0.3

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Proof that oriented footprints stay apart at every instant.
 
 Over a stretch of time the relative position of two vehicles lies in the convex hull of four control points, and each
@@ -9,7 +23,7 @@ axis). Where no such line is found the stretch is halved, until it is proven, an
 import numpy as np
 
 from scenario_gen.arrays import Floats
-from scenario_gen.kernels import F1, F2, F4, OUT2, F, kernel
+from scenario_gen.kernels import F, F1, F2, F4, kernel, OUT2
 from scenario_gen.validity.motion import stretch
 
 BLOCK = 16  # intervals that share one bounding box

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The checker: proves a scenario valid at every instant, or says what is wrong with it, when and by how much."""
 
 from collections.abc import Iterator, Sequence
@@ -7,7 +21,7 @@ import numpy as np
 
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
-from scenario_gen.interaction import Conflict, Wait, pair_conflict, runs
+from scenario_gen.interaction import Conflict, pair_conflict, runs, Wait
 from scenario_gen.roads.clearance import clearance_in_cells
 from scenario_gen.roads.road import Road
 from scenario_gen.scenario import BoundaryStates, Cause, Scenario, Verdict, Violation

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Limits of the motion itself, and whether the published fields agree with each other.
 
 Speed, acceleration and heading are linear between samples, so an extreme of speed, of |acceleration| and of speed times
@@ -9,7 +23,7 @@ from enum import IntEnum
 import numpy as np
 
 from scenario_gen.arrays import Floats
-from scenario_gen.kernels import F1, F2, F3, OUT3, kernel
+from scenario_gen.kernels import F1, F2, F3, kernel, OUT3
 from scenario_gen.scenario import Cause
 
 TURN_ROUNDING = 1e-4  # rad, change of heading that a vehicle may show without having moved

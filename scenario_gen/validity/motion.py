@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The motion between samples as Bézier curves, whose control points bound it over any stretch of time.
 
 The cubic Hermite interpolant of positions p0, p1 and velocities m0, m1 over h seconds is the Bézier curve with control
@@ -8,7 +22,7 @@ difference of two of them; and the part between u0 and u1 has control points giv
 import numpy as np
 
 from scenario_gen.arrays import Floats
-from scenario_gen.kernels import F1, F2, F3, OUT4, kernel
+from scenario_gen.kernels import F1, F2, F3, kernel, OUT4
 
 
 @kernel(F1, F3, F2, F2, OUT4)

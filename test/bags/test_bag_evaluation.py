@@ -1,15 +1,29 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A bag evaluated from its messages alone gives the figures of the scenarios that were put into it."""
 
-import pytest
 from evaluation_worlds import report_case
+import pytest
 
 from msg_conventions.topics import topic_entry
-from scenario_gen.bags import Run, read_messages, write_run
+from scenario_gen.bags import read_messages, Run, write_run
 from scenario_gen.bags.evaluation import bag_cases, evaluate_bag
 from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import EvaluationConfig, ReportInput, render
+from scenario_gen.evaluation import EvaluationConfig, render, ReportInput
 from scenario_gen.validity import Limits
 
 QUICK = EvaluationConfig(resamples=50)

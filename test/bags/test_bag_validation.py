@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Every scenario of a bag is checked anew, against what the bag itself says of its request."""
 
 from dataclasses import replace
@@ -8,7 +22,7 @@ from typer.testing import CliRunner
 
 from msg_conventions.scenarios import digest, encode_scenario
 from msg_conventions.topics import topic_entry
-from scenario_gen.bags import AtomicBag, Run, read_messages, write_run
+from scenario_gen.bags import AtomicBag, read_messages, Run, write_run
 from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.bags.validation import ALTERED, UNUSABLE, validate_bag
 from scenario_gen.cli import app

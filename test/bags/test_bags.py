@@ -1,19 +1,33 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Bags: what is written opens everywhere, the same bytes each time, whole or not at all; what others wrote can be read."""
 
-import os
-import subprocess
-import sys
 from collections import Counter
 from dataclasses import replace
+import os
 from pathlib import Path
+import subprocess
+import sys
 
-import numpy as np
-import pytest
-import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+import numpy as np
+import pytest
 from rosbags.highlevel import AnyReader
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import get_typestore, Stores
+import yaml
 
 from msg_conventions.changepoints import decode_posterior
 from msg_conventions.diagnostics import decode_diagnostics, read_request
@@ -22,7 +36,7 @@ from msg_conventions.paths import decode_route
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.bags import BagWriter, Run, Split, bag_topics, read_messages, read_scenario_set, reindex, write_run
+from scenario_gen.bags import bag_topics, BagWriter, read_messages, read_scenario_set, reindex, Run, Split, write_run
 from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import InputError
 from scenario_gen.fitting.result import Fit, FittedVehicle

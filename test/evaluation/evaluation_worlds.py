@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Small worlds with known answers: a crossing of two cars, and samples around it."""
 
 from collections import Counter
@@ -6,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from scenario_gen.encounter import Encounter, Vehicle
-from scenario_gen.evaluation import Case, CheckCounts, EvaluationConfig, evaluate
+from scenario_gen.evaluation import Case, CheckCounts, evaluate, EvaluationConfig
 from scenario_gen.fitting.result import Fit, FittedVehicle
 from scenario_gen.planning.route import Route
 from scenario_gen.roads.road import Road

@@ -1,12 +1,26 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The report in headless Chromium: no errors, no requests, it plays, scrubs and switches; nothing is wider than a phone."""
 
-import io
 from base64 import b64decode
+import io
 
-import pytest
-from browser_tab import DESKTOP, PHONE, Tab, chromium
+from browser_tab import chromium, DESKTOP, PHONE, Tab
 from evaluation_worlds import report_case
 from PIL import Image
+import pytest
 
 from scenario_gen.evaluation import ReportInput, write_report
 

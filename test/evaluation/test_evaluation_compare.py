@@ -1,14 +1,28 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Two sets of results side by side."""
 
-import json
 from dataclasses import replace
+import json
 
+from evaluation_worlds import crossing, samples
 import numpy as np
 import pytest
-from evaluation_worlds import crossing, samples
 
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import EvaluationConfig, evaluate
+from scenario_gen.evaluation import evaluate, EvaluationConfig
 from scenario_gen.evaluation.compare import compare, comparison_table, read_evaluations
 from scenario_gen.segmentation.result import Segmentation
 

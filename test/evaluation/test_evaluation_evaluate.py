@@ -1,16 +1,30 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The evaluation as a whole: rows, notes, determinism and its documents; the oracle."""
 
+from dataclasses import replace
 import json
 import math
-from dataclasses import replace
 
+from evaluation_worlds import CARS, crossing, replayed, samples
 import numpy as np
 import pytest
-from evaluation_worlds import CARS, crossing, replayed, samples
 
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import CheckCounts, Evaluation, EvaluationConfig, evaluate, replay
+from scenario_gen.evaluation import CheckCounts, evaluate, Evaluation, EvaluationConfig, replay
 from scenario_gen.fitting.result import Fit, FittedVehicle
 from scenario_gen.scenario import BoundaryStates, Cause, ScenarioSet, Verdict, Violation
 from scenario_gen.segmentation.result import Segmentation

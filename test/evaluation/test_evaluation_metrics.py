@@ -1,12 +1,26 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Each metric against a hand-computed case and, where there is one, a library."""
 
 import math
 
-import numpy as np
-import pytest
 from evaluation_worlds import CARS, crossing, replayed, samples
 from hypothesis import given, settings
 from hypothesis import strategies as st
+import numpy as np
+import pytest
 from scipy import stats
 from scipy.spatial.distance import jensenshannon
 from shapely import affinity
@@ -16,10 +30,10 @@ from scenario_gen.encounter import Vehicle
 from scenario_gen.evaluation import likeness, variety
 from scenario_gen.evaluation.bootstrap import Bootstrap, wilson
 from scenario_gen.evaluation.criticality import criticality
-from scenario_gen.evaluation.distributions import QUANTITIES, compare, jensen_shannon, values_of
+from scenario_gen.evaluation.distributions import compare, jensen_shannon, QUANTITIES, values_of
 from scenario_gen.evaluation.dtw import feature_matrix
 from scenario_gen.evaluation.geometry import footprint_distance, time_to_collision
-from scenario_gen.evaluation.motion import Motion, at_count, at_period
+from scenario_gen.evaluation.motion import at_count, at_period, Motion
 
 ONCE = np.ones((1, 1))
 

@@ -1,11 +1,25 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Reference changepoints: evenly spaced, and the best piecewise-linear fit."""
 
 from itertools import combinations, pairwise
 
-import numpy as np
 from evaluation_worlds import crossing
 from hypothesis import given, settings
 from hypothesis import strategies as st
+import numpy as np
 
 from scenario_gen.evaluation.references import best_linear_pieces, linear_changepoints, uniform_changepoints
 from scenario_gen.segmentation.result import Segmentation

@@ -1,21 +1,35 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The report's page as text and data; how it behaves in a browser is in test_evaluation_browser.py."""
 
+from base64 import b64decode
 import io
 import json
 import re
-from base64 import b64decode
 
-import numpy as np
-import pytest
 from evaluation_worlds import cross_road, report_case
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+import numpy as np
+import pytest
 from rich.console import Console
 
-from scenario_gen.evaluation import ReportInput, feature_matrix, render, summary, write_report
+from scenario_gen.evaluation import feature_matrix, render, ReportInput, summary, write_report
 from scenario_gen.evaluation.motion import at_count
-from scenario_gen.evaluation.report_data import MATRIX_SIZE, case_data, pack, runs
+from scenario_gen.evaluation.report_data import case_data, MATRIX_SIZE, pack, runs
 
 
 @pytest.fixture(scope="module")

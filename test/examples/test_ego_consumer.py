@@ -1,12 +1,26 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The example drives among real scenarios of the real suite, and its geometry is right."""
 
 import importlib.util
 import math
 import os
+from pathlib import Path
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -63,7 +77,7 @@ def test_a_driver_that_brakes_stops_and_one_that_does_not_crashes(example):
 
 @pytest.mark.dds
 def test_it_drives_among_the_scenarios_of_the_suite(tmp_path):
-    from suite_processes import RESOURCES, Client, Processes
+    from suite_processes import Client, Processes, RESOURCES
 
     from msg_conventions.diagnostics import decode_diagnostics
     from msg_conventions.topics import TOPICS

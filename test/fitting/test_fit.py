@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Templates on roads: ends, lanes, who crosses whom, repair, refusals."""
 
 import numpy as np
@@ -5,11 +19,11 @@ import pytest
 
 from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.fitting import FittingConfig, fit_template, fitted_template
+from scenario_gen.fitting import fit_template, fitted_template, FittingConfig
 from scenario_gen.interaction import find_conflicts
 from scenario_gen.logs import read_log
 from scenario_gen.planning.route import Route
-from scenario_gen.roads import Road, build_road
+from scenario_gen.roads import build_road, Road
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.roads.curve import Curve
 from scenario_gen.segmentation.result import Segmentation

@@ -1,17 +1,31 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The bundled log: made up, believable, the same bytes every time, and read back to its ground truth."""
 
 from itertools import combinations
 
-import numpy as np
-import pytest
-import shapely
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+import numpy as np
+import pytest
 from rosbags.highlevel import AnyReader
+import shapely
 
 from scenario_gen.interaction import find_waits
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.synthetic import CASES, ORIGIN, START_NS, bundled, main, make_case
+from scenario_gen.logs.synthetic import bundled, CASES, main, make_case, ORIGIN, START_NS
 
 FINE = 0.02
 

@@ -1,13 +1,27 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Every convention gives back what went in, bit for bit, and refuses what is damaged with a reason."""
 
-import math
 from collections import Counter
+import math
 
-import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from message_examples import NASTY_HEADINGS, assert_same, encounter, generator, route, scenario, seeds, segmentation
+from message_examples import assert_same, encounter, generator, NASTY_HEADINGS, route, scenario, seeds, segmentation
+import numpy as np
+import pytest
 
 from msg_conventions import changepoints, diagnostics, fits, names, paths, pictures, roads, scenarios, tracks, trajectory
 from scenario_gen.arrays import canonical_angle

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Our bytes are those of rclpy and of rosbags, and decode there to the same values.
 
 Fast CDR leaves padding bytes uninitialised, so rclpy's bytes are compared after rosbags has put zeros there.
@@ -7,10 +21,10 @@ import importlib
 import subprocess
 import sys
 
+from message_examples import encounter, route, scenario, segmentation
 import numpy as np
 import pytest
-from message_examples import encounter, route, scenario, segmentation
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import get_typestore, Stores
 
 from msg_conventions import changepoints, diagnostics, paths, pictures, roads, scenarios, tracks
 from scenario_gen.encounter import Vehicle

@@ -1,14 +1,28 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The doctor finds what is wrong, and nothing where nothing is."""
 
 import os
+from pathlib import Path
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
-from scenario_gen.nodes.doctor import ERROR, OK, WARNING, examine, meeting, packages, python, variables
+from scenario_gen.nodes.doctor import ERROR, examine, meeting, OK, packages, python, variables, WARNING
 
 ROOT = Path(__file__).resolve().parents[2]
 MISFITS = """

@@ -1,12 +1,26 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Vehicles that stream, a segmenter that hears them, and /clock: changepoints while they drive, scenarios when they have."""
 
 import numpy as np
 import pytest
-from suite_processes import RESOURCES, Client, Processes
+from suite_processes import Client, Processes, RESOURCES
 
 from msg_conventions import trajectory
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.diagnostics import Level, decode_diagnostics
+from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.streams import decode_speed, encode_fix, encode_speed
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.logs import read_log

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The nodes in processes of their own, over DDS."""
 
 import math
@@ -5,9 +19,9 @@ import threading
 import time
 
 import pytest
-from suite_processes import RESOURCES, Client, Processes
+from suite_processes import Client, Processes, RESOURCES
 
-from msg_conventions.diagnostics import Level, decode_diagnostics
+from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.fits import decode_fit
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest, encode_scenario
@@ -15,7 +29,7 @@ from scenario_gen.bags import read_messages
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.logs import read_log
 from scenario_gen.nodes.run_suite import Job, run_suite
-from scenario_gen.pipeline import PipelineConfig, generate
+from scenario_gen.pipeline import generate, PipelineConfig
 
 pytestmark = pytest.mark.dds
 LOG = RESOURCES / "synthetic_c"

@@ -1,12 +1,26 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The parts of the nodes that need no other process."""
 
 import ast
-import threading
 from pathlib import Path
+import threading
 
 import pytest
-import yaml
 from rclpy.parameter import Parameter
+import yaml
 
 from msg_conventions.cdr import CdrWriter
 from scenario_gen.errors import InputError
@@ -15,7 +29,7 @@ from scenario_gen.nodes.domain import free_domain
 from scenario_gen.nodes.inputs import Inputs
 from scenario_gen.nodes.road_server import road_of_url
 from scenario_gen.nodes.ros_parameters import descriptor, with_values
-from scenario_gen.nodes.run_suite import SECTIONS, Job, parameters
+from scenario_gen.nodes.run_suite import Job, parameters, SECTIONS
 from scenario_gen.nodes.worker import Worker
 from scenario_gen.parameters import flatten
 from scenario_gen.pipeline import PipelineConfig
@@ -133,10 +147,13 @@ def test_default_yaml_holds_the_defaults():
 
 
 def test_nodes_are_thin():
+    def lines(path):
+        return len(path.read_text().partition('"""')[2].splitlines())  # below the licence
+
     for path in (ROOT / "scenario_gen" / "nodes").glob("*.py"):
-        assert len(path.read_text().splitlines()) <= 270, path
+        assert lines(path) <= 270, path
     for name in ("segmenter", "planner", "gp_sampler", "log_player", "road_server", "evaluator"):
-        assert len((ROOT / "scenario_gen" / "nodes" / f"{name}.py").read_text().splitlines()) <= 150, name
+        assert lines(ROOT / "scenario_gen" / "nodes" / f"{name}.py") <= 150, name
 
 
 def test_the_launch_file_names_nodes_and_parameters_that_exist():

@@ -1,17 +1,31 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The recorder and the player as processes: types of no concern to the suite, a kill, and bags of genuine rosbag2."""
 
 import os
+from pathlib import Path
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
-import pytest
-import yaml
 from mcap.reader import make_reader
+import pytest
 from rosbags.rosbag2 import Reader
 from suite_processes import Client
 from typer.testing import CliRunner
+import yaml
 
 from scenario_gen.bags import bag_topics, read_messages
 from scenario_gen.cli import app

@@ -1,20 +1,34 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Routes: exact ends, on the road, drivable, through the anchors, on their side of the road; and clear refusals."""
 
 import csv
 
-import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+import numpy as np
+import pytest
 from shapely import affinity
-from shapely.geometry import Polygon, box
+from shapely.geometry import box, Polygon
 from shapely.ops import unary_union
 
 from benchmarks._planning_maps import recorded_maps, road_of
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.fitting.result import Fit, FittedVehicle
-from scenario_gen.planning import PlanningConfig, deviations, plan_routes
+from scenario_gen.planning import deviations, plan_routes, PlanningConfig
 from scenario_gen.roads.repair import nearest_pose_with_room
 from scenario_gen.scenario import BoundaryStates
 

@@ -1,13 +1,27 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """RRT*-Connect and string pulling: never through an obstacle, never shorter than the optimum, and close to it."""
 
-import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+import numpy as np
+import pytest
 
 from benchmarks._planning_maps import clutter, enters_blocked, lane, optimum, road_of, t_intersection
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.planning.planner import BlockedError, Budget, BudgetSpentError, NoWayError, Query, path_length
+from scenario_gen.planning.planner import BlockedError, Budget, BudgetSpentError, NoWayError, path_length, Query
 from scenario_gen.planning.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig
 from scenario_gen.roads.clearance import clearance_in_cells, segments_free
 from scenario_gen.roads.flood import connected

@@ -1,13 +1,27 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Cleaned tracks, path coordinates, separation."""
 
-import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+import numpy as np
+import pytest
 
 from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import RefusedError
-from scenario_gen.roads.curve import Curve, crossings
+from scenario_gen.roads.curve import crossings, Curve
 from scenario_gen.roads.separation import footprint_gap, separate, smallest_gaps
 from scenario_gen.roads.tracks import clean_tracks
 from scenario_gen.roads.unrolled import unroll

@@ -1,14 +1,28 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Gaussian-process regression against the textbook formulas in dense float64, and against its own samples."""
 
+from hypothesis import given, settings
+from hypothesis import strategies as st
 import numpy as np
 import pytest
 import scipy.linalg
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from scenario_gen.errors import InputError
 from scenario_gen.sampling.gp import Features, Observations, Regression, squared_exponential
-from scenario_gen.sampling.ordinate import OrdinateConfig, ordinate_posterior, ordinate_samples
+from scenario_gen.sampling.ordinate import ordinate_posterior, ordinate_samples, OrdinateConfig
 
 
 def dense(x, y, noise, at, sigma, length, degree):

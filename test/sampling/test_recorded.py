@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Recorded encounters through the whole chain: valid sets, limits kept, the clock kept, waits kept, without changepoints too."""
 
 from dataclasses import replace
@@ -10,7 +24,7 @@ from scenario_gen.interaction import find_conflicts, find_waits
 from scenario_gen.logs import read_log
 from scenario_gen.planning import plan_routes
 from scenario_gen.roads import build_road
-from scenario_gen.sampling import SamplingConfig, regenerate, sample_scenarios
+from scenario_gen.sampling import regenerate, sample_scenarios, SamplingConfig
 from scenario_gen.segmentation import segment
 from scenario_gen.validity import Checker
 

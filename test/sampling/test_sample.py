@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Whole sets on hand-made routes: a straight crossed by a quarter turn, with a wait."""
 
 from functools import cache
@@ -11,7 +25,7 @@ from scenario_gen.errors import InputError
 from scenario_gen.interaction import Wait
 from scenario_gen.planning.route import Route
 from scenario_gen.roads.road import Road
-from scenario_gen.sampling import SamplingConfig, regenerate, sample_scenarios
+from scenario_gen.sampling import regenerate, sample_scenarios, SamplingConfig
 from scenario_gen.sampling.candidates import Scale
 from scenario_gen.sampling.prepare import prepare
 from scenario_gen.sampling.sample import LEVEL_SIZE

@@ -1,13 +1,27 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The time law: exact lengths, given end speeds, limits kept, waits still, no ringing."""
 
-import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+import numpy as np
+import pytest
 from scipy.optimize import LinearConstraint, minimize
 
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.time_law import SpeedBounds, SpeedProfile, TimeLaw, best_knot, layout
+from scenario_gen.sampling.time_law import best_knot, layout, SpeedBounds, SpeedProfile, TimeLaw
 
 TIME = np.arange(201) * 0.1
 CLOCK = np.array([0.0, 6.0, 9.0, 14.0, 20.0])

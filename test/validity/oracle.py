@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """An independent re-check of scenarios, written differently from the checker: many instants, shapely polygons, splines.
 
 It proves nothing (an instant between two of its own goes unseen), but shares no line with what it checks.
@@ -8,8 +22,8 @@ from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
-import shapely
 from scipy.interpolate import CubicHermiteSpline
+import shapely
 
 from scenario_gen.arrays import Floats
 from scenario_gen.interaction import Conflict, Wait

@@ -1,12 +1,26 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Overlap and off-road: known hard cases, and agreement with an independent dense re-check on random motions."""
 
-import numpy as np
-import pytest
-import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from motions import FREE, arc, open_road, road_of, scenario_of, straight, wander
+from motions import arc, FREE, open_road, road_of, scenario_of, straight, wander
+import numpy as np
 from oracle import boxes_at, drivable_area, footprints, oracle_violations
+import pytest
+import shapely
 
 from scenario_gen.encounter import Vehicle
 from scenario_gen.scenario import Cause

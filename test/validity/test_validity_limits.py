@@ -1,15 +1,29 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Limits, consistency, asked states, waits and passing order: each broken on purpose, each found with its cause."""
 
 from dataclasses import replace
 
-import numpy as np
-import pytest
 from motions import arc, open_road, scenario_of, straight
+import numpy as np
 from oracle import oracle_violations
+import pytest
 
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
-from scenario_gen.interaction import Conflict, Wait, find_conflicts
+from scenario_gen.interaction import Conflict, find_conflicts, Wait
 from scenario_gen.scenario import BoundaryStates, Cause
 from scenario_gen.validity import Checker, Limits
 

@@ -1,0 +1,72 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""ament_xmllint on package.xml. The schema that it names is looked up in a catalogue, so that no network is needed."""
+
+from pathlib import Path
+import shutil
+
+from catkin_pkg.package import parse_package
+import pytest
+from source_files import ROOT
+
+HERE = Path(__file__).resolve().parent
+CATALOGUE = """\
+<catalog xmlns="urn:oasis:names:tc:entity:xmlns:xml:catalog">
+  <uri name="http://download.ros.org/schema/package_format3.xsd" uri="{0}"/>
+  <system systemId="http://download.ros.org/schema/package_format3.xsd" uri="{0}"/>
+</catalog>
+"""
+
+
+@pytest.fixture
+def xmllint(tmp_path, monkeypatch):
+    """ament_xmllint's main, on a machine that has xmllint."""
+    linter = pytest.importorskip("ament_xmllint.main")
+    if shutil.which("xmllint") is None:
+        pytest.skip("xmllint is not installed (Debian: libxml2-utils)")
+    catalogue = tmp_path / "catalogue.xml"
+    catalogue.write_text(CATALOGUE.format((HERE / "manifest.xsd").as_uri()))
+    monkeypatch.setenv("XML_CATALOG_FILES", str(catalogue))
+    return linter.main
+
+
+@pytest.mark.xmllint
+@pytest.mark.linter
+def test_package_xml_is_valid(xmllint, capfd):
+    assert xmllint([str(ROOT / "package.xml")]) == 0, capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("<version>0.1.0</version>", "<version>0.1</version>"),
+        ("<name>scenario_gen</name>", "<name>Scenario-Gen</name>"),
+        ("exec_depend>rclpy", "run_depend>rclpy"),
+        (' email="scenario_gen@users.noreply.github.com"', ""),
+        ("</package>", ""),
+    ],
+)
+def test_what_the_format_does_not_allow_is_found(xmllint, tmp_path, old, new):
+    text = (ROOT / "package.xml").read_text()
+    assert old in text
+    (tmp_path / "package.xml").write_text(text.replace(old, new))
+    assert xmllint([str(tmp_path / "package.xml")]) == 1
+
+
+@pytest.mark.linter
+def test_catkin_pkg_reads_package_xml_without_a_warning():
+    warnings: list[str] = []
+    assert parse_package(ROOT, warnings=warnings).name == "scenario_gen"
+    assert not warnings
