@@ -5,7 +5,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "scenario_gen"
-NODES = ("segmenter", "planner", "gp_sampler", "road_server", "log_player", "evaluator", "recorder", "player")
+NODES = ("segmenter", "planner", "gp_sampler", "road_server", "log_player", "evaluator", "recorder", "player", "suite")
 
 # requirements.in names what is needed at run time first; ROS itself comes from a Jazzy installation, or from wheels as an extra.
 LISTED = Path("requirements.in").read_text(encoding="utf-8").partition("# to build and to test")[0].splitlines()

@@ -27,7 +27,7 @@ def nodes(folder: Path, domain: int, arguments: Mapping[str, Sequence[str]]) -> 
     ]
     (folder / "suite.json").write_text(json.dumps(specification), encoding="utf-8")
     process = subprocess.Popen(
-        [sys.executable, "-m", "scenario_gen.nodes.suite", str(folder / "suite.json")],
+        [sys.executable, "-m", "scenario_gen.nodes.forked", str(folder / "suite.json")],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

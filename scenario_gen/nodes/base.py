@@ -1,12 +1,9 @@
 """What all nodes with a stage have in common: lifecycle, parameters, raw topics, a worker, diagnostics, a clean end."""
 
-import importlib
-import pkgutil
 import signal
 import sys
 import traceback
 from collections.abc import Callable, Sequence
-from time import perf_counter
 from typing import Any
 
 import rclpy
@@ -17,8 +14,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 
 from msg_conventions.diagnostics import Level, Status, encode_diagnostics
-from msg_conventions.topics import Quality, topic_entry
+from msg_conventions.topics import LATCHED, Quality, topic_entry
 from scenario_gen.errors import ScenarioGenError
+from scenario_gen.nodes.compiling import compile_kernels
 from scenario_gen.nodes.interrupts import interrupt
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.publishing import publish
@@ -53,6 +51,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         super().__init__(name, namespace=namespace)
         self._raw_publishers: dict[str, Any] = {}
         self._inputs: dict[str, Any] = {}
+        self._heard: dict[str, tuple[bytes, Any]] = {}
         self._worker: Worker | None = None
         self.parameters = ConfigParameters(self, config)
         self.declare_parameter("autostart", True)
@@ -88,14 +87,16 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         """Subscribe to a topic of the suite, raw; `received` gets its messages. `quality`: another one than the suite's."""
         if topic not in self._inputs:
             kind, own = topic_entry(topic)
+            take = self._receive_latched if own == LATCHED else self._receive
             self._inputs[topic] = self.create_subscription(
-                message_class(kind), topic, lambda data: self._receive(topic, data), qos(quality or own), raw=True
+                message_class(kind), topic, lambda data: take(topic, data), qos(quality or own), raw=True
             )
 
     def ignore(self, topic: str) -> None:
         """End a subscription."""
         if topic in self._inputs:
             self.destroy_subscription(self._inputs.pop(topic))
+            self._heard.pop(topic, None)
 
     def send(self, topic: str, data: bytes) -> None:
         """Publish the CDR bytes of a topic of the suite."""
@@ -201,6 +202,12 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         self._stop()
         super().destroy_node()
 
+    def _receive_latched(self, topic: str, data: bytes) -> None:
+        """Take an input in, unless it is the last one word for word and the parameters are, too: then its node was restarted."""
+        if self._heard.get(topic) != (data, self.config):
+            self._heard[topic] = (data, self.config)
+            self._receive(topic, data)
+
     def _receive(self, topic: str, data: bytes) -> None:
         """Take an input in; whatever is wrong with it, the node lives on."""
         try:
@@ -217,23 +224,6 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         self.status(Level.ERROR, str(error) if isinstance(error, ScenarioGenError) else f"{kind}: {error}", name, error=kind)
 
 
-def compile_kernels(stages: Sequence[str]) -> tuple[int, float]:
-    """Compile the kernels of some stages, or load them from the cache; return their number and the seconds it took.
-
-    Only those of the node's own stages: to import all of them would cost every node seconds.
-    """
-    from scenario_gen import kernels
-
-    started = perf_counter()
-    for stage in stages:
-        package = importlib.import_module(f"scenario_gen.{stage}")
-        for module in pkgutil.iter_modules(getattr(package, "__path__", ())):
-            importlib.import_module(f"scenario_gen.{stage}.{module.name}")
-    for dispatcher, argument_types in kernels._registry:
-        dispatcher.compile(argument_types)
-    return len(kernels._registry), perf_counter() - started
-
-
 def namespaces(arguments: Sequence[str]) -> list[str | None]:
     """Return the values of `--namespace` (one node for each, all in this process); [None] if there is none."""
     rest = remove_ros_args(list(arguments))[1:]
@@ -242,8 +232,11 @@ def namespaces(arguments: Sequence[str]) -> list[str | None]:
     return [name or None for name in rest[1::2]] or [None]
 
 
-def run_nodes(make: Callable[[str | None], Any], arguments: Sequence[str] | None = None) -> int:
-    """Spin one node per `--namespace` until Ctrl-C, SIGTERM or shutdown; return the exit code."""
+Maker = Callable[[str | None], Any]
+
+
+def run_nodes(make: Maker | Sequence[Maker], arguments: Sequence[str] | None = None) -> int:
+    """Spin one node (or one of each) per `--namespace` until Ctrl-C, SIGTERM or shutdown; return the exit code."""
     arguments = sys.argv if arguments is None else arguments
     where = namespaces(arguments)
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -254,8 +247,9 @@ def run_nodes(make: Callable[[str | None], Any], arguments: Sequence[str] | None
     code = 0
     try:
         for namespace in where:
-            nodes.append(make(namespace))
-            executor.add_node(nodes[-1])
+            for one in (make,) if callable(make) else make:
+                nodes.append(one(namespace))
+                executor.add_node(nodes[-1])
         for node in nodes:
             node.autostart()
         executor.spin()
@@ -267,6 +261,8 @@ def run_nodes(make: Callable[[str | None], Any], arguments: Sequence[str] | None
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)  # a second Ctrl-C does not disturb the clean end
+        for node in nodes:
+            getattr(node, "cancel", list)()  # all at once, so that none is waited for before another is told
         for node in nodes:
             node.destroy_node()
         executor.shutdown(timeout_sec=1.0)

@@ -66,7 +66,7 @@ class Evaluator(StageNode):
                 if "published" in status.values:
                     self._closed.append(status)
                 elif "sha256" in status.values:
-                    self._open.setdefault(status.values["request"], []).append(status.values["sha256"])
+                    self._opened(status.values)
         else:
             self._newest[topic] = data
         for status in list(self._closed):
@@ -76,6 +76,12 @@ class Evaluator(StageNode):
                 self._open.pop(status.values["request"], None)
                 scenarios = [self._scenarios.pop(key) for key in dict.fromkeys(digests)]
                 self._submit(dict(self._newest), scenarios, status)
+
+    def _opened(self, values: Mapping[str, str]) -> None:
+        """Note a scenario of a request; number 0 begins it anew, for a sampler that was killed and restarted counts from 1 again."""
+        if values["index"] == "0":
+            self._open[values["request"]] = []
+        self._open.setdefault(values["request"], []).append(values["sha256"])
 
     def _submit(self, messages: Mapping[str, bytes], scenarios: list[bytes], status: Status) -> None:
         name = f"request {status.values['request']}"

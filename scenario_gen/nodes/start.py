@@ -25,6 +25,7 @@ log_player = partial(start, "log_player")
 evaluator = partial(start, "evaluator")
 recorder = partial(start, "recorder")
 player = partial(start, "player")
+suite = partial(start, "suite")
 
 if __name__ == "__main__":
     import sys

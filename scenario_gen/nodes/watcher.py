@@ -7,8 +7,8 @@ from rclpy.node import Node
 from msg_conventions.diagnostics import Level, decode_diagnostics
 from msg_conventions.topics import topic_entry
 from scenario_gen.nodes.base import qos, run_nodes
+from scenario_gen.nodes.forked import say
 from scenario_gen.nodes.message_classes import message_class
-from scenario_gen.nodes.suite import say
 
 MILESTONES = ("tracks", "map", "changepoints", "fit")
 

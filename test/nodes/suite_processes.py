@@ -27,13 +27,15 @@ class Processes:
         ]
         (folder / "suite.json").write_text(json.dumps(specification))
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "scenario_gen.nodes.suite", str(folder / "suite.json")],
+            [sys.executable, "-m", "scenario_gen.nodes.forked", str(folder / "suite.json")],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
             env=os.environ | {"ROS_DOMAIN_ID": str(domain), "RCUTILS_COLORIZED_OUTPUT": "0", "ROS_LOG_DIR": str(folder)},
         )
         assert json.loads(self.process.stdout.readline())["event"] == "loaded"
+        started = [json.loads(self.process.stdout.readline()) for _ in nodes]
+        self.pids = {event["node"]: event["pid"] for event in started}
 
     def end(self) -> dict[str, int]:
         """End all nodes as Ctrl-C does; return their exit codes."""

@@ -1,0 +1,23 @@
+"""The kernels of a node, compiled before it starts to work."""
+
+import importlib
+import pkgutil
+from collections.abc import Sequence
+from time import perf_counter
+
+
+def compile_kernels(stages: Sequence[str]) -> tuple[int, float]:
+    """Compile the kernels of some stages, or load them from the cache; return their number and the seconds it took.
+
+    Only those of the node's own stages: to import all of them would cost every node seconds.
+    """
+    from scenario_gen import kernels
+
+    started = perf_counter()
+    for stage in stages:
+        package = importlib.import_module(f"scenario_gen.{stage}")
+        for module in pkgutil.iter_modules(getattr(package, "__path__", ())):
+            importlib.import_module(f"scenario_gen.{stage}.{module.name}")
+    for dispatcher, argument_types in kernels._registry:
+        dispatcher.compile(argument_types)
+    return len(kernels._registry), perf_counter() - started
