@@ -1,16 +1,30 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Processes of the messages benchmark: the suite's nodes, a publisher, a caller; each on a ROS domain of its own.
 
 `python -m benchmarks._messages_processes publish TOPIC SIZE COUNT RATE` publishes COUNT messages, RATE a second (0: unpaced).
 """
 
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 import json
 import os
+from pathlib import Path
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from pathlib import Path
 
 
 def environment(domain: int) -> dict[str, str]:
@@ -62,8 +76,8 @@ def publish(topic: str, size: int, count: int, rate: float) -> None:
     from rclpy.qos import QoSProfile
     from std_msgs.msg import String
 
-    import scenario_gen.nodes  # noqa: F401  (what the wheels need)
     from msg_conventions.cdr import CdrWriter
+    import scenario_gen.nodes  # noqa: F401  (what the wheels need)
 
     rclpy.init()
     node = rclpy.create_node("benchmark_publisher")

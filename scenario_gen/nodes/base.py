@@ -1,9 +1,23 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What all nodes with a stage have in common: lifecycle, parameters, raw topics, a worker, diagnostics, a clean end."""
 
+from collections.abc import Callable, Sequence
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
@@ -13,7 +27,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 
-from msg_conventions.diagnostics import Level, Status, encode_diagnostics
+from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.topics import LATCHED, Quality, topic_entry
 from scenario_gen.errors import ScenarioGenError
 from scenario_gen.nodes.compiling import compile_kernels

@@ -78,7 +78,7 @@ class Evaluator(StageNode):
                 self._submit(dict(self._newest), scenarios, status)
 
     def _opened(self, values: Mapping[str, str]) -> None:
-        """Note a scenario of a request; number 0 begins it anew, for a sampler that was killed and restarted counts from 1 again."""
+        """Note a scenario of a request; number 0 begins it anew, for a sampler that was restarted counts from 1 again."""
         if values["index"] == "0":
             self._open[values["request"]] = []
         self._open.setdefault(values["request"], []).append(values["sha256"])

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Several nodes as separate processes, forked from one that has loaded the libraries and the kernels once.
 
 `python -m scenario_gen.nodes.forked SPECIFICATION.json`, where the file holds a list of {"node", "arguments", "log"}. Events
@@ -7,11 +21,11 @@ are written to standard output as JSON lines. Ctrl-C, SIGTERM, or the end of sta
 import importlib
 import json
 import os
+from pathlib import Path
 import select
 import signal
 import sys
 import traceback
-from pathlib import Path
 
 from scenario_gen.nodes.base import StageNode
 from scenario_gen.nodes.compiling import compile_kernels

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """suite: all nodes in one process with one executor, for small machines: `ros2 run scenario_gen suite`.
 
 A parameter is that of every node that has it: `--ros-args -p log_path:=LOG -p road_name:=straight -p seed:=7`; one node's own
@@ -5,9 +19,9 @@ stands in a parameter file, or, where there is no namespace, behind its name: `-
 `--nodes segmenter,planner` takes only some; `player` must be asked for.
 """
 
+from collections.abc import Callable
 import importlib
 import sys
-from collections.abc import Callable
 from typing import Any
 
 from scenario_gen.nodes.base import run_nodes

@@ -1,10 +1,24 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """watcher: tells the runner of a suite, on standard output, what the nodes have published and what they complain of."""
 
 import sys
 
 from rclpy.node import Node
 
-from msg_conventions.diagnostics import Level, decode_diagnostics
+from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.topics import topic_entry
 from scenario_gen.nodes.base import qos, run_nodes
 from scenario_gen.nodes.forked import say

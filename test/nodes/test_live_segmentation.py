@@ -28,9 +28,9 @@ from scenario_gen.logs import read_log
 pytestmark = pytest.mark.dds
 LOG = RESOURCES / "synthetic_c"
 SIM_TIME = ["-p", "use_sim_time:=true"]
+STREAM = ["-p", "stream:=true", "-p", "rate:=12.0", "-p", "wait_matching_subscriptions:=2"]
 NODES = {
-    "log_player": [*SIM_TIME, "-p", f"log_path:={LOG}", "-p", "stream:=true", "-p", "rate:=12.0"]
-    + ["-p", "wait_matching_subscriptions:=2"],
+    "log_player": [*SIM_TIME, *STREAM, "-p", f"log_path:={LOG}"],
     "segmenter": SIM_TIME,
     "road_server": [*SIM_TIME, "-p", "road_name:=straight", "-p", "wait_for_tracks:=true"],
     "planner": SIM_TIME,

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Whole suites, each composed in one process: the same scenarios, and no suite hears another one's."""
 
 import os
@@ -7,13 +21,13 @@ import sys
 import time
 
 import pytest
-from suite_processes import RESOURCES, Client
+from suite_processes import Client, RESOURCES
 
 from msg_conventions.scenarios import digest, encode_scenario
 from scenario_gen.logs import read_log
 from scenario_gen.nodes.domain import free_domain
-from scenario_gen.nodes.suite import CLASSES, chosen
-from scenario_gen.pipeline import PipelineConfig, generate
+from scenario_gen.nodes.suite import chosen, CLASSES
+from scenario_gen.pipeline import generate, PipelineConfig
 
 # name -> namespace, domain (by number), log, road, seed, the signals that end it
 SUITES = {
