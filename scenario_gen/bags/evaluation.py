@@ -18,24 +18,20 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-
-from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags.contents import read_namespaces
+from scenario_gen.bags.told import told_fit, told_segmentation, told_values
 from scenario_gen.bags.validation import Reference
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import Case, CheckCounts, evaluate, Evaluation, EvaluationConfig
 from scenario_gen.interaction import find_conflicts, find_waits
 from scenario_gen.scenario import ScenarioSet
-from scenario_gen.segmentation import Segmentation
 from scenario_gen.validity import Checker, Limits
 
-TOPICS = ("tracks", "changepoints", "map", "ego/track", "scenarios")
-SCENARIOS = "scenarios"
+SCENARIOS, INFO, DIAGNOSTICS = "scenarios", "scenarios/info", "diagnostics"
+TOPICS = ("tracks", "changepoints", "posterior", "map", "fit", "ego/track", SCENARIOS, INFO, DIAGNOSTICS)
 
 
 def evaluate_bag(
@@ -50,8 +46,8 @@ def bag_cases(
 ) -> tuple[Case, ...]:
     """Evaluate every namespace of a bag that holds both `tracks` and `scenarios`, ready for the report.
 
-    The scenarios are checked anew, on the bag's map if it has one. What the bag does not say is left out: without
-    `changepoints` K counts as 0; start and end states are not asked; fit and routes are not shown.
+    The scenarios are checked anew, on the bag's map if it has one; start and end states are not asked. What the bag does not say
+    is left out: without `changepoints` K counts as 0; fit and routes are shown if both are there, with what the fitting decided.
 
     Raises:
         InputError: the bag is missing or damaged, or no namespace has both topics.
@@ -60,17 +56,26 @@ def bag_cases(
     whole = {name: topics for name, topics in found.items() if topics["tracks"] and topics[SCENARIOS]}
     if not whole:
         raise InputError(f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare")
-    return tuple(
-        _case(f"{path.stem}{name}", name, topics, config or EvaluationConfig(), limits, seed) for name, topics in whole.items()
-    )
+    common = found.get("", {}).get(DIAGNOSTICS, [])  # nodes speak on one topic for all namespaces
+    return tuple(_case(path, name, topics, common, config or EvaluationConfig(), limits, seed) for name, topics in whole.items())
 
 
 def _case(
-    name: str, namespace: str, topics: Mapping[str, Sequence[bytes]], config: EvaluationConfig, limits: Limits | None, seed: int
+    path: Path,
+    namespace: str,
+    topics: Mapping[str, Sequence[bytes]],
+    common: Sequence[bytes],
+    config: EvaluationConfig,
+    limits: Limits | None,
+    seed: int,
 ) -> Case:
-    encounter = decode_tracks(topics["tracks"][-1], name)
-    segmentation = _segmentation(encounter, topics["changepoints"], f"{namespace}/changepoints")
-    road = decode_map(topics["map"][-1], name=f"{namespace}/map")[1] if topics["map"] else None
+    encounter = decode_tracks(topics["tracks"][-1], f"{path.stem}{namespace}")
+    told = told_values(common, encounter.start_ns, f"{namespace}/") | told_values(topics[DIAGNOSTICS], encounter.start_ns)
+    segmentation = told_segmentation(encounter, topics["changepoints"], topics["posterior"], told, f"{namespace}/changepoints")
+    fit, routes = told_fit(path, namespace, encounter, segmentation, topics["fit"], told)
+    accounts = told_values(topics[INFO], encounter.start_ns).values()
+    road_name = next((values["road"] for values in accounts if "road" in values), f"{namespace}/map")
+    road = decode_map(topics["map"][-1], name=road_name)[1] if topics["map"] else None
     scenarios = [decode_scenario(data, index=k, what=f"{namespace}/{SCENARIOS}")[1] for k, data in enumerate(topics[SCENARIOS])]
     conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
     waits = find_waits(encounter) if segmentation.changepoints.size else ()
@@ -101,8 +106,8 @@ def _case(
         encounter,
         segmentation,
         road,
-        fit=None,
-        routes=(),
+        fit=fit,
+        routes=routes,
         with_changepoints=everything,
         without_changepoints=None,
         evaluation=evaluation,
@@ -120,11 +125,3 @@ def _left_out(topics: Mapping[str, Sequence[bytes]]) -> tuple[str, ...]:
     if not topics["changepoints"]:
         said.append("the bag has no changepoints: the template counts as one primitive, and its waits were not asked")
     return tuple(said)
-
-
-def _segmentation(encounter: Encounter, messages: Sequence[bytes], what: str) -> Segmentation:
-    if messages:
-        return decode_changepoints(messages[-1], encounter, what)
-    steps = len(encounter.time)
-    none = np.zeros(0, dtype=np.int64)
-    return Segmentation(np.zeros(steps, dtype=np.int64), none, np.zeros(steps), ("the whole encounter",))

@@ -14,9 +14,13 @@
 
 """A bag evaluated from its messages alone gives the figures of the scenarios that were put into it."""
 
+from dataclasses import replace
+
 from evaluation_worlds import report_case
+import numpy as np
 import pytest
 
+from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics
 from msg_conventions.topics import topic_entry
 from scenario_gen.bags import read_messages, Run, write_run
 from scenario_gen.bags.evaluation import bag_cases, evaluate_bag
@@ -24,6 +28,11 @@ from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import EvaluationConfig, render, ReportInput
+from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
+from scenario_gen.pipeline import PipelineConfig, run_arm
+from scenario_gen.roads import build_road
+from scenario_gen.segmentation import segment
 from scenario_gen.validity import Limits
 
 QUICK = EvaluationConfig(resamples=50)
@@ -33,6 +42,15 @@ def as_run(case, namespace=""):
     return Run(
         case.encounter, case.road, case.segmentation, case.fit, tuple(case.routes), case.with_changepoints, 7, "1", namespace
     )
+
+
+def real_run(namespace=""):
+    """The synthetic merging case on a straight road."""
+    (encounter,) = read_log([bundled("c")]).encounters
+    config = PipelineConfig()
+    road = build_road("straight", encounter, config.road)
+    arm = run_arm(encounter, segment(encounter, config.segmentation, 7), road, config, count=3, seed=7)
+    return Run(encounter, road, arm.segmentation, arm.fit, arm.routes, arm.scenarios, 7, "1", namespace)
 
 
 def test_the_figures_survive_the_bag(tmp_path):
@@ -76,8 +94,59 @@ def test_a_bag_becomes_a_page_with_all_its_scenarios_valid_or_not(tmp_path):
     assert case.valid == 0 and case.published == 0 and len(case.with_changepoints.scenarios) == 5
     page = render(ReportInput([case]))
     assert "<b>0</b> of 5 scenarios asked for" in page and ">0 / 5</td>" in page
-    assert "the bag holds one set of scenarios" in page and "Fitted to the road" not in page
+    assert "the bag holds one set of scenarios" in page and "<h3>Without changepoints</h3>" not in page
     assert "<h3>Scenarios</h3>" in page
+
+
+def test_the_page_of_our_own_bag_shows_the_template_as_that_of_the_run(tmp_path):
+    """Probabilities and sentences of the segmenter, fit and routes are in the bag, so they are on its page."""
+    run = real_run()
+    (case,) = bag_cases(write_run(tmp_path / "run", run), QUICK)
+    assert case.fit is not None and case.fit.notes == run.fit.notes
+    for found, known in zip(case.fit.fitted, run.fit.fitted, strict=True):
+        assert found.manoeuvre == known.manoeuvre and found.scale == known.scale
+        for key in ("anchors", "moved", "stands"):
+            assert np.array_equal(getattr(found, key), getattr(known, key)), key
+    for found, known in zip(case.routes, run.routes, strict=True):
+        assert np.array_equal(found.points, known.points) and np.array_equal(found.anchor, known.anchor)
+    assert case.segmentation.descriptions == run.segmentation.descriptions
+    assert np.array_equal(case.segmentation.labels, run.segmentation.labels)
+    assert np.allclose(case.segmentation.changepoint_probability, run.segmentation.changepoint_probability, atol=1e-6)
+    assert case.road.name == run.road.name
+    page = render(ReportInput([case]))
+    assert "Fitted to the road" in page and run.segmentation.descriptions[0] in page
+
+
+def test_what_nodes_say_on_one_topic_is_told_apart_by_their_namespaces(tmp_path):
+    run = real_run("/here")
+    bag = write_run(tmp_path / "run", run)
+    with AtomicBag(tmp_path / "recorded") as copy:
+        for message in read_messages(bag):
+            topic = message.topic.replace("/here/diagnostics", "/diagnostics")
+            kind, quality = topic_entry(topic)
+            copy.add_topic(topic, kind, qos_yaml(quality))
+            if topic != "/diagnostics":
+                copy.write(topic, message.data, message.stamp_ns)
+                continue
+            stamp, statuses = decode_diagnostics(message.data)
+            for namespace, note in (("/here", None), ("/there", "of another suite")):
+                said = [
+                    replace(s, name=namespace + s.name, values=s.values if note is None else dict.fromkeys(s.values, note))
+                    for s in statuses
+                ]
+                copy.write(topic, encode_diagnostics(said, stamp), message.stamp_ns)
+    (case,) = bag_cases(tmp_path / "recorded", QUICK)
+    assert case.fit is not None and case.fit.notes == run.fit.notes
+    assert case.segmentation.descriptions == run.segmentation.descriptions
+
+
+def test_a_bag_with_half_of_it_shows_what_it_has(tmp_path):
+    bag = write_run(tmp_path / "run", real_run())
+    topics = ("tracks", "changepoints", "map", "fit", "scenarios")
+    (case,) = bag_cases(only(bag, tmp_path / "half", topics), QUICK)
+    assert case.fit is None and case.routes == ()
+    assert case.segmentation.descriptions[0] == "segment 0"
+    assert "Fitted to the road" not in render(ReportInput([case]))
 
 
 def test_what_a_bag_does_not_hold_is_left_out_and_said(tmp_path):

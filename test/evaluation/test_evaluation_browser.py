@@ -74,6 +74,13 @@ def test_it_loads_without_errors_or_requests(tab, report):
         assert len(pixels.getcolors(1_000_000)) > 10, role
 
 
+def test_the_table_of_figures_fits_a_desktop(tab):
+    table = tab.page.locator('[data-case="0"] .metrics')
+    assert table.evaluate("t => t.scrollWidth <= t.parentElement.clientWidth")
+    heading = table.locator("tr.group th").first
+    assert heading.evaluate("t => t.clientWidth > 0.9 * t.closest('table').clientWidth")  # spans all columns
+
+
 def test_it_plays_pauses_and_stops_at_the_end(tab):
     assert tab.time() == 0.0
     tab.part("play").click()

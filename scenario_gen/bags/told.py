@@ -1,0 +1,133 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a bag tells of its template beside the tracks, for people to look at: posterior, sentences, fit and routes.
+
+Nothing of it is needed for a figure; what is missing, damaged or of another template is left out.
+"""
+
+from collections.abc import Mapping, Sequence
+import json
+from pathlib import Path
+
+import numpy as np
+
+from msg_conventions.cdr import CdrReader
+from msg_conventions.changepoints import decode_changepoints, decode_posterior
+from msg_conventions.diagnostics import decode_diagnostics
+from msg_conventions.fits import anchor_stamps, decode_fit
+from msg_conventions.names import tokens
+from msg_conventions.paths import decode_route
+from msg_conventions.topics import vehicle_topic
+from scenario_gen.bags.reader import read_messages
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+from scenario_gen.fitting.result import Fit, FittedVehicle
+from scenario_gen.planning.route import Route
+from scenario_gen.segmentation import Segmentation
+
+Values = Mapping[str, str]
+
+
+def told_values(messages: Sequence[bytes], stamp_ns: int, nodes: str = "/") -> dict[str, Values]:
+    """Return the key-values of diagnostics that bear the stamp, by subject ("/planner: fit" is "fit"); the last word counts.
+
+    Args:
+        messages: of /diagnostics or `scenarios/info`.
+        stamp_ns: the template's stamp.
+        nodes: what the full names of the nodes begin with.
+    """
+    found: dict[str, Values] = {}
+    for data in messages:
+        try:
+            stamp, statuses = decode_diagnostics(data)
+        except InputError:
+            continue
+        if stamp == stamp_ns:
+            found |= {s.name.partition(": ")[2]: s.values for s in statuses if s.name.startswith(nodes)}
+    return found
+
+
+def told_segmentation(
+    encounter: Encounter, changepoints: Sequence[bytes], posterior: Sequence[bytes], told: Mapping[str, Values], what: str
+) -> Segmentation:
+    """Return the segmentation of the changepoints, with shared labels, probabilities and sentences where the bag has them.
+
+    Raises:
+        InputError: the changepoints are damaged or of another template.
+    """
+    if not changepoints:
+        steps = len(encounter.time)
+        none = np.zeros(0, dtype=np.int64)
+        return Segmentation(np.zeros(steps, dtype=np.int64), none, np.zeros(steps), ("the whole encounter",))
+    known = decode_changepoints(changepoints[-1], encounter, what)
+    texts = tuple(value for key, value in told.get("segmentation", {}).items() if key.startswith("segment."))
+    if len(texts) != len(known.descriptions):
+        texts = known.descriptions
+    for data in reversed(posterior):
+        try:
+            whole = decode_posterior(data, texts)
+        except InputError:
+            continue
+        if len(whole.labels) == len(known.labels) and np.array_equal(whole.changepoints, known.changepoints):
+            return whole
+    return Segmentation(known.labels, known.changepoints, known.changepoint_probability, texts)
+
+
+def told_fit(
+    bag: Path, namespace: str, encounter: Encounter, segmentation: Segmentation, fits: Sequence[bytes], told: Mapping[str, Values]
+) -> tuple[Fit | None, tuple[Route, ...]]:
+    """Return fit and routes, or None and nothing where the bag does not have both with all that the fitting decided.
+
+    Raises:
+        InputError: the bag cannot be read.
+    """
+    try:
+        data = next(data for data in reversed(fits) if CdrReader(data, "fit").stamp() == encounter.start_ns)
+        _, _, asked, anchors = decode_fit(data)
+        decided = [told[f"fit of {vehicle.id}"] for vehicle in encounter.vehicles]
+        fitted = tuple(
+            FittedVehicle(
+                anchors=poses,
+                moved=np.array(json.loads(values["moved_m"]), dtype=np.float64),
+                stands=np.array(json.loads(values["stands"]), dtype=np.bool_),
+                scale=float(values["scale"]),
+                manoeuvre=values["manoeuvre"],
+            )
+            for poses, values in zip(anchors, decided, strict=True)
+        )
+        stamps = anchor_stamps(encounter, segmentation.changepoints)
+        routes = _routes(bag, namespace, encounter, stamps)
+    except (StopIteration, KeyError, ValueError, InputError):
+        return None, ()
+    if any(len(vehicle.anchors) != len(stamps) or len(vehicle.moved) != len(stamps) for vehicle in fitted):
+        return None, ()
+    index = np.array([0, *segmentation.changepoints, len(encounter.time) - 1])
+    return Fit(encounter.vehicles, fitted, index, asked, tuple(told.get("fit", {}).values())), routes
+
+
+def _routes(bag: Path, namespace: str, encounter: Encounter, stamps: Sequence[int]) -> tuple[Route, ...]:
+    """Return the last route of this template of every vehicle.
+
+    Raises:
+        KeyError: a vehicle has none.
+        InputError: the bag or a route is damaged.
+    """
+    names = tokens(vehicle.id for vehicle in encounter.vehicles)
+    topics = [f"{namespace}/{vehicle_topic(name, 'route')}" for name in names]
+    last: dict[str, bytes] = {}
+    for message in read_messages(bag, lambda topic: topic in topics):
+        if CdrReader(message.data, message.topic).stamp() == encounter.start_ns:
+            last[message.topic] = message.data
+    return tuple(decode_route(last[topic], stamps, topic)[1] for topic in topics)
