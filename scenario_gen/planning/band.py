@@ -1,9 +1,23 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The elastic band: one banded least-squares problem per step, solved in place (after Quinlan & Khatib 1993)."""
 
 import numpy as np
 
 from scenario_gen.arrays import Floats
-from scenario_gen.kernels import F1, F2, OUT1, OUT2, F, I, kernel
+from scenario_gen.kernels import F, F1, F2, I, kernel, OUT1, OUT2
 
 PINNED = 1e15
 STRONG = 1e4  # no weight grows beyond this

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """OMPL's planners behind the same Protocol, each search in a process of its own.
 
 Some of OMPL's planners hang, and some take their process down. So every search runs in a child forked from a clean server
@@ -5,8 +19,8 @@ process that has OMPL loaded; it is ended when its time is over or the caller ca
 A fresh child also makes a seed mean the same thing every time (OMPL takes one per process only).
 """
 
-import multiprocessing
 from dataclasses import dataclass
+import multiprocessing
 from multiprocessing.connection import Connection
 from time import monotonic, thread_time
 from typing import Any
@@ -15,7 +29,7 @@ import numpy as np
 
 from scenario_gen.arrays import Floats
 from scenario_gen.parameters import check, parameter
-from scenario_gen.planning.planner import Budget, BudgetSpentError, Plan, Query, check_query, path_length
+from scenario_gen.planning.planner import Budget, BudgetSpentError, check_query, path_length, Plan, Query
 from scenario_gen.roads.clearance import clearance_in_cells, to_cells, to_metres
 from scenario_gen.roads.road import Road
 

@@ -1,8 +1,22 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The planning stage: one route per vehicle through its fitted anchors."""
 
-import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+import itertools
 
 import numpy as np
 
@@ -15,7 +29,7 @@ from scenario_gen.planning.guess import direct, keep_to_side
 from scenario_gen.planning.planner import BlockedError, Budget, BudgetSpentError, Planner, Query
 from scenario_gen.planning.route import Route
 from scenario_gen.planning.rrt_star_connect import RrtStarConnect
-from scenario_gen.planning.smooth import Curve, Guess, Targets, monotone_matching, smooth
+from scenario_gen.planning.smooth import Curve, Guess, monotone_matching, smooth, Targets
 from scenario_gen.roads.clearance import clearance_field, footprint_fits
 from scenario_gen.roads.road import Road
 

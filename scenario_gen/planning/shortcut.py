@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """String pulling: the path drawn taut, without jumping over an obstacle's corner by more than a hair.
 
 Three moves, each of which keeps the path free (exact edge checks) and makes it shorter by the triangle inequality: leave a
@@ -8,7 +22,7 @@ between its neighbours. Where none helps the string is taut.
 import numpy as np
 
 from scenario_gen.arrays import Floats
-from scenario_gen.kernels import F2, OUT2, F, I, kernel
+from scenario_gen.kernels import F, F2, I, kernel, OUT2
 from scenario_gen.roads.clearance import segment_free
 
 BISECTIONS = 14  # of an edge, per pass; later passes refine

@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Clearance: how far it is to the nearest cell that is not drivable, and exact tests against that field.
 
 The field holds, at every cell's centre, the exact Euclidean distance to the nearest non-drivable *square* (not to its
@@ -13,7 +27,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from scenario_gen.arrays import Bools, Floats
-from scenario_gen.kernels import B2, F2, OUT2, OUTB1, F, kernel
+from scenario_gen.kernels import B2, F, F2, kernel, OUT2, OUTB1
 from scenario_gen.roads.road import Road
 
 CONTACT = 1e-9  # [cells] what lies nearer than this touches

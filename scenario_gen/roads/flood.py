@@ -1,3 +1,17 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Flood fill: which parts of a road a disc can reach from which.
 
 Cells whose centre has more clearance than the disc's radius are joined to their four neighbours. Between two such centres
@@ -5,14 +19,14 @@ the clearance is nowhere less than at one of them (a square's profile is flat fo
 middle), so every step is a move that the disc can really make: where the flood says there is a way, there is one.
 """
 
-import math
 from collections.abc import Iterator
+import math
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from scenario_gen.arrays import Bools, Floats, Ints
-from scenario_gen.kernels import B2, OUTI2, kernel
+from scenario_gen.kernels import B2, kernel, OUTI2
 from scenario_gen.roads.clearance import clearance_in_cells, segment_free, segments_free, to_metres
 from scenario_gen.roads.road import Road
 
