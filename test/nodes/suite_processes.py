@@ -30,13 +30,15 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 
 class Processes:
-    """Nodes as forked processes, as the demo runs them; `arguments` are ROS arguments."""
+    """Nodes as forked processes, as the demo runs them, by name with their ROS arguments; `namespaces` of those that have any."""
 
-    def __init__(self, folder: Path, domain: int, nodes: dict[str, list[str]], namespaces: tuple[str, ...] = ()):
+    def __init__(
+        self, folder: Path, domain: int, nodes: dict[str, list[str]], namespaces: dict[str, tuple[str, ...]] | None = None
+    ):
         self.folder = folder
-        spaces = [word for name in namespaces for word in ("--namespace", name)]
+        spaces = {node: [w for name in (namespaces or {}).get(node, ()) for w in ("--namespace", name)] for node in nodes}
         specification = [
-            {"node": node, "arguments": [*spaces, "--ros-args", *arguments], "log": str(folder / f"{node}.log")}
+            {"node": node, "arguments": [*spaces[node], "--ros-args", *arguments], "log": str(folder / f"{node}.log")}
             for node, arguments in nodes.items()
         ]
         (folder / "suite.json").write_text(json.dumps(specification))

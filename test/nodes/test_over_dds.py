@@ -15,7 +15,6 @@
 """The nodes in processes of their own, over DDS."""
 
 import math
-import threading
 import time
 
 import pytest
@@ -26,9 +25,7 @@ from msg_conventions.fits import decode_fit
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest, encode_scenario
 from scenario_gen.bags import read_messages
-from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.logs import read_log
-from scenario_gen.nodes.run_suite import Job, run_suite
 from scenario_gen.pipeline import generate, PipelineConfig
 
 pytestmark = pytest.mark.dds
@@ -213,60 +210,3 @@ def test_ctrl_c_ends_everything_cleanly_and_the_bag_is_whole(suite):
             assert "effective parameters" in suite.log(node)
     recorded = {message.topic for message in read_messages(suite.folder / "bag")}
     assert {"/map", "/tracks", "/changepoints", "/fit", "/vehicle_1/route", "/scenarios", "/scenarios/info"} <= recorded
-
-
-@pytest.mark.slow
-def test_a_played_back_bag_gives_the_same_scenarios(suite, tmp_path, domain, client):
-    """Tracks and road from the bag, into a fresh segmenter, planner and sampler."""
-    if suite.process.poll() is None:
-        suite.end()
-    bag = suite.folder / "bag"
-    scenarios = [m.data for m in read_messages(bag) if m.topic == "/scenarios"]
-    topics = "/(tracks|map|road/entries|road/exits)"
-    nodes = {
-        "player": ["-p", f"bag:={bag}", "-p", f"topics:={topics}", "-p", "rate:=1000.0"],
-        "segmenter": [],
-        "planner": [],
-        "gp_sampler": ["-p", "count:=4", "-p", "seed:=7"],
-    }
-    # the last tracks in the bag are the damaged ones of an earlier test: the sound ones come again from a bag without them
-    from scenario_gen.bags import AtomicBag, bag_topics
-    from scenario_gen.bags.metadata import qos_yaml
-
-    with AtomicBag(tmp_path / "sound") as sound:
-        for topic in bag_topics(bag):
-            sound.add_topic(topic.name, topic.type, qos_yaml(topic.quality))
-        first = {}
-        for message in read_messages(bag):
-            if message.topic not in first:
-                first[message.topic] = True
-                sound.write(message.topic, message.data, message.stamp_ns)
-    nodes["player"][1] = f"bag:={tmp_path / 'sound'}"
-    made = Processes(tmp_path, domain, nodes)
-    try:
-        client.hear("/scenarios")
-        assert client.wait("/scenarios", 4, timeout=90.0)[:4] == scenarios[:4]
-    finally:
-        made.end()
-
-
-@pytest.mark.slow
-def test_the_suite_records_several_jobs_in_their_namespaces(tmp_path):
-    jobs = [Job("/case_1", LOG, "straight"), Job("/case_2", RESOURCES / "synthetic_b", "t_intersection")]
-    bag = run_suite(jobs, PipelineConfig(), count=3, seed=7, bag=tmp_path / "bag", timeout=120.0)
-    for job in jobs:
-        encounter = read_log(job.log).encounters[0]
-        case = generate(encounter, job.road, PipelineConfig(), count=3, seed=7)
-        expected = [encode_scenario(s, encounter.start_ns) for s in case.with_changepoints.scenarios]
-        assert [m.data for m in read_messages(bag) if m.topic == f"{job.namespace}/scenarios"] == expected
-    assert [path.name for path in tmp_path.iterdir()] == ["bag"]
-
-
-@pytest.mark.slow
-def test_a_job_that_cannot_be_done_names_the_stage_and_leaves_nothing(tmp_path):
-    with pytest.raises(RefusedError, match="/x/planner: plan: the template does not fit"):
-        run_suite([Job("/x", RESOURCES / "synthetic_b", "straight")], PipelineConfig(), count=3, seed=7, bag=tmp_path / "bag")
-    with pytest.raises(InputError, match="/x/log_player"):
-        run_suite([Job("/x", tmp_path / "none.csv", "straight")], PipelineConfig(), count=3, seed=7, bag=tmp_path / "bag")
-    assert list(tmp_path.iterdir()) == []
-    assert threading.active_count() < 20
