@@ -15,20 +15,25 @@
 """RRT*-Connect (the paper's Algorithms 1-5): two trees that rewire, meet, and go on improving."""
 
 from dataclasses import dataclass
+import math
 from time import thread_time
 
 import numpy as np
 
-from scenario_gen.arrays import Floats, Ints
+from scenario_gen.arrays import Floats
 from scenario_gen.parameters import check, parameter
-from scenario_gen.planning import tree_kernels as trees
+from scenario_gen.planning import tree_nodes as trees
 from scenario_gen.planning.planner import Budget, BudgetSpentError, check_query, path_length, Plan, Query
 from scenario_gen.planning.shortcut import pull
+from scenario_gen.planning.tree_kernels import grow
 from scenario_gen.roads.clearance import clearance_in_cells, to_cells, to_metres
-from scenario_gen.roads.flood import component_at, component_cells, corner_cells
+from scenario_gen.roads.flood import component_cells, corner_cells
 from scenario_gen.roads.road import Road
 
-OCCUPANCY = 64  # nodes per bucket at which its side is halved
+OCCUPANCY = 32  # nodes per bucket at which its side is halved
+ROOM = 4  # times the nodes there are: what a new pool holds
+LARGE = 1 << 15  # nodes from which on samples are drawn ahead
+AHEAD = 1 << 17  # how many at most
 HAIR = 1e-7  # [cells]
 BATCH = 512  # iterations between two looks at the clock
 
@@ -37,14 +42,16 @@ BATCH = 512  # iterations between two looks at the clock
 class RrtStarConnectConfig:
     """Settings of RRT*-Connect; lengths in cells, as in the paper."""
 
-    step: float = parameter(30.0, "longest new edge (the paper's preset: 5)", unit="cells", low=0.1, high=1e6)
-    zeta: float = parameter(30.0, "largest near radius, zeta of eq 10; it decides quality", unit="cells", low=0.1, high=1e6)
+    step: float = parameter(120.0, "longest new edge (the paper's preset: 5)", unit="cells", low=0.1, high=1e6)
+    zeta: float = parameter(
+        120.0, "largest near radius, zeta of eq 10; it decides quality (the paper's preset: 30)", unit="cells", low=0.1, high=1e6
+    )
     gamma_factor: float = parameter(
         1.1, "gamma of eq 10 as a multiple of the least that is asymptotically optimal", low=1.0, high=10.0
     )
     greedy: bool = parameter(True, "extend as far as possible until the first path is found (the paper: one step)")
     skip: bool = parameter(True, "let new edges skip ancestors in sight, as Quick-RRT* does (the paper: no)")
-    corners: float = parameter(0.3, "share of samples beside convex corners of obstacles (the paper: 0)", low=0.0, high=0.9)
+    corners: float = parameter(0.5, "share of samples beside convex corners of obstacles (the paper: 0)", low=0.0, high=0.9)
     informed: bool = parameter(True, "sample only where a shorter path can lie, once there is one")
     pull: bool = parameter(True, "draw the path taut at the end")
 
@@ -52,30 +59,29 @@ class RrtStarConnectConfig:
         check(self)
 
 
-PAPER = RrtStarConnectConfig(step=5.0, greedy=False, skip=False, corners=0.0, informed=False, pull=False)
+PAPER = RrtStarConnectConfig(step=5.0, zeta=30.0, greedy=False, skip=False, corners=0.0, informed=False, pull=False)
 
 
 class _Trees:
     """The two trees' arrays, and their growth."""
 
-    def __init__(self, road: Road, query: Query, config: RrtStarConnectConfig, seed: int) -> None:
+    def __init__(self, road: Road, query: Query, label: int, config: RrtStarConnectConfig, seed: int) -> None:
         self.clearance = clearance_in_cells(road)
         self.ends = to_cells(road, np.stack((query.start, query.goal)))
-        label = component_at(road, query.start, query.radius)
         self.free_cells = component_cells(road, query.radius, label)
         self.corner_cells = corner_cells(road, query.radius, label)
-        area = max(len(self.free_cells), 1)
-        least_gamma = 2.0 * 1.5**0.5 * (area / np.pi) ** 0.5  # Karaman & Frazzoli 2011, d = 2
-        side = max(max(self.clearance.shape) / 12.0, 1.0)
-        radius = query.radius / road.resolution
+        least_gamma = 2.0 * math.sqrt(1.5 * max(len(self.free_cells), 1) / math.pi)  # Karaman & Frazzoli 2011, d = 2
         gamma = config.gamma_factor * least_gamma
-        switches = float(config.greedy), float(config.skip), config.corners
+        side = max(max(self.clearance.shape) / 8.0, 1.0)
+        radius = query.radius / road.resolution
+        switches = config.greedy, config.skip, config.corners, config.informed
         self.setting = np.array([radius, config.step, gamma, config.zeta, side, np.inf, np.inf, *switches])
-        self.counter = np.zeros(7, dtype=np.int64)
+        self.counter = np.zeros(trees.COUNTERS, dtype=np.int64)
         self.counter[trees.MEETING] = -1
         self.history = np.empty((256, 2))
-        self.random = np.random.SeedSequence([seed]).generate_state(1, np.uint64).astype(np.uint64)
-        self._empty_pool(256)
+        self.random = np.array([seed % 2**64], dtype=np.uint64)
+        self.drawn = np.empty((0, 2))
+        self._empty_pool()
         trees.plant(self.ends, self.columns, self.node, self.link, self.chunk, self.head, self.counter, self.setting)
 
     @property
@@ -83,39 +89,41 @@ class _Trees:
         """Buckets side by side."""
         return int(np.ceil(self.clearance.shape[1] / self.setting[trees.SIDE]))
 
-    def _empty_pool(self, chunks: int) -> None:
-        rows = int(np.ceil(self.clearance.shape[0] / self.setting[trees.SIDE]))
+    def _empty_pool(self) -> None:
+        """An empty pool with room for four times the nodes there are: no bucket has more than one chunk that is not full."""
+        buckets = int(np.ceil(self.clearance.shape[0] / self.setting[trees.SIDE])) * self.columns
+        nodes = ROOM * int(self.counter[trees.NODES_A] + self.counter[trees.NODES_B])
+        chunks = 256 + nodes // trees.CHUNK + min(nodes, 2 * buckets)
         self.node = np.empty((chunks * trees.CHUNK, 4))
-        self.link = np.empty((chunks * trees.CHUNK, 5), dtype=np.int64)
+        self.link = np.empty((chunks * trees.CHUNK, 5), dtype=np.int32)
         self.chunk = np.empty((chunks, 2), dtype=np.int64)
-        self.head = np.full((2, rows * self.columns), -1, dtype=np.int64)
+        self.head = np.full((2, buckets), -1, dtype=np.int64)
 
     def grow(self, iterations: int) -> None:
-        """Make so many iterations, and give the trees room as they need it."""
+        """Make so many iterations, or fewer where the first path is found; give the trees room as they need it."""
         goal = self.counter[trees.ITERATION] + iterations
-        while self.counter[trees.ITERATION] < goal:
-            had_path = self.best < np.inf
-            trees.grow(
-                goal - self.counter[trees.ITERATION], self.clearance, self.ends, self.free_cells, self.corner_cells, self.node,
-                self.link, self.chunk, self.head, self.counter, self.setting, self.history, self.random,
+        had_path = self.best < np.inf
+        while self.counter[trees.ITERATION] < goal and (had_path or self.best == np.inf):
+            grow(
+                goal - self.counter[trees.ITERATION], self.clearance, self.ends, self.free_cells, self.corner_cells, self.drawn,
+                self.node, self.link, self.chunk, self.head, self.counter, self.setting, self.history, self.random,
             )  # fmt: skip
             if self.counter[trees.HISTORY] + 1 >= len(self.history):
                 self.history = np.concatenate((self.history, np.empty_like(self.history)))
             self._make_room()
-            if not had_path and self.best < np.inf:
-                return
 
     def _make_room(self) -> None:
-        nodes = max(self.counter[trees.NODES_A], self.counter[trees.NODES_B])
+        a, b = int(self.counter[trees.NODES_A]), int(self.counter[trees.NODES_B])
         side = self.setting[trees.SIDE]
-        crowded = nodes * side**2 > OCCUPANCY * len(self.free_cells) and side > 2.0
-        full = self.counter[trees.CHUNKS] + 8 >= len(self.chunk)
-        if crowded or full:
+        crowded = max(a, b) * side**2 > OCCUPANCY * len(self.free_cells) and side > 2.0
+        if crowded or self.counter[trees.CHUNKS] + 8 >= len(self.chunk):
             old = self.node, self.link, self.chunk, self.head
             if crowded:
                 self.setting[trees.SIDE] = 0.5 * side
-            self._empty_pool(2 * len(self.chunk))
+            self._empty_pool()
             trees.transplant(*old, self.columns, self.node, self.link, self.chunk, self.head, self.counter, self.setting)
+        if a + b > LARGE and not len(self.drawn):
+            self.drawn = np.empty((AHEAD, 2))
 
     @property
     def best(self) -> float:
@@ -124,17 +132,11 @@ class _Trees:
 
     def path(self) -> Floats:
         """The best path through the trees: (P, 2) cells, start to goal."""
+        path = np.empty((1024, 2))
         meeting = int(self.counter[trees.MEETING])
-        halves = [self._branch(meeting), self._branch(int(self.link[meeting, trees.PARTNER]))]
-        if not np.array_equal(self.node[halves[0][-1], :2], self.ends[0]):
-            halves.reverse()
-        return np.concatenate((self.node[halves[0][::-1], :2], self.node[halves[1][1:], :2]))
-
-    def _branch(self, m: int) -> Ints:
-        branch = np.empty(1024, dtype=np.int64)
-        while (count := trees.trace(self.link, m, branch)) > len(branch):
-            branch = np.empty(count, dtype=np.int64)
-        return branch[:count]
+        while (count := trees.trace(self.ends, self.node, self.link, meeting, path)) > len(path):
+            path = np.empty((count, 2))
+        return path[:count]
 
 
 class RrtStarConnect:
@@ -145,12 +147,12 @@ class RrtStarConnect:
 
     def plan(self, road: Road, query: Query, budget: Budget, seed: int) -> Plan:
         """See `Planner.plan`; with a budget in iterations the answer depends on the seed only."""
-        check_query(road, query)
+        label = check_query(road, query)
         started = thread_time()
-        search = _Trees(road, query, self.config, seed)
-        straight = float(np.hypot(*(search.ends[1] - search.ends[0])))
+        search = _Trees(road, query, label, self.config, seed)
+        straight = math.dist(search.ends[0], search.ends[1])
         shortest: Floats | None = None
-        cost, known, batch = np.inf, np.inf, 16
+        cost, known, batch = np.inf, np.inf, BATCH
         history: list[tuple[int, float, float]] = []
         while not (budget.cancelled and budget.cancelled()):
             done = int(search.counter[trees.ITERATION])
@@ -160,6 +162,7 @@ class RrtStarConnect:
                 break
             search.grow(batch)
             if search.best < known:
+                batch = 8 if known == np.inf else batch  # look often at first: a path drawn taut bounds what follows
                 known = search.best
                 path = search.path()
                 if self.config.pull:
