@@ -17,6 +17,7 @@
 import argparse
 from dataclasses import asdict
 import importlib
+import inspect
 import json
 import os
 import pkgutil
@@ -70,6 +71,7 @@ def main() -> int:
     parser.add_argument("name", nargs="?", help="a benchmark, or all")
     parser.add_argument("--list", action="store_true", help="name the benchmarks")
     parser.add_argument("--json", action="store_true", help="end with one JSON object on the last line")
+    parser.add_argument("--count", type=int, help="how many, where a benchmark counts something (scenarios to re-check)")
     arguments = parser.parse_args()
     known = names()
     if arguments.list or arguments.name is None:
@@ -79,7 +81,9 @@ def main() -> int:
         print(f"unknown benchmark {arguments.name!r}; choose one of: all, {', '.join(known)}", file=sys.stderr)
         return 2
     for name in known if arguments.name == "all" else [arguments.name]:
-        rows: list[Row] = importlib.import_module(f"benchmarks.{name}").run()
+        run = importlib.import_module(f"benchmarks.{name}").run
+        counted = arguments.count is not None and "count" in inspect.signature(run).parameters
+        rows: list[Row] = run(arguments.count) if counted else run()
         if arguments.json:
             report = [asdict(row) | {"met": row.met} for row in rows]
             print(json.dumps({"benchmark": name, "rows": report, "machine": machine()}), flush=True)

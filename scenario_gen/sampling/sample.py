@@ -208,7 +208,9 @@ class _Loop:
 
     def _say(self, best: int, tried: int) -> None:
         """Put what was adapted into sentences."""
-        if tried > 1:
+        if tried > 1 and best == 0:
+            self.adaptations.append("few candidates were valid, and smaller standard deviations did not help")
+        elif tried > 1:
             s = LEVELS[best]
             self.adaptations.append(
                 f"few candidates were valid: standard deviations multiplied by {s.lateral:g} across the route, "

@@ -1,0 +1,163 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Conservative advancement over many motions at once: a step is as long as the distance left, divided by the fastest approach.
+
+Written for the independent re-check; it shares no line with the checker. Motions are those that `Scenario` defines: position the
+cubic Hermite interpolant, heading linear between samples.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+
+from scenario_gen.arrays import Bools, Floats, Ints
+from scenario_gen.scenario import Scenario
+
+RESOLUTION = 1e-3  # s, the shortest step
+SLOT = 1e3  # s, longer than any scenario: lane n has the times n * SLOT ...
+WAY = 2e4  # m, longer than any way
+TOUCH = 1e-6  # m, a footprint is shrunk by this before it is compared with the road, whose edge it may touch
+
+
+@dataclass(frozen=True, eq=False)
+class Lanes:
+    """L motions of one footprint each, their samples end to end.
+
+    Attributes:
+        key: (S,) time of each sample plus its lane's slot, ascending.
+        end: (L,) s.
+        pose: (S, 3) x, y, yaw; velocity: (S, 2) m/s.
+        half: (L, 2) half lengths and widths [m].
+    """
+
+    key: Floats
+    end: Floats
+    pose: Floats
+    velocity: Floats
+    half: Floats
+
+    @classmethod
+    def of(cls, scenarios: Sequence[Scenario]) -> "Lanes":
+        """All vehicles of all scenarios, scenario by scenario."""
+        key: list[Floats] = []
+        end: list[float] = []
+        pose, velocity, half = [], [], []
+        for s in scenarios:
+            for n, vehicle in enumerate(s.vehicles):
+                key.append(s.time + SLOT * len(end))
+                end.append(float(s.time[-1]))
+                yaw = s.heading[n]
+                pose.append(np.column_stack([s.position[n], yaw]))
+                velocity.append(s.speed[n][:, None] * np.column_stack([np.cos(yaw), np.sin(yaw)]))
+                half.append((0.5 * vehicle.length, 0.5 * vehicle.width))
+        return cls(np.concatenate(key), np.array(end), np.concatenate(pose), np.concatenate(velocity), np.array(half))
+
+    def _interval(self, lane: Ints, time: Floats) -> tuple[Ints, Floats, Floats]:
+        """First sample of the interval that holds each time, its length [s], and the share of it that has passed."""
+        k = np.searchsorted(self.key, lane * SLOT + np.minimum(time, self.end[lane] - 1e-9), side="right") - 1
+        h = self.key[k + 1] - self.key[k]
+        return k, h, (lane * SLOT + time - self.key[k]) / h
+
+    def poses(self, lane: Ints, time: Floats) -> Floats:
+        """Poses (M, 3) of lanes (M,) at times (M,)."""
+        k, h, u = self._interval(lane, time)
+        u, h = u[:, None], h[:, None]
+        p, q, v, w = self.pose[k, :2], self.pose[k + 1, :2], self.velocity[k], self.velocity[k + 1]
+        basis = ((1.0 + 2.0 * u) * (1.0 - u) ** 2, u * (1.0 - u) ** 2, u * u * (3.0 - 2.0 * u), u * u * (u - 1.0))
+        xy = basis[0] * p + h * basis[1] * v + basis[2] * q + h * basis[3] * w
+        yaw = (1.0 - u[:, 0]) * self.pose[k, 2] + u[:, 0] * self.pose[k + 1, 2]
+        return np.column_stack([xy, yaw])
+
+    def boxes(self, lane: Ints, time: Floats, shrink: float = 0.0) -> Any:
+        """Footprints (M,) as polygons."""
+        return boxes_at(self.poses(lane, time), self.half[lane] - shrink)
+
+    def hodograph(self) -> Floats:
+        """(S - 1, 3, 2): the velocity between two samples lies in the hull of these three; the last of a lane means nothing."""
+        h = np.diff(self.key)[:, None]
+        mean = np.diff(self.pose[:, :2], axis=0) / h
+        v, w = self.velocity[:-1], self.velocity[1:]
+        return np.stack([v, 3.0 * mean - v - w, w], axis=1)
+
+    def turning(self) -> Floats:
+        """(S - 1,) rad/s."""
+        return np.asarray(np.abs(np.diff(self.pose[:, 2])) / np.diff(self.key))
+
+
+def boxes_at(poses: Floats, half: Floats) -> Any:
+    """Polygons (M,) of footprints at poses (M, 3) with half sizes (M, 2)."""
+    cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    ahead = np.column_stack([cos, sin]) * half[:, :1]
+    aside = np.column_stack([-sin, cos]) * half[:, 1:]
+    corners = np.stack([ahead + aside, aside - ahead, -ahead - aside, ahead - aside], axis=1) + poses[:, None, :2]
+    return shapely.polygons(corners)
+
+
+@dataclass(frozen=True, eq=False)
+class Paces:
+    """How fast each of L tasks may come nearer: the bound is constant between the knots.
+
+    Attributes:
+        key: (S,) s, as in `Lanes`; reach: (S,) m, the integral of the bound since the task's start plus its slot.
+    """
+
+    key: Floats
+    reach: Floats
+
+    @classmethod
+    def of(cls, key: Floats, bound: Floats) -> "Paces":
+        """From knots (S,) and bounds (S - 1,) [m/s] between them; between two tasks a bound counts for nothing."""
+        step = np.diff(key) * (bound + 1e-9)
+        jump = np.floor(key[1:] / SLOT) != np.floor(key[:-1] / SLOT)
+        step[jump] = 0.0
+        total = np.concatenate([[0.0], np.cumsum(step)])
+        first = np.concatenate([[0], np.flatnonzero(jump) + 1])
+        task = np.concatenate([[0], np.cumsum(jump)])
+        return cls(key, total - total[first][task] + WAY * task)
+
+    def after(self, task: Ints, time: Floats, distance: Floats, end: Floats) -> Floats:
+        """The time until which nothing can have come nearer by `distance` [m]."""
+        now = np.interp(task * SLOT + time, self.key, self.reach)
+        later = np.interp(np.minimum(now + distance, WAY * (task + 0.99)), self.reach, self.key) - task * SLOT
+        past = np.searchsorted(self.reach, now + distance, side="right")
+        beyond = (past >= len(self.reach)) | (np.floor(self.reach[np.minimum(past, len(self.reach) - 1)] / WAY) != task)
+        return np.where(beyond, end + 1.0, later)
+
+
+def advance(count: int, end: Floats, paces: Paces, distance: Callable[[Ints, Floats], tuple[Floats, Bools]]) -> tuple[Bools, int]:
+    """Advance `count` tasks from 0 to `end` (count,) [s].
+
+    Args:
+        count: tasks.
+        end: where each is done.
+        paces: bounds of approach.
+        distance: of tasks (M,) at times (M,): metres left, and whether there is a violation at that very instant.
+
+    Returns:
+        (count,) True where a violation was found, and the number of instants looked at.
+    """
+    bad, time, open_, looked = np.zeros(count, dtype=np.bool_), np.zeros(count), np.arange(count), 0
+    while len(open_):
+        left, violated = distance(open_, time[open_])
+        looked += len(open_)
+        bad[open_] |= violated
+        here = time[open_]
+        then = np.maximum(paces.after(open_, here, left * (1.0 - 1e-9), end[open_]), here + RESOLUTION)
+        time[open_] = np.where(here < end[open_], np.minimum(then, end[open_]), np.inf)
+        open_ = open_[np.isfinite(time[open_]) & ~bad[open_]]
+    return bad, looked

@@ -1,0 +1,93 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""As many vehicles as there are, and what is said when not all scenarios can be had."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scenario_gen.encounter import Encounter, Vehicle
+from scenario_gen.logs import read_log
+from scenario_gen.requests import Chain, Request, run_request
+from scenario_gen.roads import build_road
+from scenario_gen.sampling import SamplingConfig
+from scenario_gen.sampling.sample import LEVEL_SIZE
+from scenario_gen.scenario import Cause
+from scenario_gen.segmentation import segment
+from scenario_gen.validity import Limits
+
+
+def platoons(count):
+    """Half of `count` vehicles drive east in a queue that slows down and speeds up again, the others come towards them."""
+    time = np.arange(161) * 0.1
+    speed = 8.0 + 2.5 * np.cos(0.4 * time)
+    way = np.concatenate([[0.0], np.cumsum(0.05 * (speed[1:] + speed[:-1]))])
+    position, heading = [], []
+    for k in range(count):
+        row, east = k // 2, k % 2 == 0
+        x = way - 16.0 * row if east else 130.0 - way + 16.0 * row
+        position.append(np.column_stack([x, np.full(time.size, -1.75 if east else 1.75)]))
+        heading.append(np.full(time.size, 0.0 if east else np.pi))
+    vehicles = tuple(Vehicle(f"car_{k}", 4.5 + 0.1 * k, 1.8) for k in range(count))
+    return Encounter("platoons", vehicles, 0, 100_000_000, np.array(position), np.array(heading), np.tile(speed, (count, 1)))
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5, 6, 7, 8])
+def test_two_to_eight_vehicles(count):
+    encounter = platoons(count)
+    chain = Chain(encounter, segment(encounter, seed=1), build_road("corridor", encounter), 1)
+    outcome = run_request(chain, Request(), count=5)
+    assert len(outcome.scenarios.scenarios) == 5
+    assert {len(s.vehicles) for s in outcome.scenarios.scenarios} == {count}
+    left = run_request(chain, Request(ego=f"car_{count - 1}"), count=2).scenarios
+    assert {len(s.vehicles) for s in left.scenarios} == {count - 1}
+
+
+@pytest.fixture(scope="module")
+def tight(data):
+    """A recorded left turn on a T-intersection: its arc leaves little below the lateral limits that are set here."""
+    (log,) = (data / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn_*.csv")
+    encounter = read_log(log).encounters[0]
+    config = SamplingConfig(lateral_sigma=0.3, observation_sigma=0.3, longitudinal_sigma=0.5, time_sigma=1.0)
+    return Chain(encounter, segment(encounter), build_road("t_intersection", encounter), 0, sampling=config)
+
+
+def limited(chain, lateral, **sampling):
+    limits = Limits(max_lateral_acceleration=lateral, acceleration_tolerance=0.1)
+    return replace(chain, limits=limits, sampling=replace(chain.sampling, **sampling))
+
+
+@pytest.mark.data
+def test_variance_adapts_where_validity_is_hard(tight):
+    """Few candidates at full variance keep to the limit; with smaller deviations the set is had, and it is said."""
+    made = run_request(limited(tight, 4.5), Request(), count=30).scenarios
+    assert len(made.scenarios) == 30
+    (said,) = (line for line in made.adaptations if "few candidates were valid" in line)
+    assert "standard deviations multiplied by 0" in said
+    assert max(s.index for s in made.scenarios) >= LEVEL_SIZE, "candidates of another level are among them"
+    assert made.candidates == len(made.scenarios) + made.refused.total()
+
+
+@pytest.mark.data
+def test_a_short_set_says_how_many_and_why(tight):
+    made = run_request(limited(tight, 4.5, attempts=3), Request(), count=80).scenarios
+    assert 0 < len(made.scenarios) < made.requested == 80
+    assert made.candidates == 240 == len(made.scenarios) + made.refused.total()
+    assert set(made.refused) == {Cause.LATERAL_ACCELERATION}
+    impossible = run_request(limited(tight, 2.0), Request(), count=10).scenarios
+    assert impossible.scenarios == ()
+    assert impossible.refused.total() == impossible.candidates == 200
+    assert "few candidates were valid, and smaller standard deviations did not help" in impossible.adaptations

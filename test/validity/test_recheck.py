@@ -1,0 +1,121 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The independent re-check of the benchmark sees what it must: as brute force does, and on scenarios that are spoilt."""
+
+from dataclasses import replace
+
+from motions import open_road, road_of, scenario_of, straight, wander
+import numpy as np
+from oracle import boxes_at, drivable_area
+import pytest
+import shapely
+
+from benchmarks._recheck import Account, Recheck
+from scenario_gen.encounter import Encounter, Vehicle
+from scenario_gen.scenario import BoundaryStates
+
+TIME = np.arange(101) * 0.1
+LENGTH = 100.0
+
+
+def crossing(delay=3.0):
+    """Two cars that cross: the one from the west first, the other `delay` seconds later."""
+    return scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), straight(0.0, -50.0 - 10.0 * delay, np.pi / 2, 10.0, TIME)), TIME)
+
+
+def recheck_of(scenario, road=None, changepoints=True):
+    encounter = Encounter("t", scenario.vehicles, 0, 100_000_000, scenario.position, scenario.heading, scenario.speed)
+    ends = (np.column_stack([scenario.position[:, k], scenario.heading[:, k], scenario.speed[:, k]]) for k in (0, -1))
+    return Recheck(encounter, road or open_road(), BoundaryStates(*ends), changepoints)
+
+
+def found(recheck, *scenarios):
+    account = Account()
+    recheck.check(scenarios, account)
+    return account
+
+
+def test_a_sound_scenario_is_sound():
+    scenario = crossing()
+    account = found(recheck_of(scenario), scenario, scenario)
+    assert account.found == {}
+    assert (account.scenarios, account.vehicles, account.orders) == (2, 4, 2)
+
+
+@pytest.mark.parametrize(("delay", "hit"), [(0.0, True), (0.66, True), (0.68, False), (-0.66, True), (-0.68, False)])
+def test_contact_between_two_samples_is_found_to_the_millisecond(delay, hit):
+    """At right angles the sweeps are clear once the delay exceeds 0.67 s: (4.8 + 1.9) / 10."""
+    account = found(recheck_of(crossing()), crossing(delay))
+    assert ("overlap" in account.found) == hit
+
+
+def test_the_wrong_order_is_found():
+    account = found(recheck_of(crossing(3.0)), crossing(-1.5))
+    assert account.found["passing_order"] == 1
+    assert found(recheck_of(crossing(3.0)), crossing(1.5)).found["passing_order"] == 0
+
+
+def test_a_wrong_order_in_a_queue_is_found():
+    def queue(gap):
+        return scenario_of((straight(-40.0, 0.0, 0.0, 8.0, TIME), straight(-40.0 + gap, 0.0, 0.0, 8.0, TIME)), TIME)
+
+    assert found(recheck_of(queue(-15.0)), queue(-8.0)).found["passing_order"] == 0
+    assert found(recheck_of(queue(-15.0)), queue(15.0)).found["passing_order"] == 1
+
+
+def test_leaving_the_road_between_two_samples_is_found():
+    drivable = np.ones((200, 1000), dtype=bool)
+    drivable[105, 500] = False  # one cell, 1.05 to 1.2 m to the left of the way
+    road = road_of(drivable, 0.2, (-100.0, -20.0))
+    scenario = scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), straight(-50.0, 10.0, 0.0, 10.0, TIME)), TIME)
+    recheck = recheck_of(scenario, road)
+    assert found(recheck, scenario).found == {}
+    nearer = scenario.position.copy()
+    nearer[0, :, 1] += 0.051  # the side is at 1.001 m, the cell begins at 1.0 m
+    spoilt = replace(scenario, position=nearer)
+    assert found(recheck, spoilt).found["off_road"] == 1
+
+
+def test_a_wait_that_moves_and_ends_that_are_missed_are_found():
+    still = (np.tile((5.0, 20.0), (TIME.size, 1)), np.zeros(TIME.size), np.zeros(TIME.size))
+    scenario = scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), still), TIME)
+    recheck = recheck_of(scenario)
+    assert recheck.waits == [0, 1]
+    assert found(recheck, scenario).found == {}
+    creeping = scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), straight(5.0, 20.0, 0.0, 0.3, TIME)), TIME)
+    account = found(recheck, creeping)
+    assert account.found["moving_wait"] == 1
+    assert account.found["boundary_state"] >= 1
+
+
+def test_it_agrees_with_brute_force_on_random_motions():
+    """Overlap and off-road at 1 ms, by shapely alone; grazing by less than a micrometre aside."""
+    rng = np.random.default_rng(3)
+    drivable = np.ones((300, 300), dtype=bool)
+    drivable[rng.integers(0, 300, 40), rng.integers(0, 300, 40)] = False
+    road, time, agreed = road_of(drivable, 0.25, (-37.5, -37.5)), np.arange(31) * 0.1, 0
+    for _ in range(12):
+        scenario = scenario_of(
+            [wander(rng, time, 15.0) for _ in range(2)], time, (Vehicle("a", 4.0, 1.8), Vehicle("b", 4.0, 1.8))
+        )
+        instants = np.arange(3001) * 1e-3
+        boxes = boxes_at(scenario, instants)
+        meet = bool(shapely.intersects(*boxes).any())
+        off = [not bool(shapely.covers(drivable_area(road), b).all()) for b in boxes]
+        account = found(recheck_of(scenario, road), scenario)
+        assert account.found["overlap"] == meet
+        assert account.found["off_road"] == sum(off)
+        agreed += meet + sum(off)
+    assert agreed > 5, "some of them do collide or leave the road"
