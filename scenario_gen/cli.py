@@ -33,6 +33,7 @@ from scenario_gen.bags import read_messages, reindex
 from scenario_gen.bags.evaluation import bag_cases
 from scenario_gen.bags.provenance import sha256_of
 from scenario_gen.bags.regenerate import regenerate_scenario, write_regenerated
+from scenario_gen.bags.told import told_provenance
 from scenario_gen.bags.validation import validate_bag
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError, ScenarioGenError
@@ -283,7 +284,7 @@ def evaluate(
         (out / "evaluation.md").write_text(text + "\n", encoding="utf-8")
         figures = [json.loads(evaluation.to_json()) for evaluation in found]
         (out / FIGURES).write_text(json.dumps({"cases": figures}, indent=2) + "\n", encoding="utf-8")
-        facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"}
+        facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | told_provenance(bag)
         write_report(out / REPORT, ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts))
 
 

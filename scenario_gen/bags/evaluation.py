@@ -22,7 +22,7 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags.contents import read_namespaces
-from scenario_gen.bags.told import told_fit, told_segmentation, told_values
+from scenario_gen.bags.told import request_sentence, told_fit, told_requests, told_segmentation, told_values
 from scenario_gen.bags.validation import Reference
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import Case, CheckCounts, evaluate, Evaluation, EvaluationConfig
@@ -124,4 +124,4 @@ def _left_out(topics: Mapping[str, Sequence[bytes]]) -> tuple[str, ...]:
         said.append("the bag has no map: whether vehicles leave the road was not checked")
     if not topics["changepoints"]:
         said.append("the bag has no changepoints: the template counts as one primitive, and its waits were not asked")
-    return tuple(said)
+    return (*said, *(request_sentence(account) for account in told_requests(topics[INFO])))

@@ -38,6 +38,8 @@ from scenario_gen.planning.route import Route
 from scenario_gen.segmentation import Segmentation
 
 Values = Mapping[str, str]
+OUTCOME = ("request", "requested", "published", "candidates")
+REFUSED = "refused."
 
 
 def told_values(messages: Sequence[bytes], stamp_ns: int, nodes: str = "/") -> dict[str, Values]:
@@ -57,6 +59,40 @@ def told_values(messages: Sequence[bytes], stamp_ns: int, nodes: str = "/") -> d
         if stamp == stamp_ns:
             found |= {s.name.partition(": ")[2]: s.values for s in statuses if s.name.startswith(nodes)}
     return found
+
+
+def told_requests(messages: Sequence[bytes]) -> tuple[Values, ...]:
+    """Return the closing accounts of requests on `scenarios/info`, in the order of the bag."""
+    found: list[Values] = []
+    for data in messages:
+        try:
+            found += [status.values for status in decode_diagnostics(data)[1] if "published" in status.values]
+        except InputError:
+            continue
+    return tuple(found)
+
+
+def request_sentence(account: Values) -> str:
+    """Return in words what a request came to, by its own account."""
+    refused = [f"{key[len(REFUSED) :]} {value}" for key, value in account.items() if key.startswith(REFUSED) and value != "0"]
+    words = (account.get(key, "?") for key in ("request", "published", "requested", "candidates"))
+    told = "by its own account request {} published {} of {} from {} candidates".format(*words)
+    return f"{told}, refused: {', '.join(refused).replace('_', ' ')}" if refused else told
+
+
+def told_provenance(bag: Path) -> dict[str, str]:
+    """Return what the bag says of how its scenarios were made: logs, seed, versions, parameters; several answers side by side.
+
+    Raises:
+        InputError: the bag cannot be read.
+    """
+    found: dict[str, list[str]] = {}
+    for message in read_messages(bag, lambda topic: f"/{topic}".endswith("/scenarios/info")):
+        for account in told_requests([message.data]):
+            for key, value in account.items():
+                if key not in OUTCOME and not key.startswith((REFUSED, "adaptation.", "ego")):
+                    found.setdefault(key, []).append(value)
+    return {key: " | ".join(dict.fromkeys(values)) for key, values in found.items()}
 
 
 def told_segmentation(

@@ -14,6 +14,7 @@
 
 """A bag evaluated from its messages alone gives the figures of the scenarios that were put into it."""
 
+from collections import Counter
 from dataclasses import replace
 
 from evaluation_worlds import report_case
@@ -25,6 +26,7 @@ from msg_conventions.topics import topic_entry
 from scenario_gen.bags import read_messages, Run, write_run
 from scenario_gen.bags.evaluation import bag_cases, evaluate_bag
 from scenario_gen.bags.metadata import qos_yaml
+from scenario_gen.bags.told import told_provenance
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import EvaluationConfig, render, ReportInput
@@ -32,6 +34,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.pipeline import PipelineConfig, run_arm
 from scenario_gen.roads import build_road
+from scenario_gen.scenario import Cause
 from scenario_gen.segmentation import segment
 from scenario_gen.validity import Limits
 
@@ -138,6 +141,18 @@ def test_what_nodes_say_on_one_topic_is_told_apart_by_their_namespaces(tmp_path)
     (case,) = bag_cases(tmp_path / "recorded", QUICK)
     assert case.fit is not None and case.fit.notes == run.fit.notes
     assert case.segmentation.descriptions == run.segmentation.descriptions
+
+
+def test_the_bag_says_how_its_scenarios_were_made_and_what_was_refused(tmp_path):
+    first = replace(real_run("/one"), provenance={"log c": "sha256 12", "sampling.sigma": "1.0"})
+    refused = replace(first.result, candidates=5, refused=Counter({Cause.OVERLAP: 2}))
+    second = replace(first, namespace="/two", seed=8, result=refused, provenance={"sampling.sigma": "1.0"})
+    bag = write_run(tmp_path / "run", [first, second])
+    assert told_provenance(bag) == {"log c": "sha256 12", "sampling.sigma": "1.0", "seed": "7 | 8"}
+    cases = bag_cases(bag, QUICK)
+    assert "by its own account request 1 published 3 of 3 from 3 candidates" in cases[0].with_changepoints.adaptations
+    told = "by its own account request 1 published 3 of 3 from 5 candidates, refused: overlap 2"
+    assert told in cases[1].with_changepoints.adaptations and told in render(ReportInput(cases))
 
 
 def test_a_bag_with_half_of_it_shows_what_it_has(tmp_path):
