@@ -21,6 +21,7 @@ import traceback
 from typing import Any
 
 import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -62,6 +63,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     STAGES: tuple[str, ...] = ()  # packages of scenario_gen whose kernels are compiled while configuring
 
     def __init__(self, name: str, config: Any, namespace: str | None = None) -> None:
+        self._together = ReentrantCallbackGroup()
         super().__init__(name, namespace=namespace)
         self._raw_publishers: dict[str, Any] = {}
         self._inputs: dict[str, Any] = {}
@@ -70,6 +72,11 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         self.parameters = ConfigParameters(self, config)
         self.declare_parameter("autostart", True)
         self.parameters.log()
+
+    @property
+    def default_callback_group(self) -> ReentrantCallbackGroup:
+        """Reentrant: in rclpy's own, a service that awaits its answer keeps all other callbacks of the node from running."""
+        return self._together
 
     @property
     def config(self) -> Any:
