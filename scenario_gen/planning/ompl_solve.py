@@ -15,7 +15,8 @@
 """One query for one of OMPL's planners, in this process: see `ompl_planners` for the way that cannot hang or crash the caller.
 
 OMPL sees the same exact edge check as our own planner (a motion validator around the compiled kernel), so neither its default
-checking resolution of 1 % of the extent nor a Python callback per state stands in its way.
+checking resolution of 1 % of the extent nor a Python callback per state stands in its way. For comparison it can also be
+had as its Python users have it: state by state, one cell apart, which is not exact.
 """
 
 from collections.abc import Callable
@@ -55,6 +56,7 @@ def solve(
     step: float | None = None,
     seed: int | None = None,
     simplify: bool = True,
+    state_by_state: bool = False,
 ) -> Answer:
     """Let one of OMPL's planners search for a path.
 
@@ -67,6 +69,7 @@ def solve(
         step: longest edge [cells]; None: OMPL's own choice.
         seed: of OMPL's random numbers; only the first search of a process can set it.
         simplify: also run OMPL's path simplifier.
+        state_by_state: check edges by a Python callback per state, a cell apart, instead of exactly.
     """
     util.setLogLevel(util.LOG_NONE)
     if seed is not None:
@@ -90,9 +93,16 @@ def solve(
         def checkMotion(self, a: Any, b: Any, *_: Any) -> bool:  # noqa: N802 - OMPL's name
             return bool(segment_free(clearance, a[0], a[1], b[0], b[1], radius))
 
+    def in_free_cell(state: Any) -> bool:
+        return bool(clearance[min(int(state[1]), height - 1), min(int(state[0]), width - 1)] > radius)
+
     edges = Edges(information)
-    information.setStateValidityChecker(valid)
-    information.setMotionValidator(edges)
+    if state_by_state:
+        information.setStateValidityChecker(in_free_cell)
+        information.setStateValidityCheckingResolution(1.0 / space.getMaximumExtent())
+    else:
+        information.setStateValidityChecker(valid)
+        information.setMotionValidator(edges)
     information.setup()
     problem = base.ProblemDefinition(information)
     states = []

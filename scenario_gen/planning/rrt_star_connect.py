@@ -67,7 +67,7 @@ class _Trees:
 
     def __init__(self, road: Road, query: Query, label: int, config: RrtStarConnectConfig, seed: int) -> None:
         self.clearance = clearance_in_cells(road)
-        self.ends = to_cells(road, np.stack((query.start, query.goal)))
+        self.ends = to_cells(road, np.array((query.start, query.goal)))
         self.free_cells = component_cells(road, query.radius, label)
         self.corner_cells = corner_cells(road, query.radius, label)
         least_gamma = 2.0 * math.sqrt(1.5 * max(len(self.free_cells), 1) / math.pi)  # Karaman & Frazzoli 2011, d = 2
@@ -78,7 +78,7 @@ class _Trees:
         self.setting = np.array([radius, config.step, gamma, config.zeta, side, np.inf, np.inf, *switches])
         self.counter = np.zeros(trees.COUNTERS, dtype=np.int64)
         self.counter[trees.MEETING] = -1
-        self.history = np.empty((256, 2))
+        self.history = np.empty((64, 2))
         self.random = np.array([seed % 2**64], dtype=np.uint64)
         self.drawn = np.empty((0, 2))
         self._empty_pool()
@@ -87,17 +87,18 @@ class _Trees:
     @property
     def columns(self) -> int:
         """Buckets side by side."""
-        return int(np.ceil(self.clearance.shape[1] / self.setting[trees.SIDE]))
+        return math.ceil(int(self.clearance.shape[1]) / float(self.setting[trees.SIDE]))
 
     def _empty_pool(self) -> None:
         """An empty pool with room for four times the nodes there are: no bucket has more than one chunk that is not full."""
-        buckets = int(np.ceil(self.clearance.shape[0] / self.setting[trees.SIDE])) * self.columns
+        buckets = math.ceil(int(self.clearance.shape[0]) / float(self.setting[trees.SIDE])) * self.columns
         nodes = ROOM * int(self.counter[trees.NODES_A] + self.counter[trees.NODES_B])
         chunks = 256 + nodes // trees.CHUNK + min(nodes, 2 * buckets)
         self.node = np.empty((chunks * trees.CHUNK, 4))
         self.link = np.empty((chunks * trees.CHUNK, 5), dtype=np.int32)
         self.chunk = np.empty((chunks, 2), dtype=np.int64)
-        self.head = np.full((2, buckets), -1, dtype=np.int64)
+        self.head = np.empty((2, buckets), dtype=np.int64)
+        self.head.fill(-1)
 
     def grow(self, iterations: int) -> None:
         """Make so many iterations, or fewer where the first path is found; give the trees room as they need it."""
@@ -132,7 +133,7 @@ class _Trees:
 
     def path(self) -> Floats:
         """The best path through the trees: (P, 2) cells, start to goal."""
-        path = np.empty((1024, 2))
+        path = np.empty((512, 2))
         meeting = int(self.counter[trees.MEETING])
         while (count := trees.trace(self.ends, self.node, self.link, meeting, path)) > len(path):
             path = np.empty((count, 2))

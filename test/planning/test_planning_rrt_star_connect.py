@@ -22,7 +22,8 @@ import pytest
 from benchmarks._planning_maps import clutter, enters_blocked, lane, optimum, road_of, t_intersection
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.planning.planner import BlockedError, Budget, BudgetSpentError, NoWayError, path_length, Query
-from scenario_gen.planning.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig
+from scenario_gen.planning.rrt_star_connect import _Trees, LARGE, PAPER, RrtStarConnect, RrtStarConnectConfig
+from scenario_gen.planning.tree_nodes import CHUNK, COST, EDGE, ITERATION, NODES_A, NODES_B, PARENT
 from scenario_gen.roads.clearance import clearance_in_cells, segments_free
 from scenario_gen.roads.flood import connected
 
@@ -111,6 +112,56 @@ def test_the_paper_preset_goes_on_improving_after_the_first_meeting():
     assert np.hypot(*np.diff(first.path, axis=0).T).max() <= 30.0 + 1e-9  # no edge longer than the near radius
 
 
+def grown(road, ends, config, iterations):
+    """Both trees after so many iterations, and the ids of all their nodes."""
+    search = _Trees(road, Query(*ends), 1, config, 2)
+    while search.counter[ITERATION] < iterations:
+        search.grow(iterations - int(search.counter[ITERATION]))
+    found = []
+    for first in search.head[search.head >= 0]:
+        k = first
+        while k >= 0:
+            found.append(k * CHUNK + np.arange(search.chunk[k, 1]))
+            k = search.chunk[k, 0]
+    return search, np.concatenate(found)
+
+
+@pytest.mark.parametrize("config", [RrtStarConnectConfig(), PAPER], ids=["default", "paper"])
+@pytest.mark.parametrize("case", [clutter, lane])
+def test_large_trees_are_whole(config, case):
+    road, ends = case()
+    search, m = grown(road, ends, config, 60_000)
+    assert len(m) == len(np.unique(m)) == search.counter[NODES_A] + search.counter[NODES_B]
+    assert len(search.drawn) > 0 or len(m) <= LARGE
+    m = m[search.link[m, PARENT] >= 0]
+    parent = search.link[m, PARENT]
+    edge = np.hypot(*(search.node[m, :2] - search.node[parent, :2]).T)
+    np.testing.assert_allclose(search.node[m, EDGE], edge, atol=1e-9)
+    np.testing.assert_allclose(search.node[m, COST], search.node[parent, COST] + edge, atol=1e-7)
+    assert segments_free(road, search.node[parent, :2], search.node[m, :2], 0.0).all()
+    path = search.path()
+    assert path_length(path) == pytest.approx(search.best)
+    np.testing.assert_array_equal(path[[0, -1]], ends)
+
+
+def test_many_nodes_on_a_small_map():
+    road, ends = road_of("small", np.ones((8, 30), dtype=bool)), np.array([[1.5, 1.5], [28.5, 6.5]])
+    search, m = grown(road, ends, PAPER, 40_000)
+    assert len(m) == search.counter[NODES_A] + search.counter[NODES_B] > LARGE
+    assert search.best == pytest.approx(np.hypot(*(ends[1] - ends[0])))
+
+
+def test_only_an_informed_search_leaves_out_what_cannot_help():
+    drivable = np.ones((200, 200), dtype=bool)
+    drivable[95:140, 100] = False  # a wall to go round
+    road, ends = road_of("open", drivable), np.array([[80.5, 100.5], [120.5, 100.5]])
+    for config, everywhere in ((PAPER, True), (RrtStarConnectConfig(greedy=False, pull=False), False)):
+        search, m = grown(road, ends, config, 10_000)
+        place = search.node[m, :2]
+        by_way_of = np.hypot(*(place - ends[0]).T) + np.hypot(*(place - ends[1]).T)
+        assert (np.mean(by_way_of > 2.0 * search.best) > 0.3) == everywhere
+
+
 def test_same_seed_same_path():
     road, ends = clutter()
     plans = [RrtStarConnect().plan(road, Query(*ends), Budget(3000), seed) for seed in (4, 4, 5)]
@@ -137,6 +188,14 @@ def test_failures_are_told_apart():
         planner.plan(road_of("a gap", drivable), Query(left, right), Budget(3), 0)
     with pytest.raises(BudgetSpentError):
         planner.plan(road_of("a gap", drivable), Query(left, right), Budget(10**9, cancelled=lambda: True), 0)
+
+
+def test_cancelling_ends_a_search_and_keeps_what_it_has():
+    road, ends = clutter()
+    looks = iter([False] * 8 + [True])
+    plan = RrtStarConnect().plan(road, Query(*ends), Budget(None, cancelled=lambda: next(looks)), 0)
+    assert plan.cost == pytest.approx(plan.history[-1, 2])
+    assert plan.iterations < 8 * 512
 
 
 def test_a_disc_needs_its_room():

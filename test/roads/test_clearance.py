@@ -22,8 +22,8 @@ from shapely import affinity
 from shapely.geometry import box, LineString, Point
 from shapely.ops import unary_union
 
-from scenario_gen.roads.clearance import clearance_field, footprint_fits, segments_free
-from scenario_gen.roads.flood import component_at, components, connected
+from scenario_gen.roads.clearance import clearance_field, clearance_in_cells, footprint_fits, free_length, segments_free
+from scenario_gen.roads.flood import common_component, component_at, components, connected
 from scenario_gen.roads.repair import nearest_pose_with_room
 from scenario_gen.roads.road import Road
 
@@ -93,6 +93,26 @@ def test_segments_against_shapely(radius):
     assert seen == {True, False}
 
 
+@pytest.mark.parametrize("radius", [0.0, 0.7])
+def test_the_free_length_is_free_and_ends_within_a_cell_of_what_is_not(radius):
+    rng = np.random.default_rng(int(10 * radius) + 3)
+    stopped = 0
+    for _ in range(100):
+        road = random_road(rng, (12, 15), 0.1, 1.0, (0.0, 0.0))
+        for start, end in rng.uniform(0.5, (14.5, 11.5), (10, 2, 2)):
+            length = float(np.hypot(*(end - start)))
+            ahead = (end - start) / length
+            free = free_length(clearance_in_cells(road), *start, *end, radius)
+            assert (free == np.inf) == segments_free(road, start[None], end[None], radius)[0]
+            if free in (np.inf, 0.0):
+                continue
+            stopped += 1
+            beyond = min(free + 1.0 + 1e-9, length)
+            assert segments_free(road, start[None], (start + free * ahead)[None], radius)[0]
+            assert not segments_free(road, start[None], (start + beyond * ahead)[None], radius)[0]
+    assert stopped > 30
+
+
 def test_a_segment_may_not_slip_between_two_squares_that_touch_at_a_corner():
     road = road_of([[1, 0], [0, 1]])
     assert not segments_free(road, np.array([[0.5, 0.5]]), np.array([[1.5, 1.5]]), 0.0)[0]
@@ -134,6 +154,18 @@ def test_components_need_the_width():
     assert not connected(road, left, right, 0.51)
     assert component_at(road, np.array([10.5, 0.5]), 0.0) == 0
     assert components(road, 0.51).max() == 2
+
+
+def test_the_common_component_is_one_that_both_ends_reach():
+    drivable = np.ones((6, 21), dtype=bool)
+    drivable[:, 10] = False
+    road = road_of(drivable)
+    left, right = np.array([2.5, 2.5]), np.array([18.5, 2.5])
+    assert common_component(road, left, left + 3.0, 0.0) == component_at(road, left, 0.0) == 1
+    assert common_component(road, left, right, 0.0) is None
+    assert common_component(road, right, right, 0.0) == 2
+    narrow = road_of(np.ones((1, 9)))  # a lane where no centre has room for the disc
+    assert common_component(narrow, np.array([1.5, 0.5]), np.array([7.5, 0.5]), 0.6) is None
 
 
 @settings(max_examples=60, deadline=None)
