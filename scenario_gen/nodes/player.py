@@ -14,8 +14,9 @@
 
 """player: a bag's messages as they were recorded, raw; `~/pause` and `~/resume`; any rosbag2 bag, MCAP or SQLite.
 
-Each topic is offered with the quality of service it was recorded with. With an offset, what latched topics had said before it is
-published first. With `clock`, the bag's time is published on /clock, so that nodes with `use_sim_time` follow it.
+Each topic is offered with the quality of service it was recorded with, or as `qos_overrides./topic.publisher.reliability` and the
+like say. With an offset, what latched topics had said before it is published first. With `clock`, the bag's time is published on
+/clock, so that nodes with `use_sim_time` follow it.
 """
 
 from collections import deque
@@ -29,6 +30,8 @@ from time import monotonic
 from typing import Any
 
 from rclpy.node import Node
+from rclpy.qos import QoSPolicyKind
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
@@ -42,6 +45,7 @@ from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.parameters import check, parameter
 
 TICK = 0.01  # seconds between two clock messages
+KINDS = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,8 @@ class Player(Node):  # type: ignore[misc]
             if not re.fullmatch(config.topics, name):
                 continue
             try:
-                publisher = self.create_publisher(message_class(topic.type), name, qos(topic.quality))
+                kind, quality = message_class(topic.type), qos(topic.quality)
+                publisher = self.create_publisher(kind, name, quality, qos_overriding_options=QoSOverridingOptions(KINDS))
                 self._offered[topic.name] = (publisher, topic.quality.transient_local, topic.quality.depth)
             except InputError as error:
                 self.get_logger().error(f"{name} is not played: {error}")

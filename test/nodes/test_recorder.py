@@ -40,8 +40,8 @@ def start(domain):
     """Start a node as its executable does; what is still running at the end is killed."""
     started = []
 
-    def run(node: str, **parameters: object) -> "subprocess.Popen[str]":
-        words = [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
+    def run(node: str, *more: str, **parameters: object) -> "subprocess.Popen[str]":
+        words = [*more, *(word for name, value in parameters.items() for word in ("-p", f"{name}:={value}"))]
         process = subprocess.Popen(
             [sys.executable, "-m", "scenario_gen.nodes.start", node, "--ros-args", *words],
             stdout=subprocess.PIPE,
@@ -173,3 +173,23 @@ def test_a_bag_of_genuine_rosbag2_is_played_and_recorded_again(start, client, da
     assert [m.data for m in read_messages(copy)] == played
     info = yaml.safe_load((copy / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
     assert info["message_count"] == 10 and len(info["relative_file_paths"]) > 1
+
+
+@pytest.mark.data
+def test_the_player_takes_other_names_and_other_qualities_of_service(start, client, data):
+    from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+
+    bag = data / "bags" / "mcap" / "talker"
+    overrides = ("reliability:=best_effort", "durability:=transient_local", "depth:=3")
+    words = [word for policy in overrides for word in ("-p", f"qos_overrides./topic.publisher.{policy}")]
+    start("player", "-r", "/topic:=/here/other", *words, bag=bag, topics="/topic", paused=True)
+    client.until(lambda: client.node.count_publishers("/here/other") > 0, "the topic under its other name")
+    (offer,) = client.node.get_publishers_info_by_topic("/here/other")
+    assert offer.qos_profile.reliability == ReliabilityPolicy.RELIABLE  # the override names the topic as it is published
+    assert client.node.count_publishers("/topic") == 0
+    words = [word.replace("/topic.", "/here/other.") for word in words]
+    start("player", "-r", "/topic:=/here/other", "-r", "__node:=second", *words, bag=bag, topics="/topic", paused=True)
+    client.until(lambda: client.node.count_publishers("/here/other") == 2, "the second player")
+    offers = [info.qos_profile for info in client.node.get_publishers_info_by_topic("/here/other")]
+    changed = (ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.TRANSIENT_LOCAL)
+    assert changed in {(found.reliability, found.durability) for found in offers}
