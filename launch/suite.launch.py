@@ -18,8 +18,8 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
-from launch.conditions import IfCondition
+from launch.actions import DeclareLaunchArgument, GroupAction
+from launch.conditions import IfCondition, UnlessCondition
 from launch.substitutions import LaunchConfiguration, PythonExpression
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -35,6 +35,10 @@ ARGUMENTS = {
     "namespace": ("", "namespace of all nodes"),
     "params": (str(SHARE / "config" / "suite.yaml"), "parameter file"),
     "bag": ("", "folder to record to; empty records nothing"),
+    "composed": ("false", "all nodes in one process, for small machines"),
+    "stream": ("false", "play the log as fixes and speeds of each vehicle, with /clock, instead of as tracks"),
+    "rate": ("1.0", "how many times as fast as it was recorded the stream is"),
+    "use_sim_time": ("false", "the nodes follow /clock"),
     "rviz": ("false", "open RViz"),
 }
 
@@ -43,31 +47,56 @@ def argument(name, kind):
     return ParameterValue(LaunchConfiguration(name), value_type=kind)
 
 
+def settings(**parameters):
+    return [LaunchConfiguration("params"), parameters | {"use_sim_time": argument("use_sim_time", bool)}]
+
+
 def node(name, condition=None, **parameters):
     return Node(
         package="scenario_gen",
         executable=name,
         name=name,
         namespace=LaunchConfiguration("namespace"),
-        parameters=[LaunchConfiguration("params"), parameters],
+        parameters=settings(**parameters),
         output="screen",
         condition=condition,
     )
 
 
 def generate_launch_description():
-    seed = argument("seed", int)
-    recording = IfCondition(PythonExpression(["'", LaunchConfiguration("bag"), "' != ''"]))
+    road = {"road_name": argument("road", str), "wait_for_tracks": True}
+    seed = {"seed": argument("seed", int)}
+    count = {"count": argument("count", int)}
+    log = {
+        "log_path": argument("log", str),
+        "encounter": argument("encounter", int),
+        "stream": argument("stream", bool),
+        "rate": argument("rate", float),
+    }
+    bag = {"bag": argument("bag", str)}
+    apart = [
+        node("recorder", IfCondition(PythonExpression(["'", LaunchConfiguration("bag"), "' != ''"])), **bag),
+        node("road_server", **road),
+        node("segmenter", **seed),
+        node("planner", **seed),
+        node("gp_sampler", **seed, **count),
+        node("evaluator"),
+        node("log_player", **log),
+    ]
+    # without a name, for it would be that of every node in the process; what a parameter is called says whose it is
+    together = Node(
+        package="scenario_gen",
+        executable="suite",
+        namespace=LaunchConfiguration("namespace"),
+        parameters=settings(**road, **seed, **count, **log, **bag),
+        output="screen",
+        condition=IfCondition(LaunchConfiguration("composed")),
+    )
     return LaunchDescription(
         [
             *(DeclareLaunchArgument(name, default_value=value, description=text) for name, (value, text) in ARGUMENTS.items()),
-            node("recorder", recording, bag=argument("bag", str)),
-            node("road_server", road_name=argument("road", str), wait_for_tracks=True),
-            node("segmenter", seed=seed),
-            node("planner", seed=seed),
-            node("gp_sampler", seed=seed, count=argument("count", int)),
-            node("evaluator"),
-            node("log_player", log_path=argument("log", str), encounter=argument("encounter", int)),
+            GroupAction(apart, condition=UnlessCondition(LaunchConfiguration("composed"))),
+            together,
             # tracks lie in local_enu: shown on the map's origin, so that RViz can show both
             Node(
                 package="tf2_ros",

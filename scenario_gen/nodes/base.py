@@ -22,7 +22,6 @@ from typing import Any
 
 import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -136,21 +135,10 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             try:
                 return callback(request, response)
             except Exception as error:
-                self._failed(name, error)
+                self.failed(name, error)
                 return response
 
         self.create_service(kind, name, guarded, qos_profile=REQUESTS)
-
-    def every(self, seconds: float, name: str, callback: Callable[[], None]) -> Any:
-        """Return a timer that runs in real time, also where /clock stands; whatever goes wrong in it, the node lives on."""
-
-        def guarded() -> None:
-            try:
-                callback()
-            except Exception as error:
-                self._failed(name, error)
-
-        return self.create_timer(seconds, guarded, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def work(self, name: str, job: Job) -> None:
         """Run a job off the executor's thread; a waiting one of the same name is replaced, a running one cancelled."""
@@ -188,7 +176,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Subscribe to the inputs."""
-        self._worker = Worker(self._failed)
+        self._worker = Worker(self.failed)
         for topic in self.INPUTS:
             self.listen(topic)
         self.started()
@@ -234,9 +222,10 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         try:
             self.received(topic, data)
         except Exception as error:
-            self._failed(topic, error)
+            self.failed(topic, error)
 
-    def _failed(self, name: str, error: BaseException) -> None:
+    def failed(self, name: str, error: BaseException) -> None:
+        """Say on /diagnostics that something went wrong; the node lives on."""
         if not self.context.ok():
             return
         if not isinstance(error, ScenarioGenError):

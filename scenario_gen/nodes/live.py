@@ -20,6 +20,8 @@ import re
 from time import monotonic
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
+
 from msg_conventions.names import token
 from msg_conventions.streams import decode_fix, decode_speed
 from msg_conventions.topics import FIX_TYPE, TWIST_TYPE, vehicle_topic
@@ -65,10 +67,19 @@ class LiveStreams:
         self._streams = Streams(log, config.late)
         self._heard = monotonic()
         self._topics: dict[str, tuple[str, str]] = {}  # full name -> vehicle, kind
-        self._timer = node.every(LOOK, "streams", self._look)
+        self._timer = node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _look(self) -> None:
-        """Subscribe to new streams, as their publishers offer them; notice silence."""
+        """Find new streams; notice silence."""
+        try:
+            self._subscribe()
+        except InputError as error:
+            self._node.failed("streams", error)
+        if monotonic() - self._heard > self._config.silence:
+            self.end()
+
+    def _subscribe(self) -> None:
+        """Subscribe to new streams, as their publishers offer them."""
         for name in self._vehicles():
             for kind, kind_type in TYPES.items():
                 topic = self._node.resolve_topic_name(vehicle_topic(name, kind))
@@ -79,8 +90,6 @@ class LiveStreams:
                 if publishers[0].topic_type != kind_type:
                     raise InputError(f"{topic} is a {publishers[0].topic_type}; {kind_type} is needed, so it is left out")
                 self._node.listen(topic, offered(topic, [publisher.qos_profile for publisher in publishers])[0])
-        if monotonic() - self._heard > self._config.silence:
-            self.end()
 
     def _vehicles(self) -> list[str]:
         """The vehicles of the parameter `log.vehicles`, or all that have a fix in the node's namespace."""
