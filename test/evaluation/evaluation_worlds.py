@@ -111,3 +111,18 @@ def report_case(count=12, name="crossing", without=True):
     evaluation = evaluate(encounter, segmentation, rows, checks=checks, road="cross", config=EvaluationConfig(resamples=50))
     refused = "" if without else "no route exists"
     return Case(encounter, segmentation, cross_road(), fit, routes, near, far if without else None, evaluation, oracle, refused)
+
+
+def ego_case(count=4):
+    """The case of the report without its first vehicle, whose template track is given instead."""
+    case = report_case(count, without=False)
+
+    def only(scenario, n):
+        fields = ("position", "heading", "speed", "acceleration")
+        return replace(scenario, vehicles=(scenario.vehicles[n],), **{name: getattr(scenario, name)[[n]] for name in fields})
+
+    left = tuple(only(scenario, 1) for scenario in case.with_changepoints.scenarios)
+    made = replace(case.with_changepoints, scenarios=left, ego=only(case.oracle, 0))
+    rows = {"with changepoints": left, "oracle": [case.oracle]}
+    evaluation = evaluate(case.encounter, case.segmentation, rows, config=EvaluationConfig(resamples=50))
+    return replace(case, with_changepoints=made, evaluation=evaluation)

@@ -18,7 +18,7 @@ from base64 import b64decode
 import io
 
 from browser_tab import chromium, DESKTOP, PHONE, Tab
-from evaluation_worlds import report_case
+from evaluation_worlds import ego_case, report_case
 from PIL import Image
 import pytest
 
@@ -159,4 +159,20 @@ def test_a_phone_shows_all_of_it(browser, report):
     tab.page.set_viewport_size({"width": 800, "height": 600})  # turned
     tab.page.wait_for_timeout(300)
     assert tab.part("stage", 1).evaluate("c => c.width / c.clientWidth") == pytest.approx(1.0, abs=0.02)
+    tab.page.close()
+
+
+def test_an_ego_is_drawn_as_its_template_track(browser, tmp_path):
+    """The vehicle that is left out has a dashed outline and line of its own; nothing else breaks, with one vehicle left."""
+    path = tmp_path / "ego.html"
+    write_report(path, ReportInput([ego_case(4)]))
+    tab = Report(browser, path, DESKTOP)
+    tab.page.wait_for_timeout(300)
+    assert tab.troubles == []
+    assert "Vehicle west is left out for a planner under test" in tab.page.locator("main").inner_text()
+    before = tab.picture("stage")
+    tab.part("play").click()
+    tab.page.wait_for_timeout(500)
+    assert tab.picture("stage") != before
+    assert tab.troubles == []
     tab.page.close()

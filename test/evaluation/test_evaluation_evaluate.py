@@ -154,3 +154,39 @@ def test_the_oracle_keeps_a_dwell_and_a_short_chord():
     np.testing.assert_allclose(found.position[0, 5], [4.0, 0.0])
     assert (found.position[0, 10:] == [8.0, 0.0]).all() and not found.speed[0, 10:].any()
     np.testing.assert_allclose(found.position[1, [0, 10]], [[50, 0], [50, 0.2]], atol=1e-9)
+
+
+def alone(scenario, n):
+    """The scenario of vehicle n alone."""
+    fields = ("position", "heading", "speed", "acceleration")
+    return replace(scenario, vehicles=(scenario.vehicles[n],), **{name: getattr(scenario, name)[[n]] for name in fields})
+
+
+def test_a_vehicle_left_out_for_an_ego_is_left_out_of_every_row():
+    encounter = crossing()
+    ones = [alone(scenario, 1) for scenario in samples(encounter, 4)]
+    found = evaluate(encounter, SEGMENTATION, {"x": ones, "oracle": [replayed(encounter)]}, config=QUICK)
+    assert found.vehicles == (CARS[1].id,)
+    for figure in ("e_position", "min_distance", "min_ttc", "pet", "js_gap", "order_kept"):
+        assert np.isnan(found.value("x", figure)), figure
+    for figure in ("js_speed", "diversity", "min_ade", "coverage"):
+        assert np.isfinite(found.value("x", figure)), figure
+    assert any("one vehicle is left" in note for note in found.row("x").notes)
+
+
+def test_the_order_of_the_vehicles_does_not_matter():
+    encounter = crossing()
+    made = samples(encounter, 3)
+    swapped = [
+        replace(
+            s,
+            vehicles=s.vehicles[::-1],
+            position=s.position[::-1],
+            heading=s.heading[::-1],
+            speed=s.speed[::-1],
+            acceleration=s.acceleration[::-1],
+        )
+        for s in made
+    ]
+    one, other = (evaluate(encounter, SEGMENTATION, {"x": rows}, config=QUICK).row("x") for rows in (made, swapped))
+    assert one == other

@@ -15,6 +15,7 @@
 """Every convention gives back what went in, bit for bit, and refuses what is damaged with a reason."""
 
 from collections import Counter
+import json
 import math
 
 from hypothesis import given, settings
@@ -23,7 +24,20 @@ from message_examples import assert_same, encounter, generator, NASTY_HEADINGS, 
 import numpy as np
 import pytest
 
-from msg_conventions import changepoints, diagnostics, fits, names, paths, pictures, roads, scenarios, tracks, trajectory
+from msg_conventions import (
+    changepoints,
+    diagnostics,
+    ego,
+    fits,
+    names,
+    odometry,
+    paths,
+    pictures,
+    roads,
+    scenarios,
+    tracks,
+    trajectory,
+)
 from scenario_gen.arrays import canonical_angle
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
@@ -159,6 +173,39 @@ def test_reports():
     assert got[-1].level is diagnostics.Level.WARN
     with pytest.raises(InputError, match="no account"):
         diagnostics.read_request(got[0])
+
+
+@given(seeds)
+def test_states(seed):
+    sent = np.array([*generator(seed).normal(0, 100, 2), generator(seed).choice(NASTY_HEADINGS), 8.5])
+    stamp, frame, child, got = odometry.decode_state(odometry.encode_state(sent, "vehicle_7", "map", 5))
+    assert (stamp, frame, child) == (5, "map", "vehicle_7")
+    assert got[[0, 1, 3]].tobytes() == sent[[0, 1, 3]].tobytes()
+    assert canonical_angle(got[2]) == canonical_angle(sent[2])
+    with pytest.raises(InputError, match="not finite"):
+        odometry.encode_state(sent * np.nan, "vehicle_7", "map", 5)
+
+
+def test_ego_slot():
+    track = scenario(3, n=1)
+    sent = dict(ego.ego_messages(track, 17))
+    assert list(sent) == ["ego/start", "ego/goal", "ego/track"]
+    for topic, k in (("ego/start", 0), ("ego/goal", -1)):
+        stamp, frame, child, state = odometry.decode_state(sent[topic])
+        assert (stamp, frame, child) == (17, track.frame_id, "vehicle_v0")
+        assert state[[0, 1, 3]].tolist() == [*track.position[0, k], track.speed[0, k]]
+    assert_same(scenarios.decode_scenario(sent["ego/track"])[1], track, "vehicles", "time", "position", "speed", "frame_id")
+    told = diagnostics.request_status(ScenarioSet(1, (), 1, ego=track), "r", "/n", 7, {"count": "1", "ego": "v0"}).values
+    assert told["ego"] == "v0" and told["count"] == "1"
+    assert json.loads(told["ego_goal"])[3] == track.speed[0, -1]
+    assert ego.ego_values(None) == {}
+
+
+def test_asked_states_are_in_the_order_of_the_scenario():
+    vehicles = tuple(Vehicle(f"v{k}") for k in range(3))
+    asked = BoundaryStates(np.arange(12.0).reshape(3, 4) / 10.0, np.zeros((3, 4)))
+    told = diagnostics.asked_values(asked, vehicles, scenario(1, n=2))
+    assert json.loads(told["asked_start"]) == asked.start[:2].tolist()
 
 
 def test_footprint():

@@ -26,7 +26,7 @@ import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
-from msg_conventions import changepoints, diagnostics, paths, pictures, roads, scenarios, tracks
+from msg_conventions import changepoints, diagnostics, odometry, paths, pictures, roads, scenarios, tracks
 from scenario_gen.encounter import Vehicle
 from scenario_gen.roads.road import Road
 
@@ -42,6 +42,8 @@ def _messages():
         yield changepoints.TYPE, changepoints.encode_changepoints(template, parts)
         yield changepoints.POSTERIOR_TYPE, changepoints.encode_posterior(template, parts)
         yield scenarios.TYPE, scenarios.encode_scenario(scenario(seed, n), 17)
+        state = np.array([1.5, -2.5, 3.0, 8.25])
+        yield odometry.TYPE, odometry.encode_state(state, f"vehicle_{'x' * seed}", frame, 17)
         yield paths.TYPE, paths.encode_route(route(seed), ANCHORS, frame)
         yield paths.TYPE, paths.encode_path(np.zeros((seed - 1, 3)), np.arange(seed - 1), frame, 3)
         ends = np.array([[1.0, 2.0, 3.0]] * (seed - 1)).reshape(-1, 3)
