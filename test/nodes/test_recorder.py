@@ -61,7 +61,7 @@ def start(domain):
 def publisher(client: Client, kind: type, topic: str):
     """A publisher that somebody hears already."""
     made = client.node.create_publisher(kind, topic, QUEUE)
-    client.until(lambda: client.node.count_subscribers(topic) > 0, f"a subscriber of {topic}")
+    client.until(lambda: made.get_subscription_count() > 0, f"a subscriber of {topic}")
     return made
 
 
