@@ -139,7 +139,7 @@ def shared_vehicles(encounter: Encounter, rows: Mapping[str, Sequence[Scenario]]
                 )
             shared = [known for known in shared if known in own]
     if not shared:
-        raise InputError(f"no vehicle of {encounter.name!r} is in all scenarios")
+        raise InputError(f"no vehicle of {encounter.name!r} is in all scenarios; measure requests with different egos one by one")
     return tuple(shared)
 
 

@@ -54,9 +54,10 @@ def ego_track(
     """
     speed, steps = encounter.speed[ego], encounter.speed.shape[1]
     driven = np.concatenate([[0.0], np.cumsum(0.5 * encounter.dt * (speed[1:] + speed[:-1]))])
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(route.points[:, :2], axis=0).T))])  # as a message's reader has it
     index = [0, *segmentation.changepoints.tolist(), steps - 1]
     at, pace = np.empty(steps), np.empty(steps)
-    for (first, last), (a, b) in zip(pairwise(index), pairwise(route.length[route.anchor].tolist()), strict=True):
+    for (first, last), (a, b) in zip(pairwise(index), pairwise(way[route.anchor].tolist()), strict=True):
         piece = slice(first, last + 1)
         length = driven[last] - driven[first]
         if length > 1e-3:
@@ -65,7 +66,7 @@ def ego_track(
         else:  # where the template stands, the route hardly moves
             at[piece] = np.linspace(a, b, last + 1 - first)
             pace[piece] = (b - a) / (encounter.time[last] - encounter.time[first])
-    state = np.column_stack([np.interp(at, route.length, route.points[:, c]) for c in range(3)])
+    state = np.column_stack([np.interp(at, way, route.points[:, c]) for c in range(3)])
     state[0], state[-1] = route.points[0], route.points[-1]
     pace[0], pace[-1] = asked.start[ego, 3], asked.end[ego, 3]
     return Scenario(
