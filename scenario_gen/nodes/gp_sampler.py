@@ -19,6 +19,7 @@ It generates when the inputs are complete, and on `~/generate`, whose parameters
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from itertools import count
 import sys
 
 from rcl_interfaces.srv import SetParametersAtomically
@@ -51,9 +52,13 @@ class GpSampler(StageNode):
         paired = ("tracks", "changepoints", "fit", *(("map",) if self.config.pair_map else ()))
         self._seen = Inputs(paired, () if self.config.pair_map else ("map",))
         self._routes: set[str] = set()
-        self._requests = 0
+        self._requests = map(str, count(1))
         self.create_service(SetParametersAtomically, "~/generate", self._generate_for_caller, qos_profile=REQUESTS)
         self.serve(Trigger, "~/cancel", self._cancel)
+
+    def stopped(self) -> None:
+        """Forget the inputs: being latched, they come again."""
+        self._seen.clear()
 
     def received(self, topic: str, data: bytes) -> None:
         """Generate when everything is there."""
@@ -63,14 +68,12 @@ class GpSampler(StageNode):
         config = self.config
         if config.generate_on_input and (topic not in ENDS or config.moves) and not self._missing(config):
             messages = self._messages()
-            self.work("inputs", lambda cancelled: self._generate(messages, self._next_request(), config, cancelled))
+            self.work("inputs", lambda cancelled: self._generate(messages, next(self._requests), config, cancelled))
 
     def _missing(self, config: Config) -> list[str]:
         """The topics that a request still waits for."""
-        missing = self._seen.missing()
-        if config.moves and config.pair_map and not missing:
-            missing = [topic for topic in ENDS if topic not in self._messages()]
-        return missing
+        ends = ENDS if config.moves and config.pair_map else ()
+        return self._seen.missing() or [topic for topic in ends if topic not in self._messages()]
 
     def _messages(self) -> dict[str, bytes]:
         """The template's messages; entries and exits only if they are those of its road."""
@@ -91,10 +94,6 @@ class GpSampler(StageNode):
         self._routes = wanted
         for topic in sorted(wanted):
             self.listen(topic)
-
-    def _next_request(self) -> str:
-        self._requests += 1
-        return str(self._requests)
 
     def _generate(
         self, messages: Mapping[str, bytes], request: str, config: Config, cancelled: Callable[[], bool]
@@ -121,7 +120,7 @@ class GpSampler(StageNode):
         self, request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
     ) -> SetParametersAtomically.Response:
         """Generate with the caller's parameters; the answer comes when the set is done."""
-        name, answer, executor = self._next_request(), Future(), self.executor
+        name, answer, executor = next(self._requests), Future(), self.executor
         try:
             config, messages = self._config_of(request)
         except ScenarioGenError as error:
@@ -156,8 +155,7 @@ class GpSampler(StageNode):
 
     def _cancel(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         names = self.cancel()
-        response.success = bool(names)
-        response.message = f"cancelled: {', '.join(names)}" if names else "nothing is running"
+        response.success, response.message = bool(names), f"cancelled: {', '.join(names)}" if names else "nothing is running"
         return response
 
 

@@ -47,6 +47,10 @@ class Inputs:
             self._paired.discard(topic)
             self._newest.pop(topic, None)
 
+    def clear(self) -> None:
+        """Forget what was said."""
+        self._newest.clear()
+
     def put(self, topic: str, data: bytes) -> None:
         """Take a message in."""
         self._newest[topic] = data

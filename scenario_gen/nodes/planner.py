@@ -75,6 +75,10 @@ class Planner(StageNode):
         self._asked = 0
         self._inputs_seen = Inputs(("tracks", "changepoints", *(ROAD if paired else ())), () if paired else ("map",))
 
+    def stopped(self) -> None:
+        """Forget the inputs: being latched, they come again."""
+        self._inputs_seen.clear()
+
     def received(self, topic: str, data: bytes) -> None:
         """Plan when road, tracks and changepoints are those of one template."""
         self._inputs_seen.put(topic, data)

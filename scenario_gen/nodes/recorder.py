@@ -42,7 +42,7 @@ from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.parameters import check, parameter
 
 DEFAULT_TOPICS = (
-    r".*(/map|/road/(entries|exits)|/tracks|/changepoints|/posterior|/fit|/vehicle_\w+/(route|footprint|fix|speed)"
+    r".*(/map|/road/(entries|exits)|/tracks|/changepoints(/live)?|/posterior|/fit|/vehicle_\w+/(route|footprint|fix|speed)"
     r"|/scenarios|/scenarios/info|/markers|/report|/diagnostics)"
 )
 
