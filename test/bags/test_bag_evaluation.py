@@ -14,11 +14,15 @@
 
 """A bag evaluated from its messages alone gives the figures of the scenarios that were put into it."""
 
+from base64 import b64decode
 from collections import Counter
 from dataclasses import replace
+import io
 
+from browser_tab import chromium, DESKTOP, PHONE, Tab
 from evaluation_worlds import report_case
 import numpy as np
+from PIL import Image
 import pytest
 
 from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics
@@ -29,7 +33,7 @@ from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.bags.told import told_provenance
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import EvaluationConfig, render, ReportInput
+from scenario_gen.evaluation import EvaluationConfig, render, ReportInput, write_report
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.pipeline import PipelineConfig, run_arm
@@ -118,6 +122,24 @@ def test_the_page_of_our_own_bag_shows_the_template_as_that_of_the_run(tmp_path)
     assert case.road.name == run.road.name
     page = render(ReportInput([case]))
     assert "Fitted to the road" in page and run.segmentation.descriptions[0] in page
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+def test_that_page_in_a_browser(tmp_path, size):
+    """With fit and without, it loads without errors or requests, draws the routes and is no wider than the screen."""
+    bag = write_run(tmp_path / "run", real_run())
+    bare = only(bag, tmp_path / "bare", ("tracks", "scenarios"))
+    page = tmp_path / "report.html"
+    write_report(page, ReportInput([*bag_cases(bag, QUICK), *bag_cases(bare, QUICK)]))
+    with chromium() as browser:
+        tab = Tab(browser, page, size)
+        routes = tab.page.locator('[data-case="0"] [data-role="routes"]')
+        pixels = Image.open(io.BytesIO(b64decode(routes.evaluate("c => c.toDataURL()").partition(",")[2])))
+        assert len(pixels.getcolors(1_000_000)) > 10
+        for case in (0, 1):
+            tab.page.locator(f'[data-show="{case}"] button').click()
+            assert tab.page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+        assert tab.troubles == [] and tab.asked() == [page.as_uri()]
 
 
 def test_what_nodes_say_on_one_topic_is_told_apart_by_their_namespaces(tmp_path):
