@@ -69,7 +69,7 @@ def _warm(road: Road, ends: Floats) -> None:
 def _ompl(
     road: Road, ends: Floats, name: str, seconds: float, step: float | None = None, *, first: bool = False, states: bool = False
 ) -> Floats:
-    """OMPL's path (P, 2) after so much CPU time (or its first one, for RRTConnect); simplified unless it is the `first`."""
+    """Return OMPL's path (P, 2) after so much CPU time (or its first one, for RRTConnect); simplified unless it is the `first`."""
     started = process_time()
 
     def stop(_: int) -> bool:
