@@ -34,8 +34,18 @@ def standardised(x: Floats) -> Floats:
     return np.asarray((x - x.mean(axis=0)) / x.std(axis=0))
 
 
-def jax_moseq(x: Floats, sweeps: int, seed: int = 0, states: int = 20) -> tuple[Ints, float] | None:
-    """Gaussian sticky HDP-HMM of jax-moseq's Gibbs steps (concentrations fixed): labels, and CPU seconds without compilation."""
+def jax_moseq(x: Floats, sweeps: int, *, compiled: bool, seed: int = 0, states: int = 20) -> tuple[Ints, float] | None:
+    """Gaussian sticky HDP-HMM of jax-moseq's Gibbs steps (concentrations fixed): labels, and CPU seconds without compilation.
+
+    Args:
+        x: (T, D).
+        sweeps: timed ones; two more go before, which compile.
+        compiled: True: we compile each step as a whole, as fast as we could make them. False: the package's functions as they
+            ship, called one after the other, each with what compilation it brings; log-likelihoods from the distribution
+            that the package itself uses, mapped over the states.
+        seed: of the sampler.
+        states: L.
+    """
     if not installed("jax_moseq"):
         return None
     import jax
@@ -52,19 +62,26 @@ def jax_moseq(x: Floats, sweeps: int, seed: int = 0, states: int = 20) -> tuple[
     ones, mask = jnp.ones((samples, 1)), jnp.ones((1, samples))
     s0 = jnp.asarray(0.75 * np.cov(np.asarray(y).T))
     concentrations = {"alpha": 5.7, "kappa": 100.0, "gamma": 1.0}
+    prior = (d + 2.0, s0, jnp.zeros((d, 1)), 10.0 * jnp.eye(1))
 
-    @jax.jit  # type: ignore[untyped-decorator]
+    def state(args: Any) -> Any:
+        return _resample_regression_params(ones, y, *prior, args)
+
+    def log_prob(args: Any) -> Any:
+        return tfd.MultivariateNormalFullCovariance(args[0][:, 0], args[1]).log_prob(y)
+
     def emissions(key: Any, z: Any) -> Any:
-        members = jnp.eye(states)[:, z]
-        prior = (d + 2.0, s0, jnp.zeros((d, 1)), 10.0 * jnp.eye(1))
-        step = lambda args: _resample_regression_params(ones, y, *prior, args)  # noqa: E731
-        return jax.lax.map(step, (jr.split(key, states), members))
+        keys, members = jr.split(key, states), jnp.eye(states)[:, z]
+        if compiled:
+            return jax.lax.map(state, (keys, members))
+        return tuple(jnp.stack(part) for part in zip(*[state(pair) for pair in zip(keys, members, strict=True)], strict=True))
 
-    @jax.jit  # type: ignore[untyped-decorator]
     def labels_given(key: Any, means: Any, covariances: Any, pi: Any) -> Any:
-        log_prob = jax.lax.map(lambda p: tfd.MultivariateNormalFullCovariance(p[0][:, 0], p[1]).log_prob(y), (means, covariances))
-        return sample_hmm_stateseq(key, pi, log_prob.T, mask[0])[1]
+        over_states = jax.lax.map if compiled else lambda f, args: jax.vmap(f)(args)
+        return sample_hmm_stateseq(key, pi, over_states(log_prob, (means, covariances)).T, mask[0])[1]
 
+    if compiled:
+        emissions, labels_given = jax.jit(emissions), jax.jit(labels_given)
     key = jr.PRNGKey(seed)
     betas, _ = init_hdp_transitions(key, num_states=states, **concentrations)
     z = jr.randint(key, (samples,), 0, states)

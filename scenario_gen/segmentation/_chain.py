@@ -21,12 +21,14 @@ import numpy as np
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F1, F2, I, I1, kernel, OUT1, OUT2, OUT3, OUTI2
 from scenario_gen.segmentation._emission import (
-    accumulate,
+    add_sample,
     BLOCK,
+    block_likelihood,
     block_log_likelihood,
     cholesky,
     draw_emission,
     log_marginal,
+    posterior,
 )
 from scenario_gen.segmentation._random import (
     dirichlet_draw,
@@ -38,32 +40,38 @@ from scenario_gen.segmentation._random import (
 )
 
 TRACE = ("log_joint", "occupied", "gamma", "alpha_kappa", "rho")
+LEAST_MESSAGE = 1e-30
+REFRESH = 20
 HYPER = ("gamma_shape", "gamma_rate", "alpha_kappa_shape", "alpha_kappa_rate", "rho_a", "rho_b")
 
 
 @kernel(inline=True)
-def backward_step(log_row: Floats, columns: Floats, message: Floats, row: Floats) -> None:
-    """Fill `row` (L,) with likelihood times message at a sample, and pass `message` (L,) on to the sample before."""
+def backward_step(row: Floats, columns: Floats, message: Floats) -> None:
+    """Turn `row` (L,), the likelihoods of a sample, into likelihood times message; pass `message` (L,) on to the sample before.
+
+    Only ratios within a row or a message count, so they are rescaled no more often than underflow asks for.
+    """
     states = len(message)
-    top = log_row[0]
-    for k in range(1, states):
-        top = max(top, log_row[k])
     for k in range(states):
-        row[k] = 0.0
-        if log_row[k] - top > -300.0:
-            row[k] = math.exp(log_row[k] - top) * message[k]
+        row[k] *= message[k]
     for j in range(states):
         message[j] = 0.0
-    for k in range(states):
-        c = row[k]
-        if c > 0.0:
-            for j in range(states):
-                message[j] += columns[k, j] * c
+    whole = states - states % 4
+    for k in range(0, whole, 4):
+        c0, c1, c2, c3 = row[k], row[k + 1], row[k + 2], row[k + 3]
+        x0, x1, x2, x3 = columns[k], columns[k + 1], columns[k + 2], columns[k + 3]
+        for j in range(states):
+            message[j] += (c0 * x0[j] + c1 * x1[j]) + (c2 * x2[j] + c3 * x3[j])
+    for k in range(whole, states):
+        c0 = row[k]
+        for j in range(states):
+            message[j] += c0 * columns[k, j]
     total = 0.0
     for j in range(states):
         total += message[j]
-    for j in range(states):
-        message[j] /= total
+    if total < LEAST_MESSAGE:
+        for j in range(states):
+            message[j] /= total
 
 
 @kernel(inline=True)
@@ -77,11 +85,12 @@ def backward_messages(vt: Floats, coef: Floats, logdet: Floats, weight: float, p
         weight: what a sample counts for.
         pi: (L + 1, L) transition rows; the last is the initial distribution.
         ends: index one past the last sample of each sequence.
-        w: output.
+        w: output, each row up to a factor.
     """
     states = w.shape[1]
-    block = np.empty((BLOCK, states))
+    block = np.empty((states, BLOCK))
     work = np.empty((2, BLOCK))
+    best = np.empty(BLOCK)
     message = np.ones(states)
     columns = np.empty((states, states))
     for j in range(states):
@@ -91,13 +100,14 @@ def backward_messages(vt: Floats, coef: Floats, logdet: Floats, weight: float, p
     stop = w.shape[0]
     while stop > 0:
         start = max(0, stop - BLOCK)
-        block_log_likelihood(vt, start, stop, coef, logdet, weight, block, work)
+        block_log_likelihood(vt, start, stop, coef, logdet, weight, block, best)
+        block_likelihood(block, stop - start, best, work, w[start:stop])
         for t in range(stop - 1, start - 1, -1):
             if last >= 0 and t + 1 == ends[last]:
                 last -= 1
                 for k in range(states):
                     message[k] = 1.0
-            backward_step(block[t - start], columns, message, w[t])
+            backward_step(w[t], columns, message)
         stop = start
 
 
@@ -109,9 +119,11 @@ def sample_labels(state: State, w: Floats, pi: Floats, ends: Ints, labels: Ints)
     sequence = 0
     previous = states
     for t in range(samples):
+        row, chances = w[t], pi[previous]
+        for k in range(states):
+            share[k] = chances[k] * row[k]
         total = 0.0
         for k in range(states):
-            share[k] = pi[previous, k] * w[t, k]
             total += share[k]
         u = uniform(state) * total
         k = 0
@@ -225,6 +237,29 @@ def sample_transitions(state: State, n: Ints, hyper: Floats, top: Floats, beta: 
 
 
 @kernel(inline=True)
+def update_outer(v: Floats, before: Ints, labels: Ints, refresh: bool, outer: Floats, counts: Ints) -> None:
+    """Bring outer (L, M, M), the states' Σ v vᵀ, and counts (L,) from labels `before` (T,) to `labels`; then `before` is those.
+
+    Few samples change their label in a sweep. `refresh` adds everything up from nothing, so that rounding does not pile up.
+    """
+    if refresh:
+        for k in range(len(counts)):
+            counts[k] = 0
+            outer[k] = 0.0
+    for t in range(len(labels)):
+        a, b = before[t], labels[t]
+        if refresh or a != b:
+            add_sample(v[t], 1.0, outer[b])
+            counts[b] += 1
+            before[t] = b
+            if not refresh:
+                add_sample(v[t], -1.0, outer[a])
+                counts[a] -= 1
+                if counts[a] == 0:
+                    outer[a] = 0.0
+
+
+@kernel(inline=True)
 def log_transitions(n: Ints, top: Floats, beta: Floats) -> float:
     """Return log p(labels | β, α+κ, ρ) with π integrated out."""
     states = n.shape[1]
@@ -283,9 +318,9 @@ def run_chain(
     nu, weight, blur = hyper[6], hyper[7], hyper[8:]
     state = np.empty(1, np.uint64)
     state[0] = np.uint64(seed)
-    labels = start.copy()
-    g = np.empty((states, m, m))
-    counts = np.empty(states, np.int64)
+    labels, before = start.copy(), start.copy()
+    outer, g = np.zeros((states, m, m)), np.empty((states, m, m))
+    counts = np.zeros(states, np.int64)
     n = np.empty((states + 1, states), np.int64)
     pi = np.empty((states + 1, states))
     beta = top[3:]
@@ -300,7 +335,9 @@ def run_chain(
             sample_labels(state, w, pi, ends, labels)
         count_transitions(labels, ends, n)
         sample_transitions(state, n, hyper, top, beta, pi)
-        accumulate(v, labels, g0, weight, blur, g, counts)
+        refresh = sweep % REFRESH == REFRESH - 1
+        update_outer(v, before, labels, refresh, outer, counts)
+        posterior(outer, counts, g0, weight, blur, g)
         score = log_transitions(n, top, beta)
         occupied = 0
         for k in range(states):

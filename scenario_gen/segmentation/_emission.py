@@ -29,6 +29,11 @@ from scenario_gen.kernels import kernel
 from scenario_gen.segmentation._random import log_gamma_draw, normal, State
 
 BLOCK = 64
+LEAST_LOG = -300.0
+LOG2_E = 1.4426950408889634
+LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
+TO_INTEGER = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer, which its lowest bits then hold
+ONE_BITS = 1023 << 52  # the bits of 1.0
 
 
 @kernel(inline=True)
@@ -55,24 +60,33 @@ def accumulate(v: Floats, labels: Ints, g0: Floats, weight: float, blur: Floats,
     `weight` is what a sample counts for (1: all of it; less where neighbouring samples repeat each other); `blur`
     (D,) the variance to which a sample's channels are known at all.
     """
-    m = v.shape[1]
+    outer = np.zeros(g.shape)
+    for k in range(len(counts)):
+        counts[k] = 0
+    for t in range(v.shape[0]):
+        add_sample(v[t], 1.0, outer[labels[t]])
+        counts[labels[t]] += 1
+    posterior(outer, counts, g0, weight, blur, g)
+
+
+@kernel(inline=True)
+def add_sample(v: Floats, sign: float, outer: Floats) -> None:
+    """Add sign × v vᵀ to `outer` (M, M; lower triangle)."""
+    for i in range(len(v)):
+        c = sign * v[i]
+        for j in range(i + 1):
+            outer[i, j] += c * v[j]
+
+
+@kernel(inline=True)
+def posterior(outer: Floats, counts: Ints, g0: Floats, weight: float, blur: Floats, g: Floats) -> None:
+    """Fill g (L, M, M; lower triangles) from the states' Σ v vᵀ, `outer`, and counts; see `accumulate`."""
+    m = g0.shape[0]
     d = len(blur)
     for k in range(g.shape[0]):
-        counts[k] = 0
         for i in range(m):
             for j in range(i + 1):
-                g[k, i, j] = 0.0
-    for t in range(v.shape[0]):
-        k = labels[t]
-        counts[k] += 1
-        for i in range(m):
-            c = v[t, i]
-            for j in range(i + 1):
-                g[k, i, j] += c * v[t, j]
-    for k in range(g.shape[0]):
-        for i in range(m):
-            for j in range(i + 1):
-                g[k, i, j] = g0[i, j] + weight * g[k, i, j]
+                g[k, i, j] = g0[i, j] + weight * outer[k, i, j]
             if i >= m - d:
                 g[k, i, i] += weight * counts[k] * blur[i - (m - d)]
 
@@ -134,31 +148,79 @@ def draw_emission(state: State, factor: Floats, n: float, p: int, nu: float, blu
 
 @kernel(inline=True)
 def block_log_likelihood(
-    vt: Floats, start: int, stop: int, coef: Floats, logdet: Floats, weight: float, out: Floats, work: Floats
+    vt: Floats, start: int, stop: int, coef: Floats, logdet: Floats, weight: float, out: Floats, row: Floats
 ) -> None:
-    """Fill out (BLOCK, L) with log p(y_t | z_t, state) up to a constant, t in start..stop; vt is (M, T), work (2, BLOCK)."""
+    """Fill out (L, BLOCK) with log p(y_t | z_t, state) up to a constant, t in start..stop; vt is (M, T), row (BLOCK,)."""
     states, d, m = coef.shape
-    p = m - d
     n = stop - start
-    total = work[0]
-    row = work[1]
     for k in range(states):
+        total = out[k]
         for t in range(n):
             total[t] = 0.0
         for i in range(d):
-            c = coef[k, i, 0]
+            used = m - d + i + 1
+            c = coef[k, i]
             x = vt[0, start:stop]
             for t in range(n):
-                row[t] = c * x[t]
-            for j in range(1, p + i + 1):
-                c = coef[k, i, j]
-                x = vt[j, start:stop]
+                row[t] = c[0] * x[t]
+            j = 1
+            while j + 3 < used:  # four at a time: a partial sum is fetched and stored a quarter as often
+                c0, c1, c2, c3 = c[j], c[j + 1], c[j + 2], c[j + 3]
+                x0, x1, x2, x3 = vt[j, start:stop], vt[j + 1, start:stop], vt[j + 2, start:stop], vt[j + 3, start:stop]
                 for t in range(n):
-                    row[t] += c * x[t]
+                    row[t] += (c0 * x0[t] + c1 * x1[t]) + (c2 * x2[t] + c3 * x3[t])
+                j += 4
+            for rest in range(j, used):
+                c0 = c[rest]
+                x = vt[rest, start:stop]
+                for t in range(n):
+                    row[t] += c0 * x[t]
             for t in range(n):
                 total[t] += row[t] * row[t]
         for t in range(n):
-            out[t, k] = weight * (logdet[k] - 0.5 * total[t])
+            total[t] = weight * (logdet[k] - 0.5 * total[t])
+
+
+@kernel(inline=True)
+def block_likelihood(logs: Floats, n: int, best: Floats, work: Floats, out: Floats) -> None:
+    """Fill out (n, L) with exp(logs - best of all states), logs (L, BLOCK); below e^-300 it is 0. Work (2, BLOCK).
+
+    The exponential is a polynomial (Cody & Waite), which is vectorised, unlike a call per number; it is right to 3e-13,
+    as exact as a log-likelihood of a thousand is.
+    """
+    states = logs.shape[0]
+    for t in range(n):
+        best[t] = logs[0, t]
+    for k in range(1, states):
+        x = logs[k]
+        for t in range(n):
+            best[t] = x[t] if x[t] > best[t] else best[t]
+    power, value = work[0], work[1]
+    bits = power.view(np.int64)
+    for k in range(states):
+        x = logs[k]
+        for t in range(n):
+            y = x[t] - best[t]
+            y = y if y > LEAST_LOG else LEAST_LOG
+            shifted = y * LOG2_E + TO_INTEGER
+            power[t] = shifted
+            turns = shifted - TO_INTEGER
+            r = (y - turns * LN2_HIGH) - turns * LN2_LOW
+            p = 1.0 / 3628800.0
+            p = p * r + 1.0 / 362880.0
+            p = p * r + 1.0 / 40320.0
+            p = p * r + 1.0 / 5040.0
+            p = p * r + 1.0 / 720.0
+            p = p * r + 1.0 / 120.0
+            p = p * r + 1.0 / 24.0
+            p = p * r + 1.0 / 6.0
+            p = p * r + 0.5
+            p = p * r + 1.0
+            value[t] = (p * r + 1.0) if y > LEAST_LOG else 0.0
+        for t in range(n):
+            bits[t] = (bits[t] << 52) + ONE_BITS
+        for t in range(n):
+            out[t, k] = value[t] * power[t]
 
 
 def joint_prior(mean: Floats, precision: Floats, scale: Floats) -> Floats:

@@ -23,6 +23,7 @@ from scenario_gen.arrays import Floats, Ints
 from scenario_gen.segmentation._chain import run_chain, TRACE
 from scenario_gen.segmentation._emission import joint_prior
 from scenario_gen.segmentation._merge import merge_states
+from scenario_gen.segmentation._within import unexplained
 
 if TYPE_CHECKING:
     from scenario_gen.segmentation.series import SamplerConfig
@@ -33,10 +34,11 @@ MERGE_ROWS = (40.0, 0.1)
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Scale S0 (D, D) and degrees of freedom ν0 of the states' covariances."""
+    """Scale S0 (D, D) and degrees of freedom ν0 of the states' covariances, precision K (P, P) of their regressions."""
 
     scale: Floats
     nu: float
+    precision: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,7 @@ class Problem:
         ends: index one past the last row of each sequence.
         regressors: P.
         mean: (D, P) prior mean M of the regression.
-        precision: (P, P) prior K.
+        precision: (P, P) first guess of the prior K.
         lead: samples at the head of each sequence that have no full past and hence no row.
         weight: what a sample counts for.
         blur: (D,) variance to which each channel is known at all.
@@ -106,22 +108,19 @@ class Problem:
             blur,
         )
 
-    def residual(self, labels: Ints) -> Floats:
-        """(T', D) what the regressions of the states given by `labels` leave unexplained."""
-        z, y = self.v[:, : self.regressors], self.y
-        residual = np.empty_like(y)
-        for k in range(int(labels.max()) + 1):
-            chosen = labels == k
-            gram = z[chosen].T @ z[chosen] + self.precision
-            coefficients = np.linalg.solve(gram, z[chosen].T @ y[chosen] + self.precision @ self.mean.T)
-            residual[chosen] = y[chosen] - z[chosen] @ coefficients
-        return residual
+    def unexplained(self, labels: Ints) -> tuple[Floats, Floats]:
+        """(T', D) what the regressions of the states given by `labels` leave unexplained, and its (D, D) scatter."""
+        d = self.dimensions
+        residual, scatter = np.empty((len(self.v), d)), np.empty((d, d))
+        g0 = joint_prior(self.mean, self.precision, np.eye(d))
+        unexplained(self.v, labels, g0, self.regressors, residual, scatter)
+        return residual, scatter
 
     def within(self, labels: Ints) -> Floats:
         """(D, D) covariance of what the states given by `labels` leave unexplained, a little regularised."""
-        residual = self.residual(labels)
-        scatter = residual.T @ residual
-        freedom = max(len(residual) - self.regressors * (labels.max() + 1), len(residual) // 2)
+        scatter = self.unexplained(labels)[1]
+        samples = len(self.v)
+        freedom = max(samples - self.regressors * (labels.max() + 1), samples // 2)
         scatter = scatter / freedom + np.diag(self.blur)
         result: Floats = scatter + np.eye(self.dimensions) * (1e-3 * np.trace(scatter) / self.dimensions + 1e-6)
         return result
@@ -132,7 +131,7 @@ class Problem:
         trace = np.empty((burn + keep, len(TRACE)))
         emissions = np.empty((config.states, self.dimensions, self.v.shape[1]))
         hyper = np.concatenate([config.hyper, [prior.nu, self.weight], self.blur])
-        g0 = joint_prior(self.mean, self.precision, prior.scale)
+        g0 = joint_prior(self.mean, prior.precision, prior.scale)
         top = np.concatenate([START, np.full(config.states, 1.0 / config.states)])
         run_chain(self.v, self.vt, self.ends, g0, hyper, labels, top, self.regressors, seed, burn, samples, trace, emissions)
         return samples, trace[burn:]
@@ -142,7 +141,7 @@ class Problem:
         merged = labels.copy()
         score = np.zeros(1)
         hyper = np.concatenate([config.hyper, [prior.nu, self.weight], self.blur])
-        g0 = joint_prior(self.mean, self.precision, prior.scale)
+        g0 = joint_prior(self.mean, prior.precision, prior.scale)
         merge_states(self.v, self.ends, g0, hyper, self.regressors, *MERGE_ROWS, score, merged)
         return float(score[0]), compact(merged)
 

@@ -53,7 +53,7 @@ def normal(state: State) -> float:
 
 @kernel(inline=True)
 def log_gamma_draw(state: State, shape: float) -> float:
-    """Logarithm of a Gamma(shape, 1) draw (Marsaglia & Tsang 2000); the logarithm survives shapes near 0."""
+    """Logarithm of a Gamma(shape, 1) draw (Marsaglia & Tsang 2000, with their squeeze); the logarithm survives shapes near 0."""
     boost = 0.0
     a = shape
     if a < 1.0:
@@ -66,7 +66,8 @@ def log_gamma_draw(state: State, shape: float) -> float:
         v = 1.0 + c * x
         if v > 0.0:
             v = v * v * v
-            if math.log(uniform(state)) < 0.5 * x * x + d - d * v + d * math.log(v):
+            u = uniform(state)
+            if u < 1.0 - 0.0331 * x**4 or math.log(u) < 0.5 * x * x + d - d * v + d * math.log(v):
                 return math.log(d * v) + boost
 
 

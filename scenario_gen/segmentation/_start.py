@@ -15,15 +15,15 @@
 """Where a chain starts, and the prior it runs under: k-means, a few sweeps, greedy merges; scales from the data."""
 
 from dataclasses import dataclass, replace
+import math
 from typing import TYPE_CHECKING
-import warnings
 
 import numpy as np
-from scipy.cluster.vq import kmeans2
-from scipy.ndimage import uniform_filter1d
 
 from scenario_gen.arrays import Floats, Ints
+from scenario_gen.segmentation._kmeans import kmeans
 from scenario_gen.segmentation._problem import compact, Prior, Problem
+from scenario_gen.segmentation._windows import moving_mean
 
 if TYPE_CHECKING:
     from scenario_gen.segmentation.series import SamplerConfig
@@ -32,6 +32,9 @@ WINDOWS = (9, 15, 5, 25)
 EXTRA_DEGREES = (3, 10, 20, 50, 100)
 STAGES = (20, 15)
 LEAST_WEIGHT = 0.02
+KMEANS_ROUNDS = 10
+GUESS_COUNTS = 6
+MOST_MEAN_WEIGHT = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +50,11 @@ def cluster(problem: Problem, states: int, window: int, rng: np.random.Generator
     """(T',) labels of k-means on the samples averaged over `window`."""
     window = min(window, max(len(problem.v) // 8, 1))
     signals = problem.y if problem.regressors == 1 else _dynamics(problem)
-    smooth = uniform_filter1d(signals, window, axis=0, mode="nearest")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # fewer clusters than asked for is no trouble: labels are renumbered
-        return compact(kmeans2(smooth, min(states, max(2, len(smooth) // 4)), minit="++", rng=rng)[1].astype(np.int64))
+    smooth = np.ascontiguousarray(moving_mean(signals, window))
+    centres = np.empty((smooth.shape[1], min(states, max(2, len(smooth) // 4))))
+    labels = np.empty(len(smooth), np.int64)
+    kmeans(smooth, int(rng.integers(2**62)), KMEANS_ROUNDS, centres, labels)
+    return compact(labels)
 
 
 def _dynamics(problem: Problem) -> Floats:
@@ -61,23 +65,27 @@ def _dynamics(problem: Problem) -> Floats:
     return np.hstack([y, step / (step.std(axis=0) + 1e-12), size / (size.std(axis=0) + 1e-12)])
 
 
-def sample_weight(problem: Problem, config: "SamplerConfig", rng: np.random.Generator) -> float:
+def sample_weight(problem: Problem, config: "SamplerConfig", rng: np.random.Generator) -> tuple[float, Start]:
     """What a sample counts for: (1 - φ) / (1 + φ), φ the lag-1 autocorrelation of what states leave unexplained.
 
     An HMM takes samples as independent given their state. Where they are not (smoothed, slowly varying or oversampled
     signals), it believes each wiggle and spends states on it. The weight makes n correlated samples count for as many
     independent ones as they are worth; for independent samples it is 1. States that are not right yet leave
     correlation too, so φ is the smaller of two: around k-means' labels, and around those a chain would start from.
+
+    Returns:
+        The weight, and the start found on the way, which holds for the weight 1.
     """
     whole = replace(problem, weight=1.0)
     rough = cluster(whole, config.states, WINDOWS[0], rng)
-    phi = min(_autocorrelation(whole, rough), _autocorrelation(whole, find_start(whole, config, 0, rng).labels))
-    return 1.0 if phi < 2.0 / np.sqrt(len(rough)) else max((1.0 - phi) / (1.0 + phi), LEAST_WEIGHT)
+    start = find_start(whole, config, 0, rng)
+    phi = min(_autocorrelation(whole, rough), _autocorrelation(whole, start.labels))
+    return 1.0 if phi < 2.0 / np.sqrt(len(rough)) else max((1.0 - phi) / (1.0 + phi), LEAST_WEIGHT), start
 
 
 def _autocorrelation(problem: Problem, labels: Ints) -> float:
     """Lag-1 autocorrelation of the residuals, mean over channels, from neighbours with one label."""
-    residual = problem.residual(labels)
+    residual = problem.unexplained(labels)[0]
     pairs = labels[:-1] == labels[1:]
     pairs[problem.ends[:-1] - 1] = False
     if not pairs.any():
@@ -91,23 +99,46 @@ def find_start(problem: Problem, config: "SamplerConfig", index: int, rng: np.ra
 
     k-means on the samples averaged over a window (another one in each chain) gives L labels; a few Gibbs sweeps clean
     them; states are merged while the marginal likelihood grows; twice. S0 is (ν0 - D - 1) times the covariance within
-    the states found, so that the prior's mean is what is seen; ν0, which says how alike the states' covariances are,
-    is the value of a grid that gives the merged labels the highest marginal likelihood.
+    the states found, so that the prior's mean is what is seen; κ0 see `mean_precision`; ν0, which says how alike the
+    states' covariances are, is the value of a grid that gives the merged labels the highest marginal likelihood.
     """
     labels = cluster(problem, config.states, WINDOWS[index % len(WINDOWS)], rng)
-    prior = prior_around(problem, labels, EXTRA_DEGREES[-2])
+    prior = priors_around(problem, labels)[-2]
     spent = 0
     for stage in STAGES:
         sweeps = min(stage, config.sweeps // 4)
         labels = compact(problem.run(config, prior, labels, sweeps - 1, 1, int(rng.integers(2**62)))[0][0])
         spent += sweeps
-        priors = [prior_around(problem, labels, extra) for extra in EXTRA_DEGREES]
+        priors = priors_around(problem, labels)
         merged = [problem.merge(config, candidate, labels) for candidate in priors]
         best = int(np.argmax([score for score, _ in merged]))
         prior, labels = priors[best], merged[best][1]
     return Start(labels, prior, spent)
 
 
-def prior_around(problem: Problem, labels: Ints, extra: int) -> Prior:
-    """Return the prior with ν0 = D + extra whose mean covariance is the one within the states given by `labels`."""
-    return Prior(problem.within(labels) * (extra - 1.0), float(problem.dimensions + extra))
+def priors_around(problem: Problem, labels: Ints) -> list[Prior]:
+    """Return the priors with ν0 = D + each of EXTRA_DEGREES whose mean covariance is the one within the given states."""
+    within = problem.within(labels)
+    precision = mean_precision(problem, labels, within)
+    return [Prior(within * (extra - 1.0), float(problem.dimensions + extra), precision) for extra in EXTRA_DEGREES]
+
+
+def mean_precision(problem: Problem, labels: Ints, within: Floats) -> Floats:
+    """(P, P) prior K; for Gaussian states κ0, which says how far apart their means are beside their own spread.
+
+    With a κ0 far too small, states that differ little do not pay for a mean of their own and are merged. What the given
+    states' means say, 1 / κ0 = mean squared Mahalanobis length per channel, counts for the (K - 1) D numbers they are;
+    the configured guess for GUESS_COUNTS; averaged on the scale of logarithms.
+    """
+    counts = np.bincount(labels)
+    states = len(counts)
+    if problem.regressors > 1 or states < 2:
+        return problem.precision
+    means = np.array([np.bincount(labels, y) for y in problem.y.T]) / counts
+    lengths = (means * np.linalg.solve(within, means)).sum(axis=0) / problem.dimensions
+    seen = float(lengths @ counts) / len(labels) * states / (states - 1) - states / len(labels)
+    guess = float(problem.precision[0, 0])
+    most = max(MOST_MEAN_WEIGHT, guess)
+    said = min(max(1.0 / max(seen, 1.0 / most), guess), most)
+    share = (states - 1) * problem.dimensions
+    return np.eye(1) * math.exp((GUESS_COUNTS * math.log(guess) + share * math.log(said)) / (GUESS_COUNTS + share))

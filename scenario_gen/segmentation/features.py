@@ -26,10 +26,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import uniform_filter1d
 
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Encounter
+from scenario_gen.segmentation._windows import moving_mean
 
 STAND_SPEED = 0.5
 STAND_BLUR = 0.2
@@ -86,7 +86,7 @@ def lateral_acceleration(position: Floats, dt: float, window: float) -> Floats:
 
 def moving(speed: Floats, dt: float) -> Floats:
     """(T,) 0 where the vehicle stands, 1 where it moves, a ramp of 0.5 m/s between, from speed (T,) averaged over 0.9 s."""
-    smooth = uniform_filter1d(speed, max(1, min(round(STAND_WINDOW / dt), len(speed))), mode="nearest")
+    smooth = moving_mean(speed, max(1, min(round(STAND_WINDOW / dt), len(speed))))
     return np.asarray(np.clip((smooth - 0.5 * STAND_SPEED) / STAND_SPEED, 0.0, 1.0))
 
 

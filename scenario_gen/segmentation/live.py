@@ -17,14 +17,17 @@
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.encounter import Vehicle
-from scenario_gen.logs.streams import Sample
 from scenario_gen.segmentation.online import OnlineConfig, OnlineSegmenter
 from scenario_gen.segmentation.trends import course
+
+if TYPE_CHECKING:  # logs bring pyproj and shapely, which a segmentation does not need
+    from scenario_gen.logs.streams import Sample
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +62,7 @@ class LiveSegmenter:
         self._online: OnlineSegmenter | None = None
         self._start_ns = 0
 
-    def push(self, sample: Sample) -> LiveChangepoints | None:
+    def push(self, sample: "Sample") -> LiveChangepoints | None:
         """Take the next sample and return the changepoints it confirms, if any."""
         last = self._past[-1] if self._past else None
         if self._online is None or last is None or not self._follows(last, sample):
@@ -70,7 +73,7 @@ class LiveSegmenter:
         found = self._online.push(sample.position, sample.speed)
         return self._states([changepoint.sample for changepoint in found]) if found else None
 
-    def _follows(self, last: Sample, sample: Sample) -> bool:
+    def _follows(self, last: "Sample", sample: "Sample") -> bool:
         return sample.stamp_ns == last.stamp_ns + self._dt_ns and sample.vehicles == last.vehicles
 
     def _states(self, samples: Sequence[int]) -> LiveChangepoints:

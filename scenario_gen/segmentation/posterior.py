@@ -17,9 +17,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from scenario_gen.arrays import Bools, Floats, frozen, frozen_ints, Ints
+from scenario_gen.segmentation._labels import match_and_vote
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,14 +64,15 @@ class Posterior:
 
     def probability_within(self, radius: int) -> Floats:
         """(T,) posterior probability of at least one changepoint within `radius` samples of each sample."""
-        total = np.zeros(self.samples.shape[1])
-        for row in self.samples:
-            marks = np.zeros(len(row) + 1)
-            for c in changepoints_of(row, self.ends):
-                marks[max(c - radius, 0)] += 1
-                marks[min(c + radius + 1, len(row))] -= 1
-            total += np.cumsum(marks[:-1]) > 0
-        return total / len(self.samples)
+        rows, samples = self.samples.shape
+        changed = np.zeros((rows, samples), np.int32)
+        changed[:, 1:] = np.diff(self.samples, axis=1) != 0
+        changed[:, self.ends[:-1]] = 0
+        before = np.zeros((rows, samples + 1), np.int32)
+        np.cumsum(changed, axis=1, out=before[:, 1:])
+        t = np.arange(samples)
+        low, high = np.maximum(t - radius, 0), np.minimum(t + radius + 1, samples)
+        return np.asarray((before[:, high] > before[:, low]).mean(axis=0))
 
     def intervals(self, low: float = 0.05, high: float = 0.95) -> Floats:
         """(K, 2) credible interval of each changepoint's sample index, from the sampled changepoints nearest to it."""
@@ -116,14 +117,6 @@ def in_order(labels: Ints) -> Ints:
     return np.argsort(np.argsort(first))[inverse].astype(np.int64).reshape(-1)
 
 
-def match(labels: Ints, reference: Ints) -> Ints:
-    """Rename labels to agree with `reference` in as many samples as possible (Hungarian method)."""
-    size = int(max(labels.max(), reference.max())) + 1
-    overlap = np.bincount(labels * size + reference, minlength=size * size).reshape(size, size)
-    names: Ints = linear_sum_assignment(-overlap)[1].astype(np.int64)
-    return names[labels]
-
-
 def pool(samples: list[Ints], traces: list[Floats], ends: Ints, lead: int) -> Posterior:
     """Put the chains together.
 
@@ -144,13 +137,15 @@ def pool(samples: list[Ints], traces: list[Floats], ends: Ints, lead: int) -> Po
     chain = np.concatenate([np.full(len(s), k) for k, (s, keep) in enumerate(zip(samples, kept, strict=True)) if keep])
     scores = np.concatenate([t[:, 0] for t, keep in zip(traces, kept, strict=True) if keep])
     estimate = stack[int(np.argmax(scores))]
+    size = int(stack.max()) + 1
+    matched, votes = np.empty_like(stack), np.empty((size, stack.shape[1]), np.int64)
     for _ in range(3):
-        stack = np.array([match(row, estimate) for row in stack])
-        votes = np.array([(stack == k).sum(axis=0) for k in range(stack.max() + 1)])
+        match_and_vote(stack, estimate, size, matched, votes)
         update = votes.argmax(axis=0).astype(np.int64)
         if np.array_equal(update, estimate):
             break
         estimate = update
+    stack = matched
     order = in_order(np.concatenate([estimate, np.arange(stack.max() + 1)]))[len(estimate) :]
     if lead:
         starts = np.concatenate([[0], ends[:-1] - lead * np.arange(1, len(ends))])

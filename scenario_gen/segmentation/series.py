@@ -22,7 +22,7 @@ from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import InputError
 from scenario_gen.parameters import check, parameter
 from scenario_gen.segmentation._problem import Problem
-from scenario_gen.segmentation._start import find_start, sample_weight
+from scenario_gen.segmentation._start import find_start, sample_weight, Start
 from scenario_gen.segmentation.posterior import pool, Posterior
 
 
@@ -36,7 +36,10 @@ class SamplerConfig:
     chains: int = parameter(3, "independent chains, each from a start of its own", low=1, high=16)
     sweeps: int = parameter(100, "Gibbs sweeps of each chain, those of its start included", low=10, high=100_000)
     mean_weight: float = parameter(
-        0.05, "prior samples that the mean (or the regression) of a state is worth", low=1e-6, high=100.0
+        0.05,
+        "prior samples that the mean (or the regression) of a state is worth; a mean more where the states found lie close",
+        low=1e-6,
+        high=100.0,
     )
     weight: float = parameter(
         0.0, "what one sample counts for, below 1 where neighbours repeat each other; 0: from the data", low=0.0, high=1.0
@@ -100,16 +103,21 @@ def segment_series(
     scaled = (x[:, varies] - x[:, varies].mean(axis=0)) / spread[varies]
     first, *seeds = np.random.SeedSequence([seed]).spawn(config.chains + 1)
     problem = Problem.build(scaled, stops, config, unknown)
+    known = None
     if config.weight == 0.0:
-        problem = replace(problem, weight=sample_weight(problem, config, np.random.Generator(np.random.PCG64(first))))
-    results = [_run(problem, config, index, stream) for index, stream in enumerate(seeds)]
+        weight, start = sample_weight(problem, config, np.random.Generator(np.random.PCG64(first)))
+        problem = replace(problem, weight=weight)
+        known = start if weight == 1.0 else None
+    results = [_run(problem, config, index, stream, known if index == 0 else None) for index, stream in enumerate(seeds)]
     return pool([labels for labels, _ in results], [trace for _, trace in results], stops, problem.lead)
 
 
-def _run(problem: Problem, config: SamplerConfig, index: int, stream: np.random.SeedSequence) -> tuple[Ints, Floats]:
-    """Run chain number `index`; returns its kept labels (S, T') and their trace (S, 5)."""
+def _run(
+    problem: Problem, config: SamplerConfig, index: int, stream: np.random.SeedSequence, known: Start | None
+) -> tuple[Ints, Floats]:
+    """Run chain number `index`, from the start `known` if there is one; returns kept labels (S, T') and their trace (S, 5)."""
     rng = np.random.Generator(np.random.PCG64(stream))
-    start = find_start(problem, config, index, rng)
+    start = known or find_start(problem, config, index, rng)
     sweeps = max(config.sweeps - start.sweeps, 4)
     burn = sweeps // 3
     return problem.run(config, start.prior, start.labels, burn, sweeps - burn, int(rng.integers(2**62)))

@@ -22,14 +22,14 @@ places where the posterior sees some chance of one, and which it does miss, are 
 """
 
 from dataclasses import dataclass, field
+import math
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.ndimage import uniform_filter1d
-from scipy.special import gammainccinv
 
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F2, I, I1, kernel, OUT1
+from scenario_gen.segmentation._windows import moving_mean
 
 SPEED_NOISE = 0.1
 COURSE_NOISE = 0.3
@@ -121,7 +121,7 @@ class Trends:
 
     def threshold(self, chance: float) -> float:
         """Return the gain that noise alone exceeds with probability `chance`: a quantile of χ² with one degree per signal."""
-        return float(2.0 * gammainccinv(len(self.signals) / 2.0, chance))
+        return chi2_above(len(self.signals), chance)
 
     @property
     def samples(self) -> int:
@@ -198,13 +198,32 @@ class Trends:
             points.insert(best[2], best[1])
 
 
+def chi2_above(degrees: int, chance: float) -> float:
+    """Return what a χ² variable of an even number of degrees of freedom exceeds with probability `chance`.
+
+    For 2n degrees P(χ² > 2x) = e^-x Σ_{i<n} x^i / i!, the chance of fewer than n events where x are expected.
+    """
+    low, high = 0.0, 1.0
+
+    def exceeds(x: float) -> bool:
+        terms = [i * math.log(x) - math.lgamma(i + 1.0) - x for i in range(degrees // 2)]
+        return math.fsum(math.exp(term) for term in terms) > chance
+
+    while exceeds(high):
+        low, high = high, 2.0 * high
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if exceeds(middle) else (low, middle)
+    return low + high
+
+
 def course(position: Floats, speed: Floats, dt: float) -> tuple[Floats, Floats]:
     """Course over ground [rad], unwrapped and held where the vehicle hardly moves, and smoothed speed [m/s], each (T,)."""
     half = max(1, min(round(COURSE_WINDOW / dt) // 2, (len(speed) - 1) // 2))
     steps = np.arange(-half, half + 1)
     padded = np.pad(position, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
     velocity = sliding_window_view(padded, 2 * half + 1, axis=0) @ steps / (steps @ steps * dt)
-    pace = uniform_filter1d(speed, 2 * half + 1, mode="nearest")
+    pace = moving_mean(speed, 2 * half + 1)
     moves = pace > LEAST_SPEED
     angle = np.arctan2(velocity[:, 1], velocity[:, 0])
     if moves.any():

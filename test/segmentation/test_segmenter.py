@@ -14,6 +14,8 @@
 
 """Encounters into primitives: waits, speed changes, the rules of the result."""
 
+from dataclasses import replace
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -81,3 +83,35 @@ def test_rules_of_the_result(encounter_of, samples, vehicles, seed, rate):
     assert (np.diff([0, *points, samples]) >= 2).all()
     first = [int(np.flatnonzero(found.labels == k)[0]) for k in range(found.n_primitives)]
     assert first == sorted(first)
+
+
+def test_one_vehicle_is_no_encounter(encounter_of):
+    with pytest.raises(InputError, match="1 vehicle"):
+        segment(encounter_of(np.full((1, 200), 8.0)))
+
+
+@pytest.mark.parametrize("preset", ["driving", "paper"])
+def test_nothing_moves(encounter_of, preset):
+    found = segment(encounter_of(np.zeros((2, 60))), SegmentationConfig(preset=preset))
+    assert found.n_primitives == 1
+    assert np.isfinite(found.changepoint_probability).all()
+
+
+@pytest.mark.parametrize("field", ["position", "speed"])
+def test_not_a_number(encounter_of, field):
+    encounter = wait_and_brake(encounter_of)
+    values = np.array(getattr(encounter, field))
+    values[1, 20] = np.nan
+    with pytest.raises(InputError):
+        segment(replace(encounter, **{field: values}))
+
+
+@pytest.mark.parametrize("preset", ["driving", "paper"])
+@pytest.mark.parametrize("shortest", [0.2, 1.5])
+def test_short_segments_and_small_clusters_are_merged(encounter_of, preset, shortest):
+    rng = np.random.default_rng(5)
+    speeds = np.abs(np.cumsum(rng.standard_t(2, (2, 150)), axis=1)) * 0.3
+    found = segment(encounter_of(speeds, noise=0.2), SegmentationConfig(preset=preset, min_segment=shortest, max_rate=10.0))
+    lengths = np.diff([0, *found.changepoints, 150])
+    assert lengths.min() >= round(shortest / 0.1)
+    assert np.bincount(found.labels).min() >= 2

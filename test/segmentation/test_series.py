@@ -100,3 +100,32 @@ def test_never_nan_and_always_consistent(samples, dimensions, seed, emission):
     assert intervals.shape == (len(posterior.changepoints), 2)
     assert (intervals[:, 0] <= intervals[:, 1]).all()
     assert posterior.primitives().sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("emission", ["gaussian", "autoregressive"])
+def test_more_channels_than_samples(emission):
+    x = np.random.default_rng(3).normal(size=(10, 24))
+    posterior = segment_series(x, SamplerConfig(emission=emission), seed=0)
+    assert posterior.labels.shape == (10,)
+    assert np.isfinite(posterior.probability).all()
+
+
+def test_states_whose_means_lie_close_are_told_apart():
+    """Means of length 2.2, spread over 6 channels of unit variance."""
+    rng = np.random.default_rng(9)
+    labels = np.repeat([0, 1, 2, 0, 1, 2], 50)
+    means = rng.normal(size=(3, 6))
+    x = rng.normal(size=(300, 6)) + 2.2 * means[labels] / np.linalg.norm(means, axis=1)[labels][:, None]
+    posterior = segment_series(x, seed=2)
+    assert posterior.labels.max() == 2
+    assert np.mean(posterior.labels != labels) <= 0.05
+
+
+def test_probability_within_counts_each_sample_once():
+    x, _ = two_states(10)
+    posterior = segment_series(np.vstack([x, x]), seed=0, ends=(240, 480))
+    wide = posterior.probability_within(5)
+    for t in (0, 58, 66, 235, 244, 479):
+        low, high = max(t - 5, 0), min(t + 6, 480)
+        near = [any(low <= c < high and c != 240 for c in np.flatnonzero(np.diff(row)) + 1) for row in posterior.samples]
+        assert wide[t] == pytest.approx(np.mean(near))

@@ -1,0 +1,108 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The sampler's building blocks against plain numpy and scipy."""
+
+import numpy as np
+import pytest
+from scipy.optimize import linear_sum_assignment
+from scipy.special import gammainccinv
+
+from scenario_gen.segmentation._chain import update_outer
+from scenario_gen.segmentation._emission import BLOCK, block_likelihood, block_log_likelihood
+from scenario_gen.segmentation._kmeans import kmeans
+from scenario_gen.segmentation._labels import match_and_vote
+from scenario_gen.segmentation._windows import moving_mean
+from scenario_gen.segmentation._within import unexplained
+from scenario_gen.segmentation.trends import chi2_above
+
+
+def test_matching_is_the_best_one():
+    rng = np.random.default_rng(0)
+    samples, reference = rng.integers(0, 6, (40, 90)), rng.integers(0, 6, 90)
+    matched, votes = np.empty_like(samples), np.empty((6, 90), np.int64)
+    match_and_vote(samples, reference, 6, matched, votes)
+    for row, found in zip(samples, matched, strict=True):
+        overlap = np.zeros((6, 6))
+        np.add.at(overlap, (row, reference), 1)
+        rows, columns = linear_sum_assignment(-overlap)
+        assert (found == reference).sum() == overlap[rows, columns].sum()
+        assert len({(a, b) for a, b in zip(row, found, strict=True)}) == len(set(row))
+    np.testing.assert_array_equal(votes, [(matched == k).sum(axis=0) for k in range(6)])
+
+
+def test_likelihood_of_a_block():
+    rng = np.random.default_rng(1)
+    states, d, n = 5, 7, 50
+    vt = np.vstack([np.ones(n), rng.normal(size=(d, n)) * 4.0])
+    coef = rng.normal(size=(states, d, d + 1)) * np.tri(d, d + 1, 1)
+    logdet = rng.normal(size=states)
+    logs, row, work, out = np.empty((states, BLOCK)), np.empty(BLOCK), np.empty((2, BLOCK)), np.empty((n, states))
+    block_log_likelihood(vt, 0, n, coef, logdet, 0.5, logs, row)
+    truth = 0.5 * (logdet[:, None] - 0.5 * ((coef @ vt) ** 2).sum(axis=1))
+    np.testing.assert_allclose(logs[:, :n], truth, rtol=1e-12)
+    block_likelihood(logs, n, row, work, out)
+    below = (truth - truth.max(axis=0)).T
+    np.testing.assert_allclose(out, np.where(below > -300.0, np.exp(below), 0.0), rtol=1e-11)
+
+
+def test_statistics_follow_the_labels():
+    rng = np.random.default_rng(2)
+    v, before = rng.normal(size=(60, 3)), rng.integers(0, 4, 60)
+    outer, counts = np.zeros((5, 3, 3)), np.zeros(5, np.int64)
+    update_outer(v, before, before.copy(), True, outer, counts)
+    labels = rng.integers(1, 5, 60)
+    update_outer(v, before, labels, False, outer, counts)
+    np.testing.assert_array_equal(counts, np.bincount(labels, minlength=5))
+    for k in range(5):
+        np.testing.assert_allclose(np.tril(outer[k]), np.tril(v[labels == k].T @ v[labels == k]), atol=1e-12)
+    np.testing.assert_array_equal(before, labels)
+
+
+def test_residuals_of_regressions():
+    rng = np.random.default_rng(3)
+    z, y, labels = np.column_stack([np.ones(80), rng.normal(size=(80, 2))]), rng.normal(size=(80, 2)), rng.integers(0, 3, 80)
+    precision, residual, scatter = np.eye(3) * 0.3, np.empty((80, 2)), np.empty((2, 2))
+    g0 = np.block([[precision, np.zeros((3, 2))], [np.zeros((2, 3)), np.eye(2)]])
+    unexplained(np.hstack([z, y]), labels, g0, 3, residual, scatter)
+    for k in range(3):
+        own = labels == k
+        fit = np.linalg.solve(z[own].T @ z[own] + precision, z[own].T @ y[own])
+        np.testing.assert_allclose(residual[own], y[own] - z[own] @ fit, atol=1e-12)
+    np.testing.assert_allclose(scatter, residual.T @ residual, atol=1e-12)
+
+
+def test_kmeans_finds_what_is_far_apart():
+    rng = np.random.default_rng(4)
+    truth = np.repeat([0, 1, 2], 40)
+    x = rng.normal(size=(120, 2)) + np.array([[0.0, 0.0], [30.0, 0.0], [0.0, 30.0]])[truth]
+    centres, labels = np.empty((2, 3)), np.empty(120, np.int64)
+    kmeans(x, 7, 10, centres, labels)
+    assert len({(a, b) for a, b in zip(truth, labels, strict=True)}) == 3
+    np.testing.assert_allclose(centres[:, labels[0]], x[:40].mean(axis=0))
+    kmeans(np.ones((6, 1)), 7, 10, np.empty((1, 3)), np.empty(6, np.int64))
+
+
+@pytest.mark.parametrize("width", [1, 4, 5])
+def test_moving_mean(width):
+    x = np.arange(12.0) ** 2
+    padded = np.concatenate([np.full(width, x[0]), x, np.full(width, x[-1])])
+    truth = [padded[t + width - width // 2 : t + 2 * width - width // 2].mean() for t in range(12)]
+    np.testing.assert_allclose(moving_mean(x, width), truth)
+    np.testing.assert_allclose(moving_mean(np.column_stack([x, -x]), width)[:, 1], -np.array(truth))
+
+
+@pytest.mark.parametrize(("degrees", "chance"), [(2, 1e-6), (4, 1e-4), (16, 0.3), (48, 1e-9)])
+def test_chi_squared_quantile(degrees, chance):
+    assert chi2_above(degrees, chance) == pytest.approx(2.0 * gammainccinv(degrees / 2.0, chance), rel=1e-9)
