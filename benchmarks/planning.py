@@ -21,6 +21,8 @@ neither side simplifies. Cached per road are the clearance field and the cell li
 """
 
 from collections import defaultdict
+from functools import partial
+from operator import lt
 import os
 from pathlib import Path
 from statistics import median
@@ -69,7 +71,7 @@ def _warm(road: Road, ends: Floats) -> None:
 def _ompl(
     road: Road, ends: Floats, name: str, seconds: float, step: float | None = None, *, first: bool = False, states: bool = False
 ) -> Floats:
-    """Return OMPL's path (P, 2) after so much CPU time (or its first one, for RRTConnect); simplified unless it is the `first`."""
+    """Return OMPL's path (P, 2) after so much CPU time (or its first one, for RRTConnect), simplified but for the `first`."""
     started = process_time()
 
     def stop(_: int) -> bool:
@@ -178,7 +180,8 @@ def _growth_of_ompl(road: Road, ends: Floats) -> str:
         cost = []
         for iterations in (20_000, 100_000):
             started = process_time()
-            solve(clearance_in_cells(road), ends, 0.0, name, lambda n, last=iterations: n > last, step=5.0, simplify=False)  # type: ignore[misc]
+            until = partial(lt, iterations)  # so many have been made
+            solve(clearance_in_cells(road), ends, 0.0, name, until, step=5.0, simplify=False)
             cost.append((process_time() - started) / iterations)
         told.append(f"{PLANNERS[name]} {cost[1] / cost[0] / (np.log(1e5) / np.log(2e4)):.2f}")
     return f"OMPL at 10⁵ over 2·10⁴: {', '.join(told)}"

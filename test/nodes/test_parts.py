@@ -182,10 +182,14 @@ def _launched() -> list[tuple[str, dict[str, object]]]:
     nodes = []
 
     class Anything:
+        """Takes whatever it is given."""
+
         def __init__(self, *args, **kwargs):
             pass
 
     class Node(Anything):
+        """Remembers what it is to start."""
+
         def __init__(self, *, executable, parameters=({}, {}), **_):
             nodes.append((executable, parameters[1]))
 
