@@ -19,9 +19,11 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 import json
 import os
 from pathlib import Path
+import signal
 import subprocess
 import sys
 import time
@@ -33,8 +35,34 @@ def environment(domain: int) -> dict[str, str]:
     return os.environ | own
 
 
+@dataclass(frozen=True)
+class Suite:
+    """Running nodes: the process that has forked them, and their own ids."""
+
+    process: "subprocess.Popen[str]"
+    pids: tuple[int, ...]
+
+    def signalled(self, *signals: signal.Signals) -> float:
+        """Send signals to every node, 50 ms apart; return the seconds until the last one has gone."""
+        assert self.process.stdout is not None
+        started = time.perf_counter()
+        for number in signals:
+            for pid in self.pids:
+                os.kill(pid, number)
+            time.sleep(0.05)
+        for _ in self.pids:
+            self.process.stdout.readline()  # exited
+        return time.perf_counter() - started
+
+    def end(self) -> None:
+        """End the nodes as the demo does."""
+        if self.process.stdin is not None and not self.process.stdin.closed:
+            self.process.stdin.close()
+        self.process.wait(30.0)
+
+
 @contextmanager
-def nodes(folder: Path, domain: int, arguments: Mapping[str, Sequence[str]]) -> Iterator["subprocess.Popen[str]"]:
+def nodes(folder: Path, domain: int, arguments: Mapping[str, Sequence[str]]) -> Iterator[Suite]:
     """Run nodes, each with its ROS arguments, as the demo does; they are ended at the end."""
     specification = [
         {"node": node, "arguments": ["--ros-args", *own], "log": str(folder / f"{node}.log")} for node, own in arguments.items()
@@ -47,21 +75,13 @@ def nodes(folder: Path, domain: int, arguments: Mapping[str, Sequence[str]]) -> 
         text=True,
         env=environment(domain) | {"ROS_LOG_DIR": str(folder)},
     )
+    assert process.stdout is not None
+    process.stdout.readline()  # loaded
+    suite = Suite(process, tuple(json.loads(process.stdout.readline())["pid"] for _ in arguments))
     try:
-        assert process.stdout is not None
-        process.stdout.readline()  # loaded
-        yield process
+        yield suite
     finally:
-        end(process)
-
-
-def end(process: "subprocess.Popen[str]") -> float:
-    """End the nodes as Ctrl-C does; return the seconds until all have gone."""
-    started = time.perf_counter()
-    if process.stdin is not None and not process.stdin.closed:
-        process.stdin.close()
-    process.wait(30.0)
-    return time.perf_counter() - started
+        suite.end()
 
 
 def publisher(domain: int, topic: str, size: int, count: int, rate: float) -> "subprocess.Popen[str]":

@@ -18,6 +18,7 @@ from collections.abc import Callable
 import math
 import os
 from pathlib import Path
+import signal
 import tempfile
 import threading
 import time
@@ -26,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._messages_processes import end, nodes, publisher
+from benchmarks._messages_processes import nodes, publisher
 from benchmarks.row import Row
 from msg_conventions.paths import encode_path
 from msg_conventions.scenarios import decode_scenario, encode_scenario
@@ -41,6 +42,8 @@ POINTS = 200
 SCENARIOS = 1000
 SMALL = 6000  # messages sent to the recorder
 RATE = 2000.0  # a second
+INTERRUPT, TERMINATE = signal.SIGINT, signal.SIGTERM
+EXITS = (("Ctrl-C", INTERRUPT), ("Ctrl-C twice", INTERRUPT, INTERRUPT), ("SIGTERM", TERMINATE))
 
 
 def run() -> list[Row]:
@@ -52,6 +55,7 @@ def run() -> list[Row]:
         rows.append(_recorder(domain, Path(folder)))
     with free_domain() as domain, tempfile.TemporaryDirectory() as folder:
         rows += _calls(domain, Path(folder))
+        rows += [_exit(domain, Path(folder), *how) for how in EXITS]
     return rows
 
 
@@ -212,34 +216,26 @@ def _recorder(domain: int, folder: Path) -> Row:
 
 
 def _calls(domain: int, folder: Path) -> list[Row]:
-    """Round trips of GetMap and GetPlan while a generation runs, and how long the suite takes to end."""
+    """Round trips of GetMap, GetPlan and a call of the sampler's own while a generation runs."""
     from nav_msgs.srv import GetMap, GetPlan
-    from rcl_interfaces.srv import SetParametersAtomically
-    from rclpy.parameter import Parameter
+    from rcl_interfaces.srv import ListParameters
 
-    arguments = {
-        "log_player": ["-p", f"log_path:={bundled('c')}"],
-        "road_server": ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"],
-        "segmenter": [],
-        "planner": [],
-        "gp_sampler": ["-p", "count:=50"],
-    }
     rows = []
-    with nodes(folder, domain, arguments) as suite, _Client(domain) as client:
-        generate = client.node.create_client(SetParametersAtomically, "gp_sampler/generate")
-        generate.wait_for_service(30.0)
-        values = [Parameter("count", value=50).to_parameter_msg()]
-        request = SetParametersAtomically.Request(parameters=values)
-        while not _done(generate.call_async(request)).result.successful:
-            time.sleep(0.5)
+    with nodes(folder, domain, _arguments()), _Client(domain) as client:
+        generate, request = _generation(client), _request(50)
         plan = GetPlan.Request()
         plan.start.pose.position.x, plan.goal.pose.position.x, plan.start.pose.position.y = _ends(client)
         plan.goal.pose.position.y = plan.start.pose.position.y
-        for kind, name, call in ((GetMap, "road_server/get_map", GetMap.Request()), (GetPlan, "planner/get_plan", plan)):
+        own = ListParameters.Request()
+        for kind, name, call in (
+            (GetMap, "road_server/get_map", GetMap.Request()),
+            (GetPlan, "planner/get_plan", plan),
+            (ListParameters, "gp_sampler/list_parameters", own),
+        ):
             service = client.node.create_client(kind, name)
             service.wait_for_service(30.0)
             answer = _done(service.call_async(call))
-            if not (answer.map.data if kind is GetMap else answer.plan.poses):
+            if not (answer.map.data if kind is GetMap else answer.plan.poses if kind is GetPlan else answer.result.names):
                 raise RuntimeError(f"{name} answers with nothing")
             running, taken = generate.call_async(request), []
             for _ in range(40):
@@ -251,8 +247,48 @@ def _calls(domain: int, folder: Path) -> list[Row]:
             _done(running)
             words = f"median {1e3 * float(np.median(taken)):.1f} ms; 40 calls while generations of 50 run"
             rows.append(Row(f"{kind.__name__} round trip, 95th percentile", 1e3 * _high(taken), "ms", "lower", 200.0, words))
-        rows.append(Row("five nodes end after Ctrl-C", end(suite), "s", "lower", 2.0))
     return rows
+
+
+def _arguments() -> dict[str, list[str]]:
+    """Five nodes that generate when they are asked to."""
+    return {
+        "log_player": ["-p", f"log_path:={bundled('c')}"],
+        "road_server": ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"],
+        "segmenter": [],
+        "planner": [],
+        "gp_sampler": ["-p", "generate_on_input:=false"],
+    }
+
+
+def _request(count: int) -> Any:
+    """Return a request for so many scenarios."""
+    from rcl_interfaces.srv import SetParametersAtomically
+    from rclpy.parameter import Parameter
+
+    return SetParametersAtomically.Request(parameters=[Parameter("count", value=count).to_parameter_msg()])
+
+
+def _generation(client: _Client) -> Any:
+    """Return the client of a sampler that has all it needs."""
+    from rcl_interfaces.srv import SetParametersAtomically
+
+    generate = client.node.create_client(SetParametersAtomically, "gp_sampler/generate")
+    generate.wait_for_service(30.0)
+    while not _done(generate.call_async(_request(50))).result.successful:
+        time.sleep(0.5)
+    return generate
+
+
+def _exit(domain: int, folder: Path, name: str, *signals: signal.Signals) -> Row:
+    """How long the nodes take to end in the midst of a generation."""
+    with nodes(folder, domain, _arguments()) as suite, _Client(domain) as client:
+        running = _generation(client).call_async(_request(20_000))
+        time.sleep(2.0)
+        if running.done():
+            raise RuntimeError("the generation was over too soon")
+        words = "all five, while a generation of 20,000 runs"
+        return Row(f"nodes end after {name}", suite.signalled(*signals), "s", "lower", 2.0, words)
 
 
 def _ends(client: _Client) -> tuple[float, float, float]:

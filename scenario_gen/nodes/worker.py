@@ -55,7 +55,7 @@ class Worker:
                 cancelled.set()
         return [name for name, _ in every]
 
-    def close(self, timeout: float = 1.0) -> None:
+    def close(self, timeout: float = 0.5) -> None:
         """Cancel everything and end the thread; a job that does not listen is left behind after `timeout` seconds."""
         self.cancel()
         with self._changed:
