@@ -141,6 +141,8 @@ def write_run(folder: Path, runs: Run | Sequence[Run]) -> Path:
 def read_scenario_set(folder: Path, namespace: str = "") -> ScenarioSet:
     """Return the last request's scenarios and its account from a bag, whoever recorded it.
 
+    Scenario 0 begins a request anew: a sampler that was killed and started again counts its requests from 1 again.
+
     Raises:
         InputError: the bag cannot be read, no request was closed in it, or a scenario of the request is missing.
     """
@@ -162,6 +164,8 @@ def read_scenario_set(folder: Path, namespace: str = "") -> ScenarioSet:
             if values["sha256"] not in by_digest:
                 raise InputError(f"{folder}: scenario {values['index']} of request {values['request']} is not on {wanted[0]}")
             data = by_digest[values["sha256"]]
+            if values["index"] == "0":
+                scenarios = []
             scenarios.append(decode_scenario(data, seed=int(values["seed"]), index=int(values["index"]))[1])
     if len(scenarios) != int(closing.values["published"]):
         raise InputError(f"{folder}: {closing.values['published']} scenarios were published, {len(scenarios)} are on {wanted[0]}")

@@ -156,6 +156,20 @@ def test_the_scenarios_of_a_request_are_read_with_their_account(run, tmp_path):
         read_scenario_set(folder, "/c")
 
 
+def test_a_request_that_came_twice_counts_once(run, tmp_path):
+    """As a sampler publishes it that was killed in the midst of it and started again."""
+    whole = list(read_messages(write_run(tmp_path / "whole", run)))
+    told = [message for message in whole if message.topic in ("/scenarios", "/scenarios/info")]
+    bag = BagWriter(tmp_path / "twice")
+    for topic in bag_topics(tmp_path / "whole"):
+        bag.add_topic(topic.name, topic.type)
+    for k, message in enumerate([*whole, *told[:3], *told]):
+        bag.write(message.topic, message.data, whole[0].stamp_ns + k)
+    bag.close()
+    got = read_scenario_set(tmp_path / "twice")
+    assert [s.position.tobytes() for s in got.scenarios] == [s.position.tobytes() for s in run.result.scenarios]
+
+
 def test_same_run_same_bytes(run, tmp_path):
     one, two = (write_run(tmp_path / name / "bag", run) for name in "ab")
     for name in ("bag_0.mcap", "metadata.yaml"):

@@ -90,7 +90,8 @@ def test_colcon_builds_what_ros2_run_needs(colcon):
     """A real colcon build: executables in lib/, the ament index entry, and an executable that runs from there."""
     base, _, _ = colcon
     prefix = base / "install" / "scenario_gen"
-    nodes = {"segmenter", "planner", "gp_sampler", "road_server", "log_player", "evaluator", "recorder", "player", "scenario-gen"}
+    names = "segmenter planner gp_sampler road_server log_player evaluator recorder player suite scenario-gen"
+    nodes = set(names.split())
     assert nodes <= {path.name for path in (prefix / "lib" / "scenario_gen").iterdir()}
     assert (prefix / "share" / "ament_index" / "resource_index" / "packages" / "scenario_gen").is_file()
     for file in ("package.xml", "config/default.yaml", "launch/suite.launch.py"):
