@@ -24,24 +24,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenario_gen.arrays import Floats, wrap_angle
-from scenario_gen.encounter import Vehicle
+from scenario_gen.arrays import wrap_angle
 from scenario_gen.errors import RefusedError, ScenarioGenError
 from scenario_gen.fitting.routes import draw_route
 from scenario_gen.requests.chain import Cancelled, Chain
-from scenario_gen.requests.request import ENDS, Request, State
+from scenario_gen.requests.repair import elements, moved, repaired, with_state
+from scenario_gen.requests.request import ENDS, Request
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.roads.curve import Curve
-from scenario_gen.roads.repair import nearest_pose_with_room
-from scenario_gen.roads.separation import footprint_gap
 from scenario_gen.sampling.ego import vehicle_index
 
-FAR = 30.0  # m, how far a pose with room is looked for
 BISECTIONS = 7
 ENOUGH = 10  # valid scenarios by which a request counts as possible, if not fewer are wanted
 _FAR_ENDS = (1.0, 0.75, 0.5, 0.25)  # shares of a way at which a bisection may begin
 _STRETCHES = (0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-_OFFSETS = (0.25 * np.arange(1, 121)).tolist()  # m, by which an overlapping footprint is moved along its heading
 
 Path = Callable[[float], Request]
 
@@ -97,12 +93,12 @@ class _Search:
 
     def run(self) -> Iterator[Suggestion]:
         """Yield suggestions: the plain repair alone if it suffices, else every single change that does, else all at once."""
-        start = self._apart(self._repaired(self.asked))
+        start = repaired(self.chain, self.asked, self.base)
         if start != self.asked and self.possible(start):
             yield Suggestion(start, self._difference(start))
             return
         found = False
-        for end, name in self._elements(start):
+        for end, name in elements(start):
             for path in self._paths(start, end, name):
                 near = self._bisected(path)
                 if near is not None:
@@ -126,28 +122,26 @@ class _Search:
         base = self.base[end][n] if self.base else None
         if len(state) == 4:
             target = 0.0 if base is None else float(base[3])
-            yield lambda share: self._with(request, end, name, (*state[:3], round(state[3] + share * (target - state[3]), 2)))
+            yield lambda share: with_state(request, end, name, (*state[:3], round(state[3] + share * (target - state[3]), 2)))
         route = self._route(request, n, name)
         if route is not None:
-            yield lambda share: self._with(
-                request, end, name, _moved(state, route.at((1.0 - share if end == "goals" else share) * route.length))
+            yield lambda share: with_state(
+                request, end, name, moved(state, route.at((1.0 - share if end == "goals" else share) * route.length))
             )
         if base is not None:
             turn = float(wrap_angle(base[2:3] - state[2])[0])
             step = np.array([base[0] - state[0], base[1] - state[1], turn])
-            yield lambda share: self._with(request, end, name, _moved(state, np.array(state[:3]) + share * step))
+            yield lambda share: with_state(request, end, name, moved(state, np.array(state[:3]) + share * step))
 
     def _all_towards_base(self, request: Request, share: float) -> Request:
-        """Every asked state on its way to where the fitting has it."""
-        for end, name in self._elements(request):
-            *_, path = self._paths(request, end, name)
-            request = path(share)
-            *_, speed = (p for k, p in enumerate(self._paths(request, end, name)) if k == 0)
-            request = speed(share) if len(request.states(end)[name]) == 4 else request
+        """Every asked state on its way to where the fitting has it: poses, then speeds."""
+        for end, name in elements(request):
+            *_, pose = self._paths(request, end, name)
+            request = pose(share)
+            if len(request.states(end)[name]) == 4:
+                speed, *_ = self._paths(request, end, name)
+                request = speed(share)
         return request
-
-    def _with(self, request: Request, end: str, name: str, state: State) -> Request:
-        return request.with_states(end, request.states(end) | {name: state})
 
     def _route(self, request: Request, n: int, name: str) -> Curve | None:
         """The route of line, arc and line from the vehicle's start to its goal, where there is one."""
@@ -181,63 +175,6 @@ class _Search:
                 return Suggestion(request, said + other, stretch)
         return None
 
-    # --- repairs that need no search ------------------------------------------------------------------------------
-
-    def _elements(self, request: Request) -> list[tuple[str, str]]:
-        return [(end, name) for end in ENDS for name in request.states(end)]
-
-    def _repaired(self, request: Request) -> Request:
-        """Poses with room and speeds within the limit, as near as possible."""
-        for end, name in self._elements(request):
-            vehicle = self.chain.encounter.vehicles[vehicle_index(self.chain.encounter, name, end)]
-            state = request.states(end)[name]
-            pose = np.array(state[:3])
-            answer = nearest_pose_with_room(self.chain.road, pose, vehicle.length, vehicle.width, FAR)
-            if answer is not None and answer[1] > 0.0:
-                state = self._with_room(answer[0], pose, vehicle) + state[3:]
-            if len(state) == 4:
-                state = (*state[:3], min(state[3], self.chain.sampling.max_speed))
-            request = self._with(request, end, name, state)
-        return request
-
-    def _with_room(self, pose: Floats, asked: Floats, vehicle: Vehicle) -> State:
-        """The pose in whole centimetres, as little beyond the nearest one as its footprint then needs."""
-        away = (pose - asked)[:2] / np.hypot(*(pose - asked)[:2])
-        for margin in (0.0, 0.01, 0.02, 0.05, 0.1, 0.2):
-            tried = np.array([*np.round(pose[:2] + margin * away, 2), asked[2]])
-            if footprint_fits(self.chain.road, tried[None], vehicle.length, vehicle.width)[0]:
-                pose = tried
-                break
-        return tuple(pose.tolist())
-
-    def _apart(self, request: Request) -> Request:
-        """Where an asked footprint overlaps another one, it is moved along its heading until it no longer does."""
-        encounter = self.chain.encounter
-        for end, name in self._elements(request):
-            n = vehicle_index(encounter, name, end)
-            rows = request.rows(end, encounter)[:, :3]
-            if self.base:
-                rows = np.where(np.isnan(rows), self.base[end][:, :3], rows)
-            others = [m for m in range(len(rows)) if m != n and not np.isnan(rows[m, 0])]
-
-            def gap(pose: Floats, n: int = n, others: list[int] = others, rows: Floats = rows) -> float:
-                vehicles = encounter.vehicles
-                gaps = [footprint_gap(vehicles[n], pose[None], vehicles[m], rows[[m]])[0][0] for m in others]
-                return float(min(gaps, default=np.inf))
-
-            state = request.states(end)[name]
-            if gap(np.array(state[:3])) > 0.0:
-                continue
-            ahead = np.array([np.cos(state[2]), np.sin(state[2]), 0.0])
-            vehicle = encounter.vehicles[n]
-            for offset in (sign * step for step in _OFFSETS for sign in (1.0, -1.0)):
-                pose = np.array(_moved(state, np.array(state[:3]) + offset * ahead)[:3])
-                fits = footprint_fits(self.chain.road, pose[None], vehicle.length, vehicle.width)[0]
-                if fits and gap(pose) >= self.chain.fitting.clearance:
-                    request = self._with(request, end, name, (*pose.tolist(), *state[3:]))
-                    break
-        return request
-
     def _difference(self, request: Request) -> str:
         """What differs from what was asked, as parameters to be set, and by how much."""
         said = []
@@ -248,13 +185,10 @@ class _Search:
                 a, b = before[name], after[name]
                 if (distance := float(np.hypot(b[0] - a[0], b[1] - a[1]))) > 0.0:
                     changes.append(f"vehicle {name} {distance:.2f} m away")
+                elif a[2] != b[2]:
+                    changes.append(f"vehicle {name} turned by {b[2] - a[2]:+.2f} rad")
                 if a[3:] != b[3:]:
                     changes.append(f"vehicle {name} {b[3] - a[3]:+.2f} m/s")
             if changes:
                 said.append(f"{end}:='{getattr(request, end)}' ({', '.join(changes)})")
         return " and ".join(said)
-
-
-def _moved(state: State, pose: Floats) -> State:
-    """The state at another pose, in whole centimetres and tenths of a milliradian, its speed as it was."""
-    return (*np.round(pose[:2], 2).tolist(), round(float(pose[2]), 4), *state[3:])
