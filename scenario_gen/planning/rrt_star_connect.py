@@ -33,7 +33,7 @@ from scenario_gen.roads.road import Road
 OCCUPANCY = 32  # nodes per bucket at which its side is halved
 ROOM = 4  # times the nodes there are: what a new pool holds
 LARGE = 1 << 15  # nodes from which on samples are drawn ahead
-AHEAD = 1 << 17  # how many at most
+AHEAD = 1 << 18  # how many at most
 HAIR = 1e-7  # [cells]
 BATCH = 512  # iterations between two looks at the clock
 
