@@ -104,10 +104,11 @@ def run_arm(
     seed: int,
     request: Request = Request(),  # noqa: B008 - frozen
     progress: Progress | None = None,
+    suggest: bool = True,
 ) -> Arm:
     """Fit the changepoints to the road, plan between them, sample and check."""
     chain = Chain(encounter, segmentation, road, seed, config.fitting, config.planning, config.sampling, config.limits)
-    outcome = run_request(chain, request, count=count, progress=progress)
+    outcome = run_request(chain, request, count=count, progress=progress, suggest=suggest)
     return Arm(segmentation, outcome.fit, outcome.routes, outcome.scenarios)
 
 
@@ -141,7 +142,7 @@ def with_ablation(
     arms, refused = {WITH: arm}, {}
     for name, segmentation in others.items():
         try:
-            arms[name] = run_arm(encounter, segmentation, road, config, count=count, seed=seed, request=request)
+            arms[name] = run_arm(encounter, segmentation, road, config, count=count, seed=seed, request=request, suggest=False)
         except RefusedError as error:
             refused[name] = str(error)
     made = {name: one.scenarios for name, one in arms.items()}

@@ -35,9 +35,15 @@ class Outcome:
 
 
 def run_request(
-    chain: Chain, request: Request, *, count: int, progress: Progress | None = None, cancelled: Cancelled | None = None
+    chain: Chain,
+    request: Request,
+    *,
+    count: int,
+    progress: Progress | None = None,
+    cancelled: Cancelled | None = None,
+    suggest: bool = True,
 ) -> Outcome:
-    """Fit, plan, sample and check.
+    """Fit, plan, sample and check; `suggest` whether to look for the nearest possible request where this one is not.
 
     Raises:
         InputError: a vehicle that is named does not exist.
@@ -49,7 +55,7 @@ def run_request(
         fit, routes = chain.place(request)
         made = chain.sample(request, routes, fit.asked, count=count, progress=progress, cancelled=cancelled)
     except RefusedError as error:
-        if not request.moves:
+        if not request.moves or not suggest:
             raise
         raise ImpossibleError(str(error), suggestions(chain, request, count, cancelled)) from error
     return Outcome(fit, routes, made)
