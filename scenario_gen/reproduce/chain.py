@@ -35,7 +35,8 @@ from scenario_gen.roads import build_road, Road, RoadConfig
 from scenario_gen.sampling.candidates import knots_on
 from scenario_gen.sampling.config import SamplingConfig
 from scenario_gen.sampling.ordinate import ordinate_samples
-from scenario_gen.sampling.time_law import layout, SpeedBounds, SpeedProfile, TimeLaw
+from scenario_gen.sampling.time_law import SpeedBounds, SpeedProfile, TimeLaw
+from scenario_gen.sampling.time_layout import layout
 from scenario_gen.segmentation import Segmentation
 
 ROADS = ("straight", "t_intersection")

@@ -32,7 +32,8 @@ from scenario_gen.sampling.clock import Clock, DT
 from scenario_gen.sampling.gp import combine
 from scenario_gen.sampling.lateral import kept_within
 from scenario_gen.sampling.path import arc_lengths, BasePath, states
-from scenario_gen.sampling.time_law import SpeedProfile, TimeLaw, TimeLayout
+from scenario_gen.sampling.time_law import SpeedProfile, TimeLaw
+from scenario_gen.sampling.time_layout import TimeLayout
 from scenario_gen.scenario import Scenario
 
 DAMPING = (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)  # of a candidate's clock, until a speed profile exists

@@ -34,12 +34,14 @@ from scenario_gen.sampling.config import SamplingConfig
 from scenario_gen.sampling.ego import others
 from scenario_gen.sampling.lateral import lateral_factor, lateral_room, MOST_SIGMAS, ROOM_SIGMAS
 from scenario_gen.sampling.path import BasePath
-from scenario_gen.sampling.time_law import layout, SpeedBounds, SpeedProfile, STAND, TimeLaw, TimeLayout
+from scenario_gen.sampling.time_law import SpeedBounds, SpeedProfile, TimeLaw
+from scenario_gen.sampling.time_layout import layout, STAND, TimeLayout
 from scenario_gen.scenario import BoundaryStates
 from scenario_gen.segmentation.result import Segmentation
 
 SLIDE_SIGMAS = 2.0  # an anchor that slides by so many σ_s is no farther from the template than a sample is anyway
 SAMPLE_SLIDE_SIGMAS = 4.0  # by which an anchor of a sample may slide, rather than have its clock drawn back
+_STANDS = 0.1  # m/s; a vehicle this slow stands
 _SHORTEST_WAIT = 1.25  # s; shorter waits are lengthened to it, so that they are still waits on the published grid
 _LEAST_WAIT = 1.15  # s, to which a fast clock may shorten one
 _STRETCHES = 9
@@ -86,6 +88,7 @@ def prepare(
     times = encounter.time[np.concatenate([[0], segmentation.changepoints, [encounter.speed.shape[1] - 1]]).astype(np.int64)]
     if len(routes) != len(encounter.vehicles) or any(len(route.anchor) != len(times) for route in routes):
         raise InputError(f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each")
+    waits = [_stand(encounter, wait) for wait in waits]
     driven = others(encounter, ego)
     vehicles, waits = [encounter.vehicles[n] for n in driven], [wait for wait in waits if wait.vehicle != ego]
     paths = [BasePath.of(routes[n]) for n in driven]
@@ -102,6 +105,20 @@ def prepare(
                 found = [nominal for nominal in tried if isinstance(nominal, _Nominal)]
                 return _model(vehicles, road, times, Clock(clock, config, _fastest(times, waits)), paths, found, config)
     return Prepared(None, (), "; ".join(reasons))
+
+
+def _stand(encounter: Encounter, wait: Wait) -> Wait:
+    """The part of a wait in which the vehicle stands, not yet or no longer creeps; the wait itself where that is too short.
+
+    A wait begins below 0.5 m/s, so a vehicle that brakes gently still rolls for a while.
+    """
+    inside = (encounter.time >= wait.start) & (encounter.time <= wait.end)
+    stands = encounter.time[inside & (encounter.speed[wait.vehicle] <= _STANDS)]
+    if len(stands) == 0:
+        return wait
+    start = wait.start if wait.start <= encounter.time[0] else float(stands[0])
+    end = wait.end if wait.end >= encounter.time[-1] else float(stands[-1])
+    return replace(wait, start=start, end=end) if end - start >= _SHORTEST_WAIT else wait
 
 
 def _fastest(times: Floats, waits: Sequence[Wait]) -> Floats:

@@ -15,18 +15,20 @@
 """The time law: when a vehicle is where, with piecewise constant acceleration (paper IV-B).
 
 With one constant acceleration per primitive, path lengths, durations and the two end speeds overdetermine the speeds at
-the changepoints, and chaining the law makes them ring. So every primitive has one interior knot. The speeds v at all
-knots are the least-squares fit, over time, to the template's speed scaled to this road and clock,
+the changepoints, and chaining the law makes them ring. So every primitive has one interior knot, and as little use is
+made of it as the lengths allow. The speeds v at all knots solve
 
-    minimise ∫ (v(t) - v̂(t))² dt   subject to   ½ Σ (v_i + v_{i+1}) Δ_i = L_k   for every primitive k,
+    minimise ∫ (v - v̂)² dt + w ∫ (v - c)² dt   subject to   ½ Σ (v_i + v_{i+1}) Δ_i = L_k   for every primitive k.
 
-with v given at both ends, zero in waits and dwells, v >= 0 and all limits kept: a quadratic programme of some twenty
-unknowns, solved exactly by the dual active-set method DAQP (Arnström, Bemporad, Axehill 2022).
+c runs straight from a primitive's first speed to its last: the second integral is the departure from constant
+acceleration. v̂ is what the primitives tell of the template: the straight lines, joined at the changepoints, that fit its
+speed best, scaled to this road and clock. v is given at both ends, zero in waits and dwells, v >= 0 and all limits are
+kept: a quadratic programme of some twenty unknowns, solved exactly by the dual active-set method DAQP (Arnström,
+Bemporad, Axehill 2022).
 """
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import daqp
 import numpy as np
@@ -35,14 +37,12 @@ import numpy.typing as npt
 from scenario_gen.arrays import Bools, Floats, frozen, Ints
 from scenario_gen.kernels import F1, F2, I1, kernel, OUT2, OUT3
 from scenario_gen.sampling.config import SamplingConfig
+from scenario_gen.sampling.time_layout import TimeLayout
 
 Marks = npt.NDArray[np.intc]
 
-STAND = 0.05  # m/s; an asked speed below this is met by standing
-SHORTEST = 0.2  # s, between two knots in the template
-KNOT_DISTANCE = 0.25  # s, of a primitive's knot from its ends where there is room: at most one knot between two samples
-_RAMP = 1.5  # m/s², by which a vehicle that is asked to roll comes to a stand
 _TARGET_SCALE = 4.0  # a template speed is scaled at most so much; beyond it, lengths alone decide
+CONSTANCY = 3.0  # w: what a departure from constant acceleration counts, beside one from the template
 _STIFFNESS = 100.0  # 1/s, cost of sliding an anchor: strong, so that it happens only where it must
 _LENGTH_TOLERANCE = 1e-6  # m
 _EQUALITY = 5  # DAQP's mark
@@ -74,144 +74,6 @@ class SpeedProfile:
         since = t - self.time[i]
         v = self.speed[i]
         return self.travelled[i] + (v + 0.5 * a * since) * since, v + a * since, a
-
-
-@dataclass(frozen=True, eq=False)
-class TimeLayout:
-    """The knots of one vehicle on the template's clock, and what the template's speed says about each interval.
-
-    Attributes:
-        knot: (M,) seconds.
-        piece: (M - 1,) primitive of each interval.
-        still: (M - 1,) True where the vehicle stands.
-        group: (M - 1,) length constraint each moving interval belongs to, -1 where it stands.
-        bounds: (G, 2) anchors at which each length constraint begins and ends.
-        moments: (M - 1, 2) ∫ (1 - ξ) v̂ dξ and ∫ ξ v̂ dξ over each interval, ξ from 0 to 1 [m/s].
-        unknown: (M,) number of each knot's unknown speed, -1 where it is given.
-        given: (M,) m/s, the speed where it is given.
-    """
-
-    knot: Floats
-    piece: Ints
-    still: Bools
-    group: Ints
-    bounds: Ints
-    moments: Floats
-    unknown: Ints
-    given: Floats
-
-    @property
-    def size(self) -> int:
-        """Number of unknown speeds."""
-        return int(self.unknown.max(initial=-1)) + 1
-
-
-def layout(
-    clock: Floats,
-    dwells: Bools,
-    waits: list[tuple[float, float]],
-    time: Floats,
-    speed: Floats,
-    ends: tuple[float, float],
-    knot_share: float | None = None,
-) -> TimeLayout:
-    """Lay out the knots of one vehicle.
-
-    Args:
-        clock: (K + 2,) template times [s] of start, changepoints and end.
-        dwells: (K + 1,) True for primitives in which the route does not move.
-        waits: begin and end [s] of the vehicle's waits.
-        time: (T,) the template's samples [s].
-        speed: (T,) its speeds [m/s].
-        ends: asked speeds [m/s] at start and end.
-        knot_share: where in each primitive its knot lies, as a share of its duration; None for where the template bends.
-    """
-    cuts, still = _cuts(clock, dwells, waits, ends)
-    knots, stands = [cuts[0]], []
-    for a, b, stand in zip(cuts[:-1], cuts[1:], still, strict=True):
-        if not stand:
-            at = best_knot(time, speed, a, b) if knot_share is None else a + knot_share * (b - a)
-            apart = min(KNOT_DISTANCE, 0.5 * (b - a))
-            knots.append(min(max(at, a + apart), b - apart))
-            stands.append(False)
-        knots.append(b)
-        stands.append(stand)
-    knot, standing = np.array(knots), np.array(stands)
-    piece = np.clip(np.searchsorted(clock, 0.5 * (knot[:-1] + knot[1:]), side="right") - 1, 0, len(clock) - 2)
-    group, bounds = _groups(piece, standing, dwells)
-    given = np.full(len(knot), np.nan)
-    given[[0, -1]] = ends
-    given[:-1][standing] = 0.0
-    given[1:][standing] = 0.0
-    unknown = np.where(np.isnan(given), np.cumsum(np.isnan(given)) - 1, -1)
-    xi = (np.arange(64) + 0.5) / 64
-    values = np.interp(knot[:-1, None] + np.diff(knot)[:, None] * xi, time, speed)
-    moments = np.column_stack([values @ (1.0 - xi), values @ xi]) / 64
-    return TimeLayout(knot, piece, standing, group, bounds, frozen(moments), unknown, np.nan_to_num(given))
-
-
-def _asleep(t: float, clock: Floats, dwells: Bools, waits: list[tuple[float, float]]) -> bool:
-    """Whether the template has the vehicle stand at time t."""
-    k = min(max(int(np.searchsorted(clock, t, side="right")) - 1, 0), len(dwells) - 1)
-    return bool(dwells[k]) or any(a <= t <= b for a, b in waits)
-
-
-def _ramps(clock: Floats, dwells: Bools, waits: list[tuple[float, float]], ends: tuple[float, float]) -> tuple[float, float]:
-    """Time until which, and from which on, a vehicle rolls that stands in the template but is asked to move at that end."""
-    inside = 0.5 * SHORTEST
-    asleep = [_asleep(t, clock, dwells, waits) for t in (clock[0] + inside, clock[-1] - inside)]
-    rolls = [max(SHORTEST, v / _RAMP) if stands and v > STAND else 0.0 for stands, v in zip(asleep, ends, strict=True)]
-    return float(clock[0] + rolls[0]), float(clock[-1] - rolls[1])
-
-
-def _cuts(
-    clock: Floats, dwells: Bools, waits: list[tuple[float, float]], ends: tuple[float, float]
-) -> tuple[list[float], list[bool]]:
-    """Times at which a primitive, a wait or a roll begins or ends, none nearer than `SHORTEST`; where the vehicle stands."""
-    cuts = [float(t) for t in clock]
-    if dwells.all():
-        return cuts, [True] * len(dwells)
-    rolls = _ramps(clock, dwells, waits, ends)
-    for t in [*rolls, *(t for wait in waits for t in wait)]:
-        if clock[0] < t < clock[-1] and min(abs(t - c) for c in cuts) >= SHORTEST - 1e-9:
-            cuts.append(float(t))
-    cuts.sort()
-    middle = [0.5 * (a + b) for a, b in pairwise(cuts)]
-    return cuts, [rolls[0] < t < rolls[1] and _asleep(t, clock, dwells, waits) for t in middle]
-
-
-def _groups(piece: Ints, still: Bools, dwells: Bools) -> tuple[Ints, Ints]:
-    """Length constraints: one per primitive that moves.
-
-    What cannot be driven within its own primitive (a route that moves while the vehicle stands, a vehicle that still
-    rolls while the route dwells) is driven in the next primitive that moves, or the last one.
-    """
-    moving = np.array([bool((~still[piece == k]).any()) for k in range(len(dwells))])
-    own = np.flatnonzero(moving & ~dwells)
-    if len(own) == 0:
-        own = np.flatnonzero(moving)[-1:]
-    group = np.full(len(piece), -1, dtype=np.int64)
-    if len(own) == 0:
-        return group, np.zeros((0, 2), dtype=np.int64)
-    home = np.minimum(np.searchsorted(own, piece), len(own) - 1)
-    group[~still] = home[~still]
-    last = np.append(own[:-1] + 1, len(dwells))
-    return group, np.column_stack([np.append(0, last[:-1]), last])
-
-
-def best_knot(time: Floats, speed: Floats, a: float, b: float) -> float:
-    """Time in (a, b) at which two joined straight lines fit the speed best in the least-squares sense."""
-    inside = (time >= a) & (time <= b)
-    t, v = time[inside], speed[inside]
-    candidates = t[(t > a + 0.2 * (b - a)) & (t < b - 0.2 * (b - a))]
-    if len(t) < 6 or len(candidates) < 2:
-        return 0.5 * (a + b)
-    cost = []
-    for knot in candidates:
-        basis = np.column_stack([np.ones_like(t), t - a, np.maximum(t - knot, 0.0)])
-        _, residual, *_ = np.linalg.lstsq(basis, v, rcond=None)
-        cost.append(float(residual[0]) if len(residual) else 0.0)
-    return float(candidates[int(np.argmin(np.round(cost, 9)))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,8 +153,8 @@ class TimeLaw:
         high[:, :n] = self.config.max_speed
         limits = np.array([self.config.max_deceleration, self.config.max_acceleration])
         bounds = self.bounds
-        given = (lay.group, lay.moments, lay.unknown, lay.given, self._rated, limits, bounds.interval, bounds.at, bounds.most)
-        _assemble(knot, lengths, *given, h, f, a, low, high)
+        given = (lay.group, lay.moments, lay.interior, lay.unknown, lay.given, self._rated, limits)
+        _assemble(knot, lengths, *given, bounds.interval, bounds.at, bounds.most, h, f, a, low, high)
         return h, f, a, low, high
 
     def _optimise(self, h: Floats, f: Floats, a: Floats, low: Floats, high: Floats, sense: Marks) -> tuple[Floats, Bools]:
@@ -316,12 +178,28 @@ def _term(share: float, unknown: int, given: float, a: Floats, low: Floats, high
         high[n + row] -= share * given
 
 
-@kernel(F2, F2, I1, F2, I1, F1, I1, F1, I1, F1, F1, OUT3, OUT2, OUT3, OUT2, OUT2)
+@kernel(inline=True)
+def _square(weight: float, knots: Ints, shares: Floats, unknown: Ints, given: Floats, h: Floats, f: Floats) -> None:
+    """Add weight · (Σ shares · v at knots)² to the cost; doubled, because of DAQP's ½."""
+    for j in range(len(knots)):
+        p = unknown[knots[j]]
+        if p < 0:
+            continue
+        for k in range(len(knots)):
+            q = unknown[knots[k]]
+            if q >= 0:
+                h[p, q] += 2.0 * weight * shares[j] * shares[k]
+            else:
+                f[p] += 2.0 * weight * shares[j] * shares[k] * given[knots[k]]
+
+
+@kernel(F2, F2, I1, F2, I1, I1, F1, I1, F1, I1, F1, F1, OUT3, OUT2, OUT3, OUT2, OUT2)
 def _assemble(
     knot: Floats,
     lengths: Floats,
     group: Ints,
     moments: Floats,
+    interior: Ints,
     unknown: Ints,
     given: Floats,
     rated: Ints,
@@ -362,6 +240,11 @@ def _assemble(
                     h[s, p, q] += step / 3.0
                 else:
                     f[s, p] += given[i + 1 - end] * step / 3.0
+        for i in interior:  # ∫ (v - c)², a triangle
+            before, after = knot[s, i] - knot[s, i - 1], knot[s, i + 1] - knot[s, i]
+            whole = before + after
+            shares = np.array([-after / whole, 1.0, -before / whole])
+            _square(CONSTANCY * whole / 3.0, np.arange(i - 1, i + 2), shares, unknown, given, h[s], f[s])
         for k, i in enumerate(rated):
             row, step = groups + k, knot[s, i + 1] - knot[s, i]
             low[s, n + row], high[s, n + row] = -limits[0] * step, limits[1] * step

@@ -14,6 +14,7 @@
 
 """Whole sets on hand-made routes: a straight crossed by a quarter turn, with a wait."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -276,6 +277,17 @@ def test_progress_and_cancellation():
     assert 0 < len(found.scenarios) < 500
     assert seen[-1] == (len(found.scenarios), 500)
     assert "cancelled" in found.adaptations
+
+
+def test_a_wait_stands_where_the_vehicle_does_not_where_it_creeps():
+    *head, _ = scene()
+    law = prepare(*head, (Wait(1, 6.8, 13.2),), SamplingConfig()).model.vehicles[1].law
+    still = np.flatnonzero(law.layout.still)
+    assert law.layout.knot[[still[0], still[-1] + 1]] == pytest.approx([7.0, 13.0])
+    creeping = replace(head[0], speed=np.maximum(head[0].speed, 0.2))
+    law = prepare(creeping, *head[1:], (Wait(1, 6.8, 13.2),), SamplingConfig()).model.vehicles[1].law
+    still = np.flatnonzero(law.layout.still)
+    assert law.layout.knot[[still[0], still[-1] + 1]] == pytest.approx([6.8, 13.2])
 
 
 def test_stretched_clock_is_said():

@@ -18,10 +18,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
-from scipy.optimize import LinearConstraint, minimize
+from scipy.optimize import least_squares, LinearConstraint, minimize
 
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.time_law import best_knot, layout, SpeedBounds, SpeedProfile, TimeLaw
+from scenario_gen.sampling.time_law import CONSTANCY, SpeedBounds, SpeedProfile, TimeLaw
+from scenario_gen.sampling.time_layout import best_knot, layout
 
 TIME = np.arange(201) * 0.1
 CLOCK = np.array([0.0, 6.0, 9.0, 14.0, 20.0])
@@ -37,12 +38,13 @@ def driven(speed, clock=CLOCK):
     return np.diff(profile.state(clock)[0])
 
 
-def test_own_lengths_give_the_template_back():
-    lay = layout(CLOCK, NO_DWELL, [], TIME, dip(), (dip()[0], dip()[-1]))
-    speed, ok = TimeLaw(lay, SamplingConfig()).solve(lay.knot[None], driven(dip())[None])
+def test_own_lengths_give_the_template_back_where_changepoints_sit_at_its_bends():
+    clock = np.array([0.0, 5.0, 7.0, 8.8, 11.2, 13.0, 15.0, 20.0])
+    lay = layout(clock, np.zeros(7, dtype=bool), [], TIME, dip(), (dip()[0], dip()[-1]))
+    speed, ok = TimeLaw(lay, SamplingConfig()).solve(lay.knot[None], driven(dip(), clock)[None])
     assert ok[0]
     profile = SpeedProfile(lay.knot, speed[0])
-    assert np.diff(profile.state(CLOCK)[0]) == pytest.approx(driven(dip()), abs=1e-6)
+    assert np.diff(profile.state(clock)[0]) == pytest.approx(driven(dip(), clock), abs=1e-6)
     assert np.abs(profile.state(TIME)[1] - dip()).max() < 0.8
 
 
@@ -64,18 +66,28 @@ def test_lengths_ends_and_limits_hold(factors, depth, first):
     assert acceleration.min() >= -config.max_deceleration - 1e-5
 
 
+def joined_lines(speed, clock=CLOCK):
+    """The straight lines, joined at the changepoints, that fit best, by scipy's general least squares."""
+    start = np.interp(clock, TIME, speed)
+    fit = least_squares(lambda at: np.interp(TIME, clock, at) - speed, start, xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    return np.interp(TIME, clock, fit.x)
+
+
 def test_is_the_minimum_of_the_stated_cost():
     template = dip()
     lay = layout(CLOCK, NO_DWELL, [], TIME, template, (10.0, 10.0))
-    lengths = driven(template) * np.array([1.05, 0.9, 1.1, 0.97])
+    told = joined_lines(template)
+    lengths = driven(told) * np.array([1.05, 0.9, 1.1, 0.97])
     speed, _ = TimeLaw(lay, SamplingConfig()).solve(lay.knot[None], lengths[None])
     fine = np.linspace(0.0, 20.0, 4001)
-    scale = (lengths / driven(template))[np.clip(np.searchsorted(CLOCK, fine, side="right") - 1, 0, 3)]
-    wanted = np.interp(fine, TIME, template) * scale
+    scale = (lengths / driven(told))[np.clip(np.searchsorted(CLOCK, fine, side="right") - 1, 0, 3)]
+    wanted = np.interp(fine, TIME, told) * scale
+    ends = np.searchsorted(lay.knot, CLOCK)
 
     def cost(inner):
-        v = np.interp(fine, lay.knot, np.r_[10.0, inner, 10.0])
-        return ((v - wanted) ** 2)[:-1].sum() * (fine[1] - fine[0])
+        speeds = np.r_[10.0, inner, 10.0]
+        v, constant = np.interp(fine, lay.knot, speeds), np.interp(fine, CLOCK, speeds[ends])
+        return ((v - wanted) ** 2 + CONSTANCY * (v - constant) ** 2)[:-1].sum() * (fine[1] - fine[0])
 
     rows = np.zeros((4, len(lay.knot)))
     for i, g in enumerate(lay.group):
@@ -90,6 +102,22 @@ def test_is_the_minimum_of_the_stated_cost():
         options={"ftol": 1e-12, "maxiter": 500},
     )
     assert cost(speed[0][1:-1]) <= best.fun * (1.0 + 1e-4) + 1e-6
+
+
+def test_constant_acceleration_within_primitives_is_given_back():
+    """Where the template keeps to its primitives, so does the law: no interior knot bends."""
+    template = np.interp(TIME, CLOCK, [8.0, 11.0, 4.0, 4.0, 9.0])
+    lay = layout(CLOCK, NO_DWELL, [], TIME, template, (8.0, 9.0))
+    speed, ok = TimeLaw(lay, SamplingConfig()).solve(lay.knot[None], driven(template)[None])
+    assert ok[0]
+    assert speed[0] == pytest.approx(np.interp(lay.knot, TIME, template), abs=1e-5)
+
+
+def test_primitives_shorter_than_the_samples_are_apart():
+    coarse = np.arange(0.0, 21.0)
+    clock = np.array([0.0, 6.2, 6.6, 14.0, 20.0])
+    lay = layout(clock, NO_DWELL, [], coarse, np.full(21, 7.0), (7.0, 7.0))
+    assert lay.moments == pytest.approx(np.full((len(lay.knot) - 1, 2), 3.5))
 
 
 def test_chained_law_would_ring_and_this_does_not():
