@@ -139,7 +139,7 @@ def generate(
         typer.Option(help="id of a vehicle to leave out for a planner under test; its start, goal and track are given instead"),
     ] = "",
     start: Annotated[
-        list[str] | None, typer.Option(help="a vehicle's start state, 'id: x y yaw [speed]', on the road; repeatable")
+        list[str] | None, typer.Option(help=r"a vehicle's start state, 'id: x y yaw \[speed]', on the road; repeatable")
     ] = None,
     goal: Annotated[list[str] | None, typer.Option(help="a vehicle's end state, likewise; repeatable")] = None,
     assignments: SetOption = None,
@@ -375,13 +375,24 @@ def run_all(
                 try:
                     case = run_pipeline(template, road, config, count=count, seed=seed, request=request, progress=advance)
                 except RefusedError as error:
-                    refusals.append(f"{template.name} on {road}: {error}")
+                    refusals.append(f"{template.name} on {road}: {as_options(str(error))}")
                     continue
                 cases.append(case)
                 got = len(case.with_changepoints.scenarios)
                 if got < count:
                     refusals.append(f"{template.name} on {road}: only {got} of {count} scenarios: {causes(case)}")
     return cases, refusals
+
+
+def as_options(message: str) -> str:
+    """Write the nearest possible request, which the nodes take as parameters, as options of the command line."""
+    for parameter, option in (
+        ("starts:='", "--start '"),
+        ("goals:='", "--goal '"),
+        ("sampling.max_stretch:=", "--set sampling.max_stretch="),
+    ):
+        message = message.replace(parameter, option)
+    return message
 
 
 def causes(case: Case) -> str:

@@ -70,7 +70,7 @@ def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(r
 def test_what_cannot_be_had_is_an_error_with_what_can(run):
     code, said = run("generate", LOG, *QUICK, "--count", 2, "--goal", "1: 195.5 61.75 0 11")
     assert code == 2
-    nearest = re.search(r"goals:='([^']*)'", said)[1]
+    nearest = re.search(r"--goal '([^']*)'", said)[1]
     assert "off the road" in said
     assert run("generate", LOG, *QUICK, "--count", 2, "--goal", nearest, "--out", "taken")[0] == 0
 

@@ -45,7 +45,7 @@ from scenario_gen.bags.reader import read_messages
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
-from scenario_gen.scenario import ScenarioSet
+from scenario_gen.scenario import Scenario, ScenarioSet
 
 if TYPE_CHECKING:
     from scenario_gen.fitting.result import Fit
@@ -157,7 +157,7 @@ def read_scenario_set(folder: Path, namespace: str = "") -> ScenarioSet:
     closing = next((entry for entry in reversed(entries) if "published" in entry.values), None)
     if closing is None:
         raise InputError(f"{folder}: no request was closed on {wanted[1]}")
-    scenarios = []
+    scenarios: list[Scenario] = []
     for entry in entries:
         values = entry.values
         if "sha256" in values and values["request"] == closing.values["request"]:
