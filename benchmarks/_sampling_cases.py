@@ -85,9 +85,18 @@ def cases() -> Iterator[Prepared | str]:
 
 
 def displacement(scenarios: tuple[Scenario, ...]) -> float:
-    """Mean distance [m] between the same vehicle at the same share of the duration in two samples."""
-    position = np.stack([at_count(s, 101).position for s in scenarios])
-    pairs = np.triu_indices(len(scenarios), 1)
+    """Mean distance [m] between the same vehicle at the same share of the duration in two samples, without the clock's part."""
+    return _apart(np.stack([at_count(s, 101).position for s in scenarios]))
+
+
+def displacement_at_instants(scenarios: tuple[Scenario, ...]) -> float:
+    """Mean distance [m] between the same vehicle at the same instant in two samples, up to the end of the shortest."""
+    count = min(s.time.size for s in scenarios)
+    return _apart(np.stack([s.position[:, :count] for s in scenarios]))
+
+
+def _apart(position: Floats) -> float:
+    pairs = np.triu_indices(len(position), 1)
     return float(np.linalg.norm(position[pairs[0]] - position[pairs[1]], axis=-1).mean())
 
 

@@ -54,7 +54,7 @@ def jax_moseq(x: Floats, sweeps: int, *, compiled: bool, seed: int = 0, states: 
     from jax_moseq.models.arhmm.gibbs import _resample_regression_params
     from jax_moseq.utils.distributions import sample_hmm_stateseq
     from jax_moseq.utils.transitions import init_hdp_transitions, resample_hdp_transitions
-    import tensorflow_probability.substrates.jax.distributions as tfd  # type: ignore[import-not-found]
+    import tensorflow_probability.substrates.jax.distributions as tfd
 
     jax.config.update("jax_enable_x64", True)
     y = jnp.asarray(standardised(x))

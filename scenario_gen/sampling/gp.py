@@ -31,6 +31,7 @@ from numpy.polynomial import chebyshev
 import scipy.linalg
 
 from scenario_gen.arrays import Floats
+from scenario_gen.blas import on_one_thread
 from scenario_gen.errors import InputError
 from scenario_gen.kernels import F2, kernel, OUT2
 
@@ -45,6 +46,7 @@ def squared_exponential(a: Floats, b: Floats, sigma: float, length: float) -> Fl
 class Features:
     """φ with φ(x)ᵀφ(x') = k(x, x') on an interval, from Chebyshev interpolation of the kernel in both arguments."""
 
+    @on_one_thread
     def __init__(self, low: float, high: float, sigma: float, length: float, degree: int = -1) -> None:
         """Build the features.
 
@@ -129,6 +131,7 @@ class Posterior:
         """(m, m) covariance."""
         return self.factor @ self.factor.T
 
+    @on_one_thread
     def sample(self, z: Floats) -> Floats:
         """Curves (S, m) from standard normal numbers z (S, r)."""
         return self.mean + combine(z, self.factor)
@@ -137,6 +140,7 @@ class Posterior:
 class Regression:
     """The posterior over the weights, ready to be asked at any points."""
 
+    @on_one_thread
     def __init__(self, features: Features, seen: Observations) -> None:
         """Condition on what was seen.
 
@@ -163,6 +167,7 @@ class Regression:
         self._weights = start + basis @ scipy.linalg.solve_triangular(r, q.T @ target, check_finite=False)
         self._root = scipy.linalg.solve_triangular(r, basis.T, trans="T", check_finite=False).T  # basis·r⁻¹
 
+    @on_one_thread
     def predict(self, x: Floats) -> Posterior:
         """The posterior of f at x (m,)."""
         rows = self.features(x)

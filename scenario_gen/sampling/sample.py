@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.arrays import Floats
+from scenario_gen.blas import on_one_thread
 from scenario_gen.encounter import Encounter
 from scenario_gen.interaction import Wait
 from scenario_gen.planning.route import Route
@@ -73,6 +74,7 @@ class Sampler:
         return generator.standard_normal((BLOCK, self.model.size))
 
 
+@on_one_thread
 def sample_scenarios(
     encounter: Encounter,
     segmentation: Segmentation,
@@ -123,6 +125,7 @@ def sample_scenarios(
     return ScenarioSet(count, tuple(loop.valid), loop.candidates, loop.refused, said, track)
 
 
+@on_one_thread
 def regenerate(
     encounter: Encounter,
     segmentation: Segmentation,
