@@ -38,7 +38,7 @@ from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.result import Fit, FittedVehicle
 from scenario_gen.planning import plan_routes, PlanningConfig
 from scenario_gen.planning.ompl_solve import PLANNERS, solve
-from scenario_gen.planning.planner import Budget, BudgetSpentError, path_length, Query
+from scenario_gen.planning.planner import Budget, BudgetSpentError, path_length, plan_patiently, Query
 from scenario_gen.planning.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig
 from scenario_gen.roads.clearance import clearance_in_cells, distance_transform
 from scenario_gen.roads.flood import component_at, components, connected
@@ -229,7 +229,7 @@ def _recorded(queries: int = 500) -> list[Row]:
                 ways += 1
                 started = process_time()
                 try:
-                    RrtStarConnect().plan(road, Query(start, goal, radius), Budget(1000), seed)
+                    plan_patiently(RrtStarConnect(), road, Query(start, goal, radius), PlanningConfig().iterations, seed)
                 except BudgetSpentError:
                     failed += 1
                 times.append(process_time() - started)

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.arrays import Floats
+from scenario_gen.blas import on_one_thread
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import likeness, variety
@@ -65,6 +66,7 @@ class _Reference:
     seed: int
 
 
+@on_one_thread
 def evaluate(
     encounter: Encounter,
     segmentation: Segmentation,

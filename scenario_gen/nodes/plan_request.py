@@ -23,7 +23,7 @@ from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.planning.config import PlanningConfig
 from scenario_gen.planning.plan import make_planner
-from scenario_gen.planning.planner import Budget, Query
+from scenario_gen.planning.planner import plan_patiently, Query
 from scenario_gen.roads import Road
 
 
@@ -52,7 +52,7 @@ def plan_poses(road: Road, query: Query, config: PlanningConfig, seed: int) -> F
     Raises:
         RefusedError: the start or goal is blocked, there is no way, or the budget is spent.
     """
-    path = make_planner(config).plan(road, query, Budget(iterations=config.iterations), seed).path
+    path = plan_patiently(make_planner(config), road, query, config.iterations, seed).path
     ahead = np.diff(path, axis=0) if len(path) > 1 else np.zeros((1, 2))
     heading = np.arctan2(ahead[:, 1], ahead[:, 0])
     return np.column_stack([path, np.append(heading, heading[-1])[: len(path)]])

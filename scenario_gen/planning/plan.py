@@ -26,7 +26,7 @@ from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.result import Fit, FittedVehicle
 from scenario_gen.planning.config import PlanningConfig
 from scenario_gen.planning.guess import direct, keep_to_side
-from scenario_gen.planning.planner import BlockedError, Budget, BudgetSpentError, Planner, Query
+from scenario_gen.planning.planner import BlockedError, plan_patiently, Planner, Query
 from scenario_gen.planning.route import Route
 from scenario_gen.planning.rrt_star_connect import RrtStarConnect
 from scenario_gen.planning.smooth import Curve, Guess, monotone_matching, smooth, Targets
@@ -37,7 +37,6 @@ STANDS = 0.05  # [m] a vehicle whose start and end are nearer than this has no p
 CLOSE = 0.3  # [m] anchors nearer to each other than this are one waypoint
 SHORTEST = 0.1  # [m] what a moving primitive covers at least, else it is a dwell
 SHARP = np.deg2rad(100.0)  # a waypoint farther off the heading than this lies behind
-PATIENCE = 100  # times the iterations, where a way exists and none was found
 SOFTENED = 0.1  # weight of an anchor that is no waypoint
 SLACK = 1.5  # how much more curvature than allowed a waypoint may ask for before it is softened
 
@@ -196,11 +195,7 @@ def _searched(task: _Task, a: int, b: int, radius: float) -> Floats:
     """The planner's path (P, 2) from anchor a to anchor b."""
     query = Query(task.anchors[a, :2], task.anchors[b, :2], radius)
     try:
-        try:
-            return task.planner.plan(task.road, query, Budget(task.config.iterations), task.seed + a).path
-        except BudgetSpentError:  # a flood fill says that there is a way: be patient, but take the first
-            patient = Budget(PATIENCE * task.config.iterations, first=True)
-            return task.planner.plan(task.road, query, patient, task.seed + a).path
+        return plan_patiently(task.planner, task.road, query, task.config.iterations, task.seed + a).path
     except BlockedError as error:
         raise RefusedError(f"{task.name(a if error.end == 'start' else b)} is blocked: {error}") from error
     except RefusedError as error:

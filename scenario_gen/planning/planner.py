@@ -100,6 +100,22 @@ class Planner(Protocol):
         ...
 
 
+PATIENCE = 100
+"""Times the iterations that a search may go on for a first path, where a flood fill has proven that there is a way."""
+
+
+def plan_patiently(planner: Planner, road: Road, query: Query, iterations: int, seed: int) -> Plan:
+    """Return the best path found in so many iterations; where there is none yet, the first that more patience finds.
+
+    Raises:
+        BlockedError, NoWayError, BudgetSpentError: as `Planner.plan`.
+    """
+    try:
+        return planner.plan(road, query, Budget(iterations), seed)
+    except BudgetSpentError:
+        return planner.plan(road, query, Budget(PATIENCE * iterations, first=True), seed)
+
+
 def check_query(road: Road, query: Query) -> int:
     """Raise BlockedError or NoWayError if no search could succeed.
 

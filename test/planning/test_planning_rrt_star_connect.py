@@ -21,7 +21,15 @@ import pytest
 
 from benchmarks._planning_maps import clutter, enters_blocked, lane, optimum, road_of, t_intersection
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.planning.planner import BlockedError, Budget, BudgetSpentError, NoWayError, path_length, Query
+from scenario_gen.planning.planner import (
+    BlockedError,
+    Budget,
+    BudgetSpentError,
+    NoWayError,
+    path_length,
+    plan_patiently,
+    Query,
+)
 from scenario_gen.planning.rrt_star_connect import _Trees, LARGE, PAPER, RrtStarConnect, RrtStarConnectConfig
 from scenario_gen.planning.tree_nodes import CHUNK, COST, EDGE, ITERATION, NODES_A, NODES_B, PARENT
 from scenario_gen.roads.clearance import clearance_in_cells, segments_free
@@ -222,3 +230,15 @@ def test_time_ends_a_search():
 def test_settings_are_checked():
     with pytest.raises(InputError, match="step"):
         RrtStarConnectConfig(step=0.0)
+
+
+def test_patience_finds_the_way_that_a_small_budget_does_not():
+    drivable = np.zeros((60, 60), dtype=bool)
+    drivable[:, :28] = drivable[:, 34:] = True
+    drivable[57, :] = True
+    road, query = road_of("a far gap", drivable), Query(np.array([2.5, 2.5]), np.array([57.5, 2.5]))
+    with pytest.raises(BudgetSpentError):
+        RrtStarConnect().plan(road, query, Budget(20), 0)
+    plan = plan_patiently(RrtStarConnect(), road, query, 20, 0)
+    assert plan.iterations > 20
+    assert not enters_blocked(drivable, plan.path)
