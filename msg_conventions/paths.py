@@ -47,18 +47,17 @@ def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) ->
     if not np.isfinite(poses).all():
         raise InputError("a path with a value that is not finite cannot be sent")
     first, kind, blank, text = _layout(frame_id)
-    seconds = stamps_ns // NANOSECONDS
-    nanoseconds = stamps_ns - seconds * NANOSECONDS
+    seconds, nanoseconds = np.divmod(stamps_ns, NANOSECONDS)
     z, w = half_angle(poses[:, 2])
     body = bytearray(blank * (count - 1))
     rest = np.frombuffer(body, dtype=kind)
     rest["sec"], rest["nanosec"] = seconds[1:], nanoseconds[1:]
     pose = rest["pose"]
     pose[:, :2], pose[:, 5], pose[:, 6] = poses[1:, :2], z[1:], w[1:]
-    stamp, begin, size = divmod(stamp_ns, NANOSECONDS), (seconds[0], nanoseconds[0]), len(text)
-    x, y = poses[0, :2]
+    stamp, begin, size = divmod(stamp_ns, NANOSECONDS), (seconds.item(0), nanoseconds.item(0)), len(text)
+    x, y = poses.item(0), poses.item(1)
     try:
-        head = first.pack(*stamp, size, text, count, *begin, size, text, x, y, 0.0, 0.0, 0.0, z[0], w[0])
+        head = first.pack(*stamp, size, text, count, *begin, size, text, x, y, 0.0, 0.0, 0.0, z.item(0), w.item(0))
     except struct.error as error:
         raise InputError(f"a path of stamp {stamp_ns} ns cannot be sent: {error}") from None
     return b"".join((HEADER, head, body))
