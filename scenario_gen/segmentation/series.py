@@ -73,7 +73,7 @@ def segment_series(
     """Sample the segmentations of a series under the sticky HDP-HMM (Fox et al. 2011; priors chosen from the data).
 
     Args:
-        x: (T, D), any units: what does not vary is left out, the rest is scaled to unit variance.
+        x: (T, D), any units: what does not vary is left out, the rest is scaled to unit variance, or by `blur` if that is more.
         config: model and sampler.
         seed: same seed, same answer, bit for bit.
         ends: where several sequences stand one after the other, the index one past the last sample of each.
@@ -99,16 +99,18 @@ def segment_series(
     varies = spread > 1e-9 * np.maximum(np.abs(x).max(axis=0), 1e-300)
     if not varies.any():
         return Posterior.constant(len(x))
-    unknown = np.zeros(varies.sum()) if blur is None else (np.asarray(blur)[varies] / spread[varies]) ** 2
-    scaled = (x[:, varies] - x[:, varies].mean(axis=0)) / spread[varies]
+    known = np.zeros(x.shape[1]) if blur is None else np.asarray(blur)
+    unit = np.maximum(spread, known)[varies]  # what varies less than it is known shall not be blown up to look like the rest
+    unknown = (known[varies] / unit) ** 2
+    scaled = (x[:, varies] - x[:, varies].mean(axis=0)) / unit
     first, *seeds = np.random.SeedSequence([seed]).spawn(config.chains + 1)
     problem = Problem.build(scaled, stops, config, unknown)
-    known = None
+    ready = None
     if config.weight == 0.0:
         weight, start = sample_weight(problem, config, np.random.Generator(np.random.PCG64(first)))
         problem = replace(problem, weight=weight)
-        known = start if weight == 1.0 else None
-    results = [_run(problem, config, index, stream, known if index == 0 else None) for index, stream in enumerate(seeds)]
+        ready = start if weight == 1.0 else None
+    results = [_run(problem, config, index, stream, ready if index == 0 else None) for index, stream in enumerate(seeds)]
     return pool([labels for labels, _ in results], [trace for _, trace in results], stops, problem.lead)
 
 

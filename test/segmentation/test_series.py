@@ -80,6 +80,16 @@ def test_constant_channel_and_constant_series():
     assert segment_series(np.ones((50, 3))).labels.max() == 0
 
 
+@pytest.mark.parametrize("tremble", [1e-7, 1e-3, 0.1])
+def test_channel_that_varies_less_than_it_is_known_hides_nothing(tremble):
+    """A vehicle that stands throughout: blown up to unit variance, its trembling drowned every other channel's changes."""
+    x, labels = two_states(8)
+    still = tremble * np.random.default_rng(1).normal(size=(240, 2))
+    posterior = segment_series(np.column_stack([x, still]), seed=0, blur=np.array([0.2, 0.2, 0.2, 0.4]))
+    assert np.mean(posterior.labels != labels) <= 0.02
+    assert posterior.labels.max() == 1
+
+
 @pytest.mark.parametrize("bad", [np.zeros((3, 2)), np.full((10, 2), np.nan), np.zeros((0, 2))])
 def test_refuses_what_it_cannot_use(bad):
     with pytest.raises(InputError):
