@@ -20,6 +20,8 @@ from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Vehicle
 from scenario_gen.evaluation.motion import Motion
 
+STILL = 1e-6  # m/s; what closes more slowly does not close: rounding alone makes equal velocities differ
+
 
 def footprint_distance(motion: Motion, a: int, b: int) -> Floats:
     """Return the distance (T,) in metres between the footprints of vehicles a and b; 0 where they overlap.
@@ -46,7 +48,7 @@ def time_to_collision(motion: Motion, a: int, b: int) -> Floats:
     offset, reach, closing = _separation(motion, a, b)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         one, two = (-reach - offset) / closing, (reach - offset) / closing
-    still = closing == 0.0
+    still = np.abs(closing) < STILL
     apart = np.abs(offset) >= reach
     begin = np.where(still, np.where(apart, np.inf, -np.inf), np.minimum(one, two)).max(axis=0)
     end = np.where(still, np.where(apart, -np.inf, np.inf), np.maximum(one, two)).min(axis=0)
