@@ -18,13 +18,13 @@ With one constant acceleration per primitive, path lengths, durations and the tw
 the changepoints, and chaining the law makes them ring. So every primitive has one interior knot, and as little use is
 made of it as the lengths allow. The speeds v at all knots solve
 
-    minimise ∫ (v - v̂)² dt + w ∫ (v - c)² dt   subject to   ½ Σ (v_i + v_{i+1}) Δ_i = L_k   for every primitive k.
+    minimise ∫ (v - v̂)² dt + θ² ∫ (v' - ā)² dt   subject to   ½ Σ (v_i + v_{i+1}) Δ_i = L_k   for every primitive k.
 
-c runs straight from a primitive's first speed to its last: the second integral is the departure from constant
-acceleration. v̂ is what the primitives tell of the template: the straight lines, joined at the changepoints, that fit its
-speed best, scaled to this road and clock. v is given at both ends, zero in waits and dwells, v >= 0 and all limits are
-kept: a quadratic programme of some twenty unknowns, solved exactly by the dual active-set method DAQP (Arnström,
-Bemporad, Axehill 2022).
+ā is a primitive's mean acceleration: the second integral is its departure from constant acceleration, which costs a
+short primitive dearly and a long one little. v̂ is what the primitives tell of the template: the straight lines,
+joined at all knots, that fit its speed best, scaled to this road and clock. v is given at both ends, zero in waits
+and dwells, v >= 0 and all limits are kept: a quadratic programme of some twenty unknowns, solved exactly by the dual
+active-set method DAQP (Arnström, Bemporad, Axehill 2022).
 """
 
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ from scenario_gen.sampling.time_layout import TimeLayout
 Marks = npt.NDArray[np.intc]
 
 _TARGET_SCALE = 4.0  # a template speed is scaled at most so much; beyond it, lengths alone decide
-CONSTANCY = 3.0  # w: what a departure from constant acceleration counts, beside one from the template
+CONSTANCY = 3.0  # s², θ²: what a departure from constant acceleration counts, beside one of speed from the template
 _STIFFNESS = 100.0  # 1/s, cost of sliding an anchor: strong, so that it happens only where it must
 _LENGTH_TOLERANCE = 1e-6  # m
 _EQUALITY = 5  # DAQP's mark
@@ -240,11 +240,11 @@ def _assemble(
                     h[s, p, q] += step / 3.0
                 else:
                     f[s, p] += given[i + 1 - end] * step / 3.0
-        for i in interior:  # ∫ (v - c)², a triangle
+        for i in interior:  # ∫ (v' - ā)²: v departs from the straight line by a triangle
             before, after = knot[s, i] - knot[s, i - 1], knot[s, i + 1] - knot[s, i]
             whole = before + after
             shares = np.array([-after / whole, 1.0, -before / whole])
-            _square(CONSTANCY * whole / 3.0, np.arange(i - 1, i + 2), shares, unknown, given, h[s], f[s])
+            _square(CONSTANCY * (1.0 / before + 1.0 / after), np.arange(i - 1, i + 2), shares, unknown, given, h[s], f[s])
         for k, i in enumerate(rated):
             row, step = groups + k, knot[s, i + 1] - knot[s, i]
             low[s, n + row], high[s, n + row] = -limits[0] * step, limits[1] * step

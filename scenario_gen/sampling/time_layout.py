@@ -13,8 +13,8 @@
 # limitations under the License.
 """Where the knots of the time law lie, and what the template says about the speeds between them.
 
-A primitive tells of the template what constant acceleration can: the straight lines, joined at the changepoints and at
-the ends of stands, that fit its speed best in the least-squares sense. The interior knot lies where the template bends.
+A primitive tells of the template what the law can drive: the straight lines, joined at changepoints, at interior knots and
+at the ends of stands, that fit its speed best in the least-squares sense. The interior knot lies where the template bends.
 """
 
 from dataclasses import dataclass
@@ -101,7 +101,7 @@ def layout(
     given[:-1][standing] = 0.0
     given[1:][standing] = 0.0
     unknown = np.where(np.isnan(given), np.cumsum(np.isnan(given)) - 1, -1)
-    told = np.interp(knot, cuts, _joined_lines(time, speed, np.array(cuts), np.array(still)))
+    told = _joined_lines(time, speed, knot, standing)
     moments = np.column_stack([told[:-1] / 3.0 + told[1:] / 6.0, told[:-1] / 6.0 + told[1:] / 3.0])
     inner = np.array(interior, dtype=np.int64)
     return TimeLayout(knot, piece, standing, group, bounds, frozen(moments), inner, unknown, np.nan_to_num(given))
@@ -156,16 +156,16 @@ def _groups(piece: Ints, still: Bools, dwells: Bools) -> tuple[Ints, Ints]:
     return group, np.column_stack([np.append(0, last[:-1]), last])
 
 
-def _joined_lines(time: Floats, speed: Floats, cuts: Floats, still: Bools) -> Floats:
-    """Speeds (C,) [m/s] at `cuts` (C,): straight lines between them fit `speed` (T,) best; zero where a stand begins or ends."""
-    at = np.clip(np.searchsorted(cuts, time, side="right") - 1, 0, len(still) - 1)
-    share = (time - cuts[at]) / np.diff(cuts)[at]
-    hats, rows = np.zeros((len(time), len(cuts))), np.arange(len(time))
+def _joined_lines(time: Floats, speed: Floats, knot: Floats, still: Bools) -> Floats:
+    """Speeds (M,) [m/s] at `knot` (M,): straight lines between them fit `speed` (T,) best; zero where a stand begins or ends."""
+    at = np.clip(np.searchsorted(knot, time, side="right") - 1, 0, len(still) - 1)
+    share = (time - knot[at]) / np.diff(knot)[at]
+    hats, rows = np.zeros((len(time), len(knot))), np.arange(len(time))
     hats[rows, at], hats[rows, at + 1] = 1.0 - share, share
     free = ~(np.append(still, False) | np.append(False, still))
-    lines = np.where(free, np.interp(cuts, time, speed), 0.0)
+    lines = np.where(free, np.interp(knot, time, speed), 0.0)
     moving = ~still[at]
-    if free.any():  # changes to the speeds met at the cuts: none where no sample says anything
+    if free.any():  # changes to the speeds met at the knot: none where no sample says anything
         lines[free] += np.linalg.lstsq(hats[np.ix_(moving, free)], (speed - hats @ lines)[moving], rcond=None)[0]
     return np.asarray(np.maximum(lines, 0.0))
 

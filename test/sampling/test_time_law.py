@@ -66,28 +66,31 @@ def test_lengths_ends_and_limits_hold(factors, depth, first):
     assert acceleration.min() >= -config.max_deceleration - 1e-5
 
 
-def joined_lines(speed, clock=CLOCK):
-    """The straight lines, joined at the changepoints, that fit best, by scipy's general least squares."""
-    start = np.interp(clock, TIME, speed)
-    fit = least_squares(lambda at: np.interp(TIME, clock, at) - speed, start, xtol=1e-12, ftol=1e-12, gtol=1e-12)
-    return np.interp(TIME, clock, fit.x)
+def joined_lines(speed, knot):
+    """Speeds at the knots of the straight lines, joined there, that fit best, by scipy's general least squares."""
+    start = np.interp(knot, TIME, speed)
+    fit = least_squares(lambda at: np.interp(TIME, knot, at) - speed, start, xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    return fit.x
 
 
 def test_is_the_minimum_of_the_stated_cost():
     template = dip()
     lay = layout(CLOCK, NO_DWELL, [], TIME, template, (10.0, 10.0))
-    told = joined_lines(template)
-    lengths = driven(told) * np.array([1.05, 0.9, 1.1, 0.97])
+    told = joined_lines(template, lay.knot)
+    natural = np.diff(SpeedProfile(lay.knot, told).state(CLOCK)[0])
+    lengths = natural * np.array([1.05, 0.9, 1.1, 0.97])
     speed, _ = TimeLaw(lay, SamplingConfig()).solve(lay.knot[None], lengths[None])
     fine = np.linspace(0.0, 20.0, 4001)
-    scale = (lengths / driven(told))[np.clip(np.searchsorted(CLOCK, fine, side="right") - 1, 0, 3)]
-    wanted = np.interp(fine, TIME, told) * scale
+    scale = (lengths / natural)[np.clip(np.searchsorted(CLOCK, fine, side="right") - 1, 0, 3)]
+    wanted = np.interp(fine, lay.knot, told) * scale
     ends = np.searchsorted(lay.knot, CLOCK)
 
     def cost(inner):
         speeds = np.r_[10.0, inner, 10.0]
-        v, constant = np.interp(fine, lay.knot, speeds), np.interp(fine, CLOCK, speeds[ends])
-        return ((v - wanted) ** 2 + CONSTANCY * (v - constant) ** 2)[:-1].sum() * (fine[1] - fine[0])
+        off = ((np.interp(fine, lay.knot, speeds) - wanted) ** 2)[:-1].sum() * (fine[1] - fine[0])
+        steps = np.diff(lay.knot)
+        mean = np.repeat(np.diff(speeds[ends]) / np.diff(CLOCK), 2)
+        return off + CONSTANCY * (steps * (np.diff(speeds) / steps - mean) ** 2).sum()
 
     rows = np.zeros((4, len(lay.knot)))
     for i, g in enumerate(lay.group):
