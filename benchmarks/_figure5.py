@@ -16,7 +16,6 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from importlib.resources import files
 from pathlib import Path
 import re
@@ -27,21 +26,25 @@ from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.evaluation import Case, evaluate, Evaluation, ORACLE, render, replay, ReportInput, UNIFORM, WITH, WITHOUT
 from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints
 from scenario_gen.logs import read_log
-from scenario_gen.pipeline import Arm, PipelineConfig, run_arm, without_changepoints
+from scenario_gen.pipeline import Arm, PipelineConfig, run_arm, run_reference, without_changepoints
 from scenario_gen.roads import build_road, Road
 from scenario_gen.segmentation import segment, Segmentation
 
-COUNT, SEED = 50, 7
+COUNT, SEEDS = 50, (7, 8, 9)
 OTHER_ROADS = ("t_intersection", "four_way", "straight")
 LINEAR = "best linear pieces"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measured:
-    """One encounter on one road: the evaluation of every arm that was not refused, and the CPU seconds of the report."""
+    """One encounter on one road with one seed: the evaluation of every arm that was not refused.
+
+    `seconds` are the CPU seconds of evaluation and report, 0 where no report was made.
+    """
 
     evaluation: Evaluation
     own_road: bool
+    seed: int
     seconds: float
 
     def value(self, arm: str, metric: str) -> float:
@@ -61,18 +64,14 @@ def encounters(data: Path) -> Iterator[tuple[Encounter, list[str]]]:
 
 
 def measure(data: Path, say: Callable[[str], None]) -> Iterator[Measured]:
-    """Run every case: own roads all, and of the others the first that fits."""
+    """Run every case with every seed: own roads all, and of the others the first that fits."""
     config = PipelineConfig()
     for encounter, own in encounters(data):
-        segmentation = segment(encounter, config.segmentation, SEED)
+        segmentation = segment(encounter, config.segmentation, SEEDS[0])
         for name in own:
-            found = _measure(encounter, segmentation, name, config, say, own_road=True)
-            if found:
-                yield found
+            yield from _measure(encounter, segmentation, name, config, say, own_road=True)
         others = (_measure(encounter, segmentation, name, config, say, own_road=False) for name in OTHER_ROADS)
-        first = next((found for found in others if found), None)
-        if first:
-            yield first
+        yield from next((found for found in others if found), ())
 
 
 def _measure(
@@ -83,37 +82,44 @@ def _measure(
     say: Callable[[str], None],
     *,
     own_road: bool,
-) -> Measured | None:
-    road, arms = None, {}
+) -> list[Measured]:
+    """One case with every seed of planning and sampling; none where the segmenter's arm is refused."""
     try:
         road = build_road(name, encounter, config.road)
-        arms[WITH] = _arm(encounter, segmentation, road, config)
+        made = {seed: run_arm(encounter, segmentation, road, config, count=COUNT, seed=seed) for seed in SEEDS}
     except (InputError, RefusedError) as error:
         say(f"{encounter.name} on {Path(name).stem}: {error}")
-        return None
-    makers: dict[str, Callable[[], Segmentation]] = {
-        WITHOUT: partial(without_changepoints, segmentation),
-        UNIFORM: partial(uniform_changepoints, segmentation),
-        LINEAR: partial(linear_changepoints, encounter, segmentation),
+        return []
+    references = {
+        WITHOUT: without_changepoints(segmentation),
+        UNIFORM: uniform_changepoints(segmentation),
+        LINEAR: linear_changepoints(encounter, segmentation),
     }
-    for arm, make in makers.items():
-        try:
-            arms[arm] = _arm(encounter, make(), road, config)
-        except RefusedError as error:
-            say(f"{encounter.name} on {road.name}, {arm}: {error}")
-    started = process_time()
-    oracle = replay(encounter, arms[WITH].fit, road.frame_id)
-    rows = {arm: made.scenarios.scenarios for arm, made in arms.items()} | {ORACLE: (oracle,)}
-    evaluation = evaluate(encounter, segmentation, rows, road=road.name)
-    with_, without = arms[WITH], arms.get(WITHOUT)
-    made = without.scenarios if without else None
-    case = Case(encounter, segmentation, road, with_.fit, with_.routes, with_.scenarios, made, evaluation, oracle)
-    render(ReportInput([case]))
-    found = Measured(evaluation, own_road, process_time() - started)
-    figures = (f"{arm} {found.value(arm, 'e_position'):.4f} / {found.value(arm, 'e_speed'):.4f}" for arm in (*arms, ORACLE))
-    say(f"{encounter.name} on {road.name}, K = {evaluation.changepoints}: " + "; ".join(figures))
+    found = []
+    for seed, arm in made.items():
+        arms = {WITH: arm}
+        for name_of, reference in references.items():
+            try:
+                arms[name_of] = run_reference(encounter, reference, road, config, count=COUNT, seed=seed)
+            except RefusedError as error:
+                say(f"{encounter.name} on {road.name}, seed {seed}, {name_of}: {error}")
+        found.append(_evaluated(encounter, arms, road, own_road=own_road, seed=seed))
+        values = found[-1].value
+        figures = (f"{arm} {values(arm, 'e_position'):.4f} / {values(arm, 'e_speed'):.4f}" for arm in (*arms, ORACLE))
+        say(f"{encounter.name} on {road.name}, K = {len(segmentation.changepoints)}, seed {seed}: " + "; ".join(figures))
     return found
 
 
-def _arm(encounter: Encounter, segmentation: Segmentation, road: Road, config: PipelineConfig) -> Arm:
-    return run_arm(encounter, segmentation, road, config, count=COUNT, seed=SEED)
+def _evaluated(encounter: Encounter, arms: dict[str, Arm], road: Road, *, own_road: bool, seed: int) -> Measured:
+    """Evaluate the arms, and with the first seed make the report too."""
+    started = process_time()
+    with_, without = arms[WITH], arms.get(WITHOUT)
+    oracle = replay(encounter, with_.fit, road.frame_id)
+    rows = {arm: made.scenarios.scenarios for arm, made in arms.items()} | {ORACLE: (oracle,)}
+    evaluation = evaluate(encounter, with_.segmentation, rows, road=road.name)
+    if seed != SEEDS[0]:
+        return Measured(evaluation, own_road, seed, 0.0)
+    made = without.scenarios if without else None
+    case = Case(encounter, with_.segmentation, road, with_.fit, with_.routes, with_.scenarios, made, evaluation, oracle)
+    render(ReportInput([case]))
+    return Measured(evaluation, own_road, seed, process_time() - started)

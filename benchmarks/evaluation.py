@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from benchmarks._figure5 import LINEAR, measure, Measured
+from benchmarks._figure5 import LINEAR, measure, Measured, SEEDS
 from benchmarks.row import Row
 from scenario_gen.evaluation import dtw_distance, feature_matrix, UNIFORM, WITH, WITHOUT
 
@@ -80,7 +80,7 @@ def _figure5(cases: Sequence[Measured]) -> list[Row]:
     own, others = [case for case in cases if case.own_road], [case for case in cases if not case.own_road]
     rows = [
         Row("evaluation and report of 50 samples, most costly case", max(c.seconds for c in cases), "s CPU", "lower", 10.0),
-        Row("figure 5: cases measured", len(cases), "", "higher"),
+        Row("figure 5: cases measured", len(cases), "", "higher", peer=f"seeds {', '.join(map(str, SEEDS))}"),
         Row(
             "changepoints per second, most",
             max(c.evaluation.changepoints / c.evaluation.duration for c in cases),
@@ -92,13 +92,18 @@ def _figure5(cases: Sequence[Measured]) -> list[Row]:
     for kind, targets in (("position", (0.15, 0.5, 0.7)), ("speed", (0.30, 0.5, 0.9))):
         key = f"e_{kind}"
         telling = [c for c in cases if c.value(WITHOUT, key) >= SIGNIFICANT]
-        better = [c.value(WITH, key) < c.value(WITHOUT, key) for c in telling]
-        rows.append(Row(f"E {kind}: with below without, of {len(telling)} cases", _share(better), "share", "higher", 1.0))
+        worse = [c for c in telling if not c.value(WITH, key) < c.value(WITHOUT, key)]
+        label = f"E {kind}: with below without, of {len(telling)} cases"
+        peer = ", ".join(f"not {c.evaluation.encounter} on {c.evaluation.road}, seed {c.seed}" for c in worse)
+        rows.append(Row(label, 1.0 - len(worse) / len(telling) if telling else float("nan"), "share", "higher", 1.0, peer))
         for name, group, target in (("own road", own, targets[0]), ("other roads", others, targets[1])):
             peer = f"uniform {_ratio(group, UNIFORM, key):.2f}, best linear pieces {_ratio(group, LINEAR, key):.2f}"
             rows.append(Row(f"E {kind}: median with / without, {name}", _ratio(group, WITH, key), "", "lower", target, peer))
-        even = [c.value(WITH, key) < c.value(UNIFORM, key) for c in cases if np.isfinite(c.value(UNIFORM, key))]
-        rows.append(Row(f"E {kind}: below uniform, of {len(even)} cases", _share(even), "share", "higher", targets[2]))
+        even = [c for c in cases if np.isfinite(c.value(UNIFORM, key))]
+        below = {c: c.value(WITH, key) < c.value(UNIFORM, key) for c in even}
+        shares = (f"seed {seed} {_share([below[c] for c in even if c.seed == seed]):.2f}" for seed in SEEDS)
+        label = f"E {kind}: below uniform, of {len(even)} cases"
+        rows.append(Row(label, _share(list(below.values())), "share", "higher", targets[2], ", ".join(shares)))
         correlation = float(np.nanmedian([c.value(WITH, f"correlation_{kind}") for c in cases]))
         rows.append(Row(f"{kind}: correlation with the template's matrix, median", correlation, "", "higher", 0.9))
     return rows

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from scenario_gen.arrays import Floats
+from scenario_gen.arrays import Floats, Ints
 
 Statistic = Callable[[Floats], Floats]
 
@@ -45,17 +45,27 @@ class Bootstrap:
     Attributes:
         weights: (B, S) how often each sample was drawn in each resample.
         level: confidence level.
+        units: number of samples, or groups of them, that are independent.
     """
 
     weights: Floats
     level: float
+    units: int
 
     @classmethod
-    def draw(cls, samples: int, resamples: int, level: float, seed: int) -> "Bootstrap":
-        """Draw the weights; the same seed gives the same weights."""
-        generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, samples, resamples])))
-        shares = np.full(samples, 1.0 / max(samples, 1))
-        return cls(generator.multinomial(samples, shares, size=resamples).astype(np.float64), level)
+    def draw(cls, unit: Ints, resamples: int, level: float, seed: int) -> "Bootstrap":
+        """Draw the weights; the same seed gives the same weights.
+
+        Args:
+            unit: (S,) samples with the same number depend on each other and are drawn together.
+            resamples: B.
+            level: confidence level.
+            seed: of the draws.
+        """
+        units, member = np.unique(unit, return_inverse=True)
+        generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, len(unit), resamples])))
+        shares = np.full(len(units), 1.0 / max(len(units), 1))
+        return cls(generator.multinomial(len(units), shares, size=resamples)[:, member].astype(np.float64), level, len(units))
 
     def interval(self, statistic: Statistic) -> Interval:
         """Return the statistic of the whole set with its percentile bounds (Efron 1979), widened to hold the value.
@@ -68,7 +78,7 @@ class Bootstrap:
         """
         samples = self.weights.shape[1]
         value = float(statistic(np.ones((1, samples)))[0])
-        if samples < 2 or not np.isfinite(value):
+        if self.units < 2 or not np.isfinite(value):
             return Interval(value)
         values = statistic(self.weights)
         values = values[np.isfinite(values)]

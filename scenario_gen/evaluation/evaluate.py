@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.arrays import Floats
+from scenario_gen.arrays import Floats, Ints
 from scenario_gen.blas import on_one_thread
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
@@ -163,7 +163,7 @@ def _measure(name: str, scenarios: Sequence[Scenario], reference: _Reference, co
     values = _rates(counts, config.level) if counts else {}
     if not scenarios:
         return Row(name, 0, values, ("there is no scenario in this row",))
-    bootstrap = Bootstrap.draw(len(scenarios), config.resamples, config.level, reference.seed)
+    bootstrap = Bootstrap.draw(_pairs(scenarios), config.resamples, config.level, reference.seed)
     steps = reference.motion.speed.shape[1]
     ids = [vehicle.id for vehicle in reference.motion.vehicles]
     position, speed = stacked([chosen(at_count(scenario, steps), ids) for scenario in scenarios])
@@ -177,6 +177,12 @@ def _measure(name: str, scenarios: Sequence[Scenario], reference: _Reference, co
         error = variety.displacement_to(position, fitted.position)
         values["min_ade"] = bootstrap.interval(lambda weights: variety.least(error, weights))
     return Row(name, len(scenarios), values, _notes(len(scenarios), values, config))
+
+
+def _pairs(scenarios: Sequence[Scenario]) -> Ints:
+    """(S,) number of each scenario's mirrored pair: the sampler draws candidates 2k and 2k + 1 as mirror images."""
+    index = np.array([scenario.index for scenario in scenarios])
+    return index // 2 if len(np.unique(index)) == len(index) else np.arange(len(index))  # not numbered: not the sampler's
 
 
 def _likeness(reference: _Reference, position: Floats, speed: Floats, bootstrap: Bootstrap) -> dict[str, Interval]:

@@ -194,7 +194,7 @@ def compare_priors(route: Route, seed: int) -> Regressions:
 
 def like(encounter: Encounter, arm: Sampled, seed: int) -> Likeness:
     """Figure 5 as numbers: E and the correlation of the mean matrix, for position and speed."""
-    bootstrap = Bootstrap.draw(len(arm.position), RESAMPLES, LEVEL, seed)
+    bootstrap = Bootstrap.draw(np.arange(len(arm.position)), RESAMPLES, LEVEL, seed)
     places = likeness(encounter.position, arm.position, "euclidean")
     paces = likeness(encounter.speed[..., None], arm.speed[..., None], "manhattan")
     values = {}

@@ -37,7 +37,11 @@ Cancelled = Callable[[], bool]
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """A segmented template, a road, and the parameters of all that follows; `seed` is that of planning and sampling."""
+    """A segmented template, a road, and the parameters of all that follows; `seed` is that of planning and sampling.
+
+    `holds_waits` is False for references that shall know of the template only what their own changepoints tell: they stand
+    where one of their primitives stands, and no wait is asked of them.
+    """
 
     encounter: Encounter
     segmentation: Segmentation
@@ -47,6 +51,7 @@ class Chain:
     planning: PlanningConfig = field(default_factory=PlanningConfig)
     sampling: SamplingConfig = field(default_factory=SamplingConfig)
     limits: Limits = field(default_factory=Limits)
+    holds_waits: bool = True
 
     def place(self, request: Request) -> tuple[Fit, tuple[Route, ...]]:
         """Fit the template to the road and plan its routes, from and to the states that are asked for.
@@ -67,8 +72,8 @@ class Chain:
         return fit, plan_routes(self.road, fit, self.planning, self.seed)
 
     def waits(self) -> tuple[Wait, ...]:
-        """Return the template's waits; without changepoints there is no dwell to hold, so none is asked for."""
-        return find_waits(self.encounter) if self.segmentation.changepoints.size else ()
+        """Return the template's waits if they are to hold; without changepoints there is no dwell to hold."""
+        return find_waits(self.encounter) if self.holds_waits and self.segmentation.changepoints.size else ()
 
     def scenario(self, request: Request, routes: tuple[Route, ...], asked: BoundaryStates, index: int) -> Scenario | None:
         """Return the candidate with this index, bit for bit as in a whole set; None if it has no speed profile."""

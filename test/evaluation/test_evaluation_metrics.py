@@ -68,6 +68,8 @@ def test_time_to_collision_by_hand():
     assert time_to_collision(head_on, 0, 1) == pytest.approx(2.0)
     passing = still([(0, 0), (24, 2.5)], (0, np.pi), speed=(5.0, 5.0))  # half a metre beside each other
     assert np.isinf(time_to_collision(passing, 0, 1))
+    abreast = still([(0, 0), (6, 0)], (0, 0), speed=(0.5, np.nextafter(0.5, 0)))  # differ by rounding alone
+    assert np.isinf(time_to_collision(abreast, 0, 1))
     parting = still([(0, 0), (24, 0)], (np.pi, 0), speed=(5.0, 5.0))
     assert np.isinf(time_to_collision(parting, 0, 1))
     assert time_to_collision(still([(0, 0), (1, 0)], (0, 0)), 0, 1) == 0.0  # they overlap now
@@ -180,7 +182,7 @@ def test_variety_by_hand():
 
 def test_interval_of_a_mean_agrees_with_scipy():
     values = np.random.default_rng(5).exponential(2.0, 80)
-    ours = Bootstrap.draw(80, 4000, 0.95, 1).mean(values)
+    ours = Bootstrap.draw(np.arange(80), 4000, 0.95, 1).mean(values)
     theirs = stats.bootstrap((values,), np.mean, n_resamples=4000, method="percentile", random_state=1).confidence_interval
     assert ours.value == pytest.approx(values.mean())
     width = theirs.high - theirs.low
@@ -191,14 +193,29 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     rng = np.random.default_rng(6)
     held = 0
     for trial in range(200):
-        found = Bootstrap.draw(40, 400, 0.9, trial).mean(rng.normal(3.0, 1.0, 40))
+        found = Bootstrap.draw(np.arange(40), 400, 0.9, trial).mean(rng.normal(3.0, 1.0, 40))
         held += found.low <= 3.0 <= found.high
     assert 0.82 <= held / 200 <= 0.96
 
 
+def test_samples_that_depend_on_each_other_are_drawn_together():
+    rng = np.random.default_rng(8)
+    held = {"together": 0, "apart": 0}
+    for trial in range(200):
+        values = np.repeat(rng.normal(3.0, 1.0, 20), 2)
+        for how, unit in (("together", np.arange(40) // 2), ("apart", np.arange(40))):
+            found = Bootstrap.draw(unit, 400, 0.9, trial).mean(values)
+            held[how] += found.low <= 3.0 <= found.high
+    assert 0.82 <= held["together"] / 200 <= 0.96
+    assert held["apart"] / 200 < 0.8
+    weights = Bootstrap.draw(np.array([4, 4, 7, 9, 9]), 30, 0.9, 0).weights
+    assert (weights[:, 0] == weights[:, 1]).all() and (weights[:, 3] == weights[:, 4]).all()
+
+
 def test_one_sample_has_no_interval_and_the_seed_decides():
-    assert math.isnan(Bootstrap.draw(1, 50, 0.95, 0).mean(np.array([2.0])).low)
-    one, two, other = (Bootstrap.draw(9, 50, 0.95, seed).weights for seed in (4, 4, 5))
+    assert math.isnan(Bootstrap.draw(np.arange(1), 50, 0.95, 0).mean(np.array([2.0])).low)
+    assert math.isnan(Bootstrap.draw(np.zeros(2, dtype=int), 50, 0.95, 0).mean(np.array([2.0, 3.0])).low)  # a mirrored pair
+    one, two, other = (Bootstrap.draw(np.arange(9), 50, 0.95, seed).weights for seed in (4, 4, 5))
     assert (one == two).all() and (one != other).any() and (one.sum(axis=1) == 9).all()
 
 
