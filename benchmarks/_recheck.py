@@ -76,7 +76,7 @@ class Recheck:
             encounter.vehicles, time, encounter.position, encounter.heading, encounter.speed, 0.0 * encounter.speed
         )
         self.orders = {pair: order for pair, order in _orders(self.template) if order}
-        self.waits = _waits(encounter) if has_changepoints else [0] * len(encounter.vehicles)
+        self.waits = _waits(encounter) if has_changepoints else [(0, 0)] * len(encounter.vehicles)
 
     def check(self, scenarios: Sequence[Scenario], account: Account) -> None:
         """Check a batch and count what is found."""
@@ -176,11 +176,13 @@ class Recheck:
                 account.add("passing_order", f"vehicles {pair} in scenario {s.index}")
 
     def _standing(self, s: Scenario, account: Account) -> None:
-        """As many stands as the template has waits, one second of standing for each."""
-        for v, wanted in enumerate(self.waits):
-            account.waits += wanted
-            if wanted and sum(int(length + 1e-6) for length in _stands(s, v, self.limits.stand_speed)) < wanted:
-                account.add("moving_wait", f"vehicle {v} in scenario {s.index}")
+        """As many stands, and as many slow stretches in all, as the template has, one second for each."""
+        for v, (standing, every) in enumerate(self.waits):
+            account.waits += every
+            for wanted, limit in ((standing, self.limits.stand_speed), (every, self.limits.creep_speed)):
+                if wanted and sum(int(length + 1e-6) for length in _stands(s, v, limit)) < wanted:
+                    account.add("moving_wait", f"vehicle {v} in scenario {s.index}")
+                    break
 
 
 def _drivable(road: Road) -> Any:
@@ -272,8 +274,11 @@ def _lead(a: Floats, b: Floats, times: list[Floats], hits: tuple[Ints, Ints], le
     return int(np.sign((way * np.sign(times[1][j] - times[0][i])).sum()))
 
 
-def _waits(encounter: Encounter) -> list[int]:
-    """How often each vehicle of the template waits: speed smoothed over 0.5 s below 0.5 m/s for 1 s or more."""
+def _waits(encounter: Encounter) -> list[tuple[int, int]]:
+    """How often each vehicle of the template stands while it waits, and waits: smoothed over 0.5 s below 0.5 m/s for 1 s or more.
+
+    It stands if between the first and the last sample of at most 0.1 m/s there is 1 s or more.
+    """
     reach = round(0.25 / encounter.dt)
     counts = []
     for speed in encounter.speed:
@@ -281,7 +286,10 @@ def _waits(encounter: Encounter) -> list[int]:
         smooth = np.convolve(padded, np.full(2 * reach + 1, 1.0 / (2 * reach + 1)), mode="valid")
         slow = np.concatenate([[0], (smooth < 0.5).astype(np.int64), [0]])
         begin, end = np.flatnonzero(np.diff(slow) == 1), np.flatnonzero(np.diff(slow) == -1)
-        counts.append(int(((end - 1 - begin) * encounter.dt >= 1.0 - 1e-9).sum()))
+        long = [(a, b) for a, b in zip(begin, end, strict=True) if (b - 1 - a) * encounter.dt >= 1.0 - 1e-9]
+        still = [np.flatnonzero(speed[a:b] <= 0.1) for a, b in long]
+        standing = sum(bool(len(k)) and float(k[-1] - k[0]) * encounter.dt >= 1.0 - 1e-9 for k in still)
+        counts.append((standing, len(long)))
     return counts
 
 

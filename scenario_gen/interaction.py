@@ -34,6 +34,7 @@ from scenario_gen.kernels import F1, F2, kernel, OUT1
 WAIT_SPEED = 0.5  # m/s
 WAIT_DURATION = 1.0  # s
 WAIT_SMOOTHING = 0.5  # s, width of the centred moving mean
+STAND_SPEED = 0.1  # m/s; a wait in which the vehicle is never so slow for `WAIT_DURATION` is a creeping one
 
 POSE_STEP = 1.0  # m, longest distance between two neighbouring poses of a sweep
 POSE_TURN = 0.1  # rad, largest turn between them
@@ -49,11 +50,15 @@ FOLLOWING_LENGTHS = 3.0  # a shared path longer than this many vehicle lengths i
 
 @dataclass(frozen=True)
 class Wait:
-    """Vehicle `vehicle` stands from `start` to `end` [s]: smoothed speed below 0.5 m/s for at least 1 s."""
+    """Vehicle `vehicle` waits from `start` to `end` [s]: smoothed speed below 0.5 m/s for at least 1 s.
+
+    It `creeps` if it does not stand (at most 0.1 m/s) for 1 s of that.
+    """
 
     vehicle: int
     start: float
     end: float
+    creeps: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,11 +92,17 @@ def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
     smooth = uniform_filter1d(encounter.speed, width, axis=1, mode="nearest")
     time = encounter.time
     return tuple(
-        Wait(vehicle, float(time[a]), float(time[b]))
+        Wait(vehicle, float(time[a]), float(time[b]), _creeps(encounter.speed[vehicle, a : b + 1], time[a : b + 1]))
         for vehicle, speed in enumerate(smooth)
         for a, b in runs(speed < WAIT_SPEED)
         if time[b] - time[a] >= WAIT_DURATION - 1e-9
     )
+
+
+def _creeps(speed: Floats, time: Floats) -> bool:
+    """Whether the vehicle does not stand for long enough between the first and the last sample in which it does."""
+    stands = time[speed <= STAND_SPEED]
+    return len(stands) == 0 or bool(stands[-1] - stands[0] < WAIT_DURATION - 1e-9)
 
 
 def find_conflicts(vehicles: tuple[Vehicle, ...], time: Floats, position: Floats, heading: Floats) -> tuple[Conflict, ...]:

@@ -29,21 +29,19 @@ from scenario_gen.planning.route import Route
 from scenario_gen.roads.road import Road
 from scenario_gen.sampling.along import along_factor
 from scenario_gen.sampling.candidates import CandidateModel, knots_on, piece_lengths, VehicleModel
-from scenario_gen.sampling.clock import Clock, FASTEST
+from scenario_gen.sampling.clock import Clock
 from scenario_gen.sampling.config import SamplingConfig
 from scenario_gen.sampling.ego import others
 from scenario_gen.sampling.lateral import lateral_factor, lateral_room, MOST_SIGMAS, ROOM_SIGMAS
 from scenario_gen.sampling.path import BasePath
 from scenario_gen.sampling.time_law import SpeedBounds, SpeedProfile, TimeLaw
 from scenario_gen.sampling.time_layout import layout, STAND, TimeLayout
+from scenario_gen.sampling.waits import creep_bounds, fastest_paces, lengthened, standing_part
 from scenario_gen.scenario import BoundaryStates
 from scenario_gen.segmentation.result import Segmentation
 
 SLIDE_SIGMAS = 2.0  # an anchor that slides by so many σ_s is no farther from the template than a sample is anyway
 SAMPLE_SLIDE_SIGMAS = 4.0  # by which an anchor of a sample may slide, rather than have its clock drawn back
-_STANDS = 0.1  # m/s; a vehicle this slow stands
-_SHORTEST_WAIT = 1.25  # s; shorter waits are lengthened to it, so that they are still waits on the published grid
-_LEAST_WAIT = 1.15  # s, to which a fast clock may shorten one
 _STRETCHES = 9
 _KNOT_SHARES = (None, 0.5, 0.35, 0.65, 0.2, 0.8, 0.1, 0.9)  # of a primitive; None: where the template bends
 _CURVE_REACH = 2.0  # m, around a position, in which the route's curvature is looked at
@@ -88,47 +86,25 @@ def prepare(
     times = encounter.time[np.concatenate([[0], segmentation.changepoints, [encounter.speed.shape[1] - 1]]).astype(np.int64)]
     if len(routes) != len(encounter.vehicles) or any(len(route.anchor) != len(times) for route in routes):
         raise InputError(f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each")
-    waits = [_stand(encounter, wait) for wait in waits]
+    waits = [standing_part(encounter, wait) for wait in waits]
     driven = others(encounter, ego)
     vehicles, waits = [encounter.vehicles[n] for n in driven], [wait for wait in waits if wait.vehicle != ego]
     paths = [BasePath.of(routes[n]) for n in driven]
     lays = [partial(_layout, n, encounter, times, routes[n], asked, waits) for n in driven]
+    slow = [lengthened(n, waits, creeping=True) for n in driven]
     slide = SLIDE_SIGMAS * config.longitudinal_sigma
     stretches = np.linspace(1.0, 1.0 + config.max_stretch, _STRETCHES if config.max_stretch > 0.0 else 1)
     reasons: list[str] = []
     for most, factors in ((slide, stretches), (np.inf, stretches)):
         for stretch in factors.tolist():
             clock = stretch * times
-            tried = [_nominal(path, lay, times, clock, most, config) for path, lay in zip(paths, lays, strict=True)]
+            each = zip(paths, lays, slow, strict=True)
+            tried = [_nominal(path, lay, creeps, times, clock, most, config) for path, lay, creeps in each]
             reasons = [f"vehicle {v.id} {why}" for v, why in zip(vehicles, tried, strict=True) if isinstance(why, str)]
             if not reasons:
                 found = [nominal for nominal in tried if isinstance(nominal, _Nominal)]
-                return _model(vehicles, road, times, Clock(clock, config, _fastest(times, waits)), paths, found, config)
+                return _model(vehicles, road, times, Clock(clock, config, fastest_paces(times, waits)), paths, found, config)
     return Prepared(None, (), "; ".join(reasons))
-
-
-def _stand(encounter: Encounter, wait: Wait) -> Wait:
-    """The part of a wait in which the vehicle stands, not yet or no longer creeps; the wait itself where that is too short.
-
-    A wait begins below 0.5 m/s, so a vehicle that brakes gently still rolls for a while.
-    """
-    inside = (encounter.time >= wait.start) & (encounter.time <= wait.end)
-    stands = encounter.time[inside & (encounter.speed[wait.vehicle] <= _STANDS)]
-    if len(stands) == 0:
-        return wait
-    start = wait.start if wait.start <= encounter.time[0] else float(stands[0])
-    end = wait.end if wait.end >= encounter.time[-1] else float(stands[-1])
-    return replace(wait, start=start, end=end) if end - start >= _SHORTEST_WAIT else wait
-
-
-def _fastest(times: Floats, waits: Sequence[Wait]) -> Floats:
-    """The shortest each primitive may become, as a share of its duration, so that every wait remains one."""
-    fastest = np.full(len(times) - 1, FASTEST)
-    for wait in waits:
-        inside = (times[1:] > wait.start) & (times[:-1] < wait.end)
-        least = _LEAST_WAIT / max(wait.end - wait.start, _SHORTEST_WAIT)
-        fastest[inside] = np.maximum(fastest[inside], least)
-    return fastest
 
 
 def _layout(
@@ -136,17 +112,13 @@ def _layout(
 ) -> TimeLayout:
     """The knots of vehicle n; a route without length stands throughout, whatever speed is asked."""
     dwells = route.anchor[:-1] == route.anchor[1:]
-    own = []
-    for wait in waits:
-        if wait.vehicle == n:
-            pad = max(0.0, 0.5 * (_SHORTEST_WAIT - (wait.end - wait.start)))
-            own.append((wait.start - pad, wait.end + pad))
+    own, creeps = lengthened(n, waits, creeping=False), lengthened(n, waits, creeping=True)
     ends = (float(asked.start[n, 3]), float(asked.end[n, 3]))
     if dwells.all():
         ends = (0.0, 0.0)
-    lay = layout(times, dwells, own, encounter.time, encounter.speed[n], ends, 0.5)
+    lay = layout(times, dwells, own, encounter.time, encounter.speed[n], ends, 0.5, creeps)
     standing = [v if v > STAND or not still else 0.0 for v, still in zip(ends, lay.still[[0, -1]], strict=True)]
-    return layout(times, dwells, own, encounter.time, encounter.speed[n], (standing[0], standing[1]), share)
+    return layout(times, dwells, own, encounter.time, encounter.speed[n], (standing[0], standing[1]), share, creeps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,6 +133,7 @@ class _Nominal:
 def _nominal(
     path: BasePath,
     lay: Callable[[float | None], TimeLayout],
+    creeps: Sequence[tuple[float, float]],
     times: Floats,
     clock: Floats,
     most: float,
@@ -173,7 +146,7 @@ def _nominal(
     reason = ""
     for share in _KNOT_SHARES:
         for margin in _CURVE_MARGINS:
-            found = _feasible(path, lay(share), times, clock, most, config, margin)
+            found = _feasible(path, lay(share), creeps, times, clock, most, config, margin)
             if isinstance(found, _Nominal):
                 return found
             reason = reason or found
@@ -181,15 +154,22 @@ def _nominal(
 
 
 def _feasible(
-    path: BasePath, lay: TimeLayout, times: Floats, clock: Floats, most: float, config: SamplingConfig, margin: float
+    path: BasePath,
+    lay: TimeLayout,
+    creeps: Sequence[tuple[float, float]],
+    times: Floats,
+    clock: Floats,
+    most: float,
+    config: SamplingConfig,
+    margin: float,
 ) -> _Nominal | str:
     """Anchors and speed bounds with which the undisturbed route can be driven on `clock`, or why it cannot."""
     curve, arc = path.displaced(np.zeros((1, len(path.node))))
     knot = knots_on(clock[None], times, lay)
     lengths = piece_lengths(lay, curve, arc, path.spacing, path.anchor[None])
-    bounds = SpeedBounds.none()
+    creep, bounds = creep_bounds(lay, creeps), SpeedBounds.none()
     for _ in range(_BOUND_ROUNDS):
-        law = TimeLaw(lay, config, bounds)
+        law = TimeLaw(lay, config, creep.and_(bounds))
         speed, ok = law.solve(knot, lengths)
         anchor, slid = path.anchor, 0.0
         if not ok[0]:

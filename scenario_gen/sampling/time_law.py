@@ -78,7 +78,7 @@ class SpeedProfile:
 
 @dataclass(frozen=True, eq=False)
 class SpeedBounds:
-    """Speed bounds that stand in for curvature: at fraction `at` (B,) of interval `interval` (B,), at most `most` (B,)."""
+    """Speed bounds of curves and creeping waits: at fraction `at` (B,) of interval `interval` (B,), at most `most` (B,)."""
 
     interval: Ints
     at: Floats
@@ -88,6 +88,14 @@ class SpeedBounds:
     def none(cls) -> "SpeedBounds":
         """No bound."""
         return cls(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+
+    def and_(self, other: "SpeedBounds") -> "SpeedBounds":
+        """Both."""
+        return SpeedBounds(
+            np.concatenate([self.interval, other.interval]),
+            np.concatenate([self.at, other.at]),
+            np.concatenate([self.most, other.most]),
+        )
 
 
 class TimeLaw:

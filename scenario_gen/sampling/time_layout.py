@@ -17,6 +17,7 @@ A primitive tells of the template what the law can drive: the straight lines, jo
 at the ends of stands, that fit its speed best in the least-squares sense. The interior knot lies where the template bends.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -70,6 +71,7 @@ def layout(
     speed: Floats,
     ends: tuple[float, float],
     knot_share: float | None = None,
+    creeps: Sequence[tuple[float, float]] = (),
 ) -> TimeLayout:
     """Lay out the knots of one vehicle.
 
@@ -81,8 +83,9 @@ def layout(
         speed: (T,) its speeds [m/s].
         ends: asked speeds [m/s] at start and end.
         knot_share: where in each primitive its knot lies, as a share of its duration; None for where the template bends.
+        creeps: begin and end [s] of the waits in which it rolls on slowly; they become knots.
     """
-    cuts, still = _cuts(clock, dwells, waits, ends)
+    cuts, still = _cuts(clock, dwells, waits, ends, creeps)
     knots, stands, interior = [cuts[0]], [], []
     for a, b, stand in zip(cuts[:-1], cuts[1:], still, strict=True):
         if not stand:
@@ -122,14 +125,18 @@ def _ramps(clock: Floats, dwells: Bools, waits: list[tuple[float, float]], ends:
 
 
 def _cuts(
-    clock: Floats, dwells: Bools, waits: list[tuple[float, float]], ends: tuple[float, float]
+    clock: Floats,
+    dwells: Bools,
+    waits: list[tuple[float, float]],
+    ends: tuple[float, float],
+    creeps: Sequence[tuple[float, float]],
 ) -> tuple[list[float], list[bool]]:
     """Times at which a primitive, a wait or a roll begins or ends, none nearer than `SHORTEST`; where the vehicle stands."""
     cuts = [float(t) for t in clock]
     if dwells.all():
         return cuts, [True] * len(dwells)
     rolls = _ramps(clock, dwells, waits, ends)
-    for t in [*rolls, *(t for wait in waits for t in wait)]:
+    for t in [*rolls, *(t for wait in (*waits, *creeps) for t in wait)]:
         if clock[0] < t < clock[-1] and min(abs(t - c) for c in cuts) >= SHORTEST - 1e-9:
             cuts.append(float(t))
     cuts.sort()

@@ -53,7 +53,7 @@ class Checker:
             road: the road they drive on.
             asked: start and end states, one per vehicle.
             conflicts: the template's conflicts, whose order must be kept.
-            waits: the template's waits; in every scenario the vehicle stands as often, one after the other.
+            waits: the template's waits; in every scenario the vehicle stands, or creeps, as often, one after the other.
             limits: the limits; the default ones if None.
         """
         self.road, self.asked, self.conflicts, self.waits = road, asked, conflicts, waits
@@ -211,28 +211,30 @@ class Checker:
         waits = self.waits or ()
         for i in sorted({wait.vehicle for wait in waits}):
             asked = [wait for wait in waits if wait.vehicle == i]
-            stands = self._stands(scenario, i)
             if self._never_moves(i):
-                if stands != [(0, scenario.time.size - 1)]:
+                if self._slow(scenario, i, self.limits.stand_speed) != [(0, scenario.time.size - 1)]:
                     k = int(np.argmax(scenario.speed[i]))
                     message = f"vehicle {i}: waits throughout in the template, but reaches {scenario.speed[i, k]:.3f} m/s"
                     yield Violation(Cause.MOVING_WAIT, float(scenario.time[k]), (i,), message)
                 continue
-            # a stand serves as many consecutive waits as it is long: the template's may be parted by a short twitch
-            lengths = [float(scenario.time[b] - scenario.time[a]) for a, b in stands]
-            served = sum(int((length + 1e-9) / self.limits.stand_duration) for length in lengths) if lengths else 0
-            if served < len(asked):
-                message = (
-                    f"vehicle {i}: waits {len(asked)} time(s) in the template; stands below {self.limits.stand_speed:g} m/s for "
-                    f"{', '.join(f'{length:.1f} s' for length in lengths) or 'less than two samples'}"
-                )
-                yield Violation(Cause.MOVING_WAIT, asked[min(served, len(asked) - 1)].start, (i,), message)
+            standing = [wait for wait in asked if not wait.creeps]
+            for wanted, limit, verb in ((standing, self.limits.stand_speed, "stands"), (asked, self.limits.creep_speed, "waits")):
+                # a stand serves as many consecutive waits as it is long: the template's may be parted by a short twitch
+                lengths = [float(scenario.time[b] - scenario.time[a]) for a, b in self._slow(scenario, i, limit)]
+                served = sum(int((length + 1e-9) / self.limits.stand_duration) for length in lengths)
+                if served < len(wanted):
+                    message = (
+                        f"vehicle {i}: {verb} {len(wanted)} time(s) in the template; is below {limit:g} m/s for "
+                        f"{', '.join(f'{length:.1f} s' for length in lengths) or 'less than two samples'}"
+                    )
+                    yield Violation(Cause.MOVING_WAIT, wanted[min(served, len(wanted) - 1)].start, (i,), message)
+                    break
 
-    def _stands(self, scenario: Scenario, i: int) -> list[tuple[int, int]]:
-        """First and last sample of each stand: neither the published speed nor the displacement reaches the limit."""
-        slow = scenario.speed[i] < self.limits.stand_speed
+    def _slow(self, scenario: Scenario, i: int, limit: float) -> list[tuple[int, int]]:
+        """First and last sample of each stretch in which neither published speed nor displacement reaches the limit [m/s]."""
+        slow = scenario.speed[i] < limit
         moved = np.hypot(*np.diff(scenario.position[i], axis=0).T)
-        still = slow[:-1] & slow[1:] & (moved < self.limits.stand_speed * np.diff(scenario.time))
+        still = slow[:-1] & slow[1:] & (moved < limit * np.diff(scenario.time))
         return [(a, b + 1) for a, b in runs(still)]
 
     def _never_moves(self, i: int) -> bool:

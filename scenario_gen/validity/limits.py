@@ -30,8 +30,11 @@ class Limits:
     max_curvature: float = parameter(0.25, "largest change of heading per metre driven", unit="1/m", low=0.0)
     position_tolerance: float = parameter(0.1, "start and end positions are this near to what was asked", unit="m", low=0.0)
     speed_tolerance: float = parameter(0.1, "start and end speeds are this near to what was asked", unit="m/s", low=0.0)
-    stand_speed: float = parameter(0.1, "a vehicle that waits in the template is slower than this", unit="m/s", low=0.0)
-    stand_duration: float = parameter(1.0, "shortest stand that counts as a wait", unit="s", low=0.01)
+    stand_speed: float = parameter(0.1, "a vehicle that stands in the template is slower than this", unit="m/s", low=0.0)
+    creep_speed: float = parameter(
+        0.5, "a vehicle that waits in the template, but creeps, is slower than this", unit="m/s", low=0.0
+    )
+    stand_duration: float = parameter(1.0, "shortest stand or creep that counts as a wait", unit="s", low=0.01)
     min_clearance: float = parameter(
         0.0,
         "smallest gap between two footprints, by their best separating axis; a gap of 0 (touching) is an overlap",

@@ -23,7 +23,7 @@ import pytest
 from scenario_gen.arrays import wrap_angle
 from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import InputError
-from scenario_gen.interaction import Wait
+from scenario_gen.interaction import find_waits, Wait
 from scenario_gen.planning.route import Route
 from scenario_gen.roads.road import Road
 from scenario_gen.sampling import regenerate, sample_scenarios, SamplingConfig
@@ -33,6 +33,7 @@ from scenario_gen.sampling.sample import LEVEL_SIZE
 from scenario_gen.sampling.time_law import SpeedProfile
 from scenario_gen.scenario import BoundaryStates, Cause, Verdict, Violation
 from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.validity import Checker
 
 TIME = np.arange(201) * 0.1
 CHANGES = (60, 90, 140)
@@ -284,10 +285,25 @@ def test_a_wait_stands_where_the_vehicle_does_not_where_it_creeps():
     law = prepare(*head, (Wait(1, 6.8, 13.2),), SamplingConfig()).model.vehicles[1].law
     still = np.flatnonzero(law.layout.still)
     assert law.layout.knot[[still[0], still[-1] + 1]] == pytest.approx([7.0, 13.0])
-    creeping = replace(head[0], speed=np.maximum(head[0].speed, 0.2))
-    law = prepare(creeping, *head[1:], (Wait(1, 6.8, 13.2),), SamplingConfig()).model.vehicles[1].law
-    still = np.flatnonzero(law.layout.still)
-    assert law.layout.knot[[still[0], still[-1] + 1]] == pytest.approx([6.8, 13.2])
+
+
+def test_a_creeping_wait_stays_slow_and_does_not_stand():
+    encounter, segmentation, road, routes, asked, _ = scene()
+    rolls = np.interp(TIME, [0.0, 6.0, 8.0, 12.0, 13.0, 20.0], [6.0, 6.0, 0.4, 0.4, 0.6, 6.0])
+    creeping = replace(encounter, speed=np.array([encounter.speed[0], rolls, encounter.speed[2]]))
+    total = SpeedProfile(TIME, rolls).travelled[-1]
+    own = route(*turn(35.0, 9.0, total - 35.0 - 4.5 * np.pi), rolls)
+    ends = np.array(asked.end)
+    ends[1] = [*own.points[-1], 6.0]
+    waits = tuple(wait for wait in find_waits(creeping) if wait.vehicle == 1)
+    assert [wait.creeps for wait in waits] == [True]
+    given = (creeping, segmentation, road, (routes[0], own, routes[2]), BoundaryStates(asked.start, ends))
+    made = sample_scenarios(*given, all_valid, count=20, seed=1, waits=waits).scenarios
+    verdicts = Checker(None, None, None, waits).check(made)
+    assert not any(violation.cause is Cause.MOVING_WAIT for verdict in verdicts for violation in verdict.violations)
+    assert all((s.speed[1] > 0.0).all() for s in made)
+    stood = sample_scenarios(*given, all_valid, count=20, seed=1, waits=(replace(waits[0], creeps=False),)).scenarios
+    assert all((s.speed[1] == 0.0).sum() > 30 for s in stood)
 
 
 def test_stretched_clock_is_said():

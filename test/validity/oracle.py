@@ -195,13 +195,14 @@ def _leads(instants, first, second):
 
 def _stands(scenario, instants, velocity, asked, waits, limits):
     for i in sorted({wait.vehicle for wait in waits}):
-        slow = np.interp(instants, scenario.time, scenario.speed[i]) < limits.stand_speed
-        slow &= np.linalg.norm(velocity[i], axis=-1) < 2.0 * limits.stand_speed
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], slow, [False]))))
-        lengths = [instants[end - 1] - instants[begin] for begin, end in zip(edges[::2], edges[1::2], strict=True)]
-        wanted = sum(wait.vehicle == i for wait in waits)
-        if sum(int((length + 0.011) / limits.stand_duration) for length in lengths) < wanted:
-            yield f"moving_wait: vehicle {i} stands {len(lengths)} time(s), {sum(lengths):.2f} s in all; {wanted} wait(s) asked"
+        own = [wait for wait in waits if wait.vehicle == i]
+        for wanted, limit in ((len(own), limits.creep_speed), (sum(not wait.creeps for wait in own), limits.stand_speed)):
+            slow = np.interp(instants, scenario.time, scenario.speed[i]) < limit
+            slow &= np.linalg.norm(velocity[i], axis=-1) < 2.0 * limit
+            edges = np.flatnonzero(np.diff(np.concatenate(([False], slow, [False]))))
+            lengths = [instants[end - 1] - instants[begin] for begin, end in zip(edges[::2], edges[1::2], strict=True)]
+            if sum(int((length + 0.011) / limits.stand_duration) for length in lengths) < wanted:
+                yield f"moving_wait: vehicle {i} is slow {len(lengths)} time(s), {sum(lengths):.2f} s in all; {wanted} asked"
         throughout = any(wait.vehicle == i and wait.start == 0 for wait in waits)
         if throughout and asked is not None and np.linalg.norm(asked.end[i, :2] - asked.start[i, :2]) < 1e-3 and not slow.all():
             yield f"moving_wait: vehicle {i} waits throughout but moves"

@@ -92,7 +92,7 @@ def test_a_wait_that_moves_and_ends_that_are_missed_are_found():
     still = (np.tile((5.0, 20.0), (TIME.size, 1)), np.zeros(TIME.size), np.zeros(TIME.size))
     scenario = scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), still), TIME)
     recheck = recheck_of(scenario)
-    assert recheck.waits == [0, 1]
+    assert recheck.waits == [(0, 0), (1, 1)]
     assert found(recheck, scenario).found == {}
     creeping = scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), straight(5.0, 20.0, 0.0, 0.3, TIME)), TIME)
     account = found(recheck, creeping)

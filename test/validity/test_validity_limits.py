@@ -197,6 +197,16 @@ def test_a_wait_must_stand_for_a_second():
     assert causes(stopping(3.0, crawl=0.05), waits=waits) == []
 
 
+def test_a_creeping_wait_must_be_slow_for_a_second():
+    waits = (Wait(0, 7.0, 10.0, creeps=True),)
+    assert causes(stopping(3.0, crawl=0.4), waits=waits) == []
+    assert causes(stopping(1.2), waits=waits) == []
+    assert causes(stopping(3.0, crawl=0.6), waits=waits) == [Cause.MOVING_WAIT]
+    both = (Wait(0, 2.0, 3.5), Wait(0, 7.0, 10.0, creeps=True))
+    assert causes(stopping(3.0, crawl=0.4), waits=both) == [Cause.MOVING_WAIT]
+    assert causes(stopping(3.0), waits=both) == []
+
+
 def test_two_waits_need_two_stands_or_one_as_long():
     waits = (Wait(0, 2.0, 3.5), Wait(0, 5.0, 6.2))
     assert causes(stopping(1.2), waits=waits) == [Cause.MOVING_WAIT]
