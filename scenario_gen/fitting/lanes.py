@@ -59,10 +59,12 @@ def place_along_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConf
     Raises:
         RefusedError: it turns or crosses, or the road has too few lanes or is too short.
     """
-    unrolled = unroll(tracks)
-    needed = {sign: int(unrolled.lane[unrolled.direction == sign].max(initial=-1)) + 1 for sign in (1, -1)}
     axes = _axes(road, tracks)
-    fitting = [axis for axis in axes if len(axis.ahead) >= needed[1] and len(axis.against) >= needed[-1]]
+    for unrolled in (unroll(tracks).spread(), unroll(tracks)):
+        needed = {sign: int(unrolled.lane[unrolled.direction == sign].max(initial=-1)) + 1 for sign in (1, -1)}
+        fitting = [axis for axis in axes if len(axis.ahead) >= needed[1] and len(axis.against) >= needed[-1]]
+        if fitting:
+            break
     if not fitting:
         found = "; ".join(f"{len(a.ahead)} and {len(a.against)}" for a in axes) or "none"
         raise RefusedError(

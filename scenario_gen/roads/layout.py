@@ -40,7 +40,7 @@ def layout_for(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) 
         layout = Layout(_PLAIN, _PLAIN, 1)
     else:
         try:
-            layout = _along_a_road(tracks, unroll(tracks))
+            layout = _along_a_road(tracks, unroll(tracks).spread())
         except RefusedError:  # turns or crossings: a junction's template
             layout = _at_a_junction(tracks, config)
     main, side = (config.arm_length, config.arm_length) if config.arm_length else (layout.main, layout.side)

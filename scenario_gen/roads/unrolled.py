@@ -18,7 +18,7 @@ Vehicles that follow, meet or pass each other on one road, however it winds, are
 between them survive when the line is laid out straight.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,7 +32,9 @@ _SAME_LANE = 1.75  # metres of offset within which two vehicles may share a lane
 _LANE_CHANGE = 2.1  # metres of offset between start and end that make a lane change
 _LINE = 20.0  # metres: the reference line is smoothed over this wavelength
 _STEADY = 150.0  # metres: what projection adds is smoothed over this wavelength
+_WIDE = 30.0  # metres between oncoming vehicles on the widest road
 _BUMPER = 1.0  # metres kept between two footprints that share a lane
+_MOST_BETWEEN = 4  # lanes left free between oncoming vehicles, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +49,8 @@ class Unrolled:
         lane: (N, 2) lane at the start and at the end, counted per direction from the driver's left, 0 is the leftmost.
         change: (N, T) how much of the lane change is done, 0 to 1; 0 for a vehicle that keeps its lane.
         lanes: lanes per direction that the template needs.
+        between: (2,) lanes along and against the line that are left free between oncoming vehicles, to be as far apart as
+            they are; a road that has not got them can do without.
     """
 
     line: Curve
@@ -56,6 +60,13 @@ class Unrolled:
     lane: Ints
     change: Floats
     lanes: int
+    between: tuple[int, int] = (0, 0)
+
+    def spread(self) -> "Unrolled":
+        """The same with the lanes between oncoming vehicles counted."""
+        ahead, against = self.between
+        lane = self.lane + np.where(self.direction[:, None] > 0, ahead, against)
+        return replace(self, lane=frozen_ints(lane), lanes=int(lane.max()) + 1, between=(0, 0))
 
 
 def unroll(tracks: tuple[Track, ...]) -> Unrolled:
@@ -84,7 +95,10 @@ def unroll(tracks: tuple[Track, ...]) -> Unrolled:
                 f"this template needs a junction"
             )
     lane, change, lanes = _lanes(tracks, direction, station, offset)
-    return Unrolled(line, frozen_ints(direction), frozen(station), frozen(offset), frozen_ints(lane), frozen(change), lanes)
+    between = _between(direction, offset)
+    return Unrolled(
+        line, frozen_ints(direction), frozen(station), frozen(offset), frozen_ints(lane), frozen(change), lanes, between
+    )
 
 
 def _steadied(track: Track, along: Floats) -> Floats:
@@ -150,7 +164,7 @@ def _extended(line: Curve, other: Curve) -> Curve:
 
 
 def _shifted(curve: Curve, rows: Ints, offset: float) -> Floats:
-    shift = offset if abs(offset) < 10.0 else 0.0  # farther apart there is nothing to fit on to
+    shift = offset if abs(offset) < _WIDE else 0.0  # farther apart there is nothing to fit on to
     normal = np.column_stack((np.sin(curve.points[rows, 2]), -np.cos(curve.points[rows, 2])))
     return np.asarray(curve.points[rows, :2] + shift * normal)
 
@@ -184,6 +198,16 @@ def _lanes(tracks: tuple[Track, ...], direction: Ints, station: Floats, offset: 
             if not changes[j]:
                 lane[j, 1] = current
     return lane, change, int(lane.max()) + 1
+
+
+def _between(direction: Ints, offset: Floats) -> tuple[int, int]:
+    """Lanes along and against the line by which oncoming vehicles are farther apart than neighbouring lanes are."""
+    aside = offset.mean(axis=1)
+    if (direction > 0).all() or (direction < 0).all():
+        return 0, 0
+    apart = float(aside[direction < 0].min() - aside[direction > 0].max())  # of those nearest to the middle
+    free = min(max(round(apart / (2.0 * _SAME_LANE)) - 1, 0), _MOST_BETWEEN)
+    return (free + 1) // 2, free // 2
 
 
 def _beside(tracks: tuple[Track, ...], station: Floats, i: int, j: int) -> bool:
