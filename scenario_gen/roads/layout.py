@@ -31,6 +31,8 @@ _U_TURN = 12.0  # metres between the lanes of a U-turn
 _SAME_WAY = np.radians(25.0)
 _LANE_GAP = 2.0  # metres sideways that make another lane
 _WIDEST = 12.0
+_ONCOMING = 20.0  # metres sideways within which oncoming vehicles are on the same road
+_MOST_LANES = 3  # per direction, for oncoming vehicles to be as far apart as they are
 _PLAIN = 60.0  # metres: an arm when there is no template
 
 
@@ -86,14 +88,17 @@ def _at_a_junction(tracks: tuple[Track, ...], config: RoadConfig) -> Layout:
     need = np.array(needs)
     main = float(need.max())
     side = max(float(need[across > np.sin(np.radians(30.0))].max(initial=_SHORTEST)), _SHORTEST)
-    lanes = _parallel_lanes(tracks)
+    lanes = _parallel_lanes(tracks, config.lane_width)
     if any(track.makes_u_turn for track in tracks):  # from one outermost lane to the other in a half circle
         lanes = max(lanes, int(np.ceil((_U_TURN / config.lane_width + 1.0) / 2.0)))
     return Layout(max(main, _SHORTEST), side, lanes)
 
 
-def _parallel_lanes(tracks: tuple[Track, ...]) -> int:
-    """The most lanes in which vehicles come or leave the same way, by how far beside one's path others start or end."""
+def _parallel_lanes(tracks: tuple[Track, ...], lane_width: float) -> int:
+    """Lanes per direction for those who come or leave the same way, and for those who come or leave the opposite way.
+
+    By how far beside one's path others start or end; lanes i and j of the two directions are i + j + 1 lanes apart.
+    """
     most = 1
     for k in (0, -1):
         poses = np.stack([track.poses[k] for track in tracks])
@@ -102,4 +107,7 @@ def _parallel_lanes(tracks: tuple[Track, ...]) -> int:
             same = (np.cos(poses[:, 2] - track.curve.at(station)[:, 2]) > np.cos(_SAME_WAY)) & (np.abs(offset) < _WIDEST)
             gaps = np.diff(np.sort(offset[same]))
             most = max(most, 1 + int((gaps > _LANE_GAP).sum()))
+            oncoming = (np.cos(poses[:, 2] - track.curve.at(station)[:, 2]) < -np.cos(_SAME_WAY)) & (np.abs(offset) < _ONCOMING)
+            between = np.round(np.abs(offset[oncoming]) / lane_width - 1.0).max(initial=0.0)
+            most = max(most, min(1 + int(np.ceil(between / 2.0)), _MOST_LANES))
     return most
