@@ -23,7 +23,7 @@ from scenario_gen.fitting import fit_template, fitted_template, FittingConfig
 from scenario_gen.interaction import find_conflicts
 from scenario_gen.logs import read_log
 from scenario_gen.planning.route import Route
-from scenario_gen.roads import build_road, Road
+from scenario_gen.roads import build_road, Road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.roads.curve import Curve
 from scenario_gen.segmentation.result import Segmentation
@@ -103,6 +103,17 @@ def test_every_recorded_encounter_fits_two_roads_and_refusals_say_why(recorded):
                 assert 0.8 <= f.scale <= 1.25
                 assert f.moved.max() <= 3.0
         assert fitted >= 2, name
+
+
+def test_oncoming_vehicles_stay_as_far_apart_where_there_are_lanes():
+    speed = np.full(80, 9.0)
+    encounter = encounter_of(driven(straight(0.0, 0.0, 0.3), speed), driven(straight(110.0, 45.0, 0.3 - np.pi), speed))
+    assert relative(np.array([0.0, 0.0, 0.3]), np.array([110.0, 45.0]))[1] == pytest.approx(10.5, abs=0.1)
+    for lanes, apart in ((0, 10.5), (1, 3.5)):  # as many as the template needs; one, which does too
+        road = build_road("straight", encounter, RoadConfig(lanes=lanes))
+        fit = fit_template(encounter, every(encounter), road)
+        one, two = (f.anchors[0] for f in fit.fitted)
+        assert abs(relative(one, two)[1]) == pytest.approx(apart, abs=0.1)
 
 
 @pytest.mark.data

@@ -122,6 +122,26 @@ def test_lanes_and_changes_of_lane_are_told_from_offsets():
     assert not unrolled.change[1:].any()
 
 
+@pytest.mark.parametrize(
+    ("apart", "between"), [(3.5, (0, 0)), (7.0, (1, 0)), (12.0, (1, 1)), (14.0, (2, 1)), (25.0, (2, 2)), (-4.0, (0, 0))]
+)
+def test_oncoming_vehicles_that_are_far_apart_have_lanes_between_them(apart, between):
+    encounter = encounter_of(line(0.0, 0.0, 0.0, 10.0), line(120.0, apart, np.pi, 9.0))
+    unrolled = unroll(clean_tracks(encounter))
+    assert unrolled.between == between
+    spread = unrolled.spread()
+    ahead, against = (spread.lane[unrolled.direction == sign, 0].item() for sign in (1, -1))
+    assert (ahead, against) == between
+    assert spread.lanes == max(between) + 1
+
+
+def test_a_line_continued_by_one_far_beside_it_does_not_jump():
+    encounter = encounter_of(line(0.0, 0.0, 0.0, 7.0), line(125.0, 18.0, np.pi, 6.0))
+    unrolled = unroll(clean_tracks(encounter))
+    assert np.ptp(unrolled.line.points[:, 1]) < 1.0
+    assert abs(abs(unrolled.offset[1] - unrolled.offset[0]).mean() - 18.0) < 0.5
+
+
 def test_turns_and_crossings_are_not_along_a_road():
     with pytest.raises(RefusedError, match="vehicle 0 turns left"):
         unroll(clean_tracks(encounter_of(arc(0.0, 0.0, 0.0, 10.0, 2.0), line(0.0, 30.0, 0.0, 5.0))))
