@@ -26,7 +26,7 @@ from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.evaluation import Case, evaluate, Evaluation, ORACLE, render, replay, ReportInput, UNIFORM, WITH, WITHOUT
 from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints
 from scenario_gen.logs import read_log
-from scenario_gen.pipeline import Arm, PipelineConfig, run_arm, run_reference, without_changepoints
+from scenario_gen.pipeline import Arm, PipelineConfig, run_arm, without_changepoints
 from scenario_gen.roads import build_road, Road
 from scenario_gen.segmentation import segment, Segmentation
 
@@ -100,7 +100,7 @@ def _measure(
         arms = {WITH: arm}
         for name_of, reference in references.items():
             try:
-                arms[name_of] = run_reference(encounter, reference, road, config, count=COUNT, seed=seed)
+                arms[name_of] = run_arm(encounter, reference, road, config, count=COUNT, seed=seed, reference=True)
             except RefusedError as error:
                 say(f"{encounter.name} on {road.name}, seed {seed}, {name_of}: {error}")
         found.append(_evaluated(encounter, arms, road, own_road=own_road, seed=seed))

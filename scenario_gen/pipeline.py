@@ -104,31 +104,16 @@ def run_arm(
     seed: int,
     request: Request = Request(),  # noqa: B008 - frozen
     progress: Progress | None = None,
+    reference: bool = False,
 ) -> Arm:
-    """Fit the changepoints to the road, plan between them, sample and check."""
-    chain = Chain(encounter, segmentation, road, seed, config.fitting, config.planning, config.sampling, config.limits)
-    outcome = run_request(chain, request, count=count, progress=progress)
-    return Arm(segmentation, outcome.fit, outcome.routes, outcome.scenarios)
+    """Fit the changepoints to the road, plan between them, sample and check.
 
-
-def run_reference(
-    encounter: Encounter,
-    segmentation: Segmentation,
-    road: Road,
-    config: PipelineConfig,
-    *,
-    count: int,
-    seed: int,
-    request: Request = Request(),  # noqa: B008 - frozen
-) -> Arm:
-    """Do the same with changepoints that the segmenter's are measured against.
-
-    Of the template it knows what its own changepoints tell: a wait whose ends were known besides would be two more of them.
+    A `reference`, which the segmenter's changepoints are measured against, knows of the template what its own changepoints
+    tell: a wait whose ends were known besides would be two more of them.
     """
-    chain = Chain(
-        encounter, segmentation, road, seed, config.fitting, config.planning, config.sampling, config.limits, holds_waits=False
-    )
-    outcome = run_request(chain, request, count=count, suggest=False)
+    stages = (config.fitting, config.planning, config.sampling, config.limits)
+    chain = Chain(encounter, segmentation, road, seed, *stages, holds_waits=not reference)
+    outcome = run_request(chain, request, count=count, progress=progress, suggest=not reference)
     return Arm(segmentation, outcome.fit, outcome.routes, outcome.scenarios)
 
 
@@ -162,7 +147,7 @@ def with_ablation(
     arms, refused = {WITH: arm}, {}
     for name, segmentation in others.items():
         try:
-            arms[name] = run_reference(encounter, segmentation, road, config, count=count, seed=seed, request=request)
+            arms[name] = run_arm(encounter, segmentation, road, config, count=count, seed=seed, request=request, reference=True)
         except RefusedError as error:
             refused[name] = str(error)
     made = {name: one.scenarios for name, one in arms.items()}

@@ -91,15 +91,13 @@ def prepare(
     vehicles, waits = [encounter.vehicles[n] for n in driven], [wait for wait in waits if wait.vehicle != ego]
     paths = [BasePath.of(routes[n]) for n in driven]
     lays = [partial(_layout, n, encounter, times, routes[n], asked, waits) for n in driven]
-    slow = [lengthened(n, waits, creeping=True) for n in driven]
     slide = SLIDE_SIGMAS * config.longitudinal_sigma
     stretches = np.linspace(1.0, 1.0 + config.max_stretch, _STRETCHES if config.max_stretch > 0.0 else 1)
     reasons: list[str] = []
     for most, factors in ((slide, stretches), (np.inf, stretches)):
         for stretch in factors.tolist():
             clock = stretch * times
-            each = zip(paths, lays, slow, strict=True)
-            tried = [_nominal(path, lay, creeps, times, clock, most, config) for path, lay, creeps in each]
+            tried = [_nominal(path, lay, times, clock, most, config) for path, lay in zip(paths, lays, strict=True)]
             reasons = [f"vehicle {v.id} {why}" for v, why in zip(vehicles, tried, strict=True) if isinstance(why, str)]
             if not reasons:
                 found = [nominal for nominal in tried if isinstance(nominal, _Nominal)]
@@ -133,7 +131,6 @@ class _Nominal:
 def _nominal(
     path: BasePath,
     lay: Callable[[float | None], TimeLayout],
-    creeps: Sequence[tuple[float, float]],
     times: Floats,
     clock: Floats,
     most: float,
@@ -146,7 +143,7 @@ def _nominal(
     reason = ""
     for share in _KNOT_SHARES:
         for margin in _CURVE_MARGINS:
-            found = _feasible(path, lay(share), creeps, times, clock, most, config, margin)
+            found = _feasible(path, lay(share), times, clock, most, config, margin)
             if isinstance(found, _Nominal):
                 return found
             reason = reason or found
@@ -154,20 +151,13 @@ def _nominal(
 
 
 def _feasible(
-    path: BasePath,
-    lay: TimeLayout,
-    creeps: Sequence[tuple[float, float]],
-    times: Floats,
-    clock: Floats,
-    most: float,
-    config: SamplingConfig,
-    margin: float,
+    path: BasePath, lay: TimeLayout, times: Floats, clock: Floats, most: float, config: SamplingConfig, margin: float
 ) -> _Nominal | str:
     """Anchors and speed bounds with which the undisturbed route can be driven on `clock`, or why it cannot."""
     curve, arc = path.displaced(np.zeros((1, len(path.node))))
     knot = knots_on(clock[None], times, lay)
     lengths = piece_lengths(lay, curve, arc, path.spacing, path.anchor[None])
-    creep, bounds = creep_bounds(lay, creeps), SpeedBounds.none()
+    creep, bounds = creep_bounds(lay), SpeedBounds.none()
     for _ in range(_BOUND_ROUNDS):
         law = TimeLaw(lay, config, creep.and_(bounds))
         speed, ok = law.solve(knot, lengths)

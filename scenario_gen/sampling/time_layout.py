@@ -39,6 +39,7 @@ class TimeLayout:
         knot: (M,) seconds.
         piece: (M - 1,) primitive of each interval.
         still: (M - 1,) True where the vehicle stands.
+        creeping: (M - 1,) True where it waits, but rolls on slowly.
         group: (M - 1,) length constraint each moving interval belongs to, -1 where it stands.
         bounds: (G, 2) anchors at which each length constraint begins and ends.
         moments: (M - 1, 2) ∫ (1 - ξ) v̂ dξ and ∫ ξ v̂ dξ over each interval, ξ from 0 to 1 [m/s].
@@ -50,6 +51,7 @@ class TimeLayout:
     knot: Floats
     piece: Ints
     still: Bools
+    creeping: Bools
     group: Ints
     bounds: Ints
     moments: Floats
@@ -97,7 +99,9 @@ def layout(
         knots.append(b)
         stands.append(stand)
     knot, standing = np.array(knots), np.array(stands)
-    piece = np.clip(np.searchsorted(clock, 0.5 * (knot[:-1] + knot[1:]), side="right") - 1, 0, len(clock) - 2)
+    middle = 0.5 * (knot[:-1] + knot[1:])
+    piece = np.clip(np.searchsorted(clock, middle, side="right") - 1, 0, len(clock) - 2)
+    slow = ~standing & np.array([any(a < t < b for a, b in creeps) for t in middle.tolist()])
     group, bounds = _groups(piece, standing, dwells)
     given = np.full(len(knot), np.nan)
     given[[0, -1]] = ends
@@ -107,7 +111,7 @@ def layout(
     told = _joined_lines(time, speed, knot, standing)
     moments = np.column_stack([told[:-1] / 3.0 + told[1:] / 6.0, told[:-1] / 6.0 + told[1:] / 3.0])
     inner = np.array(interior, dtype=np.int64)
-    return TimeLayout(knot, piece, standing, group, bounds, frozen(moments), inner, unknown, np.nan_to_num(given))
+    return TimeLayout(knot, piece, standing, slow, group, bounds, frozen(moments), inner, unknown, np.nan_to_num(given))
 
 
 def _asleep(t: float, clock: Floats, dwells: Bools, waits: list[tuple[float, float]]) -> bool:

@@ -62,13 +62,9 @@ def lengthened(n: int, waits: Sequence[Wait], *, creeping: bool) -> list[tuple[f
     return [(wait.start - pad, wait.end + pad) for wait, pad in zip(own, pads, strict=True)]
 
 
-def creep_bounds(lay: TimeLayout, creeps: Sequence[tuple[float, float]]) -> SpeedBounds:
+def creep_bounds(lay: TimeLayout) -> SpeedBounds:
     """Speed bounds at both ends of every interval within a creeping wait, where the speed there is not given."""
-    middle = 0.5 * (lay.knot[:-1] + lay.knot[1:])
-    slow = np.zeros(len(middle), dtype=np.bool_)
-    for begin, end in creeps:
-        slow |= (middle > begin) & (middle < end) & ~lay.still
-    inside = np.flatnonzero(slow)
+    inside = np.flatnonzero(lay.creeping)
     interval, at = np.concatenate([inside, inside]), np.repeat([0.0, 1.0], len(inside))
     known = lay.unknown[interval + at.astype(np.int64)] < 0
     return SpeedBounds(interval[~known], at[~known], np.full(int((~known).sum()), _CREEPS))
