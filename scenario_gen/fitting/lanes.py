@@ -60,7 +60,8 @@ def place_along_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConf
         RefusedError: it turns or crosses, or the road has too few lanes or is too short.
     """
     axes = _axes(road, tracks)
-    for unrolled in (unroll(tracks).spread(), unroll(tracks)):
+    compact = unroll(tracks)
+    for unrolled in (compact.spread(), compact):
         needed = {sign: int(unrolled.lane[unrolled.direction == sign].max(initial=-1)) + 1 for sign in (1, -1)}
         fitting = [axis for axis in axes if len(axis.ahead) >= needed[1] and len(axis.against) >= needed[-1]]
         if fitting:

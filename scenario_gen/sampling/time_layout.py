@@ -176,7 +176,7 @@ def _joined_lines(time: Floats, speed: Floats, knot: Floats, still: Bools) -> Fl
     free = ~(np.append(still, False) | np.append(False, still))
     lines = np.where(free, np.interp(knot, time, speed), 0.0)
     moving = ~still[at]
-    if free.any():  # changes to the speeds met at the knot: none where no sample says anything
+    if free.any():  # changes to the speeds met at the knots: none where no sample says anything
         lines[free] += np.linalg.lstsq(hats[np.ix_(moving, free)], (speed - hats @ lines)[moving], rcond=None)[0]
     return np.asarray(np.maximum(lines, 0.0))
 
