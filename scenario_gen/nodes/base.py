@@ -30,6 +30,7 @@ from rclpy.utilities import remove_ros_args
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.topics import LATCHED, Quality, topic_entry
 from scenario_gen.errors import ScenarioGenError
+from scenario_gen.nodes.answering import Answers
 from scenario_gen.nodes.compiling import compile_kernels
 from scenario_gen.nodes.interrupts import interrupt
 from scenario_gen.nodes.message_classes import message_class
@@ -259,6 +260,7 @@ def run_nodes(make: Maker | Sequence[Maker], arguments: Sequence[str] | None = N
         for namespace in where:
             for one in (make,) if callable(make) else make:
                 nodes.append(one(namespace))
+                Answers(nodes[-1])
                 executor.add_node(nodes[-1])
         for node in nodes:
             node.autostart()

@@ -86,7 +86,11 @@ def test_twenty_callers_from_twenty_processes_get_their_own_answers(suite, domai
         )
         for seed, count in counts.items()
     }
-    answers = {seed: json.loads(caller.communicate(timeout=120.0)[0]) for seed, caller in callers.items()}
+    said = {seed: caller.communicate(timeout=120.0)[0] for seed, caller in callers.items()}
+    assert all(said.values()), (
+        f"callers without an answer: {[seed for seed in said if not said[seed]]}\n{suite.log('gp_sampler')}"
+    )
+    answers = {seed: json.loads(words) for seed, words in said.items()}
     for seed, (successful, reason) in answers.items():
         assert successful, reason
         assert f"{counts[seed]} of {counts[seed]} scenarios" in reason
