@@ -22,6 +22,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from itertools import islice
 import json
 from typing import TYPE_CHECKING
 
@@ -120,6 +121,17 @@ def scenario_status(scenario: Scenario, data: bytes, request: str, node: str, **
         **more,
     }
     return Status(f"{node}: scenario", Level.OK, f"scenario {scenario.index} of request {request}", values)
+
+
+def take_entry(entries: dict[str, Mapping[str, str]], entry: Mapping[str, str]) -> None:
+    """Add a scenario's entry to those of its request, by index; an index that is there already, or another seed, begins it anew.
+
+    A sampler that was killed and started again counts its requests from 1 again. Index 0 may be missing, for its candidate may
+    have been refused, and indices do not always ascend, for adapted candidates are counted apart.
+    """
+    if entry["index"] in entries or any(entry["seed"] != known["seed"] for known in islice(entries.values(), 1)):
+        entries.clear()
+    entries[entry["index"]] = entry
 
 
 def request_status(

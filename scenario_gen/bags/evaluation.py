@@ -19,15 +19,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from msg_conventions.roads import decode_map
-from msg_conventions.scenarios import decode_scenario
+from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags.contents import read_namespaces
-from scenario_gen.bags.told import request_sentence, told_fit, told_requests, told_segmentation, told_values
+from scenario_gen.bags.told import request_sentence, told_fit, told_numbers, told_requests, told_segmentation, told_values
 from scenario_gen.bags.validation import Reference
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import Case, CheckCounts, evaluate, Evaluation, EvaluationConfig
 from scenario_gen.interaction import find_conflicts, find_waits
-from scenario_gen.scenario import ScenarioSet
+from scenario_gen.scenario import Scenario, ScenarioSet
 from scenario_gen.validity import Checker, Limits
 
 SCENARIOS, INFO, DIAGNOSTICS = "scenarios", "scenarios/info", "diagnostics"
@@ -76,7 +76,7 @@ def _case(
     accounts = told_values(topics[INFO], encounter.start_ns).values()
     road_name = next((values["road"] for values in accounts if "road" in values), f"{namespace}/map")
     road = decode_map(topics["map"][-1], name=road_name)[1] if topics["map"] else None
-    scenarios = [decode_scenario(data, index=k, what=f"{namespace}/{SCENARIOS}")[1] for k, data in enumerate(topics[SCENARIOS])]
+    scenarios = _scenarios(topics, f"{namespace}/{SCENARIOS}")
     conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
     waits = find_waits(encounter) if segmentation.changepoints.size else ()
     names = tuple(vehicle.id for vehicle in encounter.vehicles)
@@ -115,6 +115,16 @@ def _case(
         row=SCENARIOS,
         valid=counts.candidates - sum(counts.refused.values()),
     )
+
+
+def _scenarios(topics: Mapping[str, Sequence[bytes]], what: str) -> list[Scenario]:
+    """Return the scenarios, numbered as `scenarios/info` says; those that it does not know by their places in the bag."""
+    told = told_numbers(topics[INFO])
+    numbers = [told.get(digest(data), (0, k)) for k, data in enumerate(topics[SCENARIOS])]
+    return [
+        decode_scenario(data, seed=seed, index=index, what=what)[1]
+        for data, (seed, index) in zip(topics[SCENARIOS], numbers, strict=True)
+    ]
 
 
 def _left_out(topics: Mapping[str, Sequence[bytes]]) -> tuple[str, ...]:

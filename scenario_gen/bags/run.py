@@ -30,6 +30,7 @@ from msg_conventions.diagnostics import (
     request_status,
     scenario_status,
     Status,
+    take_entry,
 )
 from msg_conventions.ego import ego_messages, ego_values
 from msg_conventions.fits import anchor_stamps, encode_fit
@@ -141,7 +142,7 @@ def write_run(folder: Path, runs: Run | Sequence[Run]) -> Path:
 def read_scenario_set(folder: Path, namespace: str = "") -> ScenarioSet:
     """Return the last request's scenarios and its account from a bag, whoever recorded it.
 
-    Scenario 0 begins a request anew: a sampler that was killed and started again counts its requests from 1 again.
+    A request that a killed sampler began and, started again, published once more counts once (`take_entry`).
 
     Raises:
         InputError: the bag cannot be read, no request was closed in it, or a scenario of the request is missing.
@@ -157,16 +158,16 @@ def read_scenario_set(folder: Path, namespace: str = "") -> ScenarioSet:
     closing = next((entry for entry in reversed(entries) if "published" in entry.values), None)
     if closing is None:
         raise InputError(f"{folder}: no request was closed on {wanted[1]}")
-    scenarios: list[Scenario] = []
+    own: dict[str, Mapping[str, str]] = {}
     for entry in entries:
-        values = entry.values
-        if "sha256" in values and values["request"] == closing.values["request"]:
-            if values["sha256"] not in by_digest:
-                raise InputError(f"{folder}: scenario {values['index']} of request {values['request']} is not on {wanted[0]}")
-            data = by_digest[values["sha256"]]
-            if values["index"] == "0":
-                scenarios = []
-            scenarios.append(decode_scenario(data, seed=int(values["seed"]), index=int(values["index"]))[1])
+        if "sha256" in entry.values and entry.values["request"] == closing.values["request"]:
+            take_entry(own, entry.values)
+    scenarios: list[Scenario] = []
+    for values in own.values():
+        if values["sha256"] not in by_digest:
+            raise InputError(f"{folder}: scenario {values['index']} of request {values['request']} is not on {wanted[0]}")
+        data = by_digest[values["sha256"]]
+        scenarios.append(decode_scenario(data, seed=int(values["seed"]), index=int(values["index"]))[1])
     if len(scenarios) != int(closing.values["published"]):
         raise InputError(f"{folder}: {closing.values['published']} scenarios were published, {len(scenarios)} are on {wanted[0]}")
     return read_request(closing, tuple(scenarios))

@@ -72,6 +72,18 @@ def told_requests(messages: Sequence[bytes]) -> tuple[Values, ...]:
     return tuple(found)
 
 
+def told_numbers(messages: Sequence[bytes]) -> dict[str, tuple[int, int]]:
+    """Return seed and index of the scenarios that `scenarios/info` numbers, by SHA-256."""
+    found: dict[str, tuple[int, int]] = {}
+    for data in messages:
+        try:
+            entries = [status.values for status in decode_diagnostics(data)[1] if "sha256" in status.values]
+            found |= {entry["sha256"]: (int(entry["seed"]), int(entry["index"])) for entry in entries}
+        except (InputError, KeyError, ValueError):
+            continue
+    return found
+
+
 def request_sentence(account: Values) -> str:
     """Return in words what a request came to, by its own account."""
     refused = [f"{key[len(REFUSED) :]} {value}" for key, value in account.items() if key.startswith(REFUSED) and value != "0"]

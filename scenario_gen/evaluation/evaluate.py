@@ -180,9 +180,15 @@ def _measure(name: str, scenarios: Sequence[Scenario], reference: _Reference, co
 
 
 def _pairs(scenarios: Sequence[Scenario]) -> Ints:
-    """(S,) number of each scenario's mirrored pair: the sampler draws candidates 2k and 2k + 1 as mirror images."""
-    index = np.array([scenario.index for scenario in scenarios])
-    return index // 2 if len(np.unique(index)) == len(index) else np.arange(len(index))  # not numbered: not the sampler's
+    """(S,) number of each scenario's mirrored pair: the sampler draws candidates 2k and 2k + 1 of a seed as mirror images.
+
+    Scenarios that share a number were not numbered by the sampler; each is a pair of its own.
+    """
+    numbers = [(scenario.seed, scenario.index) for scenario in scenarios]
+    if len(set(numbers)) < len(numbers):
+        return np.arange(len(numbers))
+    pairs: dict[tuple[int, int], int] = {}
+    return np.array([pairs.setdefault((seed, index // 2), len(pairs)) for seed, index in numbers], dtype=np.int64)
 
 
 def _likeness(reference: _Reference, position: Floats, speed: Floats, bootstrap: Bootstrap) -> dict[str, Interval]:

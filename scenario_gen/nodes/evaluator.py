@@ -14,19 +14,21 @@
 
 """evaluator: `tracks`, `changepoints` and the `scenarios` of a request in; its figures out as `report`."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 import math
 import sys
 
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, read_request, Status
+from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, read_request, Status, take_entry
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import CheckCounts, evaluate, EvaluationConfig, WITH
 from scenario_gen.nodes.base import run_nodes, StageNode
 from scenario_gen.parameters import check, parameter
+
+Told = Sequence[tuple[bytes, Mapping[str, str]]]  # scenarios, each with its entry of `scenarios/info`
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Evaluator(StageNode):
         super().__init__("evaluator", Config(), namespace)
         self._newest: dict[str, bytes] = {}
         self._scenarios: dict[str, bytes] = {}  # by SHA-256
-        self._open: dict[str, list[str]] = {}  # request -> digests, in order
+        self._open: dict[str, dict[str, Mapping[str, str]]] = {}  # request -> index -> entry of `scenarios/info`
         self._closed: list[Status] = []
 
     def received(self, topic: str, data: bytes) -> None:
@@ -66,31 +68,26 @@ class Evaluator(StageNode):
                 if "published" in status.values:
                     self._closed.append(status)
                 elif "sha256" in status.values:
-                    self._opened(status.values)
+                    take_entry(self._open.setdefault(status.values["request"], {}), status.values)
         else:
             self._newest[topic] = data
         for status in list(self._closed):
-            digests = self._open.get(status.values["request"], [])
-            if {"tracks", "changepoints"} <= set(self._newest) and all(key in self._scenarios for key in digests):
+            entries = tuple(self._open.get(status.values["request"], {}).values())
+            if {"tracks", "changepoints"} <= set(self._newest) and all(v["sha256"] in self._scenarios for v in entries):
                 self._closed.remove(status)
                 self._open.pop(status.values["request"], None)
-                scenarios = [self._scenarios.pop(key) for key in dict.fromkeys(digests)]
-                self._submit(dict(self._newest), scenarios, status)
+                self._submit(dict(self._newest), [(self._scenarios[v["sha256"]], v) for v in entries], status)
+                for values in entries:  # two may have the same bytes
+                    self._scenarios.pop(values["sha256"], None)
 
-    def _opened(self, values: Mapping[str, str]) -> None:
-        """Note a scenario of a request; number 0 begins it anew, for a sampler that was restarted counts from 1 again."""
-        if values["index"] == "0":
-            self._open[values["request"]] = []
-        self._open.setdefault(values["request"], []).append(values["sha256"])
-
-    def _submit(self, messages: Mapping[str, bytes], scenarios: list[bytes], status: Status) -> None:
+    def _submit(self, messages: Mapping[str, bytes], scenarios: Told, status: Status) -> None:
         name = f"request {status.values['request']}"
         self.work(name, lambda cancelled: None if cancelled() else self._evaluate(messages, scenarios, status))
 
-    def _evaluate(self, messages: Mapping[str, bytes], scenarios: list[bytes], status: Status) -> None:
+    def _evaluate(self, messages: Mapping[str, bytes], scenarios: Told, status: Status) -> None:
         encounter = decode_tracks(messages["tracks"])
         segmentation = decode_changepoints(messages["changepoints"], encounter)
-        decoded = [decode_scenario(data) for data in scenarios]
+        decoded = [decode_scenario(data, seed=int(v["seed"]), index=int(v["index"])) for data, v in scenarios]
         if any(stamp != encounter.start_ns for stamp, _ in decoded):
             raise InputError(f"request {status.values['request']}: its scenarios are not those of the newest tracks")
         account = read_request(status, tuple(scenario for _, scenario in decoded))

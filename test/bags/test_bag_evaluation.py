@@ -33,7 +33,7 @@ from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.bags.told import told_provenance
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import EvaluationConfig, render, ReportInput, write_report
+from scenario_gen.evaluation import evaluate, EvaluationConfig, render, ReportInput, write_report
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.pipeline import PipelineConfig, run_arm
@@ -71,6 +71,22 @@ def test_the_figures_survive_the_bag(tmp_path):
             expected = case.evaluation.value("with changepoints", key)
             assert evaluation.value("scenarios", key) == pytest.approx(expected, rel=1e-6, abs=1e-9), key
         assert 0.0 <= evaluation.value("scenarios", "acceptance") <= 1.0
+
+
+def test_the_intervals_survive_it_too_where_candidates_were_refused(tmp_path):
+    """Which scenarios mirror each other follows from their indices, not from their places in the bag."""
+    case = report_case(6)
+    numbered = [replace(s, index=k) for s, k in zip(case.with_changepoints.scenarios, (1, 2, 5, 8, 9, 3), strict=True)]
+    case = replace(case, with_changepoints=replace(case.with_changepoints, scenarios=tuple(numbered)))
+    (found,) = evaluate_bag(write_run(tmp_path / "run", as_run(case)), QUICK)
+    direct = evaluate(case.encounter, case.segmentation, {"scenarios": numbered}, config=QUICK)
+    (row,), (expected,) = ([row for row in e.rows if row.name == "scenarios"] for e in (found, direct))
+    places = [replace(scenario, index=k) for k, scenario in enumerate(numbered)]
+    (other,) = (row for row in evaluate(case.encounter, case.segmentation, {"scenarios": places}, config=QUICK).rows[1:])
+    for key in ("e_position", "e_speed", "diversity"):
+        assert row.values[key].low == pytest.approx(expected.values[key].low, rel=1e-6), key
+        assert row.values[key].high == pytest.approx(expected.values[key].high, rel=1e-6), key
+        assert row.values[key].low != pytest.approx(other.values[key].low, rel=1e-3), key
 
 
 def test_a_bag_without_scenarios_is_refused(tmp_path):

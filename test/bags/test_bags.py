@@ -156,17 +156,24 @@ def test_the_scenarios_of_a_request_are_read_with_their_account(run, tmp_path):
         read_scenario_set(folder, "/c")
 
 
-def test_a_request_that_came_twice_counts_once(run, tmp_path):
+@pytest.mark.parametrize(
+    "indices", [(0, 1, 2, 3, 4), (1, 2, 1_000_001, 1_000_003, 4)], ids=["none refused", "refused and adapted"]
+)
+@pytest.mark.parametrize("begun", [3, 5, 7])
+def test_a_request_that_came_twice_counts_once(run, tmp_path, indices, begun):
     """As a sampler publishes it that was killed in the midst of it and started again."""
+    scenarios = tuple(replace(s, index=index) for s, index in zip(run.result.scenarios, indices, strict=True))
+    run = replace(run, result=replace(run.result, scenarios=scenarios))
     whole = list(read_messages(write_run(tmp_path / "whole", run)))
     told = [message for message in whole if message.topic in ("/scenarios", "/scenarios/info")]
     bag = BagWriter(tmp_path / "twice")
     for topic in bag_topics(tmp_path / "whole"):
         bag.add_topic(topic.name, topic.type)
-    for k, message in enumerate([*whole, *told[:3], *told]):
+    for k, message in enumerate([*whole, *told[:begun], *told]):
         bag.write(message.topic, message.data, whole[0].stamp_ns + k)
     bag.close()
     got = read_scenario_set(tmp_path / "twice")
+    assert [s.index for s in got.scenarios] == list(indices)
     assert [s.position.tobytes() for s in got.scenarios] == [s.position.tobytes() for s in run.result.scenarios]
 
 

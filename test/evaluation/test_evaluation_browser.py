@@ -52,6 +52,14 @@ class Report(Tab):
     def time(self, case=0):
         return float(self.part("clock", case).inner_text().split("/")[0])
 
+    def wait(self, condition):
+        """Wait until something holds; half a minute is enough for a busy machine."""
+        for _ in range(600):
+            if condition():
+                return
+            self.page.wait_for_timeout(50)
+        raise AssertionError("waited for half a minute")
+
     def picture(self, role, case=0):
         """The canvas as text: two pictures are equal if and only if their texts are."""
         return self.part(role, case).evaluate("canvas => canvas.toDataURL()")
@@ -84,17 +92,16 @@ def test_the_table_of_figures_fits_a_desktop(tab):
 def test_it_plays_pauses_and_stops_at_the_end(tab):
     assert tab.time() == 0.0
     tab.part("play").click()
-    tab.page.wait_for_timeout(600)
+    tab.wait(lambda: tab.time() > 0.2)
     tab.part("play").click()
     paused = tab.time()
-    assert 0.2 < paused < 3.0
     tab.page.wait_for_timeout(200)
     assert tab.time() == paused
     tab.part("pace").select_option("4")
     tab.part("scrub").fill("970")
     tab.part("play").click()
-    tab.page.wait_for_timeout(600)
-    assert tab.time() == 12.0 and tab.part("play").get_attribute("aria-label") == "play"
+    tab.wait(lambda: tab.time() == 12.0)
+    tab.wait(lambda: tab.part("play").get_attribute("aria-label") == "play")
 
 
 def test_scrubbing_moves_the_cars_and_names_the_primitive(tab):
@@ -141,9 +148,11 @@ def test_the_keyboard_drives_it(tab):
     tab.page.keyboard.press("ArrowRight")
     assert tab.part("sample").evaluate("s => s.selectedIndex") == 1
     tab.page.keyboard.press("Space")
-    tab.page.wait_for_timeout(400)
+    tab.wait(lambda: tab.time() > 0.1)
     tab.page.keyboard.press("Space")
-    assert 0.1 < tab.time() < 3.0
+    paused = tab.time()
+    tab.page.wait_for_timeout(200)
+    assert tab.time() == paused
 
 
 def test_a_phone_shows_all_of_it(browser, report):
@@ -157,8 +166,7 @@ def test_a_phone_shows_all_of_it(browser, report):
         assert tab.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
         assert tab.page.locator("section:not([hidden])").locator("canvas, .chart svg, button, select").evaluate_all(wide) == []
     tab.page.set_viewport_size({"width": 800, "height": 600})  # turned
-    tab.page.wait_for_timeout(300)
-    assert tab.part("stage", 1).evaluate("c => c.width / c.clientWidth") == pytest.approx(1.0, abs=0.02)
+    tab.wait(lambda: abs(tab.part("stage", 1).evaluate("c => c.width / c.clientWidth") - 1.0) < 0.02)
     tab.page.close()
 
 
@@ -172,7 +180,6 @@ def test_an_ego_is_drawn_as_its_template_track(browser, tmp_path):
     assert "Vehicle west is left out for a planner under test" in tab.page.locator("main").inner_text()
     before = tab.picture("stage")
     tab.part("play").click()
-    tab.page.wait_for_timeout(500)
-    assert tab.picture("stage") != before
+    tab.wait(lambda: tab.picture("stage") != before)
     assert tab.troubles == []
     tab.page.close()

@@ -111,7 +111,7 @@ def test_it_drives_among_the_scenarios_of_the_suite(tmp_path):
             TOPICS.pop("ego_consumer/report", None)
             client.close()
             ego.send_signal(signal.SIGINT)
-            output, _ = ego.communicate(timeout=60.0)
+            output, _ = ego.communicate(timeout=180.0)
             print(output)  # pytest shows it where the test fails
             suite.end()
     assert "Traceback" not in output, output

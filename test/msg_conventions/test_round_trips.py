@@ -175,6 +175,17 @@ def test_reports():
         diagnostics.read_request(got[0])
 
 
+@given(st.lists(st.integers(0, 9), min_size=1, unique=True), st.lists(st.integers(0, 9), min_size=1, unique=True), st.data())
+def test_a_request_that_was_begun_and_comes_again_is_taken_once(indices, others, data):
+    """Whatever the killed sampler had published: a part of the same set, or of that of another seed."""
+    again = [{"index": str(k), "seed": "7", "sha256": f"7/{k}"} for k in indices]
+    begun = data.draw(st.sampled_from([again, [{"index": str(k), "seed": "8", "sha256": f"8/{k}"} for k in others]]))
+    entries = {}
+    for entry in [*begun[: data.draw(st.integers(0, len(begun)))], *again]:
+        diagnostics.take_entry(entries, entry)
+    assert list(entries.values()) == again
+
+
 @given(seeds)
 def test_states(seed):
     sent = np.array([*generator(seed).normal(0, 100, 2), generator(seed).choice(NASTY_HEADINGS), 8.5])

@@ -57,7 +57,7 @@ class Processes:
         """End all nodes as Ctrl-C does; return their exit codes."""
         self.process.stdin.close()
         events = [json.loads(line) for line in self.process.stdout]
-        self.process.wait(60.0)
+        self.process.wait(180.0)
         return {event["node"]: event["code"] for event in events if event["event"] == "exited"}
 
     def log(self, node: str) -> str:

@@ -33,7 +33,8 @@ SIM_TIME = ["-p", "use_sim_time:=true"]
 STREAM = ["-p", "stream:=true", "-p", "rate:=12.0", "-p", "wait_matching_subscriptions:=2"]
 NODES = {
     "log_player": [*SIM_TIME, *STREAM, "-p", f"log_path:={LOG}"],
-    "segmenter": [*SIM_TIME, "-p", "live.late:=3.0"],  # a busy machine delivers some topics later than others
+    # a busy machine delivers some topics later than others, and now and then nothing for a while
+    "segmenter": [*SIM_TIME, "-p", "live.late:=3.0", "-p", "live.silence:=6.0"],
     "road_server": [*SIM_TIME, "-p", "road_name:=straight", "-p", "wait_for_tracks:=true"],
     "planner": SIM_TIME,
     "gp_sampler": [*SIM_TIME, "-p", "count:=2", "-p", "seed:=7"],
