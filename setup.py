@@ -34,7 +34,7 @@ setup(
     maintainer_email="scenario_gen@users.noreply.github.com",
     python_requires=">=3.11",
     packages=find_packages(include=["scenario_gen*", "msg_conventions*"]),
-    package_data={NAME: ["py.typed", "resources/*", "resources/**/*", "evaluation/assets/*"]},
+    package_data={NAME: ["py.typed", "resources/*", "resources/**/*", "evaluation/assets/*", "nodes/*.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

@@ -28,11 +28,12 @@ import subprocess
 import sys
 import time
 
+from scenario_gen.nodes.domain import this_host_only
+
 
 def environment(domain: int) -> dict[str, str]:
     """Return the environment of a process on `domain`, this host only."""
-    own = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "RCUTILS_COLORIZED_OUTPUT": "0"}
-    return os.environ | own
+    return {**os.environ, **this_host_only(), "ROS_DOMAIN_ID": str(domain), "RCUTILS_COLORIZED_OUTPUT": "0"}
 
 
 @dataclass(frozen=True)

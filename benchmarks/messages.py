@@ -35,7 +35,7 @@ from scenario_gen.arrays import Floats
 from scenario_gen.bags import bag_topics
 from scenario_gen.encounter import Vehicle
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.nodes.domain import free_domain
+from scenario_gen.nodes.domain import free_domain, this_host_only
 from scenario_gen.scenario import Scenario
 
 POINTS = 200
@@ -48,7 +48,7 @@ EXITS = (("Ctrl-C", INTERRUPT), ("Ctrl-C twice", INTERRUPT, INTERRUPT), ("SIGTER
 
 def run() -> list[Row]:
     """Measure."""
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    os.environ.update(this_host_only())
     rows = [_path(), _trajectory()]
     with free_domain() as domain, tempfile.TemporaryDirectory() as folder:
         rows.append(_consumer(domain))

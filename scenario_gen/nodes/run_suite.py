@@ -30,7 +30,7 @@ from typing import Any
 import yaml
 
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.nodes.domain import free_domain
+from scenario_gen.nodes.domain import free_domain, this_host_only
 from scenario_gen.parameters import flatten
 from scenario_gen.pipeline import PipelineConfig
 
@@ -162,9 +162,10 @@ def _run(
         if entry["node"] != "watcher":
             entry["arguments"] = [*entry["arguments"], *ros]
     (scratch / "suite.json").write_text(json.dumps(specification), encoding="utf-8")
-    environment = os.environ | {
+    environment = {
+        **os.environ,
+        **this_host_only(),
         "ROS_DOMAIN_ID": str(domain),
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_LOG_DIR": str(scratch / "log"),
         "RCUTILS_COLORIZED_OUTPUT": "0",
     }

@@ -23,10 +23,12 @@ import sys
 import threading
 import time
 
+from scenario_gen.nodes.domain import this_host_only
+
 ROOT = Path(__file__).resolve().parents[2]
 RESOURCES = ROOT / "scenario_gen" / "resources"
 os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
-os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+os.environ.update(this_host_only())
 
 
 class Processes:

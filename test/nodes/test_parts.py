@@ -27,7 +27,6 @@ import yaml
 from msg_conventions.cdr import CdrWriter
 from scenario_gen.errors import InputError
 from scenario_gen.nodes.default_parameters import default_yaml
-from scenario_gen.nodes.domain import free_domain
 from scenario_gen.nodes.inputs import Inputs
 from scenario_gen.nodes.road_server import road_of_url
 from scenario_gen.nodes.ros_parameters import descriptor, with_values
@@ -122,13 +121,6 @@ def test_urls_of_load_map():
         road_of_url("package://no_such_package/map.yaml")
     with pytest.raises(InputError, match="file://"):
         road_of_url("http://example.org/map.yaml")
-
-
-def test_two_runs_get_two_domains():
-    with free_domain() as one, free_domain() as two:
-        assert one != two
-    with free_domain() as again:
-        assert again == one
 
 
 def test_the_suite_hands_every_stage_parameter_to_a_node(tmp_path):

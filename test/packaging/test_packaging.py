@@ -98,6 +98,7 @@ def test_colcon_builds_what_ros2_run_needs(colcon):
         assert (prefix / "share" / "scenario_gen" / file).is_file()
     (packages,) = prefix.glob("lib/python3*/site-packages")
     assert (packages / "scenario_gen" / "resources" / "synthetic_a").is_dir()
+    assert (packages / "scenario_gen" / "nodes" / "loopback.xml").is_file()
     ran = subprocess.run(
         [sys.executable, prefix / "lib" / "scenario_gen" / "scenario-gen", "parameters"],
         cwd=base,

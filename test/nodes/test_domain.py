@@ -1,0 +1,52 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Processes that meet on this host only: which domain, and over which devices."""
+
+from contextlib import suppress
+import os
+from pathlib import Path
+
+import pytest
+
+from scenario_gen.nodes.domain import free_domain, this_host_only
+
+
+def test_two_runs_get_two_domains():
+    with free_domain() as one, free_domain() as two:
+        assert one != two
+    with free_domain() as again:
+        assert again == one
+
+
+def test_other_middleware_is_kept_on_this_host_by_ros_itself():
+    assert this_host_only({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}) == {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    for own in ({}, {"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}):
+        assert Path(this_host_only(own)["FASTRTPS_DEFAULT_PROFILES_FILE"]).is_file()
+
+
+@pytest.mark.dds
+def test_nothing_is_said_beyond_the_loopback_device_nor_through_shared_memory(client):
+    """As the kernel sees this process, which has a participant in it."""
+    process = Path("/proc") / str(os.getpid())
+    opened = set()
+    for entry in (process / "fd").iterdir():
+        with suppress(FileNotFoundError):  # the folder's own descriptor has gone by then
+            opened.add(str(entry.readlink()))
+    rows = [line.split() for line in (process / "net" / "udp").read_text().splitlines()[1:]]
+    addresses = {row[1].partition(":")[0] for row in rows if f"socket:[{row[9]}]" in opened}
+    assert addresses == {"0100007F"}  # 127.0.0.1
+    other = [line.split() for line in (process / "net" / "udp6").read_text().splitlines()[1:]]
+    assert not [row for row in other if f"socket:[{row[9]}]" in opened]
+    assert "/dev/shm/fastrtps_" not in (process / "maps").read_text()
