@@ -79,7 +79,7 @@ class Client:
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
         self.heard: dict[str, list[bytes]] = defaultdict(list)
-        self._publishers = {}
+        self._publishers, self._callers = {}, {}
         self.thread = threading.Thread(target=self.executor.spin, daemon=True)
         self.thread.start()
 
@@ -126,9 +126,10 @@ class Client:
             time.sleep(0.02)
 
     def call_later(self, kind, name: str, request):
-        client = self.node.create_client(kind, name)
-        assert client.wait_for_service(120.0), name
-        return client.call_async(request)
+        if name not in self._callers:  # one for all calls of a service, so that they arrive in order
+            self._callers[name] = self.node.create_client(kind, name)
+        assert self._callers[name].wait_for_service(120.0), name
+        return self._callers[name].call_async(request)
 
     def call(self, kind, name: str, request, timeout: float = 180.0):
         future = self.call_later(kind, name, request)
