@@ -25,6 +25,21 @@ from scenario_gen.arrays import Floats
 from scenario_gen.kernels import F1, F2, F3, kernel, OUT4
 
 
+@kernel(F1, F3, F2, F2, F2)
+def is_motion(time: Floats, position: Floats, heading: Floats, speed: Floats, acceleration: Floats) -> bool:
+    """Whether all values are finite and time increases."""
+    n, t = heading.shape
+    for k in range(t):
+        if not np.isfinite(time[k]) or (k > 0 and time[k] <= time[k - 1]):
+            return False
+    for i in range(n):
+        for k in range(t):
+            # a sum is finite only if all its terms are
+            if not np.isfinite(position[i, k, 0] + position[i, k, 1] + heading[i, k] + speed[i, k] + acceleration[i, k]):
+                return False
+    return True
+
+
 @kernel(F1, F3, F2, F2, OUT4)
 def control_points(time: Floats, position: Floats, heading: Floats, speed: Floats, out: Floats) -> None:
     """Fill `out` (N, T - 1, 4, 2) with the control points [m] of every vehicle in every interval."""
