@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test bench install tools clean
+.PHONY: demo test soak bench install tools clean
 
 demo: $(READY)
 	$(BIN)/scenario-gen demo --ros --out out/demo
@@ -13,6 +13,10 @@ test: $(READY) tools
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+# Long tests: `make soak PART=kills` runs one part; a part that was stopped goes on where it was. One table at the end.
+soak: $(READY)
+	$(BIN)/python test/soak $(PART)
 
 # Peers that are not on this machine give no row.
 bench: $(READY)
