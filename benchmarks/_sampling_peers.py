@@ -26,7 +26,6 @@ import scipy.linalg
 
 from benchmarks.row import Row
 from scenario_gen.arrays import Floats
-from scenario_gen.blas import on_one_thread
 from scenario_gen.sampling.gp import Features, Observations, Regression, squared_exponential
 
 SIZES = ((200, 500, 40.0), (1000, 2000, 1000.0))  # points seen, points asked, target ratio
@@ -57,7 +56,6 @@ def rows() -> list[Row]:
     return found
 
 
-@on_one_thread
 def _against_dense(x: Floats, y: Floats, noise: Floats, at: Floats):  # type: ignore[no-untyped-def]  # noqa: ANN202
     """Our prediction, the dense mean and covariance, and the least CPU seconds of a fit with its samples."""
     mean, cov = _dense(x, y, noise, at)

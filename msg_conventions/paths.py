@@ -30,6 +30,7 @@ import numpy as np
 from msg_conventions.cdr import CdrReader, CdrWriter, HEADER, NANOSECONDS
 from msg_conventions.roads import poses_of
 from msg_conventions.yaw import half_angle
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import InputError
 
@@ -99,7 +100,7 @@ def decode_path(data: bytes, what: str = "path") -> tuple[int, str, Floats, Ints
 
 def chord_length(points: Floats) -> Floats:
     """Return (M,) metres along (M, 2+) points."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+    return np.concatenate([[0.0], np.cumsum(exact.hypot(*np.diff(points[:, :2], axis=0).T))])
 
 
 def encode_route(route: "Route", anchors_ns: Sequence[int], frame_id: str) -> bytes:

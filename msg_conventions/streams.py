@@ -24,6 +24,7 @@ import numpy as np
 import pyproj
 
 from msg_conventions.cdr import CdrReader, CdrWriter
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
@@ -84,4 +85,4 @@ def decode_speed(data: bytes, what: str = "speed") -> tuple[int, float]:
 
 def speed_of(x: float, y: float) -> float:
     """Return the speed [m/s] of a twist: linear.x of the body frame, or the length of the horizontal vector."""
-    return x if y == 0.0 else math.hypot(x, y)
+    return x if y == 0.0 else exact.hypot(x, y)

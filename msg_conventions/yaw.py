@@ -16,6 +16,7 @@
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 
 TWO_PI = 2.0 * np.pi
@@ -29,7 +30,7 @@ def half_angle(heading: Floats) -> tuple[Floats, Floats]:
     if heading.size and max(heading.max(), -heading.min()) > np.pi:  # seldom
         heading = heading - TWO_PI * np.rint(heading / TWO_PI)
     half = 0.5 * heading
-    return np.sin(half), np.cos(half)
+    return exact.sin(half), exact.cos(half)
 
 
 def quaternion(heading: Floats) -> Floats:
@@ -44,7 +45,7 @@ def yaw(quaternions: Floats) -> Floats:
     x, y, z, w = np.moveaxis(quaternions, -1, 0)
     angle: Floats = np.where(
         (x == 0.0) & (y == 0.0),
-        2.0 * np.arctan2(z, w),
-        np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+        2.0 * exact.arctan2(z, w),
+        exact.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
     )
     return angle

@@ -27,6 +27,7 @@ from itertools import combinations
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.kernels import F1, F2, kernel, OUT1
@@ -151,13 +152,13 @@ def _sweep(time: Floats, position: Floats, heading: Floats) -> Floats:
     total, last = 1, 0
     for k in range(1, t):
         if k < t - 1:
-            here = np.hypot(position[k, 0] - position[last, 0], position[k, 1] - position[last, 1])
-            there = np.hypot(position[k + 1, 0] - position[last, 0], position[k + 1, 1] - position[last, 1])
+            here = exact.hypot(position[k, 0] - position[last, 0], position[k, 1] - position[last, 1])
+            there = exact.hypot(position[k + 1, 0] - position[last, 0], position[k + 1, 1] - position[last, 1])
             turn = max(abs(heading[k] - heading[last]), abs(heading[k + 1] - heading[last]))
             if max(here, there) < STAND_STEP and turn < STAND_STEP:
                 keep[k] = 0
                 continue
-        moved = np.hypot(position[k, 0] - position[last, 0], position[k, 1] - position[last, 1])
+        moved = exact.hypot(position[k, 0] - position[last, 0], position[k, 1] - position[last, 1])
         keep[k] = max(1, int(np.ceil(max(moved / POSE_STEP, abs(heading[k] - heading[last]) / POSE_TURN))))
         total += keep[k]
         last = k
@@ -171,7 +172,7 @@ def _sweep(time: Floats, position: Floats, heading: Floats) -> Floats:
             poses[m, 0] = (1.0 - w) * time[last] + w * time[k]
             poses[m, 1] = (1.0 - w) * position[last, 0] + w * position[k, 0]
             poses[m, 2] = (1.0 - w) * position[last, 1] + w * position[k, 1]
-            poses[m, 3], poses[m, 4] = np.cos(yaw), np.sin(yaw)
+            poses[m, 3], poses[m, 4] = exact.cos(yaw), exact.sin(yaw)
             m += 1
         if steps:
             last = k
@@ -188,7 +189,7 @@ def _block_circles(poses: Floats) -> Floats:
         lo, hi = b * BLOCK, min(m, (b + 1) * BLOCK)
         x, y, radius = 0.5 * (poses[lo, 1] + poses[hi - 1, 1]), 0.5 * (poses[lo, 2] + poses[hi - 1, 2]), 0.0
         for i in range(lo, hi):
-            radius = max(radius, np.hypot(poses[i, 1] - x, poses[i, 2] - y))
+            radius = max(radius, exact.hypot(poses[i, 1] - x, poses[i, 2] - y))
         circles[b, 0], circles[b, 1], circles[b, 2] = x, y, radius
     return circles
 
@@ -210,7 +211,7 @@ def _boxes_meet(dx: float, dy: float, ca: float, sa: float, half_a: Size, cb: fl
 def _meets_sweep(pose: Floats, half: Size, poses: Floats, circles: Floats, other: Size) -> bool:
     """True if the box at `pose` (t, x, y, cos, sin) meets any box of the sweep `poses`."""
     x, y = pose[1], pose[2]
-    reach = np.hypot(half[0], half[1]) + np.hypot(other[0], other[1])
+    reach = exact.hypot(half[0], half[1]) + exact.hypot(other[0], other[1])
     for b in range(circles.shape[0]):
         dx, dy, r = circles[b, 0] - x, circles[b, 1] - y, circles[b, 2] + reach
         if dx * dx + dy * dy >= r * r:
@@ -230,7 +231,7 @@ def _crossing_time(out_pose: Floats, in_pose: Floats, half: Size, poses: Floats,
         w = 0.5 * (outside + inside)
         for i in range(5):
             pose[i] = (1.0 - w) * out_pose[i] + w * in_pose[i]
-        norm = np.hypot(pose[3], pose[4])
+        norm = exact.hypot(pose[3], pose[4])
         pose[3], pose[4] = pose[3] / norm, pose[4] / norm
         if _meets_sweep(pose, half, poses, circles, other):
             inside = w
@@ -263,9 +264,9 @@ def _stay(mine: Floats, half: Size, poses: Floats, circles: Floats, other: Size)
 def _shared_path(a: Floats, b: Floats, circles_b: Floats, half_a: Size, half_b: Size) -> tuple[float, float]:
     """(metres of a's path shared with b in the same direction, metres of it on which a came first minus second)."""
     shared, lead, last = 0.0, 0.0, 0
-    reach = np.hypot(half_a[0] + half_b[0], half_a[1] + half_b[1])
+    reach = exact.hypot(half_a[0] + half_b[0], half_a[1] + half_b[1])
     for i in range(1, a.shape[0]):
-        step = np.hypot(a[i, 1] - a[i - 1, 1], a[i, 2] - a[i - 1, 2])
+        step = exact.hypot(a[i, 1] - a[i - 1, 1], a[i, 2] - a[i - 1, 2])
         if step == 0.0:
             continue
         near, nearest = -1, reach * reach
@@ -281,7 +282,7 @@ def _shared_path(a: Floats, b: Floats, circles_b: Floats, half_a: Size, half_b: 
                 if distance < nearest:
                     near, nearest = j, distance
         last = max(near, 0)
-        if near < 0 or a[i, 3] * b[near, 3] + a[i, 4] * b[near, 4] < np.cos(FOLLOWING_ANGLE):
+        if near < 0 or a[i, 3] * b[near, 3] + a[i, 4] * b[near, 4] < exact.cos(FOLLOWING_ANGLE):
             continue
         dx, dy = b[near, 1] - a[i, 1], b[near, 2] - a[i, 2]
         if _boxes_meet(dx, dy, a[i, 3], a[i, 4], half_a, b[near, 3], b[near, 4], half_b):

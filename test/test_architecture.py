@@ -26,7 +26,8 @@ PACKAGE = ROOT / "scenario_gen"
 
 # The data flow, first to last; modules of one tuple may import each other.
 ORDER = (
-    ("errors", "arrays", "blas", "kernels", "parameters"),
+    ("errors", "arrays", "kernels", "parameters"),
+    ("exact",),
     ("encounter", "scenario", "interaction"),
     ("logs",),
     ("segmentation",),

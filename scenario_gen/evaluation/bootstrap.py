@@ -22,8 +22,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 
 Statistic = Callable[[Floats], Floats]
@@ -64,8 +64,10 @@ class Bootstrap:
         """
         units, member = np.unique(unit, return_inverse=True)
         generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, len(unit), resamples])))
-        shares = np.full(len(units), 1.0 / max(len(units), 1))
-        return cls(generator.multinomial(len(units), shares, size=resamples)[:, member].astype(np.float64), level, len(units))
+        drawn = generator.integers(len(units), size=(resamples, len(units))) if len(units) else np.zeros((resamples, 0), np.int64)
+        times = np.zeros((resamples, len(units)))
+        np.add.at(times, (np.arange(resamples)[:, None], drawn), 1.0)
+        return cls(times[:, member], level, len(units))
 
     def interval(self, statistic: Statistic) -> Interval:
         """Return the statistic of the whole set with its percentile bounds (Efron 1979), widened to hold the value.
@@ -98,14 +100,14 @@ def mean_of(values: Floats, weights: Floats) -> Floats:
     known = np.isfinite(values)
     total = weights[:, known].sum(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray((weights[:, known] @ values[known]) / total)
+        return np.asarray(exact.matmul(weights[:, known], values[known]) / total)
 
 
 def wilson(count: int, total: int, level: float) -> Interval:
     """Return the share count / total with Wilson's interval (1927), which stays in [0, 1] and is not empty at 0 or 1."""
     if total == 0:
         return Interval(float("nan"))
-    z = float(ndtri(0.5 + 0.5 * level))
+    z = float(exact.ndtri(0.5 + 0.5 * level))
     share = count / total
     centre = (share + z * z / (2 * total)) / (1 + z * z / total)
     half = z / (1 + z * z / total) * float(np.sqrt(share * (1 - share) / total + z * z / (4 * total * total)))

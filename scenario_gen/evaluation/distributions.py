@@ -20,6 +20,7 @@ from itertools import combinations
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.evaluation.geometry import footprint_distance
 from scenario_gen.evaluation.motion import Motion
@@ -29,6 +30,8 @@ SMOOTHING = 0.5
 
 ROUNDING = 1e-6
 """Bins: a value this little below an edge belongs to the bin above, or rounding would move a cruise at 10 m/s."""
+
+_LN2 = 0.6931471805599453
 
 
 @dataclass(frozen=True)
@@ -95,18 +98,18 @@ class Comparison:
 
     def jensen_shannon(self, weights: Floats) -> Floats:
         """Return the Jensen-Shannon divergences (B,) in bits under weights (B, S), between 0 and 1."""
-        return jensen_shannon(weights @ self.samples, self.template)
+        return jensen_shannon(exact.matmul(weights, self.samples), self.template)
 
     def wasserstein_near(self, weights: Floats) -> Floats:
         """Return Wasserstein distances (B,) under weights (B, S), integrated over the grid (for intervals)."""
         with np.errstate(invalid="ignore"):
-            cdf = (weights @ self.sample_cdf) / (weights @ self.sizes)[:, None]
-        return np.asarray(np.abs(cdf[:, :-1] - self.template_cdf[:-1]) @ np.diff(self.grid))
+            cdf = (exact.matmul(weights, self.sample_cdf)) / (exact.matmul(weights, self.sizes))[:, None]
+        return np.asarray(exact.matmul(np.abs(cdf[:, :-1] - self.template_cdf[:-1]), np.diff(self.grid)))
 
     def coverage(self, weights: Floats) -> Floats:
         """Return the share (B,) of the template's values that lie in a bin which the set visits too."""
         with np.errstate(invalid="ignore"):
-            return np.asarray(((weights @ self.samples) > 0.0) @ self.template / self.template.sum())
+            return np.asarray(exact.matmul((exact.matmul(weights, self.samples)) > 0.0, self.template) / self.template.sum())
 
 
 def wasserstein(a: Floats, b: Floats) -> float:
@@ -160,7 +163,7 @@ def jensen_shannon(p: Floats, q: Floats) -> Floats:
         middle = 0.5 * (p + q)
 
         def divergence(x: Floats) -> Floats:
-            return np.asarray(np.where(x > 0.0, x * np.log2(np.where(x > 0.0, x, 1.0) / middle), 0.0).sum(axis=-1))
+            return np.asarray(np.where(x > 0.0, x * exact.log(np.where(x > 0.0, x, 1.0) / middle), 0.0).sum(axis=-1))
 
-        result = 0.5 * divergence(p) + 0.5 * divergence(np.broadcast_to(q, p.shape))
+        result = 0.5 * (divergence(p) + divergence(np.broadcast_to(q, p.shape))) / _LN2
     return np.where(np.isfinite(p.sum(axis=-1)), np.maximum(result, 0.0), np.nan)

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.blas import on_one_thread
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import likeness, variety
@@ -66,7 +65,6 @@ class _Reference:
     seed: int
 
 
-@on_one_thread
 def evaluate(
     encounter: Encounter,
     segmentation: Segmentation,

@@ -16,6 +16,7 @@
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Vehicle
 from scenario_gen.evaluation.motion import Motion
@@ -59,14 +60,14 @@ def _separation(motion: Motion, a: int, b: int) -> tuple[Floats, Floats, Floats]
     """Project b relative to a on the four separating axes: offset, summed half extents, closing speed; (4, T) each."""
     heading = motion.heading
     axes = np.stack([heading[a], heading[a] + np.pi / 2, heading[b], heading[b] + np.pi / 2])
-    direction = np.stack([np.cos(axes), np.sin(axes)], axis=-1)  # (4, T, 2)
-    velocity = motion.speed[..., None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    direction = np.stack([exact.cos(axes), exact.sin(axes)], axis=-1)  # (4, T, 2)
+    velocity = motion.speed[..., None] * np.stack([exact.cos(heading), exact.sin(heading)], axis=-1)
     offset = ((motion.position[b] - motion.position[a]) * direction).sum(axis=-1)
     closing = ((velocity[b] - velocity[a]) * direction).sum(axis=-1)
     reach = np.zeros_like(offset)
     for vehicle, angle in ((motion.vehicles[a], heading[a]), (motion.vehicles[b], heading[b])):
         turned = axes - angle
-        reach += 0.5 * vehicle.length * np.abs(np.cos(turned)) + 0.5 * vehicle.width * np.abs(np.sin(turned))
+        reach += 0.5 * vehicle.length * np.abs(exact.cos(turned)) + 0.5 * vehicle.width * np.abs(exact.sin(turned))
     return offset, reach, closing
 
 
@@ -74,14 +75,14 @@ def _corners(centre: Floats, heading: Floats, vehicle: Vehicle) -> Floats:
     """Return the corners (4, T, 2) of footprints at centres (T, 2) with headings (T,)."""
     x = 0.5 * vehicle.length * np.array([1.0, 1.0, -1.0, -1.0])[:, None]
     y = 0.5 * vehicle.width * np.array([1.0, -1.0, -1.0, 1.0])[:, None]
-    c, s = np.cos(heading), np.sin(heading)
+    c, s = exact.cos(heading), exact.sin(heading)
     return centre + np.stack([x * c - y * s, x * s + y * c], axis=-1)
 
 
 def _corner_distance(centre: Floats, heading: Floats, vehicle: Vehicle, points: Floats) -> Floats:
     """Return the least distance (T,) from points (4, T, 2) to a footprint; 0 for a point inside."""
     offset = points - centre
-    c, s = np.cos(heading), np.sin(heading)
+    c, s = exact.cos(heading), exact.sin(heading)
     along = np.abs(offset[..., 0] * c + offset[..., 1] * s) - 0.5 * vehicle.length
     across = np.abs(offset[..., 1] * c - offset[..., 0] * s) - 0.5 * vehicle.width
-    return np.asarray(np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0)).min(axis=0))
+    return np.asarray(exact.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0)).min(axis=0))

@@ -24,6 +24,7 @@ from itertools import combinations
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.evaluation.dtw import blocks, Distance, feature_extents, feature_rows
 
@@ -47,7 +48,7 @@ class PairLikeness:
     def error(self, weights: Floats) -> Floats:
         """Return E (B,) under weights (B, S); NaN if T is zero (both vehicles stand throughout)."""
         shares = weights / weights.sum(axis=1, keepdims=True)
-        square = np.einsum("bs,bs->b", shares @ self.gram, shares)
+        square = (exact.matmul(shares, self.gram) * shares).sum(axis=1)
         norm = self.template[2]
         return np.sqrt(np.maximum(square, 0.0) / norm) if norm > 0.0 else np.full(len(weights), np.nan)
 
@@ -56,8 +57,9 @@ class PairLikeness:
         shares = weights / weights.sum(axis=1, keepdims=True)
         count, first, second = self.template
         variance = second - first * first / count
-        covariance = shares @ self.cross - (shares @ self.total) * first / count
-        spread = np.einsum("bs,bs->b", shares @ self.gram, shares) - (shares @ self.total) ** 2 / count
+        total = exact.matmul(shares, self.total)
+        covariance = exact.matmul(shares, self.cross) - total * first / count
+        spread = (exact.matmul(shares, self.gram) * shares).sum(axis=1) - np.square(total) / count
         generated = variance + 2.0 * covariance + spread
         with np.errstate(invalid="ignore", divide="ignore"):
             result = (variance + covariance) / np.sqrt(variance * generated)
@@ -82,11 +84,11 @@ def pair_likeness(template: tuple[Floats, Floats], generated: tuple[Floats, Floa
         target = feature_rows(left, right, own, rows, distance)[0]
         difference = feature_rows(a, b, extents, rows, distance)
         difference -= target
-        gram += difference @ difference.T
-        cross += difference @ target
+        gram += exact.matmul(difference, difference.T)
+        cross += exact.matmul(difference, target)
         total += difference.sum(axis=1)
         first += float(target.sum())
-        second += float(target @ target)
+        second += float(np.square(target).sum())
     return PairLikeness(gram, cross, total, (steps * steps, first, second))
 
 

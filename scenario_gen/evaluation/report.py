@@ -25,7 +25,6 @@ import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from scenario_gen.blas import on_one_thread
 from scenario_gen.encounter import Encounter
 from scenario_gen.evaluation.bootstrap import Interval
 from scenario_gen.evaluation.report_data import case_data
@@ -113,7 +112,6 @@ def write_report(path: Path, report: ReportInput) -> None:
     path.write_text(render(report), encoding="utf-8")
 
 
-@on_one_thread
 def render(report: ReportInput) -> str:
     """Return the page as text."""
     assets = files("scenario_gen.evaluation") / "assets"

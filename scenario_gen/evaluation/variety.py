@@ -16,6 +16,7 @@
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 
 
@@ -29,7 +30,7 @@ def displacements(position: Floats) -> Floats:
     table = np.zeros((samples, samples))
     for s in range(samples - 1):
         step = position[s + 1 :] - position[s]
-        table[s, s + 1 :] = np.hypot(step[..., 0], step[..., 1]).mean(axis=(1, 2))
+        table[s, s + 1 :] = exact.hypot(step[..., 0], step[..., 1]).mean(axis=(1, 2))
     return table + table.T
 
 
@@ -38,8 +39,8 @@ def diversity(table: Floats, weights: Floats) -> Floats:
 
     A sample drawn twice makes no pair with itself, or resampling would shrink the diversity.
     """
-    total = np.einsum("bs,bs->b", weights @ table, weights)
-    pairs = weights.sum(axis=1) ** 2 - (weights**2).sum(axis=1)
+    total = (exact.matmul(weights, table) * weights).sum(axis=1)
+    pairs = np.square(weights.sum(axis=1)) - np.square(weights).sum(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(total / pairs)
 
@@ -47,7 +48,7 @@ def diversity(table: Floats, weights: Floats) -> Floats:
 def displacement_to(position: Floats, target: Floats) -> Floats:
     """Return (S,): mean distance in metres of samples (S, N, T, 2) to a target (N, T, 2), over vehicles and instants (ADE)."""
     step = position - target
-    return np.asarray(np.hypot(step[..., 0], step[..., 1]).mean(axis=(1, 2)))
+    return np.asarray(exact.hypot(step[..., 0], step[..., 1]).mean(axis=(1, 2)))
 
 
 def least(values: Floats, weights: Floats) -> Floats:

@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen, wrap_angle
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import RefusedError
@@ -142,7 +143,7 @@ def _all_ways(vehicle: Vehicle, road: Road, *, u_turns: bool) -> list[_Way]:
             if curve is not None:
                 everything.append(_Way(e, x, curve, float(curve.points[-1, 2] - curve.points[0, 2])))
             elif u_turns:
-                reach = max(float(np.hypot(*(other[:2] - entry[:2]))) for other in road.exits)
+                reach = max(float(exact.hypot(*(other[:2] - entry[:2]))) for other in road.exits)
                 for apex in _APEXES * reach:
                     curve = draw_u_turn(entry, leave, float(apex), fits)
                     if curve is not None:
@@ -160,7 +161,7 @@ def _suits(track: Track, way: _Way) -> bool:
 
 
 def _search(tracks: tuple[Track, ...], ways: list[list[_Way]], relations: tuple[Relation, ...], scale: float) -> _Choice:
-    degree = [sum(i in (r.a, r.b) for r in relations) for i in range(len(tracks))]
+    degree = [len([r for r in relations if i in (r.a, r.b)]) for i in range(len(tracks))]
     order = sorted(range(len(tracks)), key=lambda i: (-degree[i], -tracks[i].travelled))
     solver = _Solver(tracks, relations, scale)
     beam = [_Choice({}, {}, 0.0, 0, 0.0, 0.0)]
@@ -197,7 +198,7 @@ class _Solver:
         rotation, shift, yaw = self._align(ways, start, members)
         untied = [i for i in members if i not in start]
         for i in untied:  # who has no equation is placed by its relative position
-            target = self.poses[i][::3, :2] @ rotation.T + shift
+            target = exact.matmul(self.poses[i][::3, :2], rotation.T) + shift
             station, _ = ways[i].curve.project(target)
             start[i] = float(np.median(station - self.driven[i][::3]))
         if untied:
@@ -218,7 +219,9 @@ class _Solver:
         most = max(curve.length - float(self.driven[i, -1]), 0.0)
         starts = np.linspace(0.0, most, int(np.ceil(most)) + 1)
         off = curve.at((starts[:, None] + self.driven[i]).ravel())[:, 2].reshape(len(starts), -1) - self.poses[i][:, 2]
-        alike = np.abs(np.exp(1j * off).mean(axis=1))  # 1 where way and template differ by one rotation throughout
+        alike = exact.hypot(
+            exact.cos(off).mean(axis=1), exact.sin(off).mean(axis=1)
+        )  # 1 where way and template differ by one rotation throughout
         best = starts[alike >= alike.max() - 1e-3]
         return float(best[np.argmin(np.abs(best - most / 2.0))])
 
@@ -230,11 +233,11 @@ class _Solver:
         a, b = self.scale * source[:, :2], target[:, :2]
         ca, cb = a.mean(axis=0), b.mean(axis=0)
         u, v = a - ca, b - cb
-        sine = float((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum()) + 10.0 * float(np.sin(target[:, 2] - source[:, 2]).sum())
-        cosine = float((u * v).sum()) + 10.0 * float(np.cos(target[:, 2] - source[:, 2]).sum())
-        yaw = float(np.arctan2(sine, cosine))
+        sine = float((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum()) + 10.0 * float(exact.sin(target[:, 2] - source[:, 2]).sum())
+        cosine = float((u * v).sum()) + 10.0 * float(exact.cos(target[:, 2] - source[:, 2]).sum())
+        yaw = float(exact.arctan2(sine, cosine))
         rotation = _rotation(yaw)
-        return self.scale * rotation, cb - rotation @ ca, yaw
+        return self.scale * rotation, cb - exact.matmul(rotation, ca), yaw
 
     def _judged(
         self,
@@ -250,16 +253,16 @@ class _Solver:
         came = [float(ways[i].curve.points[0, 2] - self.poses[i][0, 2]) for i in members]
         for k in range(1, len(members)):
             apart = wrap_angle(np.array([came[k] - other for other in came[:k]]))
-            cost += _ARM * float((apart**2).sum()) / len(members)
+            cost += _ARM * float((np.square(apart)).sum()) / len(members)
         for i in members:
             curve = ways[i].curve
             fitted = curve.at(start[i] + self.driven[i])
-            miss = np.hypot(*(fitted[:, :2] - self.poses[i][:, :2] @ rotation.T - shift).T)
+            miss = exact.hypot(*(fitted[:, :2] - exact.matmul(self.poses[i][:, :2], rotation.T) - shift).T)
             off = np.abs(wrap_angle(fitted[:, 2] - self.poses[i][:, 2] - yaw))
             own = float((fitted[-1, 2] - fitted[0, 2]) - (self.poses[i][-1, 2] - self.poses[i][0, 2]))
             whole = float(ways[i].turn - (self.poses[i][-1, 2] - self.poses[i][0, 2]))
-            alike = np.mean(np.minimum(miss, _FAR) ** 2) + _HEADING * np.mean(1.0 - np.cos(off))
-            alike += _OWN_TURN * own**2 + _WHOLE_TURN * whole**2
+            alike = np.mean(np.square(np.minimum(miss, _FAR))) + _HEADING * np.mean(1.0 - exact.cos(off))
+            alike += _OWN_TURN * np.square(own) + _WHOLE_TURN * np.square(whole)
             cost += float(alike) / len(members)
             turned = max(turned, float(off.mean()), abs(own) - _OWN_SLACK)
             half = self.tracks[i].vehicle.length / 2.0 + 0.5
@@ -270,7 +273,7 @@ class _Solver:
 
 
 def _rotation(yaw: float) -> Floats:
-    return np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    return np.array([[exact.cos(yaw), -exact.sin(yaw)], [exact.sin(yaw), exact.cos(yaw)]])
 
 
 def _least_squares(members: list[int], system: list[Equation]) -> dict[int, float]:
@@ -290,7 +293,7 @@ def _least_squares(members: list[int], system: list[Equation]) -> dict[int, floa
         for i, factor in equation.terms:
             matrix[row, tied.index(i)] = equation.weight * factor
         value[row] = equation.weight * equation.value
-    solution = np.linalg.lstsq(matrix, value, rcond=None)[0]
+    solution = exact.lstsq(matrix, value)
     return {i: float(a) for i, a in zip(tied, solution, strict=True)}
 
 

@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen, wrap_angle
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
@@ -103,7 +104,7 @@ def _axes(road: Road, tracks: tuple[Track, ...]) -> list[_Axis]:
     for entry in road.entries:
         for leave in road.exits:
             d = leave[:2] - entry[:2]
-            cos, sin = np.cos(entry[2]), np.sin(entry[2])
+            cos, sin = exact.cos(entry[2]), exact.sin(entry[2])
             ahead, aside = d[0] * cos + d[1] * sin, d[1] * cos - d[0] * sin
             straight = abs(wrap_angle(np.asarray(leave[2] - entry[2]))) < _PARALLEL
             if straight and ahead > 2.0 * length and abs(aside) < _COLLINEAR:
@@ -115,11 +116,11 @@ def _axes(road: Road, tracks: tuple[Track, ...]) -> list[_Axis]:
         if any(_belongs(entry, axis) for axis in axes):
             continue
         yaw = float(entry[2])
-        normal = np.array([-np.sin(yaw), np.cos(yaw)])
+        normal = np.array([-exact.sin(yaw), exact.cos(yaw)])
         ahead, against = [], []
         for other, _ in through:
             turned = abs(float(wrap_angle(np.asarray(other[2] - yaw))))
-            offset = float((other[:2] - entry[:2]) @ normal)
+            offset = float(exact.matmul(other[:2] - entry[:2], normal))
             if turned < _PARALLEL:
                 ahead.append(offset)
             elif turned > np.pi - _PARALLEL:
@@ -140,12 +141,12 @@ def _lay(track: Track, i: int, unrolled: Unrolled, axis: _Axis, centre: float, s
     lanes = axis.ahead if sign > 0 else axis.against
     start, end = float(lanes[unrolled.lane[i, 0]]), float(lanes[unrolled.lane[i, 1]])
     along = along if sign > 0 else axis.length - along  # metres driven since the beginning of its own lane
-    begin = axis.begin if sign > 0 else axis.begin + axis.length * np.array([np.cos(axis.yaw), np.sin(axis.yaw)])
+    begin = axis.begin if sign > 0 else axis.begin + axis.length * np.array([exact.cos(axis.yaw), exact.sin(axis.yaw)])
     yaw = axis.yaw if sign > 0 else axis.yaw + np.pi
     s = np.arange(0.0, max(along[-1] - along[0], 1.0) + 1.0, 0.5)
     aside = start + (end - start) * _blend(along - along[0], unrolled.change[i], s, abs(end - start))
     x = along[0] + s
-    xy = begin + np.outer(x, [np.cos(yaw), np.sin(yaw)]) + np.outer(aside, [-np.sin(axis.yaw), np.cos(axis.yaw)])
+    xy = begin + np.outer(x, [exact.cos(yaw), exact.sin(yaw)]) + np.outer(aside, [-exact.sin(axis.yaw), exact.cos(axis.yaw)])
     curve = Curve.through(xy)
     progress = np.zeros_like(along) if track.still else np.interp(along - along[0], s, curve.station)
     return replace(track, curve=curve, progress=frozen(progress))
@@ -159,4 +160,4 @@ def _blend(driven: Floats, change: Floats, s: Floats, width: float) -> Floats:
     reach = max((last - first) / 0.5, np.sqrt(width * 5.7735 / _SHIFT_CURVATURE), 1.0)
     middle = np.clip((first + last) / 2.0, min(reach / 2.0, s[-1] / 2.0), max(s[-1] - reach / 2.0, s[-1] / 2.0))
     x = np.clip((s - middle) / min(reach, s[-1]) + 0.5, 0.0, 1.0)
-    return np.asarray(x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
+    return np.asarray(exact.power(x, 3) * (10.0 - 15.0 * x + 6.0 * np.square(x)))

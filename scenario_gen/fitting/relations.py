@@ -23,6 +23,7 @@ from enum import Enum
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, wrap_angle
 from scenario_gen.roads.curve import crossings, Curve
 from scenario_gen.roads.meeting import meeting
@@ -99,11 +100,11 @@ def equations(relation: Relation, one: Curve, two: Curve, scale: float) -> tuple
     """The relation on two routes as equations, or None if these routes do not have it."""
     a, b, la, lb = relation.a, relation.b, scale * relation.at_a, scale * relation.at_b
     if relation.kind is Kind.SHARED_START:
-        if float(np.hypot(*(one.points[0, :2] - two.points[0, :2]))) > 0.5:
+        if float(exact.hypot(*(one.points[0, :2] - two.points[0, :2]))) > 0.5:
             return None
         return (Equation(((a, 1.0), (b, -1.0)), lb - la, 2.0),)
     if relation.kind is Kind.SHARED_END:
-        if float(np.hypot(*(one.points[-1, :2] - two.points[-1, :2]))) > 0.5:
+        if float(exact.hypot(*(one.points[-1, :2] - two.points[-1, :2]))) > 0.5:
             return None
         return (Equation(((a, 1.0), (b, -1.0)), (one.length - la) - (two.length - lb), 1.0),)
     found = crossings(one, two, _ANGLE)

@@ -18,6 +18,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, wrap_angle
 from scenario_gen.roads.curve import Curve
 
@@ -39,10 +40,10 @@ def draw_route(entry: Floats, leave: Floats, fits: Fits) -> Curve | None:
         return _accepted(_beside(entry, leave, ahead, left), fits) if ahead > 1.0 else None
     if abs(turn) > np.pi - _PARALLEL:
         return None  # a U-turn: where along the road is for the template to say, see draw_u_turn
-    along_exit = left / np.sin(turn)  # from the lines' intersection to the exit
-    along_entry = ahead - along_exit * np.cos(turn)
+    along_exit = left / exact.sin(turn)  # from the lines' intersection to the exit
+    along_entry = ahead - along_exit * exact.cos(turn)
     for radius in _RADII:
-        tangent = radius * np.tan(abs(turn) / 2.0)
+        tangent = radius * exact.tan(abs(turn) / 2.0)
         if tangent <= min(along_entry, along_exit) - 0.5:
             route = _accepted(_arc(entry, along_entry - tangent, turn, radius, along_exit - tangent), fits)
             if route is not None:
@@ -63,7 +64,7 @@ def draw_u_turn(entry: Floats, leave: Floats, apex: float, fits: Fits) -> Curve 
 def _relative(pose: Floats, xy: Floats) -> tuple[float, float]:
     """How far `xy` lies ahead and to the left of a pose."""
     d = xy - pose[:2]
-    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    cos, sin = exact.cos(pose[2]), exact.sin(pose[2])
     return float(d[0] * cos + d[1] * sin), float(d[1] * cos - d[0] * sin)
 
 
@@ -83,8 +84,8 @@ def _beside(entry: Floats, leave: Floats, ahead: float, left: float) -> Curve | 
         return None
     x = np.linspace(0.0, 1.0, int(np.ceil(reach)) + 1)
     along = np.concatenate(([0.0], (ahead - reach) / 2.0 + reach * x, [ahead]))
-    aside = np.concatenate(([0.0], left * x**3 * (10.0 - 15.0 * x + 6.0 * x**2), [left]))
-    cos, sin = np.cos(entry[2]), np.sin(entry[2])
+    aside = np.concatenate(([0.0], left * exact.power(x, 3) * (10.0 - 15.0 * x + 6.0 * np.square(x)), [left]))
+    cos, sin = exact.cos(entry[2]), exact.sin(entry[2])
     return Curve.through(entry[:2] + np.column_stack((along * cos - aside * sin, along * sin + aside * cos)))
 
 
@@ -93,12 +94,12 @@ def _arc(entry: Floats, before: float, turn: float, radius: float, after: float)
     steps = int(np.ceil(abs(turn) * radius / _ARC_STEP))
     angle = np.linspace(0.0, turn, steps + 1)
     signed = np.copysign(radius, turn)
-    ahead = before + signed * np.sin(angle)
-    left = signed * (1.0 - np.cos(angle))
+    ahead = before + signed * exact.sin(angle)
+    left = signed * (1.0 - exact.cos(angle))
     points = np.column_stack((ahead, left, angle))
-    end = points[-1] + np.array([after * np.cos(turn), after * np.sin(turn), 0.0])
+    end = points[-1] + np.array([after * exact.cos(turn), after * exact.sin(turn), 0.0])
     points = np.vstack(([0.0, 0.0, 0.0], points, end))
-    cos, sin = np.cos(entry[2]), np.sin(entry[2])
+    cos, sin = exact.cos(entry[2]), exact.sin(entry[2])
     return Curve(
         np.column_stack(
             (

@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
@@ -40,6 +41,7 @@ _KEPT = 10  # coarse placements that are refined
 _SPACING = 1.5  # metres between the path's sampled discs
 _MOSTLY = 0.8  # share of footprints with room below which a placement is no good
 _COMFORT = 0.7  # metres of room beyond the margin that are worth having
+_WHOLE = 2**20  # costs are counted in units of 1 / _WHOLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +128,8 @@ def _discs(tracks: tuple[Track, ...]) -> tuple[Floats, Floats]:
 def _penalty(clearance: Floats, need: float) -> Floats:
     """Missing clearance squared; a little of it also for room that would be nice to have."""
     return np.asarray(
-        np.maximum(need - clearance, 0.0) ** 2 / need**2 + 0.02 * np.maximum(need + _COMFORT - clearance, 0.0) ** 2 / need**2
+        np.square(np.maximum(need - clearance, 0.0)) / np.square(need)
+        + 0.02 * np.square(np.maximum(need + _COMFORT - clearance, 0.0)) / np.square(need)
     )
 
 
@@ -138,6 +141,7 @@ def _coarse(discs: Floats, road: Road, need: float, scale: float) -> list[_Motio
     cell = every * road.resolution
     field = _penalty(clearance_field(road)[every // 2 :: every, every // 2 :: every], need)
     field = field - float(_penalty(np.zeros(1), need)[0])  # outside the map counts as blocked: make that the zero of the sum
+    whole = np.round(field * _WHOLE)
     best = []
     for yaw in np.arange(_TURNS) * 2.0 * np.pi / _TURNS:
         points = scale * _turned(discs, float(yaw))
@@ -146,9 +150,11 @@ def _coarse(discs: Floats, road: Road, need: float, scale: float) -> list[_Motio
         if size[0] > field.shape[1] or size[1] > field.shape[0]:
             continue
         kernel = np.zeros((size[1], size[0]))
-        np.add.at(kernel, (index[:, 1] - low[1], index[:, 0] - low[0]), 1.0 / len(points))
-        cost = fftconvolve(field, kernel[::-1, ::-1], mode="valid")
-        row, column = np.unravel_index(int(np.argmin(np.round(cost, 9))), cost.shape)
+        np.add.at(kernel, (index[:, 1] - low[1], index[:, 0] - low[0]), 1.0)
+        # Of whole numbers: the transform's rounding, which depends on the CPU, is rounded away.
+        total = np.round(fftconvolve(whole, kernel[::-1, ::-1], mode="valid"))
+        cost = total / (_WHOLE * len(points))
+        row, column = np.unravel_index(int(np.argmin(total)), total.shape)
         grid = np.array([column - low[0], row - low[1]]) * cell + (every // 2 + 0.5) * road.resolution
         at = np.asarray(road.origin) + grid
         best.append(_Motion(float(np.round(cost[row, column], 9)), scale, float(yaw), (float(at[0]), float(at[1]))))
@@ -156,8 +162,8 @@ def _coarse(discs: Floats, road: Road, need: float, scale: float) -> list[_Motio
 
 
 def _turned(points: Floats, yaw: float) -> Floats:
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    return np.asarray(points @ np.array([[cos, sin], [-sin, cos]]))
+    cos, sin = exact.cos(yaw), exact.sin(yaw)
+    return np.asarray(exact.matmul(points, np.array([[cos, sin], [-sin, cos]])))
 
 
 def _fine_cost(discs: Floats, road: Road, need: float, scale: float, state: Floats) -> float:

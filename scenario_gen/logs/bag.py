@@ -28,6 +28,7 @@ from msg_conventions import trajectory
 from msg_conventions.streams import speed_of
 from msg_conventions.tracks import decode_tracks
 from msg_conventions.yaw import yaw
+from scenario_gen import exact
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.logs.config import LogConfig
@@ -201,7 +202,7 @@ def take_odometry(message: Any, vehicle: Rows, stamp: int, row: int) -> None:
     turn = pose.orientation
     heading = float(yaw(np.array([turn.x, turn.y, turn.z, turn.w])))
     vehicle.fixes.append((stamp, row, pose.position.x, pose.position.y, heading))
-    vehicle.speeds.append((stamp, row, math.hypot(linear.x, linear.y)))
+    vehicle.speeds.append((stamp, row, exact.hypot(linear.x, linear.y)))
 
 
 def read_tracks(topics: list[Topic], name: str, label: str, others: list[str]) -> RawLog:

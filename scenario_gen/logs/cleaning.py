@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import pyproj
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.errors import InputError
 from scenario_gen.logs.config import LogConfig
@@ -248,7 +249,7 @@ def first_of_each(stamps: Ints) -> tuple[Ints, Ints]:
 def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig) -> Track:
     """Drop fixes that the vehicle cannot have reached at the speeds it measured; several in a row that agree are believed."""
     limit = reach(vehicle)
-    step = np.hypot(*np.diff(vehicle.fix, axis=0).T)
+    step = exact.hypot(*np.diff(vehicle.fix, axis=0).T)
     seconds = np.diff(vehicle.fix_ns) * 1e-9
     keep = np.ones(len(vehicle.fix_ns), dtype=bool)
     if (step > JUMP_SLACK + limit[1:] * seconds).any():
@@ -278,10 +279,10 @@ def reachable(seconds: Floats, fix: Floats, limit: Floats) -> Bools:
     keep = np.ones(len(fix), dtype=bool)
     last, doubted = 0, 0
     for i in range(1, len(fix)):
-        if np.hypot(*(fix[i] - fix[last])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[last]):
+        if exact.hypot(*(fix[i] - fix[last])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[last]):
             last, doubted = i, 0
             continue
-        agrees = doubted and np.hypot(*(fix[i] - fix[i - 1])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[i - 1])
+        agrees = doubted and exact.hypot(*(fix[i] - fix[i - 1])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[i - 1])
         doubted = doubted + 1 if agrees else 1
         keep[i] = False
         if doubted >= RELOCATED:

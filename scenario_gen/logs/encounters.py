@@ -29,6 +29,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.intervals import runs
@@ -117,7 +118,7 @@ def near(a: Piece, b: Piece, config: LogConfig) -> Bools:
     if last <= first:
         return np.zeros(0, dtype=bool)
     gap = a.smooth.position[first - a.first : last - a.first] - b.smooth.position[first - b.first : last - b.first]
-    return np.hypot(gap[:, 0], gap[:, 1]) < config.proximity
+    return exact.hypot(gap[:, 0], gap[:, 1]) < config.proximity
 
 
 def space_time_gap(a: Piece, b: Piece, first: int, last: int, config: LogConfig) -> float:
@@ -132,7 +133,7 @@ def space_time_gap(a: Piece, b: Piece, first: int, last: int, config: LogConfig)
     time = np.arange(first, last, every) * config.period
     at_a = a.smooth.position[first - a.first : last - a.first : every]
     at_b = b.smooth.position[first - b.first : last - b.first : every]
-    apart = np.hypot(at_a[:, None, 0] - at_b[None, :, 0], at_a[:, None, 1] - at_b[None, :, 1])
+    apart = exact.hypot(at_a[:, None, 0] - at_b[None, :, 0], at_a[:, None, 1] - at_b[None, :, 1])
     return float((apart + LAG * np.abs(time[:, None] - time[None, :])).min())
 
 

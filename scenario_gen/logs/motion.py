@@ -25,6 +25,7 @@ import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
 from scipy import sparse
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.errors import InputError
 from scenario_gen.logs.config import LogConfig
@@ -40,8 +41,8 @@ class Motion:
         self.dt, self.ticks = dt, len(stands)
         self.merge = sparse.csr_array((np.ones(count), (np.arange(count), group)))
         first = self._differences(1) / dt
-        second = self._differences(2) / dt**2
-        third = self._differences(3) * (np.sqrt(dt) / (config.jerk * dt**3))
+        second = self._differences(2) / np.square(dt)
+        third = self._differences(3) * (np.sqrt(dt) / (config.jerk * exact.power(dt, 3)))
         self.prior = (third.T @ third).tocsc()
         self.constraints = sparse.vstack([-first, second, -second], format="csc")
         rows = second.shape[0]
@@ -63,7 +64,7 @@ class Motion:
         if speed:
             weights = [(u - 1.0) / self.dt, (1.0 - 2.0 * u) / self.dt, u / self.dt]
         else:
-            weights = [(1.0 - u) ** 2 / 2.0, 0.5 + u - u**2, u**2 / 2.0]
+            weights = [np.square(1.0 - u) / 2.0, 0.5 + u - np.square(u), np.square(u) / 2.0]
         row = np.arange(len(seconds))
         entries = (np.concatenate(weights), (np.tile(row, 3), np.concatenate([tick, tick + 1, tick + 2])))
         return sparse.csr_array(entries, shape=(len(seconds), self.ticks + 1)) @ self.merge
@@ -77,7 +78,7 @@ class Motion:
         quadratic, linear = self.prior, np.zeros(self.merge.shape[1])
         for seconds, values, deviation, speed in observed:
             rows = self._basis(seconds, speed=speed)
-            weighted = rows.T * (1.0 / deviation**2)
+            weighted = rows.T * (1.0 / np.square(deviation))
             quadratic = quadratic + weighted @ rows
             linear = linear - weighted @ values
         settings = clarabel.DefaultSettings()
@@ -97,7 +98,7 @@ class Motion:
         tick = np.clip(np.floor(seconds / self.dt).astype(int), 0, max(self.ticks - 2, 0))
         u = seconds / self.dt - tick
         c0, c1, c2 = (coefficients[tick + k] for k in range(3))
-        place: Floats = c0 * (1.0 - u) ** 2 / 2.0 + c1 * (0.5 + u - u**2) + c2 * u**2 / 2.0
+        place: Floats = c0 * np.square(1.0 - u) / 2.0 + c1 * (0.5 + u - np.square(u)) + c2 * np.square(u) / 2.0
         return place
 
     def at_ticks(self, coefficients: Floats) -> tuple[Floats, Floats]:

@@ -19,6 +19,7 @@ from itertools import combinations
 import numpy as np
 import shapely
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Encounter
 from scenario_gen.logs.quality import Overlap
@@ -28,9 +29,9 @@ def footprints(encounter: Encounter, vehicle: int) -> Floats:
     """(T, 4, 2) corners of a vehicle's footprint, counter-clockwise from the rear right."""
     body = encounter.vehicles[vehicle]
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [body.length / 2.0, body.width / 2.0]
-    cos, sin = np.cos(encounter.heading[vehicle]), np.sin(encounter.heading[vehicle])
+    cos, sin = exact.cos(encounter.heading[vehicle]), exact.sin(encounter.heading[vehicle])
     turn = np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=-2)
-    turned: Floats = np.einsum("tij,kj->tki", turn, corners) + encounter.position[vehicle][:, None, :]
+    turned: Floats = exact.matmul(corners, np.swapaxes(turn, 1, 2)) + encounter.position[vehicle][:, None, :]
     return turned
 
 

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import BSpline
-from scipy.linalg import solveh_banded
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 
 KNOT = 1.0  # m between knots
@@ -43,15 +43,15 @@ class Path:
         """Arc length of the points' feet on the curve near the parameters `guess`, and the points' distances from it."""
         tangent = self.curve(guess, 1)
         gap = points - self.curve(guess)
-        foot = guess + (gap * tangent).sum(axis=1) / (tangent**2).sum(axis=1)
+        foot = guess + (gap * tangent).sum(axis=1) / (np.square(tangent)).sum(axis=1)
         foot = np.clip(foot, self.parameter[0], self.parameter[-1])
-        return np.interp(foot, self.parameter, self.length), np.hypot(*(points - self.curve(foot)).T)
+        return np.interp(foot, self.parameter, self.length), exact.hypot(*(points - self.curve(foot)).T)
 
     def pose(self, arc: Floats) -> tuple[Floats, Floats]:
         """Positions (T, 2) and headings (T,), unwrapped, at arc lengths."""
         u = np.interp(arc, self.length, self.parameter)
         tangent = self.curve(u, 1)
-        return self.curve(u), np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
+        return self.curve(u), np.unwrap(exact.arctan2(tangent[:, 1], tangent[:, 0]))
 
 
 def fit_path(place: Floats, points: Floats, weight: Floats, noise: float) -> Path:
@@ -61,7 +61,7 @@ def fit_path(place: Floats, points: Floats, weight: Floats, noise: float) -> Pat
     step = (high - low) / spans
     knots = low + step * np.arange(-3, spans + 4)
     spread = np.gradient(place) if len(place) > 1 else np.ones(1)
-    weight = weight * np.clip(np.abs(spread) / CREEP, 0.005, 1.0) / noise**2
+    weight = weight * np.clip(np.abs(spread) / CREEP, 0.005, 1.0) / np.square(noise)
     count = spans + 3
     band = np.zeros((4, count))
     right = np.zeros((count, 2))
@@ -72,9 +72,9 @@ def fit_path(place: Floats, points: Floats, weight: Floats, noise: float) -> Pat
         np.add.at(right, start + i, (weight * values[:, i])[:, None] * points)
         for j in range(i + 1):
             np.add.at(band[i - j], start + j, weight * values[:, i] * values[:, j])
-    penalise(band, 2, step**-3 / CURVATURE)
-    penalise(band, 3, step**-5 / STEERING)
-    return tabulate(BSpline(knots, solveh_banded(band, right, lower=True), 3), low, high)
+    penalise(band, 2, exact.power(step, -3) / CURVATURE)
+    penalise(band, 3, exact.power(step, -5) / STEERING)
+    return tabulate(BSpline(knots, exact.solve_banded(band, right), 3), low, high)
 
 
 def penalise(band: Floats, order: int, weight: float) -> None:
@@ -88,7 +88,7 @@ def penalise(band: Floats, order: int, weight: float) -> None:
 
 def straight_path(point: Floats, heading: float, low: float, high: float) -> Path:
     """A straight line through `point` where the distance driven is (low + high) / 2."""
-    direction = np.array([np.cos(heading), np.sin(heading)])
+    direction = np.array([exact.cos(heading), exact.sin(heading)])
     ends = np.array([low - MARGIN, high + MARGIN])
     where = point + (ends - (low + high) / 2.0)[:, None] * direction
     return tabulate(BSpline(np.repeat(ends, 2), where, 1), ends[0], ends[1])
@@ -97,6 +97,6 @@ def straight_path(point: Floats, heading: float, low: float, high: float) -> Pat
 def tabulate(curve: BSpline, low: float, high: float) -> Path:
     """Measure the curve's arc length."""
     u = np.linspace(low, high, int(np.ceil((high - low) / STEP)) + 1)
-    rate = np.hypot(*curve(u, 1).T)
+    rate = exact.hypot(*curve(u, 1).T)
     length = low + np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(u))])
     return Path(curve, u, length)

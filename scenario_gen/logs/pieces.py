@@ -19,6 +19,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, Track
 from scenario_gen.logs.config import LogConfig
@@ -48,7 +49,7 @@ def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Pie
     seconds = np.diff(track.fix_ns) * 1e-9
     usual = float(np.median(seconds))
     longest = longest_bridge(seconds, config)
-    step = np.hypot(*np.diff(track.fix, axis=0).T)
+    step = exact.hypot(*np.diff(track.fix, axis=0).T)
     gaps = (seconds > longest) | (step > JUMP_SLACK + FASTEST * seconds)
     back = reversals(track, config)
     cuts = gaps | back
@@ -62,12 +63,12 @@ def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Pie
 
     def rms(name: str) -> float:
         values = np.concatenate([np.zeros(0), *(getattr(smooth, name) for smooth in smooths)])
-        return float(np.sqrt((values**2).mean())) if len(values) else 0.0
+        return float(np.sqrt(np.square(values).mean())) if len(values) else 0.0
 
     quality = VehicleQuality(
         id=track.id,
         fixes=len(track.fix_ns),
-        seconds=sum(piece.last - piece.first - 1 for piece in pieces) * config.period,
+        seconds=sum(int(piece.last - piece.first - 1) for piece in pieces) * config.period,
         pieces=len(pieces),
         bridged=int(bridged.sum()),
         longest_bridged=float(seconds[bridged].max(initial=0.0)),
@@ -101,7 +102,7 @@ def reversals(track: Track, config: LogConfig) -> Bools:
         first, last = np.searchsorted(seconds, (ticks[begin], ticks[end - 1])).tolist()
         before = departure(track.fix[first::-1])
         after = departure(track.fix[last:])
-        if before is not None and after is not None and float(before @ after) > -np.cos(TURNED):
+        if before is not None and after is not None and float(exact.matmul(before, after)) > -exact.cos(TURNED):
             cuts[min((first + last) // 2, len(cuts) - 1)] = True
     return cuts
 
@@ -109,7 +110,7 @@ def reversals(track: Track, config: LogConfig) -> Bools:
 def departure(fix: Floats) -> Floats | None:
     """Unit vector from the first fix to the first one that is `LEVER` away; None if there is none."""
     offset = fix - fix[0]
-    away = np.hypot(offset[:, 0], offset[:, 1])
+    away = exact.hypot(offset[:, 0], offset[:, 1])
     far = np.flatnonzero(away > LEVER)
     return offset[far[0]] / away[far[0]] if len(far) else None
 

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import InputError
 from scenario_gen.logs.cleaning import clean, Drops
@@ -177,7 +178,7 @@ def no_meeting(log: RawLog, pieces: Sequence[Piece], config: LogConfig) -> str:
             first, last = max(a.first, b.first), min(a.last, b.last)
             if a.track.id != b.track.id and last > first:
                 gap = a.smooth.position[first - a.first : last - a.first] - b.smooth.position[first - b.first : last - b.first]
-                least = float(np.hypot(gap[:, 0], gap[:, 1]).min())
+                least = float(exact.hypot(gap[:, 0], gap[:, 1]).min())
                 if least < nearest:
                     nearest, who = least, f"{a.track.id} and {b.track.id} come closest, to {least:.0f} m"
     return (

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.logs.cleaning import Track
 from scenario_gen.logs.config import LogConfig
@@ -98,7 +99,7 @@ def smooth_piece(piece: Track, origin_ns: int, config: LogConfig) -> Smooth | No
         place, aside = path.project(guess, piece.fix)
         drive = motion.solve([*measured, (fix_t, place, noise / np.sqrt(weight), False)])
         guess = motion.place(drive, fix_t)
-        weight = np.minimum(1.0, 2.0 * noise / np.maximum(np.hypot(aside, place - guess), 1e-9))  # Huber's
+        weight = np.minimum(1.0, 2.0 * noise / np.maximum(exact.hypot(aside, place - guess), 1e-9))  # Huber's
     place, published = motion.at_ticks(drive)
     position, heading = path.pose(place)
     if np.ptp(place) < MOVED and not np.isfinite(piece.heading).any():
@@ -111,7 +112,7 @@ def smooth_piece(piece: Track, origin_ns: int, config: LogConfig) -> Smooth | No
         before=differs,
         after=published - speed_of_fixes(ticks, position),
         changed=piece.speed - np.interp(speed_t, ticks, published)[: len(piece.speed)],
-        moved=np.hypot(*(piece.fix - path.pose(guess)[0]).T),
+        moved=exact.hypot(*(piece.fix - path.pose(guess)[0]).T),
     )
 
 
@@ -130,10 +131,10 @@ def path_of(guess: Floats, piece: Track, weight: Floats, noise: float) -> Path:
         return fit_path(guess, piece.fix, weight, noise)
     known = piece.heading[np.isfinite(piece.heading)]
     if len(known):
-        heading = float(np.arctan2(np.median(np.sin(known)), np.median(np.cos(known))))
+        heading = float(exact.arctan2(np.median(exact.sin(known)), np.median(exact.cos(known))))
     else:  # the direction of the fixes' regression on the distance driven
         lever = guess - guess.mean()
-        heading = float(np.arctan2(*(lever @ (piece.fix - piece.fix.mean(axis=0)))[::-1]))
+        heading = float(exact.arctan2(*exact.matmul(lever, piece.fix - piece.fix.mean(axis=0))[::-1]))
     point = np.median(piece.fix, axis=0)
     return straight_path(point, heading, 2.0 * float(np.median(guess)) - high, high)
 
@@ -146,7 +147,7 @@ def speed_of_fixes(seconds: Floats, fix: Floats, window: float = 0.5) -> Floats:
         np.where(late > early, early, np.maximum(early - 1, 0)),
         np.where(late > early, late, np.minimum(late + 1, len(fix) - 1)),
     )
-    rate: Floats = np.hypot(*(fix[late] - fix[early]).T) / (seconds[late] - seconds[early])
+    rate: Floats = exact.hypot(*(fix[late] - fix[early]).T) / (seconds[late] - seconds[early])
     return rate
 
 
@@ -156,9 +157,9 @@ def estimated_noise(fix: Floats) -> float:
     if half < 3:
         return 0.5
     lag = np.arange(-half, half + 1)
-    square = lag**2 - (lag**2).mean()
-    parabola = 1.0 / len(lag) - (lag**2).mean() * square / (square @ square)  # the fitted parabola's value at lag 0
-    residual = fix[half : len(fix) - half] - np.array([np.convolve(axis, parabola, mode="valid") for axis in fix.T]).T
+    square = np.square(lag) - np.square(lag).mean()
+    parabola = 1.0 / len(lag) - np.square(lag).mean() * square / np.square(square).sum()  # the fitted parabola's value at lag 0
+    residual = fix[half : len(fix) - half] - exact.matmul(sliding_window_view(fix, len(lag), axis=0), parabola)
     return float(np.clip(max(white_equivalent(residual[:, 0]), white_equivalent(residual[:, 1])), 0.1, 1.5))
 
 
@@ -171,9 +172,9 @@ def white_equivalent(noise: Floats) -> float:
     noise = noise - np.median(noise)
     limit = 3.0 * 1.4826 * float(np.median(np.abs(noise))) + 1e-3
     noise = np.clip(noise, -limit, limit)
-    power, time = float(noise @ noise), 1.0
+    power, time = float(np.square(noise).sum()), 1.0
     for lag in range(1, min(20, len(noise) // 3)):
-        correlation = float(noise[:-lag] @ noise[lag:]) / max(power, 1e-12)
+        correlation = float((noise[:-lag] * noise[lag:]).sum()) / max(power, 1e-12)
         if correlation < 0.1:
             break
         time += 2.0 * correlation
@@ -202,5 +203,5 @@ def standing(ticks: Floats, fix_t: Floats, fix: Floats, speed_t: Floats, speed: 
         k = max(len(inside) // 5, 1)
         if (end - begin) * dt >= 1.0 and len(inside):
             shift = np.median(inside[-k:], axis=0) - np.median(inside[:k], axis=0)
-            stands[begin:end] = np.hypot(*shift) <= CREEPS
+            stands[begin:end] = exact.hypot(*shift) <= CREEPS
     return stands

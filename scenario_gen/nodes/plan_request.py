@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.planning.config import PlanningConfig
@@ -54,5 +55,5 @@ def plan_poses(road: Road, query: Query, config: PlanningConfig, seed: int) -> F
     """
     path = plan_patiently(make_planner(config), road, query, config.iterations, seed).path
     ahead = np.diff(path, axis=0) if len(path) > 1 else np.zeros((1, 2))
-    heading = np.arctan2(ahead[:, 1], ahead[:, 0])
+    heading = exact.arctan2(ahead[:, 1], ahead[:, 0])
     return np.column_stack([path, np.append(heading, heading[-1])[: len(path)]])

@@ -15,7 +15,9 @@
 """The band's first guess between two poses: a direct curve where it is free, else the planner's path, moved to its side."""
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.planning.smooth import Guess, resampled
 from scenario_gen.roads.clearance import clearance_field, segments_free
@@ -30,15 +32,22 @@ DIRECT_HOLD, PATH_HOLD = 0.3, 0.3
 
 def direct(road: Road, start: Floats, end: Floats, radius: float, limit: float) -> Guess | None:
     """A cubic Hermite curve between two poses (3,), if a disc can follow it and its curvature stays within the limit."""
-    chord = float(np.hypot(*(end - start)[:2]))
+    chord = float(exact.hypot(*(end - start)[:2]))
     count = max(int(np.ceil(chord / SPACING)) + 1, 8)
     t = np.linspace(0.0, 1.0, count)[:, None]
-    ahead, arrive = (np.array([np.cos(pose[2]), np.sin(pose[2])]) for pose in (start, end))
+    ahead, arrive = (np.array([exact.cos(pose[2]), exact.sin(pose[2])]) for pose in (start, end))
     for stretch in (1.0, 1.3, 0.8, 1.6):
         a, b = stretch * chord * ahead, stretch * chord * arrive
-        p = start[:2] * (1 + 2 * t) * (1 - t) ** 2 + a * t * (1 - t) ** 2 + end[:2] * t**2 * (3 - 2 * t) + b * t**2 * (t - 1)
+        p = (
+            start[:2] * (1 + 2 * t) * np.square(1 - t)
+            + a * t * np.square(1 - t)
+            + end[:2] * np.square(t) * (3 - 2 * t)
+            + b * np.square(t) * (t - 1)
+        )
         first, second = np.gradient(p, axis=0), np.gradient(np.gradient(p, axis=0), axis=0)
-        bend = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / np.maximum(np.hypot(*first.T), 1e-9) ** 3
+        bend = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / exact.power(
+            np.maximum(exact.hypot(*first.T), 1e-9), 3
+        )
         onward = ((p[1:-1] - p[:-2]) * (p[2:] - p[1:-1])).sum(axis=1) > 0.0  # no cusp
         if onward.all() and bend[1:-1].max() <= limit and segments_free(road, p[:-1], p[1:], radius).all():
             return Guess(p, np.full(count, DIRECT_HOLD))
@@ -52,7 +61,7 @@ def keep_to_side(road: Road, path: Floats, radius: float, side: str) -> Guess:
     """
     guess = resampled(Guess(path, np.full(len(path), PATH_HOLD)), SPACING)
     tangent = np.gradient(guess.points, axis=0)
-    tangent /= np.maximum(np.hypot(*tangent.T), 1e-9)[:, None]
+    tangent /= np.maximum(exact.hypot(*tangent.T), 1e-9)[:, None]
     outward = np.column_stack((tangent[:, 1], -tangent[:, 0])) * (1.0 if side == "right" else -1.0)
     near, far = (sight(road, guess.points, sign * outward) for sign in (1.0, -1.0))
     width = near + far
@@ -85,7 +94,7 @@ def sight(road: Road, points: Floats, direction: Floats) -> Floats:
 
 def _averaged(values: Floats, valid: Bools, reach: int = 8) -> Floats:
     """Mean of the valid values within `reach` neighbours, 0 where there is none."""
-    window = np.ones(2 * reach + 1)
     padded = np.pad(np.where(valid, values, 0.0), reach, mode="edge")
-    weight = np.convolve(np.pad(valid.astype(float), reach, mode="edge"), window, mode="valid")
-    return np.convolve(padded, window, mode="valid") / np.maximum(weight, 1.0)
+    weight = np.pad(valid.astype(float), reach, mode="edge")
+    total, count = (sliding_window_view(each, 2 * reach + 1).sum(axis=1) for each in (padded, weight))
+    return np.asarray(total / np.maximum(count, 1.0))

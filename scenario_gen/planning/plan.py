@@ -20,6 +20,7 @@ import itertools
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import RefusedError
@@ -94,7 +95,7 @@ def plan_routes(road: Road, fit: Fit, config: PlanningConfig = PlanningConfig(),
 
 def deviations(route: Route, fitted: FittedVehicle) -> Floats:
     """How far [m] the route passes from each anchor: (K + 2,)."""
-    return np.asarray(np.hypot(*(route.points[route.anchor, :2] - fitted.anchors[:, :2]).T))
+    return np.asarray(exact.hypot(*(route.points[route.anchor, :2] - fitted.anchors[:, :2]).T))
 
 
 def make_planner(config: PlanningConfig) -> Planner:
@@ -114,7 +115,7 @@ def _route(task: _Task) -> Route:
                 f"{task.name(k)} is blocked: its footprint, {task.vehicle.length:.2f} m by {task.vehicle.width:.2f} m, "
                 f"has no room there on road {task.road.name!r}"
             )
-    if task.fitted.stands.all() or np.hypot(*(anchors[-1] - anchors[0])[:2]) < STANDS:
+    if task.fitted.stands.all() or exact.hypot(*(anchors[-1] - anchors[0])[:2]) < STANDS:
         return Route(anchors[:1], np.zeros(len(anchors), dtype=np.int64), np.zeros(1))
     waypoints = _waypoints(anchors, task.fitted.stands, task.config.max_curvature)
     if not task.config.drivable:
@@ -146,12 +147,12 @@ def _waypoints(anchors: Floats, stands: Bools, limit: float) -> list[int]:
 def _leads(start: Floats, end: Floats, limit: float) -> bool:
     """Whether `end` lies ahead of `start`, both seen from their headings, without a turn much sharper than `limit`."""
     dx, dy = (end - start)[:2]
-    chord = float(np.hypot(dx, dy))
+    chord = float(exact.hypot(dx, dy))
     if chord < CLOSE:
         return False
     for yaw in (start[2], end[2]):
-        off = abs(float((np.arctan2(dy, dx) - yaw + np.pi) % (2.0 * np.pi) - np.pi))
-        if off > SHARP or 2.0 * np.sin(min(off, 0.5 * np.pi)) / chord > SLACK * limit:
+        off = abs(float((exact.arctan2(dy, dx) - yaw + np.pi) % (2.0 * np.pi) - np.pi))
+        if off > SHARP or 2.0 * exact.sin(min(off, 0.5 * np.pi)) / chord > SLACK * limit:
             return False
     return True
 
@@ -164,8 +165,8 @@ def _weights(anchors: Floats, waypoints: list[int]) -> Floats:
         chord = (anchors[b] - anchors[a])[:2]
         for k in range(a + 1, b):
             from_a, to_b = (anchors[k] - anchors[a])[:2], (anchors[b] - anchors[k])[:2]
-            between = from_a @ chord > 0.0 and to_b @ chord > 0.0
-            if between and min(np.hypot(*from_a), np.hypot(*to_b)) > CLOSE:
+            between = exact.matmul(from_a, chord) > 0.0 and exact.matmul(to_b, chord) > 0.0
+            if between and min(exact.hypot(*from_a), exact.hypot(*to_b)) > CLOSE:
                 weight[k] = SOFTENED
     return weight
 
@@ -237,7 +238,7 @@ def _stops(task: _Task, length: Floats, poses: Floats) -> Floats:
         poses: (M, 3) the curve there.
     """
     group = np.concatenate(([0], np.cumsum(~task.fitted.stands)))
-    square = ((poses[None, :, :2] - task.anchors[:, None, :2]) ** 2).sum(axis=-1)
+    square = (np.square(poses[None, :, :2] - task.anchors[:, None, :2])).sum(axis=-1)
     per_group = np.zeros((group[-1] + 1, len(poses)))
     np.add.at(per_group, group, square)
     per_group[0, 1:] = np.inf
@@ -245,7 +246,7 @@ def _stops(task: _Task, length: Floats, poses: Floats) -> Floats:
     nearest = monotone_matching(per_group)
     offset = task.anchors[:, :2] - poses[nearest[group], :2]
     yaw = poses[nearest[group], 2]
-    ahead = np.bincount(group, offset[:, 0] * np.cos(yaw) + offset[:, 1] * np.sin(yaw)) / np.bincount(group)
+    ahead = np.bincount(group, offset[:, 0] * exact.cos(yaw) + offset[:, 1] * exact.sin(yaw)) / np.bincount(group)
     step = length[1] if len(length) > 1 else 0.0
     refined = length[nearest] + np.clip(ahead, -step, step)  # between the dense points
     refined[0], refined[-1] = 0.0, length[-1]
@@ -257,8 +258,8 @@ def _polyline(task: _Task, waypoints: list[int]) -> Route:
     legs = [_searched(task, a, b, _radius(task, task.anchors[a], task.anchors[b])) for a, b in itertools.pairwise(waypoints)]
     path = np.concatenate([legs[0]] + [leg[1:] for leg in legs[1:]])
     edge = np.diff(path, axis=0)
-    at = np.concatenate(([0.0], np.cumsum(np.hypot(*edge.T))))
-    yaw = np.unwrap(np.arctan2(edge[:, 1], edge[:, 0]))
+    at = np.concatenate(([0.0], np.cumsum(exact.hypot(*edge.T))))
+    yaw = np.unwrap(exact.arctan2(edge[:, 1], edge[:, 0]))
 
     def poses_at(length: Floats) -> Floats:
         which = np.clip(np.searchsorted(at, length, side="right") - 1, 0, len(yaw) - 1)
@@ -279,5 +280,5 @@ def _complaint(task: _Task, curve: Curve) -> str:
     if len(curve.off_road):
         where = curve.off_road[len(curve.off_road) // 2, :2]
         reasons.append(f"its footprint leaves the road at ({where[0]:.2f}, {where[1]:.2f}) m")
-    nearest = task.name(int(np.argmin(np.hypot(*(task.anchors[:, :2] - where).T))))
+    nearest = task.name(int(np.argmin(exact.hypot(*(task.anchors[:, :2] - where).T))))
     return f"no drivable route for vehicle {task.vehicle.id} on road {task.road.name!r} near {nearest}: " + "; ".join(reasons)

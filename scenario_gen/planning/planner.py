@@ -20,6 +20,7 @@ from typing import Protocol
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.errors import RefusedError
 from scenario_gen.roads.clearance import segments_free
@@ -144,4 +145,4 @@ def check_query(road: Road, query: Query) -> int:
 
 def path_length(path: Floats) -> float:
     """Length of a polyline (P, 2)."""
-    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+    return float(exact.hypot(*np.diff(path, axis=0).T).sum())

@@ -20,6 +20,7 @@ from time import thread_time
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.parameters import check, parameter
 from scenario_gen.planning import tree_nodes as trees
@@ -116,7 +117,7 @@ class _Trees:
     def _make_room(self) -> None:
         a, b = int(self.counter[trees.NODES_A]), int(self.counter[trees.NODES_B])
         side = self.setting[trees.SIDE]
-        crowded = max(a, b) * side**2 > OCCUPANCY * len(self.free_cells) and side > 2.0
+        crowded = max(a, b) * np.square(side) > OCCUPANCY * len(self.free_cells) and side > 2.0
         if crowded or self.counter[trees.CHUNKS] + 8 >= len(self.chunk):
             old = self.node, self.link, self.chunk, self.head
             if crowded:
@@ -151,7 +152,7 @@ class RrtStarConnect:
         label = check_query(road, query)
         started = thread_time()
         search = _Trees(road, query, label, self.config, seed)
-        straight = math.dist(search.ends[0], search.ends[1])
+        straight = float(exact.hypot(*(search.ends[1] - search.ends[0])))
         shortest: Floats | None = None
         cost, known, batch = np.inf, np.inf, BATCH
         history: list[tuple[int, float, float]] = []

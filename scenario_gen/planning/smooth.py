@@ -23,8 +23,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicHermiteSpline
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints, wrap_angle
 from scenario_gen.encounter import Vehicle
 from scenario_gen.planning.band import relax
@@ -33,7 +34,7 @@ from scenario_gen.roads.clearance import clearance_field, footprint_fits
 from scenario_gen.roads.road import Road
 
 ROUNDS, STEPS = 40, 8  # the band is resampled between rounds
-BEND = 4.0**4  # [m^4] with hold = 1 a kink spreads over about 4 m
+BEND = exact.power(4.0, 4)  # [m^4] with hold = 1 a kink spreads over about 4 m
 PULL = 200.0  # weight of an anchor
 DISCS = 5  # that cover a footprint
 TAPER = 0.05  # how fast the wanted clearance rises from what there is at the ends
@@ -60,7 +61,7 @@ class Targets:
 class Curve:
     """A verified or failed curve: the spline over `knots` (0 .. end), and what is wrong with it."""
 
-    spline: CubicSpline
+    spline: CubicHermiteSpline
     end: float
     curvature: float
     sharpest: Floats  # (2,) where that is
@@ -69,8 +70,8 @@ class Curve:
     @cached_property
     def _arc(self) -> tuple[Floats, Floats]:
         u = np.linspace(0.0, self.end, int(np.ceil(self.end / CHECK)) + 1)
-        speed = np.hypot(*self.spline(u, 1).T)
-        middle = np.hypot(*self.spline(0.5 * (u[1:] + u[:-1]), 1).T)
+        speed = exact.hypot(*self.spline(u, 1).T)
+        middle = exact.hypot(*self.spline(0.5 * (u[1:] + u[:-1]), 1).T)
         pieces = np.diff(u) * (speed[:-1] + 4.0 * middle + speed[1:]) / 6.0  # Simpson
         return u, np.concatenate(([0.0], np.cumsum(pieces)))
 
@@ -83,7 +84,7 @@ class Curve:
         """Poses (M, 3) at arc lengths (M,); yaw unwrapped."""
         u = np.interp(length, self._arc[1], self._arc[0])
         slope = self.spline(u, 1)
-        return np.column_stack((self.spline(u), np.unwrap(np.arctan2(slope[:, 1], slope[:, 0]))))
+        return np.column_stack((self.spline(u), np.unwrap(exact.arctan2(slope[:, 1], slope[:, 0]))))
 
 
 def smooth(
@@ -95,7 +96,7 @@ def smooth(
         The first curve within the limits; if there is none, the last one, with what is wrong about it.
     """
     disc = (np.arange(DISCS) - 0.5 * (DISCS - 1)) * vehicle.length / DISCS
-    cover = float(np.hypot(0.5 * vehicle.width, 0.5 * vehicle.length / DISCS))
+    cover = float(exact.hypot(0.5 * vehicle.width, 0.5 * vehicle.length / DISCS))
     headings = np.stack([_ahead(start), _ahead(end)])
     guess = resampled(guess, config.spacing)
     points = guess.points
@@ -129,7 +130,7 @@ def smooth(
 
 def _ahead(pose: Floats) -> Floats:
     """Unit vector of a pose's heading."""
-    return np.array([np.cos(pose[2]), np.sin(pose[2])])
+    return np.array([exact.cos(pose[2]), exact.sin(pose[2])])
 
 
 def _needed(road: Road, disc: Floats, need: float, start: Floats, end: Floats, spacing: float, count: int) -> Floats:
@@ -147,13 +148,13 @@ def _needed(road: Road, disc: Floats, need: float, start: Floats, end: Floats, s
 
 def verified(road: Road, vehicle: Vehicle, points: Floats, start: Floats, end: Floats) -> Curve:
     """Lay the clamped spline through the band and measure it."""
-    knots = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-    spline = CubicSpline(knots, points, bc_type=((1, _ahead(start)), (1, _ahead(end))))
+    knots = np.concatenate(([0.0], np.cumsum(exact.hypot(*np.diff(points, axis=0).T))))
+    spline = exact.cubic_spline(knots, points, (_ahead(start), _ahead(end)))
     u = np.linspace(0.0, knots[-1], int(np.ceil(knots[-1] / CHECK)) + 1)
     first, second = spline(u, 1), spline(u, 2)
-    bend = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / np.hypot(*first.T) ** 3
-    poses = np.column_stack((spline(u), np.arctan2(first[:, 1], first[:, 0])))
-    turned = np.abs(wrap_angle(np.diff(poses[:, 2]))) / np.maximum(np.hypot(*np.diff(poses[:, :2], axis=0).T), 1e-6)
+    bend = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / exact.power(exact.hypot(*first.T), 3)
+    poses = np.column_stack((spline(u), exact.arctan2(first[:, 1], first[:, 0])))
+    turned = np.abs(wrap_angle(np.diff(poses[:, 2]))) / np.maximum(exact.hypot(*np.diff(poses[:, :2], axis=0).T), 1e-6)
     bend[1:] = np.maximum(bend[1:], turned)  # a cusp on a straight line has no curvature, but turns round
     poses[0], poses[-1] = start, end
     fits = footprint_fits(road, poses, vehicle.length, vehicle.width)
@@ -162,12 +163,12 @@ def verified(road: Road, vehicle: Vehicle, points: Floats, start: Floats, end: F
 
 def length_of(points: Floats) -> float:
     """Length of a polyline (P, 2)."""
-    return float(np.hypot(*np.diff(points, axis=0).T).sum())
+    return float(exact.hypot(*np.diff(points, axis=0).T).sum())
 
 
 def resampled(guess: Guess, spacing: float, count: int | None = None) -> Guess:
     """The polyline at equal distances of about `spacing` (or with `count` points)."""
-    step = np.hypot(*np.diff(guess.points, axis=0).T)
+    step = exact.hypot(*np.diff(guess.points, axis=0).T)
     at = np.concatenate(([0.0], np.cumsum(step)))
     count = count or max(int(np.ceil(at[-1] / spacing)) + 1, 8)
     s = np.linspace(0.0, at[-1], count)
@@ -179,7 +180,7 @@ def _assigned(points: Floats, targets: Targets) -> tuple[Floats, Floats]:
     """Give each target to the point of the band that a monotone matching says: positions (M, 2), weights (M,)."""
     anchor, pull = points.copy(), np.zeros(len(points))
     if len(targets.points):
-        index = monotone_matching(((points[None] - targets.points[:, None]) ** 2).sum(axis=-1))
+        index = monotone_matching((np.square(points[None] - targets.points[:, None])).sum(axis=-1))
         for m, point, weight in zip(index, targets.points, targets.weight, strict=True):
             if weight * PULL > pull[m]:
                 anchor[m], pull[m] = point, weight * PULL

@@ -19,6 +19,7 @@ See `tree_nodes` for the trees' memory and `tree_samples` for what they grow to.
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F2, I, I1, kernel, OUT1, OUT2, OUTI1, OUTI2
 from scenario_gen.planning.tree_nodes import (
@@ -132,7 +133,7 @@ def _extend(  # noqa: PLR0912
     """
     side, radius, step, bound = setting[SIDE], setting[RADIUS], setting[STEP], setting[BOUND]
     n = float(max(counter[tree], 2))
-    reach = min(setting[GAMMA] * np.sqrt(np.log(n) / n), setting[ZETA])  # eq 10 with exponent 1/d, d = 2
+    reach = min(setting[GAMMA] * np.sqrt(exact.log(n) / n), setting[ZETA])  # eq 10 with exponent 1/d, d = 2
     count = 0
     if nearest < 0 and reach <= step:  # nearly always the nearest node is near: one search for both
         count = near_nodes(tree, qx, qy, reach, node, chunk, head, side, columns, near, gap)

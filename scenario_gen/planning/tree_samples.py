@@ -22,6 +22,7 @@ from numba import types
 import numpy as np
 from numpy.typing import NDArray
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import kernel
 from scenario_gen.planning.tree_nodes import BOUND, CORNERS, DRAWN, NODES_A, NODES_B, SIDE, USED
@@ -38,7 +39,8 @@ def uniform(state: Random) -> float:
     z = state[0]
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return float((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
+    value: float = float((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
+    return value
 
 
 @kernel(inline=True)
@@ -79,7 +81,7 @@ def _sample(
     for _ in range(100):
         if small:  # Gammell, Srinivasa & Barfoot 2014: sample the ellipse directly
             angle, r = 2.0 * np.pi * uniform(random), np.sqrt(uniform(random))
-            u, v = major * r * np.cos(angle), minor * r * np.sin(angle)
+            u, v = major * r * exact.cos(angle), minor * r * exact.sin(angle)
             c, s = (dx / straight, dy / straight) if straight > 0.0 else (1.0, 0.0)
             x = 0.5 * (ends[0, 0] + ends[1, 0]) + c * u - s * v
             y = 0.5 * (ends[0, 1] + ends[1, 1]) + s * u + c * v

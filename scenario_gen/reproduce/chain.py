@@ -23,6 +23,7 @@ from itertools import product
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, wrap_angle
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError
@@ -144,7 +145,7 @@ class _Lanes:
         if outside < 0.0:
             reach = abs(distance) * HALF_ROAD / self.junction
         back = (SIDE / 2.0 - np.sign(distance) * reach) * (-1.0 if leaves else 1.0)
-        return [x + back * np.cos(heading), y + back * np.sin(heading), heading]
+        return [x + back * exact.cos(heading), y + back * exact.sin(heading), heading]
 
 
 def _evenly_scaled(encounter: Encounter, segmentation: Segmentation, road: Road, lanes: _Lanes) -> tuple[Floats, Floats]:
@@ -172,11 +173,13 @@ def _on_lane(road: Road, pose: Floats, centre: Floats) -> tuple[bool, int, float
     best, answer = np.inf, (False, 0, 0.0)
     for leaves, gates in ((False, road.entries), (True, road.exits)):
         for lane, gate in enumerate(gates):
-            along = np.array([np.cos(gate[2]), np.sin(gate[2])])
+            along = np.array([exact.cos(gate[2]), exact.sin(gate[2])])
             outward = along if leaves else -along
             offset = pose[:2] - gate[:2]
-            distance = float((pose[:2] - centre) @ outward)
-            off = abs(offset @ np.array([-along[1], along[0]])) + 10.0 * abs(float(wrap_angle(np.asarray(pose[2] - gate[2]))))
+            distance = float(exact.matmul(pose[:2] - centre, outward))
+            off = abs(exact.matmul(offset, np.array([-along[1], along[0]]))) + 10.0 * abs(
+                float(wrap_angle(np.asarray(pose[2] - gate[2])))
+            )
             cost = float(off) + (0.0 if distance >= 0.0 else 1.0)
             if cost < best:
                 best, answer = cost, (leaves, lane, distance)
@@ -206,7 +209,7 @@ def sample(
         if factor < 1.0
     )
     step = np.diff(position, axis=2)
-    speed = np.hypot(step[..., 0], step[..., 1]) / encounter.dt  # eq 16
+    speed = exact.hypot(step[..., 0], step[..., 1]) / encounter.dt  # eq 16
     return Sampled(fit, routes, position, np.concatenate([speed, speed[..., -1:]], axis=-1), notes)
 
 
@@ -221,12 +224,12 @@ def _vehicle(
     clock = np.unique(np.concatenate([np.arange(0.0, times[-1], TRAINING_PERIOD), times]))
     training, wanted = (_along(route, profile.state(t)[0]) for t in (clock, encounter.time))
     chord = training[-1] - training[0]
-    turn = np.arctan2(chord[1], chord[0])
-    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    x = (wanted @ rotation)[:, 0]
+    turn = exact.arctan2(chord[1], chord[0])
+    rotation = np.array([[exact.cos(turn), -exact.sin(turn)], [exact.sin(turn), exact.cos(turn)]])
+    x = (exact.matmul(wanted, rotation))[:, 0]
     there, back = np.unique(x, return_inverse=True)
-    y = ordinate_samples(training @ rotation, there, count, seed + 7919 * n)[:, back]
-    return np.stack([np.broadcast_to(x, y.shape), y], axis=-1) @ rotation.T, factor
+    y = ordinate_samples(exact.matmul(training, rotation), there, count, seed + 7919 * n)[:, back]
+    return exact.matmul(np.stack([np.broadcast_to(x, y.shape), y], axis=-1), rotation.T), factor
 
 
 def _profile(encounter: Encounter, fit: Fit, n: int, route: Route, waits: tuple[Wait, ...]) -> tuple[SpeedProfile, float]:

@@ -19,6 +19,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import RefusedError
@@ -140,8 +141,8 @@ def line_error(speed: Floats, changepoints: Ints) -> float:
     total = 0.0
     for a, b in pairwise([0, *changepoints.tolist(), speed.shape[1]]):
         basis = np.vander(np.arange(a, b) - 0.5 * (a + b), 2)
-        fitted = basis @ np.linalg.lstsq(basis, speed[:, a:b].T, rcond=None)[0]
-        total += float(((speed[:, a:b].T - fitted) ** 2).sum())
+        fitted = exact.matmul(basis, exact.lstsq(basis, speed[:, a:b].T))
+        total += float((np.square(speed[:, a:b].T - fitted)).sum())
     return float(np.sqrt(total / speed.size))
 
 
@@ -167,16 +168,16 @@ def stop_speed(encounter: Encounter, arm: Sampled) -> float:
 def _bend(route: Route) -> tuple[float, float]:
     """How far a path strays from its chord; of straight ones the longest."""
     offset = route.points[:, :2] - route.points[0, :2]
-    chord = offset[-1] / max(float(np.hypot(*offset[-1])), 1e-9)
+    chord = offset[-1] / max(float(exact.hypot(*offset[-1])), 1e-9)
     return round(float(np.abs(offset[:, 0] * chord[1] - offset[:, 1] * chord[0]).max()), 1), float(route.length[-1])
 
 
 def compare_priors(route: Route, seed: int) -> Regressions:
     """Figure 2 on one planned path: the grid is turned so that the path's chord is along x, and y is far from zero."""
     chord = (route.points[-1] - route.points[0])[:2]
-    turn = np.arctan2(chord[1], chord[0])
-    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    path = route.points[:, :2] @ rotation
+    turn = exact.arctan2(chord[1], chord[0])
+    rotation = np.array([[exact.cos(turn), -exact.sin(turn)], [exact.sin(turn), exact.cos(turn)]])
+    path = exact.matmul(route.points[:, :2], rotation)
     path = path[np.concatenate([[True], path[1:, 0] > np.maximum.accumulate(path[:, 0])[:-1]])]  # a function of x
     x = np.linspace(path[0, 0], path[-1, 0], 120)
     truth = np.interp(x, *path.T)
@@ -187,8 +188,8 @@ def compare_priors(route: Route, seed: int) -> Regressions:
     priors = {}
     for name, degree in PRIORS.items():
         posterior = Regression(Features(x[0], x[-1], SIGMA, LENGTH, degree), observations).predict(x)
-        samples = posterior.sample(generator.standard_normal((10, posterior.factor.shape[1])))
-        priors[name] = Prior(samples, float(np.sqrt(((posterior.mean - truth) ** 2).mean())))
+        samples = posterior.sample(exact.standard_normal(generator, (10, posterior.factor.shape[1])))
+        priors[name] = Prior(samples, float(np.sqrt((np.square(posterior.mean - truth)).mean())))
     return Regressions(x, truth, training, priors)
 
 

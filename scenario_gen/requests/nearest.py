@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import wrap_angle
 from scenario_gen.errors import RefusedError, ScenarioGenError
 from scenario_gen.fitting.routes import draw_route
@@ -183,7 +184,7 @@ class _Search:
             changes = []
             for name in (name for name in after if after[name] != before[name]):
                 a, b = before[name], after[name]
-                if (distance := float(np.hypot(b[0] - a[0], b[1] - a[1]))) > 0.0:
+                if (distance := float(exact.hypot(b[0] - a[0], b[1] - a[1]))) > 0.0:
                     changes.append(f"vehicle {name} {distance:.2f} m away")
                 elif a[2] != b[2]:
                     changes.append(f"vehicle {name} turned by {b[2] - a[2]:+.2f} rad")

@@ -18,6 +18,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Vehicle
 from scenario_gen.requests.chain import Chain
@@ -67,7 +68,7 @@ def repaired(chain: Chain, request: Request, base: Mapping[str, Floats]) -> Requ
 
 def _with_room(road: Road, vehicle: Vehicle, pose: Floats, asked: Floats) -> State:
     """The pose in whole centimetres, as little beyond the nearest one as its footprint then needs."""
-    away = (pose - asked)[:2] / np.hypot(*(pose - asked)[:2])
+    away = (pose - asked)[:2] / exact.hypot(*(pose - asked)[:2])
     for margin in _MARGINS:
         tried = np.array([*np.round(pose[:2] + margin * away, 2), asked[2]])
         if footprint_fits(road, tried[None], vehicle.length, vehicle.width)[0]:
@@ -91,7 +92,7 @@ def _apart(chain: Chain, request: Request, base: Mapping[str, Floats], end: str,
     state = request.states(end)[name]
     if gap(np.array(state[:3])) > 0.0:
         return request
-    ahead = np.array([np.cos(state[2]), np.sin(state[2]), 0.0])
+    ahead = np.array([exact.cos(state[2]), exact.sin(state[2]), 0.0])
     for offset in (sign * step for step in _OFFSETS for sign in (1.0, -1.0)):
         tried = moved(state, np.array(state[:3]) + offset * ahead)
         pose = np.array(tried[:3])

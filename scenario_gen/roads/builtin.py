@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.road import Road
@@ -88,13 +89,13 @@ def draw(name: str, layout: Layout, config: RoadConfig) -> Road:
 def _corner(u: Floats, v: Floats, radius: float) -> Bools:
     """Cells of the rounded corner between two kerbs, u and v metres beyond each of them."""
     inside = (u >= 0.0) & (v >= 0.0) & (u < radius) & (v < radius)
-    return np.asarray(inside & (np.hypot(u - radius, v - radius) > radius))
+    return np.asarray(inside & (exact.hypot(u - radius, v - radius) > radius))
 
 
 def _lane_ends(arm: str, reach: float, lanes: int, config: RoadConfig) -> tuple[Floats, Floats]:
     """Entries (lanes, 3) and exits (lanes, 3) of one arm, from the middle of the road outwards."""
     outward = _OUTWARD[arm]
-    along = np.array([np.cos(outward), np.sin(outward)])
+    along = np.array([exact.cos(outward), exact.sin(outward)])
     right = np.array([along[1], -along[0]]) * (1.0 if config.traffic_side == "right" else -1.0)
     offsets = (np.arange(lanes) + 0.5)[:, None] * config.lane_width * right
     entries = np.column_stack((along * reach - offsets, np.full(lanes, outward + np.pi)))

@@ -26,6 +26,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.kernels import B2, F, F2, kernel, OUT2, OUTB1
 from scenario_gen.roads.road import Road
@@ -256,7 +257,7 @@ def footprint_free(clearance: Floats, x: float, y: float, yaw: float, half_lengt
         return False
     if clearance[i, j] - 0.7072 >= np.sqrt(half_length * half_length + half_width * half_width):
         return True
-    c, s = np.cos(yaw), np.sin(yaw)
+    c, s = exact.cos(yaw), exact.sin(yaw)
     corner_x, corner_y = np.empty(4), np.empty(4)
     for k in range(4):
         u = half_length if k in (0, 3) else -half_length

@@ -17,6 +17,7 @@
 import numpy as np
 from PIL import Image, ImageDraw
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.road import Road
@@ -64,7 +65,7 @@ def draw_corridor(tracks: tuple[Track, ...], config: RoadConfig) -> Road:
 
 def _corners(poses: Floats, length: float, width: float) -> Floats:
     """(M, 4, 2) corners of footprints at (M, 3) poses."""
-    cos, sin = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
+    cos, sin = exact.cos(poses[:, 2])[:, None], exact.sin(poses[:, 2])[:, None]
     u = np.array([1.0, -1.0, -1.0, 1.0]) * length / 2.0
     v = np.array([1.0, 1.0, -1.0, -1.0]) * width / 2.0
     return np.stack((poses[:, :1] + u * cos - v * sin, poses[:, 1:2] + u * sin + v * cos), axis=-1)

@@ -19,6 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
 
 
@@ -39,9 +40,9 @@ class Curve:
     def through(cls, xy: Floats) -> "Curve":
         """Lay a curve on points (M, 2); the yaw of each is the mean direction of its two neighbouring edges."""
         step = np.diff(xy, axis=0)
-        keep = np.concatenate(([True], np.hypot(step[:, 0], step[:, 1]) > 1e-9))
+        keep = np.concatenate(([True], exact.hypot(step[:, 0], step[:, 1]) > 1e-9))
         xy = xy[keep]
-        edge = np.unwrap(np.arctan2(np.diff(xy[:, 1]), np.diff(xy[:, 0])))
+        edge = np.unwrap(exact.arctan2(np.diff(xy[:, 1]), np.diff(xy[:, 0])))
         yaw = np.concatenate((edge[:1], (edge[1:] + edge[:-1]) / 2.0, edge[-1:]))
         return cls(np.column_stack((xy, yaw)))
 
@@ -49,7 +50,7 @@ class Curve:
     def station(self) -> Floats:
         """(M,) arc length [m] of each point."""
         step = np.diff(self.points[:, :2], axis=0)
-        return frozen(np.concatenate(([0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1])))))
+        return frozen(np.concatenate(([0.0], np.cumsum(exact.hypot(step[:, 0], step[:, 1])))))
 
     @property
     def length(self) -> float:
@@ -61,15 +62,15 @@ class Curve:
         s = np.asarray(station, dtype=np.float64)
         pose = np.stack([np.interp(s, self.station, self.points[:, k]) for k in range(3)], axis=-1)
         beyond = np.minimum(s, 0.0) + np.maximum(s - self.length, 0.0)
-        pose[..., 0] += beyond * np.cos(pose[..., 2])
-        pose[..., 1] += beyond * np.sin(pose[..., 2])
+        pose[..., 0] += beyond * exact.cos(pose[..., 2])
+        pose[..., 1] += beyond * exact.sin(pose[..., 2])
         return pose
 
     def beside(self, station: Floats, offset: Floats) -> Floats:
         """Poses (..., 3) at arc lengths and offsets [m, left positive]; the yaw is the curve's own."""
         pose = self.at(station)
-        pose[..., 0] -= offset * np.sin(pose[..., 2])
-        pose[..., 1] += offset * np.cos(pose[..., 2])
+        pose[..., 0] -= offset * exact.sin(pose[..., 2])
+        pose[..., 1] += offset * exact.cos(pose[..., 2])
         return pose
 
     def project(self, xy: Floats) -> tuple[Floats, Floats]:
@@ -79,11 +80,11 @@ class Curve:
         line = np.vstack((ends[:1], self.points, ends[1:]))[:, :2]
         at = np.concatenate(([-reach], self.station, [self.length + reach]))
         edge = np.diff(line, axis=0)
-        size = np.hypot(edge[:, 0], edge[:, 1])
+        size = exact.hypot(edge[:, 0], edge[:, 1])
         along = edge / size[:, None]
         rel = xy[:, None, :] - line[None, :-1, :]
         t = np.clip(rel[..., 0] * along[:, 0] + rel[..., 1] * along[:, 1], 0.0, size)
-        gap = np.hypot(rel[..., 0] - t * along[:, 0], rel[..., 1] - t * along[:, 1])
+        gap = exact.hypot(rel[..., 0] - t * along[:, 0], rel[..., 1] - t * along[:, 1])
         best = np.argmin(gap, axis=1)
         rows = np.arange(len(xy))
         side = along[best, 0] * rel[rows, best, 1] - along[best, 1] * rel[rows, best, 0]
@@ -110,8 +111,8 @@ def crossings(first: Curve, second: Curve, min_angle: float = 0.35) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         t = (w[..., 0] * v[None, :, 1] - w[..., 1] * v[None, :, 0]) / det
         q = (w[..., 0] * u[:, None, 1] - w[..., 1] * u[:, None, 0]) / det
-    sine = np.abs(det) / (np.hypot(u[:, 0], u[:, 1])[:, None] * np.hypot(v[:, 0], v[:, 1])[None, :])
-    hit = (t >= 0.0) & (t < 1.0) & (q >= 0.0) & (q < 1.0) & (sine >= np.sin(min_angle))
+    sine = np.abs(det) / (exact.hypot(u[:, 0], u[:, 1])[:, None] * exact.hypot(v[:, 0], v[:, 1])[None, :])
+    hit = (t >= 0.0) & (t < 1.0) & (q >= 0.0) & (q < 1.0) & (sine >= exact.sin(min_angle))
     i, j = np.nonzero(hit)
     return np.column_stack(
         (

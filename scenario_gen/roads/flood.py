@@ -25,6 +25,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.kernels import B2, kernel, OUTI2
 from scenario_gen.roads.clearance import clearance_in_cells, segment_free, segments_free, to_metres
@@ -114,7 +115,7 @@ def _reachable(road: Road, xy: Floats, radius: float) -> Iterator[int]:
     i, j = i[labels[i, j] > 0], j[labels[i, j] > 0]
     centres = to_metres(road, np.stack((j + 0.5, i + 0.5), axis=-1))
     free = segments_free(road, np.broadcast_to(xy, centres.shape), centres, radius)
-    for k in np.argsort(np.hypot(*(centres - xy).T), kind="stable"):
+    for k in np.argsort(exact.hypot(*(centres - xy).T), kind="stable"):
         if free[k]:
             yield int(labels[i[k], j[k]])
 

@@ -16,6 +16,7 @@
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, wrap_angle
 from scenario_gen.errors import RefusedError
 from scenario_gen.roads.builtin import Layout
@@ -80,14 +81,14 @@ def _at_a_junction(tracks: tuple[Track, ...], config: RoadConfig) -> Layout:
     for track in tracks:
         for k in (0, -1):
             pose = track.poses[k]
-            away = float(np.hypot(*(pose[:2] - centre)))
+            away = float(exact.hypot(*(pose[:2] - centre)))
             needs.append(away + track.vehicle.length / 2.0 + _ROOM + _SLACK)
             yaws.append(float(pose[2]))
     main_yaw = yaws[int(np.argmax(needs))]
-    across = np.abs(np.sin(wrap_angle(np.array(yaws) - main_yaw)))
+    across = np.abs(exact.sin(wrap_angle(np.array(yaws) - main_yaw)))
     need = np.array(needs)
     main = float(need.max())
-    side = max(float(need[across > np.sin(np.radians(30.0))].max(initial=_SHORTEST)), _SHORTEST)
+    side = max(float(need[across > exact.sin(np.radians(30.0))].max(initial=_SHORTEST)), _SHORTEST)
     lanes = _parallel_lanes(tracks, config.lane_width)
     if any(track.makes_u_turn for track in tracks):  # from one outermost lane to the other in a half circle
         lanes = max(lanes, int(np.ceil((_U_TURN / config.lane_width + 1.0) / 2.0)))
@@ -104,10 +105,12 @@ def _parallel_lanes(tracks: tuple[Track, ...], lane_width: float) -> int:
         poses = np.stack([track.poses[k] for track in tracks])
         for track in tracks:
             station, offset = track.curve.project(poses[:, :2])
-            same = (np.cos(poses[:, 2] - track.curve.at(station)[:, 2]) > np.cos(_SAME_WAY)) & (np.abs(offset) < _WIDEST)
+            same = (exact.cos(poses[:, 2] - track.curve.at(station)[:, 2]) > exact.cos(_SAME_WAY)) & (np.abs(offset) < _WIDEST)
             gaps = np.diff(np.sort(offset[same]))
             most = max(most, 1 + int((gaps > _LANE_GAP).sum()))
-            oncoming = (np.cos(poses[:, 2] - track.curve.at(station)[:, 2]) < -np.cos(_SAME_WAY)) & (np.abs(offset) < _ONCOMING)
+            oncoming = (exact.cos(poses[:, 2] - track.curve.at(station)[:, 2]) < -exact.cos(_SAME_WAY)) & (
+                np.abs(offset) < _ONCOMING
+            )
             between = np.round(np.abs(offset[oncoming]) / lane_width - 1.0).max(initial=0.0)
             most = max(most, min(1 + int(np.ceil(between / 2.0)), _MOST_LANES))
     return most

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.roads.curve import crossings
 from scenario_gen.roads.tracks import Track
@@ -40,12 +41,12 @@ def meeting(a: Track, b: Track) -> Meeting | None:
     one, two = (t.curve.cut(-_BEYOND, t.travelled + _BEYOND) for t in (a, b))
     found = crossings(one, two, _ANGLE) - _BEYOND
     angle = a.curve.at(found[:, 0])[:, 2] - b.curve.at(found[:, 1])[:, 2]
-    found, angle = found[np.cos(angle) > -np.cos(_HEAD_ON)], angle[np.cos(angle) > -np.cos(_HEAD_ON)]
+    found, angle = found[exact.cos(angle) > -exact.cos(_HEAD_ON)], angle[exact.cos(angle) > -exact.cos(_HEAD_ON)]
     if len(found) == 0:
         return None
-    short = sum(_outside(found[:, k], t.travelled) for k, t in enumerate((a, b)))
+    short = _outside(found[:, 0], a.travelled) + _outside(found[:, 1], b.travelled)
     apart = np.abs(_sample(a, found[:, 0]) - _sample(b, found[:, 1]))
-    best = int(np.argmin(short * 10.0 + apart * 0.05 + 25.0 * (1.0 - np.abs(np.sin(angle)))))
+    best = int(np.argmin(short * 10.0 + apart * 0.05 + 25.0 * (1.0 - np.abs(exact.sin(angle)))))
     return Meeting(float(found[best, 0]), float(found[best, 1]))
 
 

@@ -16,6 +16,7 @@
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.roads.road import Road
@@ -47,7 +48,7 @@ def nearest_pose_with_room(
     reach = int(max_distance / road.resolution)
     steps = np.arange(-reach, reach + 1) * road.resolution
     offset = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    distance = np.hypot(offset[:, 0], offset[:, 1])
+    distance = exact.hypot(offset[:, 0], offset[:, 1])
     order = np.argsort(distance, kind="stable")
     order = order[distance[order] <= max_distance]
     candidates = pose + np.pad(offset[order], ((0, 0), (0, 1)))
@@ -63,4 +64,4 @@ def nearest_pose_with_room(
         else:
             blocked = middle
     moved = pose + free * shift
-    return moved, float(np.hypot(*(moved - pose)[:2]))
+    return moved, float(exact.hypot(*(moved - pose)[:2]))

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import RefusedError
@@ -43,6 +44,11 @@ class Separation:
     notes: tuple[str, ...]
 
 
+def _reach(vehicle: Vehicle, turned: Floats) -> Floats:
+    """(T,) half the width of a footprint, turned by these angles, along an axis."""
+    return vehicle.length / 2.0 * np.abs(exact.cos(turned)) + vehicle.width / 2.0 * np.abs(exact.sin(turned))
+
+
 def footprint_gap(a: Vehicle, poses_a: Floats, b: Vehicle, poses_b: Floats) -> tuple[Floats, Floats]:
     """Signed gap of two oriented footprints by the separating-axis theorem.
 
@@ -60,12 +66,9 @@ def footprint_gap(a: Vehicle, poses_a: Floats, b: Vehicle, poses_b: Floats) -> t
     gap = np.full(len(between), -np.inf)
     axis = np.zeros((len(between), 2))
     for yaw in (poses_a[:, 2], poses_a[:, 2] + np.pi / 2.0, poses_b[:, 2], poses_b[:, 2] + np.pi / 2.0):
-        n = np.column_stack((np.cos(yaw), np.sin(yaw)))
+        n = np.column_stack((exact.cos(yaw), exact.sin(yaw)))
         along = (between * n).sum(axis=1)
-        reach = sum(
-            v.length / 2.0 * np.abs(np.cos(p[:, 2] - yaw)) + v.width / 2.0 * np.abs(np.sin(p[:, 2] - yaw))
-            for v, p in ((a, poses_a), (b, poses_b))
-        )
+        reach = _reach(a, poses_a[:, 2] - yaw) + _reach(b, poses_b[:, 2] - yaw)
         separation = np.abs(along) - reach
         better = separation > gap
         gap = np.where(better, separation, gap)
@@ -119,19 +122,19 @@ def separate(
         if i < 0:
             break
         levers = np.array([_lever(poses[i][at, 2], normal), -_lever(poses[j][at, 2], normal)])
-        power = (ease * levers**2).sum()
+        power = (ease * np.square(levers)).sum()
         if power < 1e-6:
             raise RefusedError(_too_close(tracks[i], tracks[j], gap_now, clearance, max_shift))
         push = (clearance - gap_now) / power * ease * levers
         shift[i] += push[0]
         shift[j] += push[1]
-        if np.hypot(*shift.T).max() > max_shift:
+        if exact.hypot(*shift.T).max() > max_shift:
             raise RefusedError(_too_close(tracks[i], tracks[j], gap_now, clearance, max_shift))
         for k in (i, j):
             poses[k] = _place(tracks[k], shift[k]).poses
     else:
         raise RefusedError(_too_close(tracks[i], tracks[j], gap_now, clearance, max_shift))
-    moved = np.hypot(*shift.T)
+    moved = exact.hypot(*shift.T)
     before = smallest_gaps(tracks).min(axis=1)
     notes = tuple(
         f"vehicle {tracks[k].vehicle.id} came within {before[k]:.2f} m of another{' (overlap)' if before[k] < 0 else ''}: "
@@ -145,7 +148,9 @@ def separate(
 
 def _lever(yaw: float, normal: Floats) -> Floats:
     """How far a unit shift along and to the left moves a vehicle along `normal`."""
-    return np.array([np.cos(yaw) * normal[0] + np.sin(yaw) * normal[1], -np.sin(yaw) * normal[0] + np.cos(yaw) * normal[1]])
+    return np.array(
+        [exact.cos(yaw) * normal[0] + exact.sin(yaw) * normal[1], -exact.sin(yaw) * normal[0] + exact.cos(yaw) * normal[1]]
+    )
 
 
 def _place(track: Track, shift: Floats) -> Track:

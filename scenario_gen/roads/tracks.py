@@ -25,8 +25,8 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen, wrap_angle
 from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.roads.curve import Curve
@@ -102,23 +102,23 @@ def clean_tracks(encounter: Encounter) -> tuple[Track, ...]:
 def _clean(encounter: Encounter, i: int) -> Track:
     position, speed = encounter.position[i], encounter.speed[i]
     claimed = np.concatenate(([0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 * encounter.dt)))
-    spread = float(np.hypot(*np.ptp(position, axis=0)))
+    spread = float(exact.hypot(*np.ptp(position, axis=0)))
     if claimed[-1] < _STILL or spread < _STILL:
         centre = position.mean(axis=0)
-        yaw = float(np.arctan2(np.sin(encounter.heading[i]).mean(), np.cos(encounter.heading[i]).mean()))
-        curve = Curve(np.array([[*centre, yaw], [centre[0] + np.cos(yaw), centre[1] + np.sin(yaw), yaw]]))
-        deviation = float(np.hypot(*(position - centre).T).max())
+        yaw = float(exact.arctan2(exact.sin(encounter.heading[i]).mean(), exact.cos(encounter.heading[i]).mean()))
+        curve = Curve(np.array([[*centre, yaw], [centre[0] + exact.cos(yaw), centre[1] + exact.sin(yaw), yaw]]))
+        deviation = float(exact.hypot(*(position - centre).T).max())
         return Track(encounter.vehicles[i], curve, frozen(np.zeros(len(speed))), speed, True, deviation)
     best: tuple[float, Curve, Floats, float] | None = None
     for wavelength in _WAVELENGTHS:
         grid, smooth = smoothing_spline(claimed, position, wavelength)
         curve = Curve.through(smooth)
         progress = np.interp(claimed, grid, curve.station)
-        deviation = float(np.hypot(*(curve.at(progress)[:, :2] - position).T).max())
+        deviation = float(exact.hypot(*(curve.at(progress)[:, :2] - position).T).max())
         curvature = np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)
-        lateral = curvature * np.interp((grid[1:] + grid[:-1]) / 2.0, *_increasing(claimed, speed)) ** 2
+        lateral = curvature * np.square(np.interp((grid[1:] + grid[:-1]) / 2.0, *_increasing(claimed, speed)))
         excess = (curvature.max() / _MAX_CURVATURE, lateral.max() / _MAX_LATERAL, deviation / _MAX_DEVIATION)
-        badness = float(sum(w * max(e - 1.0, 0.0) for w, e in zip(_WEIGHT, excess, strict=True)))
+        badness = math.fsum(w * max(float(e) - 1.0, 0.0) for w, e in zip(_WEIGHT, excess, strict=True))
         if best is None or badness < best[0]:
             best = (badness, curve, progress, deviation)
         if badness == 0.0:
@@ -129,7 +129,7 @@ def _clean(encounter: Encounter, i: int) -> Track:
         share = progress / curve.length
         curve = _eased(curve)
         progress = share * curve.length
-        deviation = float(np.hypot(*(curve.at(progress)[:, :2] - position).T).max())
+        deviation = float(exact.hypot(*(curve.at(progress)[:, :2] - position).T).max())
     return Track(
         encounter.vehicles[i], _aligned(curve, encounter.heading[i], speed, progress), frozen(progress), speed, False, deviation
     )
@@ -155,7 +155,7 @@ def _eased(curve: Curve) -> Curve:
         bend[:-1] += excess[1:] / 2.0
     yaw = even[0, 2] + np.concatenate(([0.0], np.cumsum(bend)))
     middle = (yaw[1:] + yaw[:-1]) / 2.0
-    xy = np.vstack(([0.0, 0.0], np.cumsum(step * np.column_stack((np.cos(middle), np.sin(middle))), axis=0)))
+    xy = np.vstack(([0.0, 0.0], np.cumsum(step * np.column_stack((exact.cos(middle), exact.sin(middle))), axis=0)))
     xy += (even[:, :2] - xy).mean(axis=0)
     return Curve(np.column_stack((xy, yaw)))
 
@@ -191,16 +191,16 @@ def smoothing_spline(u: Floats, values: Floats, wavelength: float) -> tuple[Floa
     cell = np.minimum((u / step).astype(np.int64), count - 2)
     right = u / step - cell
     left = 1.0 - right
-    bands = np.zeros((3, count))  # upper diagonals 2, 1, 0 of the normal matrix
+    bands = np.zeros((3, count))  # diagonals 0, 1, 2 below and on the normal matrix's
     rhs = np.zeros((count, values.shape[1]))
-    np.add.at(bands[2], cell, weight * left**2)
-    np.add.at(bands[2], cell + 1, weight * right**2)
-    np.add.at(bands[1], cell + 1, weight * left * right)
+    np.add.at(bands[0], cell, weight * np.square(left))
+    np.add.at(bands[0], cell + 1, weight * np.square(right))
+    np.add.at(bands[1], cell, weight * left * right)
     np.add.at(rhs, cell, (weight * left)[:, None] * values)
     np.add.at(rhs, cell + 1, (weight * right)[:, None] * values)
-    penalty = (wavelength / (2.0 * np.pi)) ** 4 / step**3
+    penalty = exact.power(wavelength / (2.0 * np.pi), 4) / exact.power(step, 3)
     for k, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))):
         factor = penalty * (1.0, 4.0, 1.0, -2.0, -2.0, 1.0)[k]
-        columns = np.arange(count - 2) + b
-        bands[2 - (b - a), columns] += factor
-    return grid, np.asarray(solveh_banded(bands, rhs))
+        columns = np.arange(count - 2) + a
+        bands[b - a, columns] += factor
+    return grid, exact.solve_banded(bands, rhs)

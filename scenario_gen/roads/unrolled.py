@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.errors import RefusedError
 from scenario_gen.roads.curve import Curve
@@ -139,7 +140,7 @@ def _reference_line(tracks: tuple[Track, ...], base: int) -> tuple[Curve, Ints]:
     for i in order[1:]:
         curve = tracks[i].curve
         station, _ = line.project(curve.points[:, :2])
-        against = np.cos(curve.points[:, 2] - line.at(station)[:, 2]).mean() < 0.0
+        against = exact.cos(curve.points[:, 2] - line.at(station)[:, 2]).mean() < 0.0
         direction[i] = -1 if against else 1
         if not tracks[i].still:
             line = _extended(line, curve.reversed() if against else curve)
@@ -165,7 +166,7 @@ def _extended(line: Curve, other: Curve) -> Curve:
 
 def _shifted(curve: Curve, rows: Ints, offset: float) -> Floats:
     shift = offset if abs(offset) < _WIDE else 0.0  # farther apart there is nothing to fit on to
-    normal = np.column_stack((np.sin(curve.points[rows, 2]), -np.cos(curve.points[rows, 2])))
+    normal = np.column_stack((exact.sin(curve.points[rows, 2]), -exact.cos(curve.points[rows, 2])))
     return np.asarray(curve.points[rows, :2] + shift * normal)
 
 

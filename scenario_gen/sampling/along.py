@@ -16,9 +16,10 @@
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.gp import combine, Features, Observations, Regression
+from scenario_gen.sampling.gp import Features, Observations, Regression
 
 MOST_SHARE = 0.3  # an anchor moves by at most this share of the way to its neighbours
 
@@ -40,8 +41,7 @@ def along_factor(times: Floats, anchor: Floats, config: SamplingConfig) -> Float
     ends = times[[0, -1]]
     features = Features(ends[0], ends[1], config.longitudinal_sigma, config.longitudinal_time)
     factor = Regression(features, Observations(ends, np.zeros(2), np.zeros(2))).predict(middle[1:-1]).factor
-    u, s, _ = np.linalg.svd(factor, full_matrices=False)
-    return np.asarray(u * s)
+    return exact.compact(factor)
 
 
 def displaced_anchors(anchor: Floats, factor: Floats, z: Floats) -> Floats:
@@ -51,5 +51,5 @@ def displaced_anchors(anchor: Floats, factor: Floats, z: Floats) -> Floats:
     if factor.size:
         gap = np.diff(distinct)
         most = MOST_SHARE * np.minimum(gap[:-1], gap[1:])
-        moved[:, 1:-1] += np.clip(combine(z, factor), -most, most)
+        moved[:, 1:-1] += np.clip(exact.matmul(z, factor.T), -most, most)
     return np.asarray(moved[:, which])

@@ -25,11 +25,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.encounter import Vehicle
 from scenario_gen.sampling.along import displaced_anchors
 from scenario_gen.sampling.clock import Clock, DT
-from scenario_gen.sampling.gp import combine
 from scenario_gen.sampling.lateral import kept_within
 from scenario_gen.sampling.path import arc_lengths, BasePath, states
 from scenario_gen.sampling.time_law import SpeedProfile, TimeLaw
@@ -77,7 +77,7 @@ class VehicleModel:
 
     def deviations(self, z: Floats) -> Floats:
         """Return how far each sample is to the side (S, G) [m]."""
-        return kept_within(combine(z, self.factor), self.room)
+        return kept_within(exact.matmul(z, self.factor.T), self.room)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +163,7 @@ class CandidateModel:
     @property
     def size(self) -> int:
         """Standard normal numbers needed per candidate."""
-        return self.clock.size + sum(v.size for v in self.vehicles)
+        return self.clock.size + sum(int(v.size) for v in self.vehicles)
 
     def _speeds(self, v: VehicleModel, knot: Floats, lengths: Floats) -> tuple[Floats, Bools]:
         """Speeds (S, M) and feasible (S,); where the drawn anchors cannot be reached in time, they slide a little."""

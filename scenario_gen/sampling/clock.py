@@ -15,11 +15,11 @@
 """The joint clock: when the changepoints come, for all vehicles alike, so that who goes first survives."""
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.gp import combine, Features, Observations, Regression
+from scenario_gen.sampling.gp import Features, Observations, Regression
 
 DT = 0.1  # s, the grid of published scenarios
 SLOWEST, FASTEST = 1.35, 0.75  # longest and shortest a primitive may become, as a share of its own duration
@@ -53,13 +53,11 @@ class Clock:
             self._end_sigma, self._share, self._factor = 0.0, times / end, np.zeros((len(times), 0))
             return
         features = Features(0.0, end, config.time_sigma, _LENGTH_SHARE * end)
-        ends, exact = np.array([0.0, end]), np.zeros(2)
-        free = Regression(features, Observations(ends[:1], exact[:1], exact[:1])).predict(ends[1:])
-        self._end_sigma = float(np.linalg.norm(free.factor))
-        given = Regression(features, Observations(ends, np.array([0.0, 1.0]), exact)).predict(times)
-        u, s, _ = np.linalg.svd(given.factor, full_matrices=False)
-        keep = s > 1e-9
-        self._share, self._factor = given.mean, u[:, keep] * s[keep]
+        ends, none = np.array([0.0, end]), np.zeros(2)
+        free = Regression(features, Observations(ends[:1], none[:1], none[:1])).predict(ends[1:])
+        self._end_sigma = float(np.sqrt(np.square(free.factor).sum()))
+        given = Regression(features, Observations(ends, np.array([0.0, 1.0]), none)).predict(times)
+        self._share, self._factor = given.mean, exact.compact(given.factor, 1e-9)
 
     @property
     def size(self) -> int:
@@ -68,7 +66,7 @@ class Clock:
 
     def sample(self, z: Floats, scale: Floats) -> Floats:
         """Clocks (S, K + 2) [s] from numbers z (S, size), deviations multiplied by scale (S,)."""
-        rest = combine(z[:, 1:], self._factor)
+        rest = exact.matmul(z[:, 1:], self._factor.T)
         delta = (self._share * self._end(z[:, 0])[:, None] + rest) * scale[:, None]
         steps = np.diff(self.times)
         rate = np.clip(1.0 + np.diff(delta, axis=1) / steps, self._fastest, SLOWEST)
@@ -85,5 +83,5 @@ class Clock:
         low, high = self._shortest * DT - self.times[-1], self._longest * DT - self.times[-1]
         if self._end_sigma < 1e-9 or high - low < 1e-9:
             return np.zeros_like(z)
-        a, b = ndtr(low / self._end_sigma), ndtr(high / self._end_sigma)
-        return np.asarray(self._end_sigma * ndtri(a + (b - a) * ndtr(z)))
+        a, b = exact.ndtr(low / self._end_sigma), exact.ndtr(high / self._end_sigma)
+        return np.asarray(self._end_sigma * exact.ndtri(a + (b - a) * exact.ndtr(z)))

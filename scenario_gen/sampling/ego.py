@@ -19,6 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from msg_conventions.names import tokens
+from scenario_gen import exact
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.planning.route import Route
@@ -54,7 +55,7 @@ def ego_track(
     """
     speed, steps = encounter.speed[ego], encounter.speed.shape[1]
     driven = np.concatenate([[0.0], np.cumsum(0.5 * encounter.dt * (speed[1:] + speed[:-1]))])
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(route.points[:, :2], axis=0).T))])  # as a message's reader has it
+    way = np.concatenate([[0.0], np.cumsum(exact.hypot(*np.diff(route.points[:, :2], axis=0).T))])  # as a message's reader has it
     index = [0, *segmentation.changepoints.tolist(), steps - 1]
     at, pace = np.empty(steps), np.empty(steps)
     for (first, last), (a, b) in zip(pairwise(index), pairwise(way[route.anchor].tolist()), strict=True):

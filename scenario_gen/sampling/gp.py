@@ -28,25 +28,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import chebyshev
-import scipy.linalg
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
-from scenario_gen.blas import on_one_thread
 from scenario_gen.errors import InputError
-from scenario_gen.kernels import F2, kernel, OUT2
-
-_RANK_TOLERANCE = 1e-17  # eigenvalues below this share of the largest are rounding
 
 
 def squared_exponential(a: Floats, b: Floats, sigma: float, length: float) -> Floats:
     """Kernel matrix (len(a), len(b)) of eq 14: sigma² exp(-(a - b)² / (2 length²))."""
-    return np.asarray(sigma**2 * np.exp(-0.5 * ((a[:, None] - b[None, :]) / length) ** 2))
+    return np.asarray(np.square(sigma) * exact.exp(-0.5 * np.square((a[:, None] - b[None, :]) / length)))
 
 
 class Features:
     """φ with φ(x)ᵀφ(x') = k(x, x') on an interval, from Chebyshev interpolation of the kernel in both arguments."""
 
-    @on_one_thread
     def __init__(self, low: float, high: float, sigma: float, length: float, degree: int = -1) -> None:
         """Build the features.
 
@@ -62,15 +57,13 @@ class Features:
         self.low, self.high, self.degree = low, high, degree
         ratio = (high - low) / length
         n = 20 + int(np.ceil(3.0 * ratio))
-        node = np.cos(np.pi * (np.arange(n) + 0.5) / n)
+        node = exact.cos(np.pi * (np.arange(n) + 0.5) / n)
         kernel = squared_exponential(node, node, sigma, 2.0 / ratio)
-        value, vector = np.linalg.eigh(kernel)
-        keep = value > max(_RANK_TOLERANCE * value[-1], 0.0)
-        root = vector[:, keep][:, ::-1] * np.sqrt(value[keep][::-1])
+        root = exact.root(kernel)
         # Values at the nodes -> Chebyshev coefficients, by the discrete orthogonality of T_j on these nodes.
         transform = chebyshev.chebvander(node, n - 1).T * (2.0 / n)
         transform[0] *= 0.5
-        self._coefficients = transform @ root
+        self._coefficients = exact.matmul(transform, root)
 
     @property
     def rank(self) -> int:
@@ -81,11 +74,12 @@ class Features:
         """Features (m, rank + degree + 1) at x (m,), or their derivative of that order."""
         scale = 2.0 / (self.high - self.low)
         u = scale * (np.asarray(x, dtype=np.float64) - self.low) - 1.0
-        coefficients = chebyshev.chebder(self._coefficients, derivative) * scale**derivative if derivative else self._coefficients
-        columns = [chebyshev.chebvander(u, coefficients.shape[0] - 1) @ coefficients]
+        power = exact.power(scale, derivative)
+        coefficients = chebyshev.chebder(self._coefficients, derivative) * power if derivative else self._coefficients
+        columns = [exact.matmul(chebyshev.chebvander(u, coefficients.shape[0] - 1), coefficients)]
         if self.degree >= 0:
             mean = np.polynomial.legendre.legder(np.eye(self.degree + 1), derivative) if derivative else np.eye(self.degree + 1)
-            columns.append(np.polynomial.legendre.legvander(u, mean.shape[0] - 1) @ mean * scale**derivative)
+            columns.append(exact.matmul(np.polynomial.legendre.legvander(u, mean.shape[0] - 1), mean) * power)
         return np.hstack(columns)
 
 
@@ -129,18 +123,16 @@ class Posterior:
     @property
     def covariance(self) -> Floats:
         """(m, m) covariance."""
-        return self.factor @ self.factor.T
+        return exact.matmul(self.factor, self.factor.T)
 
-    @on_one_thread
     def sample(self, z: Floats) -> Floats:
         """Curves (S, m) from standard normal numbers z (S, r)."""
-        return self.mean + combine(z, self.factor)
+        return self.mean + exact.matmul(z, self.factor.T)
 
 
 class Regression:
     """The posterior over the weights, ready to be asked at any points."""
 
-    @on_one_thread
     def __init__(self, features: Features, seen: Observations) -> None:
         """Condition on what was seen.
 
@@ -155,51 +147,30 @@ class Regression:
         p = features.degree + 1
         rows = seen.rows(features)
         width = rows.shape[1]
-        exact = seen.noise == 0.0
-        start, basis = _constrained(rows[exact], seen.y[exact], width)
-        weight = 1.0 / seen.noise[~exact, None]
-        prior = np.eye(width)[: width - p]
-        stacked = np.vstack([(weight * rows[~exact]) @ basis, prior @ basis])
-        target = np.concatenate([weight[:, 0] * (seen.y[~exact] - rows[~exact] @ start), -start[: width - p]])
-        q, r = scipy.linalg.qr(stacked, mode="economic", check_finite=False)
+        certain = seen.noise == 0.0
+        noisy, y, noise = rows[~certain], seen.y[~certain], seen.noise[~certain]
+        start, basis = _constrained(rows[certain], seen.y[certain], width)
+        stacked = np.vstack([exact.matmul(noisy / noise[:, None], basis), basis[: width - p]])
+        target = np.concatenate([(y - exact.matmul(noisy, start)) / noise, -start[: width - p]])
+        q, r, _ = exact.qr(stacked)
         if r.shape[0] < r.shape[1] or np.abs(np.diag(r)).min(initial=np.inf) < 1e-13 * np.abs(r).max(initial=0.0):
             raise InputError(f"{len(seen.x)} observations are too few for a mean of degree {features.degree}")
-        self._weights = start + basis @ scipy.linalg.solve_triangular(r, q.T @ target, check_finite=False)
-        self._root = scipy.linalg.solve_triangular(r, basis.T, trans="T", check_finite=False).T  # basis·r⁻¹
+        self._weights = start + exact.matmul(basis, exact.solve_triangular(r, exact.matmul(q.T, target)))
+        self._root = exact.solve_triangular(r, basis.T, transposed=True).T  # basis·r⁻¹
 
-    @on_one_thread
     def predict(self, x: Floats) -> Posterior:
         """The posterior of f at x (m,)."""
         rows = self.features(x)
-        return Posterior(rows @ self._weights, rows @ self._root)
+        return Posterior(exact.matmul(rows, self._weights), exact.matmul(rows, self._root))
 
 
 def _constrained(rows: Floats, values: Floats, width: int) -> tuple[Floats, Floats]:
     """All weights that meet rows·w = values: w = start + basis·a, basis orthonormal (width, width - c)."""
     if len(rows) == 0:
         return np.zeros(width), np.eye(width)
-    norm = np.linalg.norm(rows, axis=1)
-    q, r = scipy.linalg.qr((rows / norm[:, None]).T, check_finite=False)
+    norm = np.sqrt(np.square(rows).sum(axis=1))
+    q, r, _ = exact.qr((rows / norm[:, None]).T, full=True)
     c = len(rows)
     if c > width or np.abs(np.diag(r)).min() < 1e-12:
         raise InputError("two exact observations of a Gaussian process repeat or contradict one another")
-    return q[:, :c] @ scipy.linalg.solve_triangular(r[:c], values / norm, trans="T", check_finite=False), q[:, c:]
-
-
-@kernel(F2, F2, OUT2)
-def _combine(z: Floats, rows: Floats, out: Floats) -> None:
-    for s in range(z.shape[0]):
-        for k in range(z.shape[1]):
-            for j in range(rows.shape[1]):
-                out[s, j] += z[s, k] * rows[k, j]
-
-
-def combine(z: Floats, factor: Floats) -> Floats:
-    """Samples (S, m) of zero mean from numbers z (S, r) and a square root of the covariance, factor (m, r).
-
-    Each row is summed in the same order whatever the number of rows and threads, so that any single sample can be
-    drawn again bit for bit; a matrix product of the linear-algebra library promises no such thing.
-    """
-    out = np.zeros((len(z), len(factor)))
-    _combine(np.ascontiguousarray(z), np.ascontiguousarray(factor.T), out)
-    return out
+    return exact.matmul(q[:, :c], exact.solve_triangular(r[:c], values / norm, transposed=True)), q[:, c:]

@@ -17,6 +17,7 @@
 import numpy as np
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.encounter import Vehicle
 from scenario_gen.roads.road import Road
@@ -54,9 +55,7 @@ def lateral_factor(path: BasePath, room: Floats, config: SamplingConfig) -> Floa
     noise = np.concatenate([np.zeros(4), np.full(len(inside), config.observation_sigma)])
     seen = Observations(x, np.zeros(len(x)), noise, (0, 0, 1, 1, *(0 for _ in inside)))
     factor = Regression(Features(0.0, path.length, sigma, config.lateral_length), seen).predict(path.arc).factor
-    u, s, _ = np.linalg.svd(factor, full_matrices=False)
-    keep = s > 1e-6 * sigma
-    return np.asarray(np.minimum(room / (ROOM_SIGMAS * sigma), 1.0)[:, None] * u[:, keep] * s[keep])
+    return np.minimum(room / (ROOM_SIGMAS * sigma), 1.0)[:, None] * exact.compact(factor, 1e-6 * sigma)
 
 
 def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> Floats:
@@ -66,7 +65,7 @@ def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> F
     ahead and behind, such as the edge of the map where a vehicle enters, does not count.
     """
     flank = np.linspace(-0.5, 0.5, int(np.ceil(vehicle.length / _FLANK_STEP)) + 1) * vehicle.length
-    ahead = np.stack([np.cos(path.node[:, 2]), np.sin(path.node[:, 2])], axis=-1)[:, None, :]
+    ahead = np.stack([exact.cos(path.node[:, 2]), exact.sin(path.node[:, 2])], axis=-1)[:, None, :]
     left = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
     axis = path.node[:, None, :2] + flank[:, None] * ahead
     room, free = np.zeros(len(path.node)), np.ones(len(path.node), dtype=np.bool_)
@@ -95,5 +94,5 @@ def kept_within(deviation: Floats, room: Floats) -> Floats:
     share = np.abs(deviation) / np.maximum(room, 1e-9)
     if (share <= SOFT).all():
         return deviation
-    bent = SOFT + (1.0 - SOFT) * np.tanh((share - SOFT) / (1.0 - SOFT))
+    bent = SOFT + (1.0 - SOFT) * exact.tanh((share - SOFT) / (1.0 - SOFT))
     return np.asarray(np.where(share <= SOFT, deviation, np.sign(deviation) * bent * room))

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.parameters import check, parameter
@@ -68,4 +69,4 @@ def ordinate_samples(anchors: Floats, x: Floats, count: int, seed: int = 0, conf
     """Curves (count, m) of y at x (m,) through one vehicle's anchors (A, 2)."""
     posterior = ordinate_posterior(anchors, x, config)
     generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed])))
-    return posterior.sample(generator.standard_normal((count, posterior.factor.shape[1])))
+    return posterior.sample(exact.standard_normal(generator, (count, posterior.factor.shape[1])))

@@ -195,7 +195,7 @@ def _curve_bounds(path: BasePath, profile: SpeedProfile, lay: TimeLayout, limit:
     bend = np.abs(path.curvature)
     wide = maximum_filter1d(bend, 2 * int(np.ceil(_CURVE_REACH / path.spacing)) + 1, mode="nearest")
     s, v, _ = profile.state(np.linspace(profile.time[0], profile.time[-1], 20 * len(lay.knot)))
-    kept = bool((v**2 * np.interp(s, path.arc, bend)).max() <= limit * 1.02)
+    kept = bool((np.square(v) * np.interp(s, path.arc, bend)).max() <= limit * 1.02)
     moving = np.flatnonzero(~lay.still)
     steps = np.diff(profile.time)
     parts = np.maximum(np.ceil(steps[moving] / _CURVE_STEP), 4).astype(np.int64)

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
-from scenario_gen.blas import on_one_thread
 from scenario_gen.encounter import Encounter
 from scenario_gen.interaction import Wait
 from scenario_gen.planning.route import Route
@@ -75,11 +75,10 @@ class Sampler:
         variates, Hammersley and Morton 1956).
         """
         generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([self.seed, level, number])))
-        z = generator.standard_normal((BLOCK // 2, self.model.size))
+        z = exact.standard_normal(generator, (BLOCK // 2, self.model.size))
         return np.stack([z, -z], axis=1).reshape(BLOCK, -1)
 
 
-@on_one_thread
 def sample_scenarios(
     encounter: Encounter,
     segmentation: Segmentation,
@@ -130,7 +129,6 @@ def sample_scenarios(
     return ScenarioSet(count, tuple(loop.valid), loop.candidates, loop.refused, said, track)
 
 
-@on_one_thread
 def regenerate(
     encounter: Encounter,
     segmentation: Segmentation,

@@ -23,6 +23,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, frozen, Ints
 
 STAND = 0.05  # m/s; an asked speed below this is met by standing
@@ -177,7 +178,7 @@ def _joined_lines(time: Floats, speed: Floats, knot: Floats, still: Bools) -> Fl
     lines = np.where(free, np.interp(knot, time, speed), 0.0)
     moving = ~still[at]
     if free.any():  # changes to the speeds met at the knots: none where no sample says anything
-        lines[free] += np.linalg.lstsq(hats[np.ix_(moving, free)], (speed - hats @ lines)[moving], rcond=None)[0]
+        lines[free] += exact.lstsq(hats[np.ix_(moving, free)], (speed - exact.matmul(hats, lines))[moving])
     return np.asarray(np.maximum(lines, 0.0))
 
 
@@ -191,6 +192,5 @@ def best_knot(time: Floats, speed: Floats, a: float, b: float) -> float:
     cost = []
     for knot in candidates:
         basis = np.column_stack([np.ones_like(t), t - a, np.maximum(t - knot, 0.0)])
-        _, residual, *_ = np.linalg.lstsq(basis, v, rcond=None)
-        cost.append(float(residual[0]) if len(residual) else 0.0)
+        cost.append(float(np.square(v - exact.matmul(basis, exact.lstsq(basis, v))).sum()))
     return float(candidates[int(np.argmin(np.round(cost, 9)))])

@@ -14,10 +14,9 @@
 
 """One chain of the weak-limit blocked Gibbs sampler for the sticky HDP-HMM (Fox, Sudderth, Jordan, Willsky 2011)."""
 
-import math
-
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F1, F2, I, I1, kernel, OUT1, OUT2, OUT3, OUTI2
 from scenario_gen.segmentation._emission import (
@@ -219,11 +218,11 @@ def sample_transitions(state: State, n: Ints, hyper: Floats, top: Floats, beta: 
         for k in range(states):
             considered += tables[k]
         log_eta = log_beta_draw(state, top[0], considered)
-        top[0] = math.exp(log_gamma_draw(state, hyper[0] + dishes)) / (hyper[1] - log_eta)
+        top[0] = exact.exp(log_gamma_draw(state, hyper[0] + dishes)) / (hyper[1] - log_eta)
     if hyper[2] > 0.0:
-        top[1] = math.exp(log_gamma_draw(state, hyper[2] + sums[0])) / (hyper[3] - sums[2])
+        top[1] = exact.exp(log_gamma_draw(state, hyper[2] + sums[0])) / (hyper[3] - sums[2])
     if hyper[4] > 0.0:
-        top[2] = math.exp(log_beta_draw(state, hyper[4] + sums[1], hyper[5] + sums[0] - sums[1]))
+        top[2] = exact.exp(log_beta_draw(state, hyper[4] + sums[1], hyper[5] + sums[0] - sums[1]))
         top[2] = min(max(top[2], 1e-9), 1.0 - 1e-9)
     for k in range(states):
         weights[k] = top[0] / states + tables[k]
@@ -270,11 +269,11 @@ def log_transitions(n: Ints, top: Floats, beta: Floats) -> float:
         for k in range(states):
             if n[j, k] > 0:
                 a = alpha * beta[k] + (kappa if j == k else 0.0)
-                value += math.lgamma(a + n[j, k]) - math.lgamma(a)
+                value += exact.lgamma(a + n[j, k]) - exact.lgamma(a)
                 customers += n[j, k]
         if customers > 0:
             a = top[1] if j < states else alpha
-            value += math.lgamma(a) - math.lgamma(a + customers)
+            value += exact.lgamma(a) - exact.lgamma(a + customers)
     return value
 
 

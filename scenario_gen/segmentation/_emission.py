@@ -24,6 +24,7 @@ import math
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import kernel
 from scenario_gen.segmentation._random import log_gamma_draw, normal, State
@@ -99,11 +100,11 @@ def log_marginal(factor: Floats, n: float, p: int, nu: float) -> float:
     """
     m = factor.shape[0]
     d = m - p
-    value: float = -0.5 * n * d * math.log(math.pi)
+    value: float = -0.5 * n * d * exact.log(math.pi)
     for i in range(p):
-        value -= d * math.log(factor[i, i])
+        value -= d * exact.log(factor[i, i])
     for i in range(d):
-        value += math.lgamma(0.5 * (nu + n - i)) - (nu + n) * math.log(factor[p + i, p + i])
+        value += exact.lgamma(0.5 * (nu + n - i)) - (nu + n) * exact.log(factor[p + i, p + i])
     return value
 
 
@@ -121,7 +122,7 @@ def draw_emission(state: State, factor: Floats, n: float, p: int, nu: float, blu
         for j in range(i):
             coef[i, p + j] = normal(state)
         shape = 0.5 * (nu + n - (d - 1 - i))
-        coef[i, p + i] = math.exp(0.5 * (log_gamma_draw(state, shape) + math.log(2.0)))
+        coef[i, p + i] = exact.exp(0.5 * (log_gamma_draw(state, shape) + exact.log(2.0)))
         for j in range(i + 1, d):
             coef[i, p + j] = 0.0
         for j in range(i, -1, -1):
@@ -129,7 +130,7 @@ def draw_emission(state: State, factor: Floats, n: float, p: int, nu: float, blu
             coef[i, p + j] = c
             for q in range(j):
                 coef[i, p + q] -= c * factor[p + j, p + q]
-        logdet += math.log(coef[i, p + i])
+        logdet += exact.log(coef[i, p + i])
         for j in range(i + 1):
             logdet -= 0.5 * coef[i, p + j] ** 2 * blur[j]
         for q in range(p):
@@ -225,4 +226,9 @@ def block_likelihood(logs: Floats, n: int, best: Floats, work: Floats, out: Floa
 
 def joint_prior(mean: Floats, precision: Floats, scale: Floats) -> Floats:
     """Return G0 (P + D, P + D) of an MNIW prior with mean M (D, P), K (P, P) and S0 (D, D)."""
-    return np.block([[precision, precision @ mean.T], [mean @ precision, scale + mean @ precision @ mean.T]])
+    return np.block(
+        [
+            [precision, exact.matmul(precision, mean.T)],
+            [exact.matmul(mean, precision), scale + exact.matmul(exact.matmul(mean, precision), mean.T)],
+        ]
+    )

@@ -14,10 +14,9 @@
 
 """Greedy merging of states by marginal likelihood: what Gibbs sampling alone does with difficulty."""
 
-import math
-
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F, F1, F2, I, I1, kernel, OUT1, OUTI1
 from scenario_gen.segmentation._chain import count_transitions
@@ -28,7 +27,7 @@ from scenario_gen.segmentation._emission import accumulate, cholesky, log_margin
 def merge_gain(n: Ints, i: int, j: int, stay: float, move: float) -> float:
     """Gain in log p(labels) from making states i and j one; rows are Dirichlet with `stay` at home and `move` elsewhere."""
     states = n.shape[1]
-    gain = 0.0
+    gain: float = 0.0
     joint_row = 0
     row_i, row_j = 0, 0
     for k in range(states):
@@ -37,17 +36,18 @@ def merge_gain(n: Ints, i: int, j: int, stay: float, move: float) -> float:
         if k not in (i, j):
             joint = n[i, k] + n[j, k]
             joint_row += joint
-            gain += math.lgamma(move + joint) - math.lgamma(move + n[i, k]) - math.lgamma(move + n[j, k]) + math.lgamma(move)
+            gain += exact.lgamma(move + joint) - exact.lgamma(move + n[i, k]) - exact.lgamma(move + n[j, k]) + exact.lgamma(move)
             joint = n[k, i] + n[k, j]
-            gain += math.lgamma(move + joint) - math.lgamma(move + n[k, i]) - math.lgamma(move + n[k, j]) + math.lgamma(move)
+            gain += exact.lgamma(move + joint) - exact.lgamma(move + n[k, i]) - exact.lgamma(move + n[k, j]) + exact.lgamma(move)
     home = n[i, i] + n[i, j] + n[j, i] + n[j, j]
     joint_row += home
-    gain += math.lgamma(stay + home) - math.lgamma(stay)
-    gain -= math.lgamma(stay + n[i, i]) - math.lgamma(stay) + math.lgamma(stay + n[j, j]) - math.lgamma(stay)
-    gain -= math.lgamma(move + n[i, j]) - math.lgamma(move) + math.lgamma(move + n[j, i]) - math.lgamma(move)
+    gain += exact.lgamma(stay + home) - exact.lgamma(stay)
+    gain -= exact.lgamma(stay + n[i, i]) - exact.lgamma(stay) + exact.lgamma(stay + n[j, j]) - exact.lgamma(stay)
+    gain -= exact.lgamma(move + n[i, j]) - exact.lgamma(move) + exact.lgamma(move + n[j, i]) - exact.lgamma(move)
     total = stay + states * move
-    gain += math.lgamma(total) - math.lgamma(total + joint_row)
-    return gain - 2.0 * math.lgamma(total) + math.lgamma(total + row_i) + math.lgamma(total + row_j)
+    gain += exact.lgamma(total) - exact.lgamma(total + joint_row)
+    gain += -2.0 * exact.lgamma(total) + exact.lgamma(total + row_i) + exact.lgamma(total + row_j)
+    return gain
 
 
 @kernel(inline=True)

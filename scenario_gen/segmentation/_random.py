@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.kernels import kernel
 
@@ -48,7 +49,7 @@ def uniform(state: State) -> float:
 @kernel(inline=True)
 def normal(state: State) -> float:
     """Return a standard normal number (Box-Muller)."""
-    return math.sqrt(-2.0 * math.log(uniform(state))) * math.cos(6.283185307179586 * uniform(state))
+    return math.sqrt(-2.0 * exact.log(uniform(state))) * exact.cos(6.283185307179586 * uniform(state))
 
 
 @kernel(inline=True)
@@ -57,7 +58,7 @@ def log_gamma_draw(state: State, shape: float) -> float:
     boost = 0.0
     a = shape
     if a < 1.0:
-        boost = math.log(uniform(state)) / a
+        boost = exact.log(uniform(state)) / a
         a += 1.0
     d = a - 1.0 / 3.0
     c = 1.0 / math.sqrt(9.0 * d)
@@ -67,8 +68,8 @@ def log_gamma_draw(state: State, shape: float) -> float:
         if v > 0.0:
             v = v * v * v
             u = uniform(state)
-            if u < 1.0 - 0.0331 * x**4 or math.log(u) < 0.5 * x * x + d - d * v + d * math.log(v):
-                return math.log(d * v) + boost
+            if u < 1.0 - 0.0331 * x**4 or exact.log(u) < 0.5 * x * x + d - d * v + d * exact.log(v):
+                return exact.log(d * v) + boost
 
 
 @kernel(inline=True)
@@ -77,7 +78,7 @@ def log_beta_draw(state: State, a: float, b: float) -> float:
     x = log_gamma_draw(state, a)
     y = log_gamma_draw(state, b)
     top = max(x, y)
-    return x - (top + math.log(math.exp(x - top) + math.exp(y - top)))
+    return x - (top + exact.log(exact.exp(x - top) + exact.exp(y - top)))
 
 
 @kernel(inline=True)
@@ -90,7 +91,7 @@ def dirichlet_draw(state: State, weights: Floats, out: Floats) -> None:
         top = max(top, out[k])
     total = 0.0
     for k in range(n):
-        out[k] = max(math.exp(out[k] - top), 1e-100)
+        out[k] = max(exact.exp(out[k] - top), 1e-100)
         total += out[k]
     for k in range(n):
         out[k] /= total

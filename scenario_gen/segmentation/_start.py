@@ -15,11 +15,11 @@
 """Where a chain starts, and the prior it runs under: k-means, a few sweeps, greedy merges; scales from the data."""
 
 from dataclasses import dataclass, replace
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.segmentation._kmeans import kmeans
 from scenario_gen.segmentation._problem import compact, Prior, Problem
@@ -90,7 +90,7 @@ def _autocorrelation(problem: Problem, labels: Ints) -> float:
     pairs[problem.ends[:-1] - 1] = False
     if not pairs.any():
         return 0.0
-    power = (residual**2).mean(axis=0) + 1e-300
+    power = np.square(residual).mean(axis=0) + 1e-300
     return float(np.mean((residual[:-1] * residual[1:])[pairs].mean(axis=0) / power))
 
 
@@ -135,10 +135,10 @@ def mean_precision(problem: Problem, labels: Ints, within: Floats) -> Floats:
     if problem.regressors > 1 or states < 2:
         return problem.precision
     means = np.array([np.bincount(labels, y) for y in problem.y.T]) / counts
-    lengths = (means * np.linalg.solve(within, means)).sum(axis=0) / problem.dimensions
-    seen = float(lengths @ counts) / len(labels) * states / (states - 1) - states / len(labels)
+    lengths = (means * exact.solve_positive(within, means)).sum(axis=0) / problem.dimensions
+    seen = float((lengths * counts).sum()) / len(labels) * states / (states - 1) - states / len(labels)
     guess = float(problem.precision[0, 0])
     most = max(MOST_MEAN_WEIGHT, guess)
     said = min(max(1.0 / max(seen, 1.0 / most), guess), most)
     share = (states - 1) * problem.dimensions
-    return np.eye(1) * math.exp((GUESS_COUNTS * math.log(guess) + share * math.log(said)) / (GUESS_COUNTS + share))
+    return np.eye(1) * exact.exp((GUESS_COUNTS * exact.log(guess) + share * exact.log(said)) / (GUESS_COUNTS + share))

@@ -27,6 +27,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Encounter
 from scenario_gen.segmentation._windows import moving_mean
@@ -49,12 +50,12 @@ def _best_window(signals: Sequence[Floats], width: int, degree: int, value: Call
     width = min(width, samples)
     middle = (width - 1) / 2.0
     powers = np.vander(np.arange(width) - middle, degree + 1, increasing=True)
-    fit = np.linalg.pinv(powers).T
+    fit = exact.lstsq(powers, np.eye(width)).T
     coefficients, misfit = [], np.zeros(samples - width + 1)
     for signal in signals:
         windows = sliding_window_view(signal, width)
-        found = windows @ fit
-        misfit += ((windows - found @ powers.T) ** 2).sum(axis=1)
+        found = exact.matmul(windows, fit)
+        misfit += np.square(windows - exact.matmul(found, powers.T)).sum(axis=1)
         coefficients.append(found)
     t = np.arange(samples)
     offsets = [width - 1, (3 * width) // 4, width // 2, width // 4, 0]
@@ -75,9 +76,9 @@ def lateral_acceleration(position: Floats, dt: float, window: float) -> Floats:
 
     def lateral(c: list[Floats]) -> Floats:
         velocity = np.stack([c[0][:, 1], c[1][:, 1]]) / dt
-        acceleration = 2.0 * np.stack([c[0][:, 2], c[1][:, 2]]) / dt**2
+        acceleration = 2.0 * np.stack([c[0][:, 2], c[1][:, 2]]) / np.square(dt)
         cross = velocity[0] * acceleration[1] - velocity[1] * acceleration[0]
-        return np.asarray(cross / np.maximum(np.hypot(velocity[0], velocity[1]), 1.0))
+        return np.asarray(cross / np.maximum(exact.hypot(velocity[0], velocity[1]), 1.0))
 
     if len(position) < 4:
         return np.zeros(len(position))

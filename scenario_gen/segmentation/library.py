@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
@@ -176,12 +177,16 @@ def _summarise(
         for a, b in pairwise(edges):
             lengths[own[a]].append((b - a) * example.dt)
     means = np.array([x[labels == j].mean(axis=0) for j in range(k)])
-    pooled = np.cov((x - means[labels]).T) + np.diag(blur**2)
+    within = x - means[labels]
+    within -= within.mean(axis=0)
+    pooled = exact.matmul(within.T, within) / (len(x) - 1) + np.diag(np.square(blur))
     covariances = np.empty((k, x.shape[1], x.shape[1]))
     prior = 3.0 * x.shape[1]
     for j in range(k):
         rest = x[labels == j] - means[j]
-        covariances[j] = (prior * pooled + rest.T @ rest + len(rest) * np.diag(blur**2)) / (prior + len(rest))
+        covariances[j] = (prior * pooled + exact.matmul(rest.T, rest) + len(rest) * np.diag(np.square(blur))) / (
+            prior + len(rest)
+        )
     return PrimitiveLibrary(
         vehicles=len(example.vehicles),
         means=means,
@@ -220,25 +225,25 @@ def _smooth(library: PrimitiveLibrary, x: Floats) -> tuple[Floats, Floats]:
     """(T, K) probability of each primitive and (T,) of a change, at each sample of x (T, D)."""
     log_likelihood = np.empty((len(x), len(library.means)))
     for k, (mean, covariance) in enumerate(zip(library.means, library.covariances, strict=True)):
-        factor = np.linalg.cholesky(covariance)
-        rest = np.linalg.solve(factor, (x - mean).T)
-        log_likelihood[:, k] = -0.5 * (rest**2).sum(axis=0) - np.log(np.diag(factor)).sum()
+        factor = exact.cholesky(covariance)
+        rest = exact.solve_triangular(factor.T, (x - mean).T, transposed=True)
+        log_likelihood[:, k] = -0.5 * np.square(rest).sum(axis=0) - exact.log(np.diag(factor)).sum()
     log_likelihood *= library.weight
-    likelihood = np.exp(log_likelihood - log_likelihood.max(axis=1, keepdims=True)) + 1e-300
+    likelihood = exact.exp(log_likelihood - log_likelihood.max(axis=1, keepdims=True)) + 1e-300
     forward = np.empty_like(likelihood)
     backward = np.ones_like(likelihood)
     forward[0] = library.initial * likelihood[0]
     forward[0] /= forward[0].sum()
     for t in range(1, len(x)):
-        forward[t] = forward[t - 1] @ library.transition * likelihood[t]
+        forward[t] = exact.matmul(forward[t - 1], library.transition) * likelihood[t]
         forward[t] /= forward[t].sum()
     for t in range(len(x) - 2, -1, -1):
-        backward[t] = library.transition @ (likelihood[t + 1] * backward[t + 1])
+        backward[t] = exact.matmul(library.transition, likelihood[t + 1] * backward[t + 1])
         backward[t] /= backward[t].sum()
     smooth = forward * backward
     smooth /= smooth.sum(axis=1, keepdims=True)
     changed = np.zeros(len(x))
     same = forward[:-1] * np.diag(library.transition) * likelihood[1:] * backward[1:]
-    every = np.einsum("tj,jk,tk->t", forward[:-1], library.transition, likelihood[1:] * backward[1:])
+    every = (exact.matmul(forward[:-1], library.transition) * likelihood[1:] * backward[1:]).sum(axis=1)
     changed[1:] = np.clip(1.0 - same.sum(axis=1) / every, 0.0, 1.0)
     return smooth, changed

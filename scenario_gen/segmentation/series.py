@@ -101,7 +101,7 @@ def segment_series(
         return Posterior.constant(len(x))
     known = np.zeros(x.shape[1]) if blur is None else np.asarray(blur)
     unit = np.maximum(spread, known)[varies]  # what varies less than it is known shall not be blown up to look like the rest
-    unknown = (known[varies] / unit) ** 2
+    unknown = np.square(known[varies] / unit)
     scaled = (x[:, varies] - x[:, varies].mean(axis=0)) / unit
     first, *seeds = np.random.SeedSequence([seed]).spawn(config.chains + 1)
     problem = Problem.build(scaled, stops, config, unknown)

@@ -27,6 +27,7 @@ import math
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F2, I, I1, kernel, OUT1
 from scenario_gen.segmentation._windows import moving_mean
@@ -206,8 +207,8 @@ def chi2_above(degrees: int, chance: float) -> float:
     low, high = 0.0, 1.0
 
     def exceeds(x: float) -> bool:
-        terms = [i * math.log(x) - math.lgamma(i + 1.0) - x for i in range(degrees // 2)]
-        return math.fsum(math.exp(term) for term in terms) > chance
+        terms = [i * exact.log(x) - exact.lgamma(i + 1.0) - x for i in range(degrees // 2)]
+        return math.fsum(exact.exp(term) for term in terms) > chance
 
     while exceeds(high):
         low, high = high, 2.0 * high
@@ -222,10 +223,10 @@ def course(position: Floats, speed: Floats, dt: float) -> tuple[Floats, Floats]:
     half = max(1, min(round(COURSE_WINDOW / dt) // 2, (len(speed) - 1) // 2))
     steps = np.arange(-half, half + 1)
     padded = np.pad(position, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
-    velocity = sliding_window_view(padded, 2 * half + 1, axis=0) @ steps / (steps @ steps * dt)
+    velocity = exact.matmul(sliding_window_view(padded, 2 * half + 1, axis=0), steps) / (exact.matmul(steps, steps) * dt)
     pace = moving_mean(speed, 2 * half + 1)
     moves = pace > LEAST_SPEED
-    angle = np.arctan2(velocity[:, 1], velocity[:, 0])
+    angle = exact.arctan2(velocity[:, 1], velocity[:, 0])
     if moves.any():
         last = np.maximum.accumulate(np.where(moves, np.arange(len(speed)), 0))
         angle = angle[np.maximum(last, int(np.argmax(moves)))]

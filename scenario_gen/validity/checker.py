@@ -16,10 +16,10 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
-import math
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.interaction import Conflict, pair_conflict, runs, Wait
@@ -140,7 +140,7 @@ class Checker:
         for name, k, asked in (("start", 0, self.asked.start), ("end", -1, self.asked.end)):  # too few numbers for arrays
             ends = zip(scenario.position[:, k].tolist(), scenario.speed[:, k].tolist(), asked.tolist(), strict=True)
             for i, ((x, y), speed, (x_asked, y_asked, _, speed_asked)) in enumerate(ends):
-                distance, difference = math.hypot(x - x_asked, y - y_asked), abs(speed - speed_asked)
+                distance, difference = exact.hypot(x - x_asked, y - y_asked), abs(speed - speed_asked)
                 if distance > limits.position_tolerance + 1e-9 or difference > limits.speed_tolerance + 1e-9:
                     message = f"vehicle {i}: {name} is {distance:.3f} m and {difference:.3f} m/s from what was asked"
                     yield Violation(Cause.BOUNDARY_STATE, float(scenario.time[k]), (i,), message)
@@ -235,7 +235,7 @@ class Checker:
     def _slow(self, scenario: Scenario, i: int, limit: float) -> list[tuple[int, int]]:
         """First and last sample of each stretch in which neither published speed nor displacement reaches the limit [m/s]."""
         slow = scenario.speed[i] < limit
-        moved = np.hypot(*np.diff(scenario.position[i], axis=0).T)
+        moved = exact.hypot(*np.diff(scenario.position[i], axis=0).T)
         still = slow[:-1] & slow[1:] & (moved < limit * np.diff(scenario.time))
         return [(a, b + 1) for a, b in runs(still)]
 
@@ -244,7 +244,7 @@ class Checker:
         if self.asked is None or not any(wait.vehicle == i and wait.start == 0.0 for wait in self.waits or ()):
             return False
         off = self.asked.end[i, :2] - self.asked.start[i, :2]
-        return bool(np.hypot(off[0], off[1]) <= self.limits.position_tolerance)
+        return bool(exact.hypot(off[0], off[1]) <= self.limits.position_tolerance)
 
 
 def _not_finite(scenario: Scenario) -> Violation | None:

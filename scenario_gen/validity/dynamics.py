@@ -22,6 +22,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.kernels import F1, F2, F3, kernel, OUT3
 from scenario_gen.scenario import Cause
@@ -131,7 +132,7 @@ def worst_excess(
                 ay = (
                     (position[i, k + 1, 1] - position[i, k, 1]) / h - (position[i, k, 1] - position[i, k - 1, 1]) / before
                 ) / half
-                c, s = np.cos(heading[i, k]), np.sin(heading[i, k])
+                c, s = exact.cos(heading[i, k]), exact.sin(heading[i, k])
                 ahead, aside = c * ax + s * ay, abs(c * ay - s * ax)
                 _note(out[i], 9, ahead - speeding - tolerance, ahead, speeding + tolerance, now)
                 _note(out[i], 9, -ahead - braking - tolerance, -ahead, braking + tolerance, now)
@@ -148,11 +149,16 @@ def worst_excess(
             if turn > TURN_ROUNDING + curvature * moved:
                 bend = turn / moved
                 _note(out[i], 6, bend - curvature, bend, curvature, now)
-            c0, s0, c1, s1 = np.cos(heading[i, k]), np.sin(heading[i, k]), np.cos(heading[i, k + 1]), np.sin(heading[i, k + 1])
+            c0, s0, c1, s1 = (
+                exact.cos(heading[i, k]),
+                exact.sin(heading[i, k]),
+                exact.cos(heading[i, k + 1]),
+                exact.sin(heading[i, k + 1]),
+            )
             vx, vy, wx, wy = v * c0, v * s0, w * c1, w * s1
             # mean velocity of the displacement against that of the published speeds and headings, in the body's axes
             ex, ey = dx / h - 0.5 * (vx + wx), dy / h - 0.5 * (vy + wy)
-            c, s = np.cos(0.5 * (heading[i, k] + heading[i, k + 1])), np.sin(0.5 * (heading[i, k] + heading[i, k + 1]))
+            c, s = exact.cos(0.5 * (heading[i, k] + heading[i, k + 1])), exact.sin(0.5 * (heading[i, k] + heading[i, k + 1]))
             allowed = slip + share * fast
             ahead, aside = abs(c * ex + s * ey), abs(c * ey - s * ex)
             _note(out[i], 7, ahead - allowed, ahead, allowed, now)

@@ -22,6 +22,7 @@ Where neither suffices the stretch is halved, until it is proven, the footprint 
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.kernels import F, F1, F2, F4, I2, kernel, OUT2
 from scenario_gen.validity.motion import stretch
@@ -102,7 +103,7 @@ def _first_exit(
         stretch(b, middle, middle, part)
         x, y, at, turn = part[0, 0], part[0, 1], yaw[0] + yaw[1] * middle, 0.5 * step * abs(yaw[1])
         stretch(b, u, u + step, part)
-        c, s = np.cos(at), np.sin(at)
+        c, s = exact.cos(at), exact.sin(at)
         ahead = aside = 0.0
         for i in range(4):
             dx, dy = part[i, 0] - x, part[i, 1] - y

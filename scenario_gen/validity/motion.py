@@ -21,6 +21,7 @@ difference of two of them; and the part between u0 and u1 has control points giv
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.kernels import F1, F2, F3, kernel, OUT4
 
@@ -45,10 +46,10 @@ def control_points(time: Floats, position: Floats, heading: Floats, speed: Float
     """Fill `out` (N, T - 1, 4, 2) with the control points [m] of every vehicle in every interval."""
     n, t = heading.shape
     for i in range(n):
-        vx, vy = speed[i, 0] * np.cos(heading[i, 0]), speed[i, 0] * np.sin(heading[i, 0])
+        vx, vy = speed[i, 0] * exact.cos(heading[i, 0]), speed[i, 0] * exact.sin(heading[i, 0])
         for k in range(t - 1):
             third = (time[k + 1] - time[k]) / 3.0
-            wx, wy = speed[i, k + 1] * np.cos(heading[i, k + 1]), speed[i, k + 1] * np.sin(heading[i, k + 1])
+            wx, wy = speed[i, k + 1] * exact.cos(heading[i, k + 1]), speed[i, k + 1] * exact.sin(heading[i, k + 1])
             out[i, k, 0, 0], out[i, k, 0, 1] = position[i, k, 0], position[i, k, 1]
             out[i, k, 1, 0], out[i, k, 1, 1] = position[i, k, 0] + third * vx, position[i, k, 1] + third * vy
             out[i, k, 2, 0], out[i, k, 2, 1] = position[i, k + 1, 0] - third * wx, position[i, k + 1, 1] - third * wy

@@ -1,0 +1,69 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""SHA-256 of everything that one encounter becomes on one road, as JSON: run under other CPUs' settings, it must not change.
+
+    python test/exact/digest.py COUNT SEED LOG ROAD [LOG ROAD ...]
+"""
+
+import hashlib
+import json
+from pathlib import Path
+import sys
+
+import numpy as np
+
+from msg_conventions.scenarios import encode_scenario
+from scenario_gen.errors import RefusedError
+from scenario_gen.evaluation import Case
+from scenario_gen.logs import read_log
+from scenario_gen.pipeline import generate, PipelineConfig
+
+
+def sha(*arrays: object) -> str:
+    """Digest of arrays' bytes."""
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).tobytes())  # type: ignore[arg-type]
+    return digest.hexdigest()
+
+
+def digests(case: Case) -> dict[str, str]:
+    """The stages' results, in their order."""
+    encounter, segmentation, made = case.encounter, case.segmentation, case.with_changepoints
+    scenarios = b"".join(encode_scenario(scenario, encounter.start_ns) for scenario in made.scenarios)
+    return {
+        "encounter": sha(encounter.position, encounter.speed, encounter.heading),
+        "changepoints": sha(segmentation.labels, segmentation.changepoints, segmentation.changepoint_probability),
+        "routes": sha(*(part for route in case.routes for part in (route.points, route.anchor))),
+        "scenarios": f"{len(made.scenarios)} of {made.candidates}: {hashlib.sha256(scenarios).hexdigest()}",
+        "evaluation": hashlib.sha256(case.evaluation.to_json().encode()).hexdigest(),
+    }
+
+
+def main(count: int, seed: int, pairs: list[str]) -> None:
+    """Print the digests of every log on every road."""
+    found: dict[str, dict[str, str]] = {}
+    for log, road in zip(pairs[::2], pairs[1::2], strict=True):
+        for encounter in read_log([Path(log)], PipelineConfig().log).encounters:
+            name = f"{encounter.name} on {Path(road).stem}"
+            try:
+                found[name] = digests(generate(encounter, road, PipelineConfig(), count=count, seed=seed))
+            except RefusedError as error:
+                found[name] = {"refused": str(error)}
+    print(json.dumps(found))
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:])
