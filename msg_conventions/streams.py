@@ -21,10 +21,9 @@ QoS: reliable, volatile, depth 1000.
 import math
 
 import numpy as np
-import pyproj
 
 from msg_conventions.cdr import CdrReader, CdrWriter
-from scenario_gen import exact
+from scenario_gen import exact, geodesy
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
@@ -40,11 +39,7 @@ def geodetic(encounter: Encounter) -> Floats:
     """
     if encounter.origin is None:
         raise InputError(f"encounter {encounter.name!r} came in metres without an origin; it cannot be streamed as NavSatFix")
-    latitude, longitude = encounter.origin
-    frame = pyproj.Proj(proj="aeqd", lat_0=latitude, lon_0=longitude, ellps="WGS84")
-    east, north = np.moveaxis(encounter.position, -1, 0)
-    lon, lat = frame(east, north, inverse=True)
-    return np.stack([lat, lon], axis=-1)
+    return np.stack(geodesy.geodetic(encounter.position, encounter.origin), axis=-1)
 
 
 def encode_fix(latitude: float, longitude: float, stamp_ns: int, frame_id: str) -> bytes:

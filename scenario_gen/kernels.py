@@ -22,8 +22,10 @@ while the arrays of our frozen dataclasses would not match a writable declaratio
 
 from collections.abc import Callable
 import importlib
+from pathlib import Path
 import pkgutil
 from time import perf_counter
+from types import FunctionType, ModuleType
 from typing import Any, cast, TypeVar
 
 import numba
@@ -49,6 +51,33 @@ OUTB1, OUTB2 = (_array(B, n, readonly=False) for n in (1, 2))
 _registry: list[tuple[Any, tuple[Any, ...]]] = []
 
 
+def _source_stamp(function: Callable[..., Any], seen: set[int]) -> tuple[Any, ...]:
+    """What tells whether a compiled function is up to date: the files of the kernels it calls, by time and size.
+
+    numba itself looks only at the file of the function, and would go on calling what a kernel in another file once was.
+    """
+    seen.add(id(function))
+    file = Path(function.__code__.co_filename).stat()
+    names = function.__code__.co_names
+    called = [function.__globals__.get(name) for name in names]
+    ours = [module for module in called if isinstance(module, ModuleType) and module.__name__.startswith("scenario_gen.")]
+    called += [getattr(module, name, None) for module in ours for name in names]
+    inner = [getattr(each, "__wrapped__", None) for each in called]  # dispatchers and ufuncs wrap what they compile
+    stamps = [
+        _source_stamp(each, seen)
+        for each in inner
+        if isinstance(each, FunctionType) and each.__module__.startswith("scenario_gen.") and id(each) not in seen
+    ]
+    return (file.st_mtime, file.st_size, *stamps)
+
+
+def _watch(dispatcher: Any, function: Callable[..., Any]) -> None:
+    """Have the dispatcher's cache compare `_source_stamp`, where this version of numba has a place for it."""
+    cache: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    if hasattr(cache, "_source_stamp"):
+        cache._source_stamp = _source_stamp(function, set())
+
+
 def kernel(*argument_types: Any, inline: bool = False) -> Callable[[Function], Function]:
     """Compile a function with numba: cached, without the GIL, IEEE arithmetic (no fastmath: same bytes everywhere).
 
@@ -59,6 +88,7 @@ def kernel(*argument_types: Any, inline: bool = False) -> Callable[[Function], F
 
     def decorate(function: Function) -> Function:
         dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+        _watch(dispatcher, function)
         if not inline:
             _registry.append((dispatcher, argument_types))
         return cast("Function", dispatcher)

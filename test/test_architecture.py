@@ -28,6 +28,7 @@ PACKAGE = ROOT / "scenario_gen"
 ORDER = (
     ("errors", "arrays", "kernels", "parameters"),
     ("exact",),
+    ("geodesy",),
     ("encounter", "scenario", "interaction"),
     ("logs",),
     ("segmentation",),

@@ -405,6 +405,8 @@ def _lgamma(x: float) -> float:
 
 @_ufunc(1)
 def _ndtr(x: float) -> float:
+    if np.isnan(x):
+        return x
     a = abs(x) * 0.70710678118654752440
     z = a * a
     if a < 1.0:

@@ -18,11 +18,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import pyproj
 
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.errors import InputError
+from scenario_gen.geodesy import local_frame
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import Observations, RawLog
 
@@ -192,11 +192,9 @@ def to_metres(
     else:
         middle = np.round(np.percentile(everything, [5, 95], axis=0).mean(axis=0), 5)  # a few wrong fixes do not move it
         origin = (float(middle[0]), float(middle[1]))
-    frame = pyproj.Proj(proj="aeqd", lat_0=origin[0], lon_0=origin[1], ellps="WGS84")
     projected = []
     for vehicle in vehicles:
-        east, north = frame(vehicle.fix[:, 1], vehicle.fix[:, 0])
-        fix = np.column_stack([east, north])
+        fix = local_frame(vehicle.fix[:, 0], vehicle.fix[:, 1], origin)
         values = {name: getattr(vehicle, name) for name in vehicle.__dataclass_fields__}
         projected.append(Observations(**(values | {"fix": fix})))
     return origin, projected

@@ -33,12 +33,12 @@ from pathlib import Path
 import sys
 
 import numpy as np
-import pyproj
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Vehicle
+from scenario_gen.geodesy import geodetic
 from scenario_gen.logs.bag import FIX, STORES, TWIST
 
 CASES = ("a", "b", "c")
@@ -226,8 +226,7 @@ def record_drive(drive: Drive, rng: np.random.Generator) -> Iterator[Recorded]:
     jitter[[0, -1]] = 0.0
     state = drive.state(clock + jitter)
     east, north = state[:, :2].T + coloured_noise(count, rng).T
-    geographic = pyproj.Proj(proj="aeqd", lat_0=ORIGIN[0], lon_0=ORIGIN[1], ellps="WGS84")
-    longitude, latitude = np.round(geographic(east, north, inverse=True), 7)  # as in a basic safety message
+    latitude, longitude = np.round(geodetic(np.stack([east, north], axis=-1), ORIGIN), 7)  # as in a basic safety message
     speed = state[:, 3] * (1.0 + SPEED_BIAS) + np.where(state[:, 3] > 0.0, rng.normal(0.0, SPEED_WHITE, count), 0.0)
     speed = np.maximum(np.round(speed / SPEED_QUANTUM) * SPEED_QUANTUM, 0.0)
     lost = rng.random((count, 2)) < LOST

@@ -14,7 +14,7 @@
 
 """SHA-256 of everything that one encounter becomes on one road, as JSON: run under other CPUs' settings, it must not change.
 
-    python test/exact/digest.py COUNT SEED LOG ROAD [LOG ROAD ...]
+python test/exact/digest.py COUNT SEED LOG ROAD [LOG ROAD ...]
 """
 
 import hashlib

@@ -1,0 +1,39 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The same bytes on every CPU: one encounter under the settings that other CPUs would choose (all of them: make soak PART=cpu)."""
+
+from functools import cache
+import json
+
+from cpu_settings import digests, SETTINGS
+import pytest
+
+from scenario_gen.logs.synthetic import bundled
+
+CASE = (str(bundled("a")), "t_intersection")
+
+
+@cache
+def found(name: str) -> dict[str, dict[str, str]]:
+    """The digests under one setting."""
+    result: dict[str, dict[str, str]] = json.loads(digests(SETTINGS[name], 8, 7, *CASE))
+    return result
+
+
+@pytest.mark.parametrize("name", list(SETTINGS)[1:])
+def test_every_stage_gives_the_same_bytes(name):
+    (one,), (two,) = found("as it is").values(), found(name).values()
+    assert set(one) == {"encounter", "changepoints", "routes", "scenarios", "evaluation"}
+    assert two == one
