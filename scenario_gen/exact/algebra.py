@@ -268,7 +268,7 @@ def _root(a: Floats, out: Floats) -> int:
 
 
 def root(a: Numbers) -> Floats:
-    """Return a root (n, r) of a positive semidefinite a (n, n), root rootᵀ = a to rounding, by Cholesky with pivoting.
+    """Return an f (n, r) with f fᵀ = a to rounding for a positive semidefinite a (n, n), by Cholesky with pivoting.
 
     r is the numerical rank: what is left of the diagonal is rounding.
     """

@@ -12,7 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The same bytes on every CPU: one encounter under the settings that other CPUs would choose (all of them: make soak PART=cpu)."""
+"""The same bytes on every CPU: one encounter under the settings that other CPUs would choose.
+
+`make soak PART=cpu` is the long form: every recorded encounter on two roads, and numba's target too.
+"""
 
 from functools import cache
 import json

@@ -65,6 +65,7 @@ def main() -> int:
     parser.add_argument("parts", nargs="*", choices=[[], *PARTS])
     parser.add_argument("--fresh", action="store_true", help="begin again instead of going on where a part was stopped")
     arguments = parser.parse_args()
+    sys.path += [str(folder) for folder in Path(__file__).resolve().parents[1].iterdir() if folder.is_dir()]  # as pytest's
     for part in arguments.parts or PARTS:
         if arguments.fresh:
             shutil.rmtree(OUT / part, ignore_errors=True)

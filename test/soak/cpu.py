@@ -18,12 +18,9 @@ from collections.abc import Iterable, Iterator
 import json
 import os
 from pathlib import Path
-import sys
 
-from figures import Figure
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "exact"))
 from cpu_settings import CODE, digests, ROOT, SETTINGS
+from figures import Figure
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", ROOT.parent / "shared" / "data"))
 ROADS = ("corridor", "t_intersection")
