@@ -19,14 +19,13 @@ import json
 from pathlib import Path
 import sys
 import tempfile
-from typing import Annotated, Any
+from typing import Annotated
 
 from rich.console import Console
 from rich.markdown import Markdown
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
 import typer
-import yaml
 
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags import read_messages, reindex
@@ -41,7 +40,7 @@ from scenario_gen.evaluation import Case, comparison_table, read_evaluations, Re
 from scenario_gen.evaluation import compare as compare_sets
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.parameters import flatten, updated
+from scenario_gen.parameters import assigned, flatten, read_parameter_file, updated
 from scenario_gen.pipeline import generate as run_pipeline
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.requests import Request
@@ -74,39 +73,8 @@ def configured(parameters: Path | None, assignments: list[str]) -> PipelineConfi
     if parameters is not None:
         config = updated(config, read_parameter_file(parameters))
     for assignment in assignments:
-        name, equals, text = assignment.partition("=")
-        if not equals:
-            raise InputError(f"--set {assignment}: write it as name=value")
-        known = flatten(config)
-        # what is declared as text stays text: vehicle "007" is no number
-        is_text = name in known and isinstance(known[name][0].default, str)
-        config = updated(config, {name: text if is_text else yaml.safe_load(text)})
+        config = assigned(config, assignment)
     return config
-
-
-def read_parameter_file(path: Path) -> dict[str, Any]:
-    """Return {dotted name: value} of a ROS 2 parameter file (`/**: ros__parameters: ...`).
-
-    Raises:
-        InputError: the file cannot be read or is not of that form.
-    """
-    try:
-        document = yaml.safe_load(path.read_text())
-        ((_, body),) = document.items()
-        nested = body["ros__parameters"]
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from error
-    except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: not a parameter file of the form '/**: ros__parameters: ...' ({error})") from error
-    return dict(_dotted(nested))
-
-
-def _dotted(nested: dict[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
-    """Flatten nested mappings to (dotted name, value) pairs."""
-    pairs: list[tuple[str, Any]] = []
-    for name, value in nested.items():
-        pairs += _dotted(value, f"{prefix}{name}.") if isinstance(value, dict) else [(prefix + name, value)]
-    return pairs
 
 
 @app.command()
