@@ -281,12 +281,17 @@ def validate(
 
 @app.command("reindex")
 def save_bag(
-    bag: Annotated[Path, typer.Argument(help="folder of a bag whose recorder was killed: MCAP files without metadata.yaml")],
+    bag: Annotated[Path, typer.Argument(help="folder of a bag that was not closed or is damaged, or one of its MCAP files")],
     out: Annotated[Path | None, typer.Option(help="folder of the new bag; BAG_reindexed if not given")] = None,
+    assignments: SetOption = None,
+    parameter_file: ParametersOption = None,
 ) -> None:
-    """Save the messages that are whole in a bag that was not closed, and index them; the old files stay as they are."""
+    """Save the messages that are whole in a bag that was not closed or is damaged; the old files stay as they are."""
     target = out or bag.with_name(f"{bag.name}_reindexed")
-    console.print(f"{reindex(bag, target)} messages: {target}", highlight=False, soft_wrap=True)
+    made = reindex(bag, target, configured(parameter_file, assignments or []).bag)
+    console.print(f"{made.messages} messages: {target}", highlight=False, soft_wrap=True)
+    for line in made.lines():
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
 @app.command()
