@@ -45,6 +45,7 @@ from scenario_gen.pipeline import generate as run_pipeline
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.requests import Request
 from scenario_gen.results import BAG, check_folder, FIGURES, namespaces, provenance_of, REPORT, write_results
+from scenario_gen.storage import remark
 
 app = typer.Typer(
     help="Turn recorded vehicle encounters into new, valid ones on other roads.",
@@ -143,9 +144,13 @@ def regenerate(
     log: Annotated[
         Path | None, typer.Option(help="make it from this raw log, not from the bag's tracks and changepoints")
     ] = None,
+    assignments: SetOption = None,
+    parameter_file: ParametersOption = None,
 ) -> None:
     """Make one published scenario again, bit for bit, and compare it with its recorded SHA-256."""
-    made = regenerate_scenario(bag, index, namespace=namespace, request=request, log=log)
+    remind(bag)
+    config = configured(parameter_file, assignments or []).bag
+    made = regenerate_scenario(bag, index, namespace=namespace, request=request, log=log, config=config)
     console.print(f"scenario {index}: the same {len(made.data)} bytes, sha256 {made.sha256}", highlight=False, soft_wrap=True)
     if out is not None:
         console.print(f"bag: {write_regenerated(made, out)}", highlight=False, soft_wrap=True)
@@ -243,7 +248,8 @@ def evaluate(
 ) -> None:
     """Measure the scenarios of a bag against the tracks in it, and check them anew."""
     config = configured(parameter_file, assignments or [])
-    cases = bag_cases(bag, config.evaluation, config.limits)
+    remind(bag)
+    cases = bag_cases(bag, config.evaluation, config.limits, bag=config.bag)
     found = [case.evaluation for case in cases]
     text = "\n\n".join(evaluation.to_markdown() for evaluation in found)
     console.print(Markdown(text))
@@ -252,7 +258,7 @@ def evaluate(
         (out / "evaluation.md").write_text(text + "\n", encoding="utf-8")
         figures = [json.loads(evaluation.to_json()) for evaluation in found]
         (out / FIGURES).write_text(json.dumps({"cases": figures}, indent=2) + "\n", encoding="utf-8")
-        facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | told_provenance(bag)
+        facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | told_provenance(bag, config.bag)
         write_report(out / REPORT, ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts))
 
 
@@ -263,7 +269,9 @@ def validate(
     parameter_file: ParametersOption = None,
 ) -> None:
     """Check every scenario of a bag at every instant; exit code 1 if one is invalid."""
-    found = validate_bag(bag, configured(parameter_file, assignments or []).limits)
+    config = configured(parameter_file, assignments or [])
+    remind(bag)
+    found = validate_bag(bag, config.limits, config.bag)
     for one in found:
         console.print(
             f"{one.namespace or '/'}: {one.scenarios - one.invalid} of {one.scenarios} scenarios are valid", highlight=False
@@ -310,6 +318,12 @@ def compare(
     """Put two sets of scenarios side by side: two seeds, two parameters, two versions."""
     differences = compare_sets(read_evaluations(first), read_evaluations(second))
     console.print(Markdown(comparison_table(differences, (first.name, second.name))))
+
+
+def remind(bag: Path) -> None:
+    """Say what is missing of a bag that is read all the same."""
+    if said := remark(bag):
+        console.print(said, highlight=False, markup=False, soft_wrap=True)
 
 
 def chosen(encounters: tuple[Encounter, ...], names: list[str]) -> list[Encounter]:

@@ -25,8 +25,8 @@ import yaml
 from scenario_gen.errors import InputError
 from scenario_gen.guard import guarded
 
-MOST_YAML = 1024 * 1024  # bytes; the parameters of all stages take 9 kB, the metadata of a bag of 1000 topics 500 kB
-MOST_JSON = 16 * 1024 * 1024  # bytes; the figures of one case take 9 kB
+MOST_YAML = 512 * 1024  # bytes; the parameters of all stages take 9 kB, the metadata of a bag of 1000 topics 500 kB
+MOST_JSON = 8 * 1024 * 1024  # bytes; the figures of one case take 9 kB
 DEEPEST = 32  # nested lists and mappings
 WHOLE = 2**63  # beyond this an integer is none that a parameter or a stamp can be
 LARGEST = 1e300  # of a number in JSON: no infinity, and room to reckon with it

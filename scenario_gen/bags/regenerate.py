@@ -27,7 +27,7 @@ from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.bags.provenance import Config, read_parameters, sha256_of, versions
-from scenario_gen.bags.reader import BagMessage, read_messages
+from scenario_gen.bags.reader import BagMessage, DEFAULT, read_messages
 from scenario_gen.bags.template import read_template
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.encounter import Encounter
@@ -39,6 +39,7 @@ from scenario_gen.requests import Chain, Request
 from scenario_gen.sampling import SamplingConfig
 from scenario_gen.scenario import Scenario
 from scenario_gen.segmentation import segment, Segmentation, SegmentationConfig
+from scenario_gen.storage import BagConfig
 
 TEMPLATE = ("tracks", "changepoints", "map", "fit")
 ROAD_ENDS = ("road/entries", "road/exits")
@@ -61,7 +62,13 @@ class Regenerated:
 
 
 def regenerate_scenario(
-    bag: Path, index: int, *, namespace: str | None = None, request: str | None = None, log: Path | None = None
+    bag: Path,
+    index: int,
+    *,
+    namespace: str | None = None,
+    request: str | None = None,
+    log: Path | None = None,
+    config: BagConfig = DEFAULT,
 ) -> Regenerated:
     """Make scenario `index` of a bag again and compare it with the recorded SHA-256.
 
@@ -74,12 +81,13 @@ def regenerate_scenario(
         namespace: where several hold such an index.
         request: id, likewise.
         log: the raw log.
+        config: what is read of the bag at most.
 
     Raises:
         InputError: the bag, the index, or something that is needed is not there or ambiguous; the log is another one.
         ScenarioGenError: it comes out differently (another version or processor); the message names what differs.
     """
-    found = _find(bag, index, namespace, request)
+    found = _find(bag, index, namespace, request, config)
     what = f"{bag}: request {found.entry.values['request']}"
     account, seed = found.account.values, int(found.entry.values["seed"])
     asked = Request(**{name: account.get(name, "") for name in ("ego", "starts", "goals")})
@@ -141,14 +149,14 @@ class _Found:
         return newest
 
 
-def _find(bag: Path, index: int, namespace: str | None, request: str | None) -> _Found:
+def _find(bag: Path, index: int, namespace: str | None, request: str | None, config: BagConfig) -> _Found:
     """Find the one scenario of that index.
 
     Raises:
         InputError: there is none, several, or its request was not closed.
     """
     entries, accounts = [], {}
-    for message in read_messages(bag, lambda topic: topic.endswith("/scenarios/info")):
+    for message in read_messages(bag, lambda topic: topic.endswith("/scenarios/info"), config):
         where = message.topic.removesuffix("/scenarios/info")
         for status in decode_diagnostics(message.data, message.topic)[1]:
             if "published" in status.values:
@@ -174,10 +182,12 @@ def _find(bag: Path, index: int, namespace: str | None, request: str | None) -> 
         raise InputError(
             f"{bag}: request {entry.values['request']} was not closed on {where}/scenarios/info: its parameters are missing"
         )
-    return _Found(where, entry, account, tuple(_belonging(bag, where, entry, info, account)))
+    return _Found(where, entry, account, tuple(_belonging(bag, where, entry, info, account, config)))
 
 
-def _belonging(bag: Path, where: str, entry: Status, info: BagMessage, account: Status) -> Iterator[BagMessage]:
+def _belonging(
+    bag: Path, where: str, entry: Status, info: BagMessage, account: Status, config: BagConfig
+) -> Iterator[BagMessage]:
     """What bears the scenario's stamp in its namespace: the newest of each topic, then the scenario and the two accounts.
 
     Raises:
@@ -186,7 +196,7 @@ def _belonging(bag: Path, where: str, entry: Status, info: BagMessage, account: 
     stamp = CdrReader(info.data, info.topic).stamp()
     newest: dict[str, BagMessage] = {}
     scenario = None
-    for message in read_messages(bag, lambda topic: topic.startswith(f"{where}/")):
+    for message in read_messages(bag, lambda topic: topic.startswith(f"{where}/"), config):
         topic = message.topic.removeprefix(f"{where}/")
         if topic == "scenarios" and digest(message.data) == entry.values["sha256"]:
             scenario = message

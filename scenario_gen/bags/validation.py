@@ -37,10 +37,12 @@ from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.arrays import Floats
 from scenario_gen.bags.contents import Contents, read_namespaces
+from scenario_gen.bags.reader import DEFAULT
 from scenario_gen.errors import InputError
 from scenario_gen.interaction import Conflict, find_conflicts, find_waits, Wait
 from scenario_gen.roads.road import Road
 from scenario_gen.scenario import BoundaryStates, Scenario
+from scenario_gen.storage import BagConfig
 from scenario_gen.validity import Checker, Limits
 
 REFERENCES = ("tracks", "changepoints", "map", "fit")
@@ -122,15 +124,14 @@ def asked_by_digest(infos: Sequence[tuple[str, bytes]]) -> dict[str, BoundarySta
     return found
 
 
-def validate_bag(path: Path, limits: Limits | None = None) -> tuple[Validation, ...]:
-    """Check every scenario of every namespace that holds any.
+def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = DEFAULT) -> tuple[Validation, ...]:
+    """Check every scenario of every namespace that holds any; `config` says how much is read at most.
 
     Raises:
         InputError: the bag is missing or damaged, holds no scenarios, or one of its tracks, maps, … cannot be read.
     """
-    found = {
-        name: topics for name, topics in read_namespaces(path, (*REFERENCES, "scenarios", INFO)).items() if topics["scenarios"]
-    }
+    contents = read_namespaces(path, (*REFERENCES, "scenarios", INFO), config)
+    found = {name: topics for name, topics in contents.items() if topics["scenarios"]}
     if not found:
         raise InputError(f"{path}: no topic `scenarios` in any namespace; there is nothing to check")
     return tuple(_validate(namespace, topics, limits) for namespace, topics in found.items())

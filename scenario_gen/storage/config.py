@@ -28,10 +28,10 @@ class BagConfig:
     """Bounds of reading a bag, so that a small damaged or malicious file cannot take all memory."""
 
     most_bytes: int = parameter(
-        1024**3, "most bytes of messages that are read from one bag, 256 beside its own for each", low=1, high=2**62
+        512 * 1024**2, "most bytes of messages that are read from one bag, 256 beside its own for each", low=1, high=2**62
     )
     most_chunk_bytes: int = parameter(
-        128 * 1024**2,
+        64 * 1024**2,
         "largest chunk of an MCAP file after decompression, largest message of a SQLite file",
         low=1,
         high=2**31 - 1,

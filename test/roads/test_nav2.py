@@ -111,7 +111,7 @@ def test_broken_files_are_errors_too(tmp_path):
         ("image: map.pgm\nresolution: 0.5\norigin: !!timestamp x\n", "line 3.*the tag"),
         (f"resolution: {'9' * 5000}\n", "does not suit"),
         ("resolution: 0xffffffffffffffffffff\n", "64 bits"),
-        ("x" * 1_100_000, "at most 1048576"),
+        ("x" * 1_100_000, "at most 524288"),
     ],
 )
 def test_yaml_has_bounds(tmp_path, text, said):
