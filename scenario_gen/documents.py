@@ -179,6 +179,21 @@ def _check_schema(value: Any, what: str, schema: Mapping[str, Any]) -> None:
     raise InputError(f"{what}: {place or 'the document'} is {shown(error.instance, 120)}; its schema asks for {rule}")
 
 
+def check_shape(value: Any, shape: tuple[int, ...], what: str) -> None:
+    """Hold lists in lists against the shape of an array.
+
+    Raises:
+        InputError: there are more or fewer items somewhere.
+    """
+    if not shape:
+        return
+    if not isinstance(value, list) or len(value) != shape[0]:
+        there = f"{len(value)} items" if isinstance(value, list) else shown(value)
+        raise InputError(f"{what} holds {there} where {shape[0]} are needed")
+    for k, item in enumerate(value) if shape[1:] else ():
+        check_shape(item, shape[1:], f"{what}[{k}]")
+
+
 def shown(value: Any, most: int = 80) -> str:
     """Return a value as text of at most `most` characters, whatever it is."""
     try:

@@ -20,7 +20,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from msg_conventions.cdr import CdrReader
-from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Status
+from msg_conventions.diagnostics import count_in, decode_diagnostics, encode_diagnostics, Status, text_in
 from msg_conventions.names import tokens
 from msg_conventions.scenarios import digest, encode_scenario
 from msg_conventions.topics import topic_entry, vehicle_topic
@@ -160,28 +160,29 @@ def _find(bag: Path, index: int, namespace: str | None, request: str | None, con
         where = message.topic.removesuffix("/scenarios/info")
         for status in decode_diagnostics(message.data, message.topic)[1]:
             if "published" in status.values:
-                accounts[where, status.values["request"]] = status
+                accounts[where, status.values.get("request", "")] = status
             elif "sha256" in status.values:
+                for key in ("index", "seed"):
+                    count_in(status.values, key, f"{bag}: {message.topic}, {status.message}")
                 entries.append((where, status, message))
     if not entries:
         raise InputError(
             f"{bag}: no scenario has an account on `scenarios/info`; only what this suite published can be made again"
         )
-    own = [e for e in entries if namespace in (None, e[0]) and request in (None, e[1].values["request"])]
+    own = [e for e in entries if namespace in (None, e[0]) and request in (None, e[1].values.get("request"))]
     same = [e for e in own if e[1].values["index"] == str(index)]
     if not same:
         known = sorted({int(status.values["index"]) for _, status, _ in own})
         some = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")
         raise InputError(f"{bag}: no scenario of index {index}; there are: {some or 'none in that namespace and request'}")
     if len(same) > 1:
-        places = "; ".join(f"--namespace '{where}' --request {status.values['request']}" for where, status, _ in same)
+        places = "; ".join(f"--namespace '{where}' --request {status.values.get('request')}" for where, status, _ in same)
         raise InputError(f"{bag}: {len(same)} scenarios have index {index}; choose one: {places}")
     where, entry, info = same[0]
-    account = accounts.get((where, entry.values["request"]))
+    name = text_in(entry.values, "request", f"{bag}: {where}/scenarios/info, {entry.message}")
+    account = accounts.get((where, name))
     if account is None:
-        raise InputError(
-            f"{bag}: request {entry.values['request']} was not closed on {where}/scenarios/info: its parameters are missing"
-        )
+        raise InputError(f"{bag}: request {name} was not closed on {where}/scenarios/info: its parameters are missing")
     return _Found(where, entry, account, tuple(_belonging(bag, where, entry, info, account, config)))
 
 

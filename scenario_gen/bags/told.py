@@ -19,6 +19,7 @@ Nothing of it is needed for a figure; what is missing, damaged or of another tem
 
 from collections.abc import Mapping, Sequence
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -30,10 +31,12 @@ from msg_conventions.fits import anchor_stamps, decode_fit
 from msg_conventions.names import tokens
 from msg_conventions.paths import decode_route
 from msg_conventions.topics import vehicle_topic
+from scenario_gen.arrays import Floats
 from scenario_gen.bags.reader import DEFAULT, read_messages
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.fitting.result import Fit, FittedVehicle
+from scenario_gen.guard import guarded
 from scenario_gen.planning.route import Route
 from scenario_gen.segmentation import Segmentation
 from scenario_gen.storage import BagConfig
@@ -152,16 +155,7 @@ def told_fit(
         data = next(data for data in reversed(fits) if CdrReader(data, "fit").stamp() == encounter.start_ns)
         _, _, asked, anchors = decode_fit(data)
         decided = [told[f"fit of {vehicle.id}"] for vehicle in encounter.vehicles]
-        fitted = tuple(
-            FittedVehicle(
-                anchors=poses,
-                moved=np.array(json.loads(values["moved_m"]), dtype=np.float64),
-                stands=np.array(json.loads(values["stands"]), dtype=np.bool_),
-                scale=float(values["scale"]),
-                manoeuvre=values["manoeuvre"],
-            )
-            for poses, values in zip(anchors, decided, strict=True)
-        )
+        fitted = tuple(_fitted(poses, values) for poses, values in zip(anchors, decided, strict=True))
         stamps = anchor_stamps(encounter, segmentation.changepoints)
         routes = _routes(bag, namespace, encounter, stamps, config)
     except (StopIteration, KeyError, ValueError, InputError):
@@ -170,6 +164,21 @@ def told_fit(
         return None, ()
     index = np.array([0, *segmentation.changepoints, len(encounter.time) - 1])
     return Fit(encounter.vehicles, fitted, index, asked, tuple(told.get("fit", {}).values())), routes
+
+
+def _fitted(poses: Floats, values: Values) -> FittedVehicle:
+    """Return what the fitting decided of a vehicle.
+
+    Raises:
+        KeyError, ValueError, InputError: it is not told, or damaged.
+    """
+    with guarded("fit"):
+        moved = np.array(json.loads(values["moved_m"]), dtype=np.float64)
+        stands = np.array(json.loads(values["stands"]), dtype=np.bool_)
+    scale = float(values["scale"])
+    if moved.ndim != 1 or stands.ndim != 1 or not np.isfinite(moved).all() or not 0.0 < scale < math.inf:
+        raise InputError("fit: damaged")
+    return FittedVehicle(anchors=poses, moved=moved, stands=stands, scale=scale, manoeuvre=values["manoeuvre"])
 
 
 def _routes(bag: Path, namespace: str, encounter: Encounter, stamps: Sequence[int], config: BagConfig) -> tuple[Route, ...]:

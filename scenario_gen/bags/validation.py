@@ -22,7 +22,6 @@ left out for an ego. Where there are accounts on `scenarios/info`, each scenario
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-import json
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +29,7 @@ import numpy as np
 from msg_conventions import trajectory
 from msg_conventions.cdr import CdrReader
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.diagnostics import decode_diagnostics
+from msg_conventions.diagnostics import decode_diagnostics, states_of
 from msg_conventions.names import tokens
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
@@ -116,11 +115,8 @@ def asked_by_digest(infos: Sequence[tuple[str, bytes]]) -> dict[str, BoundarySta
         for status in decode_diagnostics(data, what)[1]:
             values = status.values
             if {"sha256", "asked_start", "asked_end"} <= set(values):
-                try:
-                    rows = (np.array(json.loads(values[key]), dtype=np.float64) for key in ("asked_start", "asked_end"))
-                    found[values["sha256"]] = BoundaryStates(*(row.reshape(-1, 4) for row in rows))
-                except ValueError as error:
-                    raise InputError(f"{what}: the asked states of {status.message} are no rows of numbers ({error})") from None
+                where = f"{what}: the asked states of {status.message}"
+                found[values["sha256"]] = BoundaryStates(*(states_of(values[key], where) for key in ("asked_start", "asked_end")))
     return found
 
 
