@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.rosbag2 import Reader
 from rosbags.typesys import get_typestore, Stores
 
 from msg_conventions import trajectory
@@ -30,9 +29,12 @@ from msg_conventions.tracks import decode_tracks
 from msg_conventions.yaw import yaw
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
+from scenario_gen.guard import guarded
+from scenario_gen.logs.budgets import check_size, check_vehicles
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.files import bag_files
 from scenario_gen.logs.raw import RawLog, Rows, Segment
+from scenario_gen.logs.storage import opened
 
 FIX = "sensor_msgs/msg/NavSatFix"
 TWIST = "geometry_msgs/msg/TwistStamped"
@@ -59,7 +61,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     name = paths[0].stem if paths[0].is_file() else paths[0].name
     if tracks:
         return read_tracks(tracks, name, label, others=[topic.name for topic in topics if topic not in tracks])
-    return read_streams(topics, name, label)
+    return read_streams(topics, name, label, config)
 
 
 def read_topics(files: Sequence[Path], config: LogConfig) -> list[Topic]:
@@ -71,20 +73,18 @@ def read_topics(files: Sequence[Path], config: LogConfig) -> list[Topic]:
     wanted = [name.strip() for name in config.topics.split(",") if name.strip()]
     found: dict[str, Topic] = {}
     seen: dict[str, str] = {}
+    rows = size = 0
     for file in files:
-        if file.is_file() and file.stat().st_size == 0:
-            raise InputError(f"{file} is empty (0 bytes); record or copy it again")
-        try:
-            with Reader(file) as reader:
-                seen |= {connection.topic: connection.msgtype for connection in reader.connections}
-                used = [c for c in reader.connections if is_used(c.topic, c.msgtype, wanted)]
-                for connection, stamp, data in reader.messages(used) if used else ():
-                    topic = found.setdefault(connection.topic, Topic(connection.topic, connection.msgtype))
-                    topic.stamps.append(stamp)
-                    topic.data.append(bytes(data))
-        except Exception as error:  # a damaged file may fail anywhere inside the readers
-            what = f"{file}, {file.stat().st_size} bytes" if file.is_file() else str(file)
-            raise InputError(f"{what}: cut off or damaged, no bag ({error or type(error).__name__})") from error
+        with opened(file, config.size_limit << 20) as bag:
+            seen |= {connection.topic: connection.msgtype for connection in bag.connections}
+            used = [c for c in bag.connections if is_used(c.topic, c.msgtype, wanted)]
+            for connection, stamp, data in bag.messages(used):
+                rows += 1
+                size += len(data)
+                check_size(str(file), size, rows, config)
+                topic = found.setdefault(connection.topic, Topic(connection.topic, connection.msgtype))
+                topic.stamps.append(stamp)
+                topic.data.append(data)
     for name in wanted:
         if name not in seen:
             raise InputError(f"parameter topics: {files[0]} has no topic {name!r}; it has {listing(seen)}")
@@ -116,7 +116,7 @@ def vehicle_id(topic: str) -> str:
     return namespace.rpartition("/")[2].removeprefix("vehicle_") or topic.strip("/")
 
 
-def read_streams(topics: list[Topic], name: str, label: str) -> RawLog:
+def read_streams(topics: list[Topic], name: str, label: str, config: LogConfig) -> RawLog:
     """Collect fixes, speeds and odometry per vehicle."""
     if len({topic.type == ODOMETRY for topic in topics if topic.type != TWIST}) > 1:
         mixed = listing({topic.name: topic.type for topic in topics})
@@ -125,6 +125,7 @@ def read_streams(topics: list[Topic], name: str, label: str) -> RawLog:
     segments: list[Segment] = []
     unstamped: list[str] = []
     owners = own(topics, label)
+    check_vehicles(label, len(set(owners.values())), config)
     row = 0
     for topic in topics:
         segments.append(Segment(row, f"{label}, topic {topic.name}", "message", 1))
@@ -172,11 +173,8 @@ def collect(topic: Topic, take: Callable[[Any, Rows, int, int], None], vehicle: 
     """Decode the messages of a topic; return whether their headers bear no stamps."""
     unstamped = False
     for number, (received, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
-        try:
+        with guarded(f"{label}, topic {topic.name}, message {number + 1}: not a {topic.type}"):
             message: Any = STORES.deserialize_cdr(data, topic.type)
-        except Exception as error:  # damaged bytes may fail anywhere inside the decoder
-            where = f"{label}, topic {topic.name}, message {number + 1}"
-            raise InputError(f"{where}: not a {topic.type} ({error or type(error).__name__})") from error
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
         unstamped |= stamp == 0
         take(message, vehicle, stamp or received, row + number)
