@@ -26,7 +26,7 @@ from scenario_gen.logs.budgets import check_size
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.files import COLUMNS
 from scenario_gen.logs.raw import RawLog, Segment
-from scenario_gen.logs.table import from_frame, read_text, vehicle_name
+from scenario_gen.logs.table import from_frame, read_text, reals, vehicle_name
 
 EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime counts microseconds from there
 
@@ -57,7 +57,7 @@ def read_messages(path: Path, before: int, config: LogConfig) -> pd.DataFrame:
     raw.columns = pd.Index(COLUMNS)
 
     def numbers(name: str) -> "pd.Series[float]":
-        return pd.to_numeric(raw[name], errors="coerce").astype(float)
+        return reals(raw[name])
 
     stamps = numbers("Gentime")  # microseconds stay exact in float64 until the year 2289
     known = stamps.notna() & (stamps.abs() < 8e15)

@@ -31,6 +31,7 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import Observations, RawLog, Segment
 
 LONGEST = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
+LONGEST_NUMBER = 300  # characters
 LARGEST = 100.0  # m: what is longer is no vehicle
 
 
@@ -103,11 +104,18 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
         elif quantity == "time":
             out["time"], out["time_ok"] = nanoseconds(values, column.factor)
         else:
-            numbers = pd.to_numeric(values, errors="coerce").astype(float) * column.factor
+            numbers = reals(values) * column.factor
             out[quantity] = (math.pi / 2.0 - numbers) if column.clockwise else numbers
     if "vehicle" not in out:
         out["vehicle"] = "0"
     return out
+
+
+def reals(values: "pd.Series[Any]") -> "pd.Series[float]":
+    """Numbers, or texts that are numbers, as float64; NaN where they are none."""
+    if not pd.api.types.is_numeric_dtype(values):
+        values = values.where(values.astype(str).str.len() < LONGEST_NUMBER)  # pandas fails on a number beyond float64
+    return pd.to_numeric(values, errors="coerce").astype(float)
 
 
 def vehicle_name(value: Any) -> str:
@@ -129,7 +137,7 @@ def nanoseconds(values: "pd.Series[Any]", factor: float) -> tuple["pd.Series[int
     if pd.api.types.is_integer_dtype(values):
         inside = (values.astype(float).abs() * factor < LONGEST).astype(bool)
         return values.where(inside, int(LONGEST / factor)).astype(np.int64) * round(factor * 1e9), values.notna().astype(bool)
-    numbers = pd.to_numeric(values, errors="coerce").astype(float)
+    numbers = reals(values)
     if numbers.isna().all():
         dates = pd.to_datetime(values, errors="coerce", utc=True, format="ISO8601")
         ticks = dates.fillna(pd.Timestamp(0, tz="UTC")).astype(np.int64)
