@@ -26,7 +26,8 @@ PACKAGE = ROOT / "scenario_gen"
 
 # The data flow, first to last; modules of one tuple may import each other.
 ORDER = (
-    ("errors", "guard", "arrays", "blas", "kernels", "parameters"),
+    ("errors", "guard", "documents", "arrays", "blas", "kernels", "parameters"),
+    ("storage",),
     ("encounter", "scenario", "interaction"),
     ("logs",),
     ("segmentation",),
