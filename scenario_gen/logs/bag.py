@@ -32,9 +32,8 @@ from scenario_gen.errors import InputError
 from scenario_gen.guard import guarded
 from scenario_gen.logs.budgets import check_size, check_vehicles
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.files import bag_files
 from scenario_gen.logs.raw import RawLog, Rows, Segment
-from scenario_gen.logs.storage import opened
+from scenario_gen.storage import BagConfig, open_bag
 
 FIX = "sensor_msgs/msg/NavSatFix"
 TWIST = "geometry_msgs/msg/TwistStamped"
@@ -55,7 +54,7 @@ class Topic:
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     """Read the topics that this project knows; several bags are one log."""
-    topics = read_topics([file for path in paths for file in bag_files(path)], config)
+    topics = read_topics(paths, config)
     label = str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
     tracks = [topic for topic in topics if topic.type == trajectory.TYPE]
     name = paths[0].stem if paths[0].is_file() else paths[0].name
@@ -64,35 +63,34 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     return read_streams(topics, name, label, config)
 
 
-def read_topics(files: Sequence[Path], config: LogConfig) -> list[Topic]:
+def read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
     """Read the messages of all topics that can be used, sorted by name.
 
     Raises:
-        InputError: a file is damaged, or no topic can be used.
+        InputError: a file is damaged or too large, or no topic can be used.
     """
     wanted = [name.strip() for name in config.topics.split(",") if name.strip()]
     found: dict[str, Topic] = {}
     seen: dict[str, str] = {}
-    rows = size = 0
-    for file in files:
-        with opened(file, config.size_limit << 20) as bag:
-            seen |= {connection.topic: connection.msgtype for connection in bag.connections}
-            used = [c for c in bag.connections if is_used(c.topic, c.msgtype, wanted)]
-            for connection, stamp, data in bag.messages(used):
+    bounds = BagConfig(most_bytes=config.size_limit << 20)
+    rows = 0
+    for path in paths:
+        with open_bag(path, bounds, "log.size_limit") as bag:
+            seen |= {topic.name: topic.type for topic in bag.topics()}
+            for message in bag.messages(lambda name, kind: is_used(name, kind, wanted)):
                 rows += 1
-                size += len(data)
-                check_size(str(file), size, rows, config)
-                topic = found.setdefault(connection.topic, Topic(connection.topic, connection.msgtype))
-                topic.stamps.append(stamp)
-                topic.data.append(data)
+                check_size(str(path), 0, rows, config)
+                topic = found.setdefault(message.topic, Topic(message.topic, message.type))
+                topic.stamps.append(message.stamp_ns)
+                topic.data.append(message.data)
     for name in wanted:
         if name not in seen:
-            raise InputError(f"parameter topics: {files[0]} has no topic {name!r}; it has {listing(seen)}")
+            raise InputError(f"parameter topics: {paths[0]} has no topic {name!r}; it has {listing(seen)}")
         if seen[name] not in USED:
-            raise InputError(f"{files[0]}, topic {name}: type {seen[name]} is not one of {', '.join(USED)}")
+            raise InputError(f"{paths[0]}, topic {name}: type {seen[name]} is not one of {', '.join(USED)}")
     if not found:
         raise InputError(
-            f"{files[0]}: no topic to read. It has {listing(seen)}. Needed is {FIX} with {TWIST}, or {ODOMETRY}, one per "
+            f"{paths[0]}: no topic to read. It has {listing(seen)}. Needed is {FIX} with {TWIST}, or {ODOMETRY}, one per "
             f"vehicle, or a topic named tracks of {trajectory.TYPE}; the parameter topics chooses by name"
         )
     return [found[name] for name in sorted(found)]
