@@ -45,17 +45,7 @@ COLUMNS = (
 
 def is_bag(path: Path) -> bool:
     """Return whether it is a bag's folder or a bare .mcap or .db3 file."""
-    return bool(bag_files(path))
-
-
-def bag_files(path: Path) -> list[Path]:
-    """Return the files of a bag in order; none if it is no bag.
-
-    The files are opened one by one: through the folder rosbags 0.11 passes over messages whose quality of service reads
-    differently in metadata.yaml and in the file. A compressed bag is opened through its folder.
-    """
-    found = files_of(path)
-    return [path] if found.compression else list(found.files)
+    return bool(files_of(path).files)
 
 
 def is_spmd(path: Path) -> bool:

@@ -167,8 +167,17 @@ def _strictly(file: Path, logged: Iterator[Any]) -> Iterator[Any]:
 
 
 @contextmanager
-def open_bag(path: Path, config: BagConfig = BagConfig()) -> Iterator[StoredBag]:  # noqa: B008 - frozen
+def open_bag(
+    path: Path,
+    config: BagConfig = BagConfig(),  # noqa: B008 - frozen
+    bound: str = "bag.most_bytes",
+) -> Iterator[StoredBag]:
     """Open a bag for reading: its folder, or one of its files.
+
+    Args:
+        path: the folder or file.
+        config: the bounds.
+        bound: the parameter that `most_bytes` came from, for messages.
 
     Raises:
         InputError: the bag is missing, or a file of it is damaged or was not closed.
@@ -182,7 +191,7 @@ def open_bag(path: Path, config: BagConfig = BagConfig()) -> Iterator[StoredBag]
     found = files_of(path) if path.is_dir() or path.is_file() else None
     if found is None or not found.files:
         raise InputError(f"{path}: no bag; name a folder that holds .mcap or .db3 files, or one of them")
-    allowance = Allowance(config, str(path), sum(file.stat().st_size for file in found.files))
+    allowance = Allowance(config, str(path), sum(file.stat().st_size for file in found.files), bound)
     with ExitStack() as stack:
         files: list[tuple[Path, McapFile | SqliteFile]] = []
         for file in found.files:

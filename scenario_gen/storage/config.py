@@ -44,16 +44,18 @@ class BagConfig:
 class Allowance:
     """Counts what reading one bag takes, and refuses what is too much."""
 
-    def __init__(self, config: BagConfig, what: str, file_bytes: int) -> None:
+    def __init__(self, config: BagConfig, what: str, file_bytes: int, bound: str = "bag.most_bytes") -> None:
         """Begin to count.
 
         Args:
             config: the bounds.
             what: names the bag in messages.
             file_bytes: size of its files; decompressed they may be 100 times that, or `most_bytes`.
+            bound: the parameter that `most_bytes` came from, for messages.
         """
         self.config = config
         self._what = what
+        self._bound = bound
         self._unpacked = max(config.most_bytes, SHRINK * file_bytes)
         self._held = config.most_bytes
 
@@ -66,8 +68,8 @@ class Allowance:
         self._unpacked -= count
         if self._unpacked < 0:
             raise InputError(
-                f"{self._what}: decompresses to more than {SHRINK} times its size and more than bag.most_bytes "
-                f"({self.config.most_bytes}), as no recording does; set bag.most_bytes if it is one"
+                f"{self._what}: decompresses to more than {SHRINK} times its size and more than {self._bound} "
+                f"({self.config.most_bytes} bytes), as no recording does; set {self._bound} if it is one"
             )
 
     def hold(self, count: int) -> None:
@@ -79,6 +81,6 @@ class Allowance:
         self._held -= count + MESSAGE_BYTES
         if self._held < 0:
             raise InputError(
-                f"{self._what}: its messages take more than bag.most_bytes ({self.config.most_bytes}); set bag.most_bytes if "
+                f"{self._what}: its messages take more than {self._bound} ({self.config.most_bytes} bytes); set {self._bound} if "
                 "there is memory for more, or read fewer topics"
             )
