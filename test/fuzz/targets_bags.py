@@ -42,7 +42,7 @@ from scenario_gen.errors import ScenarioGenError
 from scenario_gen.evaluation import compare, comparison_table, EvaluationConfig, read_evaluations
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.parameters import assigned, flatten, read_parameter_file, updated
+from scenario_gen.parameters import assigned, flatten, loaded
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.results import as_run, provenance_of
 from scenario_gen.roads import build_road
@@ -380,7 +380,7 @@ TARGETS = (
     Target(
         "parameters",
         parameter_files,
-        in_file("p.yaml", lambda p: updated(PipelineConfig(), read_parameter_file(p))),
+        in_file("p.yaml", lambda path: loaded(PipelineConfig(), path)),
         YAML,
         ("params/*",),
     ),
