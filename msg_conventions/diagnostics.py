@@ -26,11 +26,15 @@ from itertools import islice
 import json
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.ego import ego_values
 from msg_conventions.scenarios import digest
+from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
+from scenario_gen.guard import guarded
 from scenario_gen.scenario import BoundaryStates, Cause, Scenario, ScenarioSet
 
 if TYPE_CHECKING:
@@ -92,6 +96,42 @@ def states_text(scenario: Scenario, at: int) -> str:
     """Return the vehicles' x, y, yaw, speed at sample `at` as a JSON list, exact to the bit."""
     rows = zip(scenario.position[:, at], scenario.heading[:, at], scenario.speed[:, at], strict=True)
     return json.dumps([[*map(float, position), float(heading), float(speed)] for position, heading, speed in rows])
+
+
+def states_of(text: str, what: str) -> Floats:
+    """Return the (N, 4) x, y, yaw, speed that such a list says.
+
+    Raises:
+        InputError: naming `what`, it is no list of rows of four finite numbers.
+    """
+    with guarded(f"{what}: no rows of numbers"):
+        rows = np.array(json.loads(text), dtype=np.float64)
+    if rows.ndim != 2 or rows.shape[1] != 4 or not np.isfinite(rows).all():
+        raise InputError(f"{what}: {len(text)} characters that are no rows of four finite numbers")
+    return rows
+
+
+def count_in(values: Mapping[str, str], key: str, what: str) -> int:
+    """Return a whole number of an account.
+
+    Raises:
+        InputError: naming `what`, there is none, or one of more than 63 bits.
+    """
+    text = values.get(key, "")
+    if not (text.isascii() and text.isdecimal() and len(text) < 20 and int(text) < 2**63):
+        raise InputError(f"{what}: {key} is {text!r}; a whole number is needed")
+    return int(text)
+
+
+def text_in(values: Mapping[str, str], key: str, what: str) -> str:
+    """Return a text of an account.
+
+    Raises:
+        InputError: naming `what`, it is missing.
+    """
+    if key not in values:
+        raise InputError(f"{what}: {key} is missing")
+    return values[key]
 
 
 def asked_values(asked: BoundaryStates, template: Sequence[Vehicle], scenario: Scenario) -> dict[str, str]:
@@ -161,18 +201,20 @@ def read_request(status: Status, scenarios: tuple[Scenario, ...] = ()) -> Scenar
         InputError: an entry is missing or no number.
     """
     values = status.values
+    what = f"scenarios/info: {status.name!r} is no account of a request"
     try:
         prefix = "refused."
-        refused = {Cause(key[len(prefix) :]): int(count) for key, count in values.items() if key.startswith(prefix)}
+        causes = {key: Cause(key[len(prefix) :]) for key in values if key.startswith(prefix)}
+        refused = {cause: count_in(values, key, what) for key, cause in causes.items()}
         return ScenarioSet(
-            requested=int(values["requested"]),
+            requested=count_in(values, "requested", what),
             scenarios=scenarios,
-            candidates=int(values["candidates"]),
+            candidates=count_in(values, "candidates", what),
             refused=Counter(refused),
             adaptations=tuple(text for key, text in values.items() if key.startswith("adaptation.")),
         )
-    except (KeyError, ValueError) as error:
-        raise InputError(f"scenarios/info: {status.name!r} is no account of a request ({error})") from None
+    except ValueError as error:
+        raise InputError(f"{what} ({error})") from None
 
 
 def fit_statuses(fit: "Fit", node: str) -> tuple[Status, ...]:

@@ -19,14 +19,13 @@ import json
 from pathlib import Path
 import sys
 import tempfile
-from typing import Annotated, Any
+from typing import Annotated
 
 from rich.console import Console
 from rich.markdown import Markdown
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
 import typer
-import yaml
 
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags import read_messages, reindex
@@ -41,11 +40,12 @@ from scenario_gen.evaluation import Case, comparison_table, read_evaluations, Re
 from scenario_gen.evaluation import compare as compare_sets
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.parameters import flatten, updated
+from scenario_gen.parameters import assigned, flatten, loaded
 from scenario_gen.pipeline import generate as run_pipeline
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.requests import Request
 from scenario_gen.results import BAG, check_folder, FIGURES, namespaces, provenance_of, REPORT, write_results
+from scenario_gen.storage import remark
 
 app = typer.Typer(
     help="Turn recorded vehicle encounters into new, valid ones on other roads.",
@@ -72,41 +72,10 @@ def configured(parameters: Path | None, assignments: list[str]) -> PipelineConfi
     """
     config = PipelineConfig()
     if parameters is not None:
-        config = updated(config, read_parameter_file(parameters))
+        config = loaded(config, parameters)
     for assignment in assignments:
-        name, equals, text = assignment.partition("=")
-        if not equals:
-            raise InputError(f"--set {assignment}: write it as name=value")
-        known = flatten(config)
-        # what is declared as text stays text: vehicle "007" is no number
-        is_text = name in known and isinstance(known[name][0].default, str)
-        config = updated(config, {name: text if is_text else yaml.safe_load(text)})
+        config = assigned(config, assignment)
     return config
-
-
-def read_parameter_file(path: Path) -> dict[str, Any]:
-    """Return {dotted name: value} of a ROS 2 parameter file (`/**: ros__parameters: ...`).
-
-    Raises:
-        InputError: the file cannot be read or is not of that form.
-    """
-    try:
-        document = yaml.safe_load(path.read_text())
-        ((_, body),) = document.items()
-        nested = body["ros__parameters"]
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from error
-    except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: not a parameter file of the form '/**: ros__parameters: ...' ({error})") from error
-    return dict(_dotted(nested))
-
-
-def _dotted(nested: dict[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
-    """Flatten nested mappings to (dotted name, value) pairs."""
-    pairs: list[tuple[str, Any]] = []
-    for name, value in nested.items():
-        pairs += _dotted(value, f"{prefix}{name}.") if isinstance(value, dict) else [(prefix + name, value)]
-    return pairs
 
 
 @app.command()
@@ -175,9 +144,13 @@ def regenerate(
     log: Annotated[
         Path | None, typer.Option(help="make it from this raw log, not from the bag's tracks and changepoints")
     ] = None,
+    assignments: SetOption = None,
+    parameter_file: ParametersOption = None,
 ) -> None:
     """Make one published scenario again, bit for bit, and compare it with its recorded SHA-256."""
-    made = regenerate_scenario(bag, index, namespace=namespace, request=request, log=log)
+    remind(bag)
+    config = configured(parameter_file, assignments or []).bag
+    made = regenerate_scenario(bag, index, namespace=namespace, request=request, log=log, config=config)
     console.print(f"scenario {index}: the same {len(made.data)} bytes, sha256 {made.sha256}", highlight=False, soft_wrap=True)
     if out is not None:
         console.print(f"bag: {write_regenerated(made, out)}", highlight=False, soft_wrap=True)
@@ -275,7 +248,8 @@ def evaluate(
 ) -> None:
     """Measure the scenarios of a bag against the tracks in it, and check them anew."""
     config = configured(parameter_file, assignments or [])
-    cases = bag_cases(bag, config.evaluation, config.limits)
+    remind(bag)
+    cases = bag_cases(bag, config.evaluation, config.limits, bag=config.bag)
     found = [case.evaluation for case in cases]
     text = "\n\n".join(evaluation.to_markdown() for evaluation in found)
     console.print(Markdown(text))
@@ -284,7 +258,7 @@ def evaluate(
         (out / "evaluation.md").write_text(text + "\n", encoding="utf-8")
         figures = [json.loads(evaluation.to_json()) for evaluation in found]
         (out / FIGURES).write_text(json.dumps({"cases": figures}, indent=2) + "\n", encoding="utf-8")
-        facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | told_provenance(bag)
+        facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | told_provenance(bag, config.bag)
         write_report(out / REPORT, ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts))
 
 
@@ -295,7 +269,9 @@ def validate(
     parameter_file: ParametersOption = None,
 ) -> None:
     """Check every scenario of a bag at every instant; exit code 1 if one is invalid."""
-    found = validate_bag(bag, configured(parameter_file, assignments or []).limits)
+    config = configured(parameter_file, assignments or [])
+    remind(bag)
+    found = validate_bag(bag, config.limits, config.bag)
     for one in found:
         console.print(
             f"{one.namespace or '/'}: {one.scenarios - one.invalid} of {one.scenarios} scenarios are valid", highlight=False
@@ -313,12 +289,17 @@ def validate(
 
 @app.command("reindex")
 def save_bag(
-    bag: Annotated[Path, typer.Argument(help="folder of a bag whose recorder was killed: MCAP files without metadata.yaml")],
+    bag: Annotated[Path, typer.Argument(help="folder of a bag that was not closed or is damaged, or one of its MCAP files")],
     out: Annotated[Path | None, typer.Option(help="folder of the new bag; BAG_reindexed if not given")] = None,
+    assignments: SetOption = None,
+    parameter_file: ParametersOption = None,
 ) -> None:
-    """Save the messages that are whole in a bag that was not closed, and index them; the old files stay as they are."""
+    """Save the messages that are whole in a bag that was not closed or is damaged; the old files stay as they are."""
     target = out or bag.with_name(f"{bag.name}_reindexed")
-    console.print(f"{reindex(bag, target)} messages: {target}", highlight=False, soft_wrap=True)
+    made = reindex(bag, target, configured(parameter_file, assignments or []).bag)
+    console.print(f"{made.messages} messages: {target}", highlight=False, soft_wrap=True)
+    for line in made.lines():
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
 @app.command()
@@ -337,6 +318,12 @@ def compare(
     """Put two sets of scenarios side by side: two seeds, two parameters, two versions."""
     differences = compare_sets(read_evaluations(first), read_evaluations(second))
     console.print(Markdown(comparison_table(differences, (first.name, second.name))))
+
+
+def remind(bag: Path) -> None:
+    """Say what is missing of a bag that is read all the same."""
+    if said := remark(bag):
+        console.print(said, highlight=False, markup=False, soft_wrap=True)
 
 
 def chosen(encounters: tuple[Encounter, ...], names: list[str]) -> list[Encounter]:

@@ -14,6 +14,8 @@
 
 """The errors that a person sees; each message names the place (file, row, topic, parameter) and what to do."""
 
+LONGEST = 500  # characters of a message about an input: what is quoted from a broken file may be of any length
+
 
 class ScenarioGenError(Exception):
     """Base of every error this project raises on purpose; the command line prints it without a traceback and exits with 2."""
@@ -22,7 +24,25 @@ class ScenarioGenError(Exception):
 
 
 class InputError(ScenarioGenError):
-    """A file, row, topic or parameter cannot be used as it is."""
+    """A file, row, topic or parameter cannot be used as it is.
+
+    The message is made fit to be shown, for it may quote the file: characters that do not print are escaped, and of a message
+    that is too long the middle is left out, so that the place at its beginning and the remedy at its end stay.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(presentable(message))
+
+
+def presentable(text: str) -> str:
+    """Return a message with at most `LONGEST` characters, all of which print, or are line breaks."""
+    if len(text) > LONGEST:  # at first roughly, for a quoted field may hold megabytes
+        text = text[:LONGEST] + text[-LONGEST:]
+    shown = "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode("ascii") for c in text)
+    if len(shown) <= LONGEST:
+        return shown
+    half = (LONGEST - 3) // 2
+    return f"{shown[:half]} … {shown[-half:]}"
 
 
 class RefusedError(ScenarioGenError):

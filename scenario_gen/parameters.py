@@ -15,8 +15,11 @@
 """Parameters declared once: default, unit, range and meaning; the command line, the nodes and docs/ read them here."""
 
 from dataclasses import Field, field, fields, is_dataclass, replace
+import math
+from pathlib import Path
 from typing import Any, TypeVar
 
+from scenario_gen.documents import parse_yaml, read_yaml, shown, WHOLE
 from scenario_gen.errors import InputError
 
 Config = TypeVar("Config")
@@ -45,16 +48,18 @@ def check(config: Any) -> None:
 def check_value(name: str, entry: "Field[Any]", value: Any) -> None:
     """Raise InputError naming `name` if `value` does not suit the declaration `entry`."""
     wanted: type[Any] = type(entry.default)
+    if isinstance(value, int) and not -WHOLE <= value < WHOLE:
+        raise InputError(f"parameter {name} is an integer of more than 64 bits")
     if wanted is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     if not isinstance(value, wanted) or (wanted is int and isinstance(value, bool)):
-        raise InputError(f"parameter {name} must be of type {wanted.__name__}, not {type(value).__name__} ({value!r})")
+        raise InputError(f"parameter {name} must be of type {wanted.__name__}, not {type(value).__name__} ({shown(value)})")
     meta = entry.metadata
     if meta["choices"] and value not in meta["choices"]:
-        raise InputError(f"parameter {name} is {value!r}; choose one of {', '.join(meta['choices'])}")
+        raise InputError(f"parameter {name} is {shown(value)!r}; choose one of {', '.join(meta['choices'])}")
     if wanted in (int, float):
-        if value != value:  # noqa: PLR0124 - true of NaN only
-            raise InputError(f"parameter {name} is not a number")
+        if not math.isfinite(value):
+            raise InputError(f"parameter {name} is {value}, not a number that can be reckoned with")
         if meta["low"] is not None and value < meta["low"]:
             raise InputError(f"parameter {name} is {value}; it must be at least {meta['low']} {meta['unit']}".rstrip())
         if meta["high"] is not None and value > meta["high"]:
@@ -85,7 +90,7 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
     for name, value in values.items():
         head, _, rest = name.partition(".")
         if head not in known or bool(rest) != is_dataclass(getattr(config, head)):
-            raise InputError(f"unknown parameter {prefix}{name}")
+            raise InputError(f"unknown parameter {prefix}{shown(name)}; `scenario-gen parameters` lists them")
         if rest:
             nested.setdefault(head, {})[rest] = value
         else:
@@ -94,3 +99,54 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
     for head, inner in nested.items():
         changes[head] = updated(getattr(config, head), inner, f"{prefix}{head}.")
     return replace(config, **changes)  # type: ignore[type-var]
+
+
+def assigned(config: Config, assignment: str) -> Config:
+    """Return a copy of `config` with one `name=value` set; the value is YAML, but text for a parameter that is text.
+
+    Raises:
+        InputError: there is no `=`, the name is unknown, or the value is no YAML or does not suit; the message names it.
+    """
+    name, equals, text = assignment.partition("=")
+    if not equals:
+        raise InputError(f"--set {shown(assignment)}: write it as name=value")
+    known = flatten(config)
+    if name not in known:
+        raise InputError(f"unknown parameter {shown(name)}; `scenario-gen parameters` lists them")
+    is_text = isinstance(known[name][0].default, str)  # stays text: vehicle "007" is no number
+    return updated(config, {name: text if is_text else parse_yaml(text, f"--set {name}={shown(text)}")})
+
+
+def loaded(config: Config, path: Path) -> Config:
+    """Return a copy of `config` with what a parameter file sets.
+
+    Raises:
+        InputError: the file cannot be read, a name is unknown or a value does not suit; the message names file and parameter.
+    """
+    values = read_parameter_file(path)
+    try:
+        return updated(config, values)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def read_parameter_file(path: Path) -> dict[str, Any]:
+    """Return {dotted name: value} of a ROS 2 parameter file (`/**: ros__parameters: ...`).
+
+    Raises:
+        InputError: the file cannot be read or is not of that form.
+    """
+    document = read_yaml(path)
+    body = next(iter(document.values())) if isinstance(document, dict) and len(document) == 1 else None
+    nested = body.get("ros__parameters") if isinstance(body, dict) else None
+    if not isinstance(nested, dict):
+        raise InputError(f"{path}: not a parameter file of the form '/**: ros__parameters: ...'")
+    return dict(_dotted(nested))
+
+
+def _dotted(nested: dict[Any, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    """Flatten nested mappings to (dotted name, value) pairs."""
+    pairs: list[tuple[str, Any]] = []
+    for name, value in nested.items():
+        pairs += _dotted(value, f"{prefix}{name}.") if isinstance(value, dict) else [(f"{prefix}{name}", value)]
+    return pairs

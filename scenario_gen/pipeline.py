@@ -41,6 +41,7 @@ from scenario_gen.roads import build_road, Road, RoadConfig
 from scenario_gen.sampling import SamplingConfig
 from scenario_gen.scenario import ScenarioSet
 from scenario_gen.segmentation import segment, Segmentation, SegmentationConfig
+from scenario_gen.storage import BagConfig
 from scenario_gen.validity import Limits
 
 Progress = Callable[[int, int], None]
@@ -58,6 +59,7 @@ class PipelineConfig:
     sampling: SamplingConfig = field(default_factory=SamplingConfig)
     limits: Limits = field(default_factory=Limits)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+    bag: BagConfig = field(default_factory=BagConfig)
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,9 +26,9 @@ PACKAGE = ROOT / "scenario_gen"
 
 # The data flow, first to last; modules of one tuple may import each other.
 ORDER = (
-    ("errors", "arrays", "kernels", "parameters"),
+    ("errors", "guard", "documents", "arrays", "kernels", "parameters"),
     ("exact",),
-    ("geodesy",),
+    ("geodesy", "storage"),
     ("encounter", "scenario", "interaction"),
     ("logs",),
     ("segmentation",),

@@ -56,6 +56,7 @@ def test_updated_sets_nested_values_and_leaves_the_rest():
     [
         ("inner.gain", 2.0, "inner.gain is 2.0; it must be at most 1.0 m"),
         ("inner.gain", float("nan"), "not a number"),
+        ("inner.gain", float("inf"), "not a number"),
         ("inner.mode", "c", "choose one of a, b"),
         ("count", 0, "at least 1"),
         ("count", True, "type int"),

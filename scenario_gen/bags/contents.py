@@ -18,16 +18,17 @@ from collections import defaultdict
 from collections.abc import Collection
 from pathlib import Path
 
-from scenario_gen.bags.reader import read_messages
+from scenario_gen.bags.reader import DEFAULT, read_messages
+from scenario_gen.storage import BagConfig
 
 Contents = dict[str, list[bytes]]  # topic without its namespace -> messages, in order
 
 
-def read_namespaces(path: Path, topics: Collection[str]) -> dict[str, Contents]:
+def read_namespaces(path: Path, topics: Collection[str], config: BagConfig = DEFAULT) -> dict[str, Contents]:
     """Return the messages of `topics` (one name may end with another, e.g. `scenarios/info`) by namespace, sorted.
 
     Raises:
-        InputError: the bag is missing or damaged.
+        InputError: the bag is missing or damaged, or larger than `config` allows.
     """
     found: dict[str, Contents] = defaultdict(lambda: {topic: [] for topic in topics})
     longest_first = sorted(topics, key=len, reverse=True)
@@ -35,7 +36,7 @@ def read_namespaces(path: Path, topics: Collection[str]) -> dict[str, Contents]:
     def own(name: str) -> str | None:
         return next((topic for topic in longest_first if f"/{name}".endswith(f"/{topic}")), None)
 
-    for message in read_messages(path, lambda name: own(name) is not None):
+    for message in read_messages(path, lambda name: own(name) is not None, config):
         topic = own(message.topic) or ""
         found[message.topic.removesuffix(topic).removesuffix("/")][topic].append(message.data)
     return dict(sorted(found.items()))

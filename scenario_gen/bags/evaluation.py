@@ -22,12 +22,14 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags.contents import read_namespaces
+from scenario_gen.bags.reader import DEFAULT, within
 from scenario_gen.bags.told import request_sentence, told_fit, told_numbers, told_requests, told_segmentation, told_values
 from scenario_gen.bags.validation import Reference
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import Case, CheckCounts, evaluate, Evaluation, EvaluationConfig
 from scenario_gen.interaction import find_conflicts, find_waits
 from scenario_gen.scenario import Scenario, ScenarioSet
+from scenario_gen.storage import BagConfig
 from scenario_gen.validity import Checker, Limits
 
 SCENARIOS, INFO, DIAGNOSTICS = "scenarios", "scenarios/info", "diagnostics"
@@ -35,14 +37,14 @@ TOPICS = ("tracks", "changepoints", "posterior", "map", "fit", "ego/track", SCEN
 
 
 def evaluate_bag(
-    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0
+    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0, bag: BagConfig = DEFAULT
 ) -> tuple[Evaluation, ...]:
     """Evaluate every namespace of a bag, as `bag_cases` does, and return the figures alone."""
-    return tuple(case.evaluation for case in bag_cases(path, config, limits, seed))
+    return tuple(case.evaluation for case in bag_cases(path, config, limits, seed, bag))
 
 
 def bag_cases(
-    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0
+    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0, bag: BagConfig = DEFAULT
 ) -> tuple[Case, ...]:
     """Evaluate every namespace of a bag that holds both `tracks` and `scenarios`, ready for the report.
 
@@ -52,12 +54,14 @@ def bag_cases(
     Raises:
         InputError: the bag is missing or damaged, or no namespace has both topics.
     """
-    found = read_namespaces(path, TOPICS)
+    found = read_namespaces(path, TOPICS, bag)
     whole = {name: topics for name, topics in found.items() if topics["tracks"] and topics[SCENARIOS]}
     if not whole:
         raise InputError(f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare")
     common = found.get("", {}).get(DIAGNOSTICS, [])  # nodes speak on one topic for all namespaces
-    return tuple(_case(path, name, topics, common, config or EvaluationConfig(), limits, seed) for name, topics in whole.items())
+    config = config or EvaluationConfig()
+    with within(path):
+        return tuple(_case(path, name, topics, common, config, limits, seed, bag) for name, topics in whole.items())
 
 
 def _case(
@@ -68,11 +72,12 @@ def _case(
     config: EvaluationConfig,
     limits: Limits | None,
     seed: int,
+    bag: BagConfig,
 ) -> Case:
     encounter = decode_tracks(topics["tracks"][-1], f"{path.stem}{namespace}")
     told = told_values(common, encounter.start_ns, f"{namespace}/") | told_values(topics[DIAGNOSTICS], encounter.start_ns)
     segmentation = told_segmentation(encounter, topics["changepoints"], topics["posterior"], told, f"{namespace}/changepoints")
-    fit, routes = told_fit(path, namespace, encounter, segmentation, topics["fit"], told)
+    fit, routes = told_fit(path, namespace, encounter, segmentation, topics["fit"], told, bag)
     accounts = told_values(topics[INFO], encounter.start_ns).values()
     road_name = next((values["road"] for values in accounts if "road" in values), f"{namespace}/map")
     road = decode_map(topics["map"][-1], name=road_name)[1] if topics["map"] else None

@@ -20,6 +20,7 @@ from typing import Any
 import yaml
 
 from msg_conventions.topics import Quality
+from scenario_gen.storage.qos import profiles
 
 VERSION = 9
 FOREVER = {"sec": 9223372036, "nsec": 854775807}  # rmw's infinite duration
@@ -115,7 +116,7 @@ def metadata_yaml(info: BagInfo) -> str:
                             "name": topic.name,
                             "type": topic.type,
                             "serialization_format": "cdr",
-                            "offered_qos_profiles": yaml.safe_load(topic.qos) if topic.qos else [],
+                            "offered_qos_profiles": profiles(topic.qos),
                             "type_description_hash": topic.type_hash,
                         },
                         "message_count": topic.count,

@@ -15,19 +15,19 @@
 """Any rosbag2 bag, MCAP or SQLite, as raw messages."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, ExitStack
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
-import sqlite3
-from typing import Any
-
-from rosbags.interfaces import QosDurability, QosReliability
-from rosbags.rosbag2 import Reader, ReaderError
 
 from msg_conventions.topics import Quality
 from scenario_gen.errors import InputError
-from scenario_gen.logs.files import bag_files
+from scenario_gen.storage import BagConfig, open_bag
+from scenario_gen.storage import StoredMessage as BagMessage
+from scenario_gen.storage.qos import is_reliable, is_transient_local, profiles
+
+__all__ = ["BagMessage", "BagTopic", "bag_topics", "read_messages", "within"]
+
+DEFAULT = BagConfig()
 
 
 @dataclass(frozen=True)
@@ -40,64 +40,46 @@ class BagTopic:
     count: int
 
 
-@dataclass(frozen=True)
-class BagMessage:
-    """One message as it lies in the bag: CDR bytes and the time it was logged, nanoseconds."""
-
-    topic: str
-    type: str
-    data: bytes
-    stamp_ns: int
-
-
 @contextmanager
-def _opened(path: Path) -> Iterator[list[Any]]:
-    if not path.exists():
-        raise InputError(f"{path}: no such bag")
-    files = bag_files(path)
-    if not files:
-        raise InputError(f"{path}: no bag; name a folder that holds .mcap or .db3 files, or one of them")
+def within(path: Path) -> Iterator[None]:
+    """Name the bag in errors about what lies in it: a decoder knows the topic only."""
     try:
-        with ExitStack() as stack:
-            yield [stack.enter_context(Reader(file)) for file in files]
-    except (ReaderError, OSError, sqlite3.Error, ValueError, TypeError, KeyError, EOFError) as error:
-        raise InputError(f"{path}: cannot be read as a bag ({error}); `reindex` saves what is whole in an MCAP file") from error
+        yield
+    except InputError as error:
+        if str(path) in str(error):
+            raise
+        raise InputError(f"{path}: {error}") from error
 
 
-def bag_topics(path: Path) -> tuple[BagTopic, ...]:
+def bag_topics(path: Path, config: BagConfig = DEFAULT) -> tuple[BagTopic, ...]:
     """Return the topics of a bag, sorted by name.
 
     Args:
         path: a bag's folder, or one of its files.
+        config: what is read at most.
 
     Raises:
         InputError: the bag is missing, damaged or empty of metadata.
     """
     found: dict[str, BagTopic] = {}
-    with _opened(path) as readers:
-        for connection in chain.from_iterable(reader.connections for reader in readers):
-            offered = connection.ext.offered_qos_profiles
+    with open_bag(path, config) as bag:
+        for stored in bag.topics():
             quality = Quality(depth=10, transient_local=False)
-            if offered:
-                quality = Quality(
-                    depth=max(1, offered[0].depth),
-                    reliable=offered[0].reliability is not QosReliability.BEST_EFFORT,
-                    transient_local=offered[0].durability is QosDurability.TRANSIENT_LOCAL,
-                )
-            topic = BagTopic(connection.topic, connection.msgtype, quality, connection.msgcount)
+            for profile in profiles(stored.qos)[:1]:
+                quality = Quality(max(1, profile["depth"]), is_reliable(profile), is_transient_local(profile))
+            topic = BagTopic(stored.name, stored.type, quality, stored.count)
             earlier = found.get(topic.name)
             found[topic.name] = replace(earlier, count=earlier.count + topic.count) if earlier else topic
     return tuple(found[name] for name in sorted(found))
 
 
-def read_messages(path: Path, wanted: Callable[[str], bool] = lambda _: True) -> Iterator[BagMessage]:
-    """Yield the messages of the topics that are `wanted`, in the order they were logged.
+def read_messages(
+    path: Path, wanted: Callable[[str], bool] = lambda _: True, config: BagConfig = DEFAULT
+) -> Iterator[BagMessage]:
+    """Yield the messages of the topics that are `wanted`, in the order they were logged; those of all files of a bag together.
 
     Raises:
-        InputError: the bag is missing or damaged.
+        InputError: the bag is missing or damaged, or larger than `config` allows.
     """
-    with _opened(path) as readers:
-        for reader in readers:
-            connections = [connection for connection in reader.connections if wanted(connection.topic)]
-            for connection, stamp_ns, data in reader.messages(connections) if connections else ():
-                yield BagMessage(connection.topic, connection.msgtype, bytes(data), stamp_ns)
+    with open_bag(path, config) as bag:
+        yield from bag.messages(lambda topic, _: wanted(topic))

@@ -20,14 +20,14 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from msg_conventions.cdr import CdrReader
-from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Status
+from msg_conventions.diagnostics import count_in, decode_diagnostics, encode_diagnostics, Status, text_in
 from msg_conventions.names import tokens
 from msg_conventions.scenarios import digest, encode_scenario
 from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.bags.provenance import Config, read_parameters, sha256_of, versions
-from scenario_gen.bags.reader import BagMessage, read_messages
+from scenario_gen.bags.reader import BagMessage, DEFAULT, read_messages, within
 from scenario_gen.bags.template import read_template
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.encounter import Encounter
@@ -39,6 +39,7 @@ from scenario_gen.requests import Chain, Request
 from scenario_gen.sampling import SamplingConfig
 from scenario_gen.scenario import Scenario
 from scenario_gen.segmentation import segment, Segmentation, SegmentationConfig
+from scenario_gen.storage import BagConfig
 
 TEMPLATE = ("tracks", "changepoints", "map", "fit")
 ROAD_ENDS = ("road/entries", "road/exits")
@@ -61,7 +62,13 @@ class Regenerated:
 
 
 def regenerate_scenario(
-    bag: Path, index: int, *, namespace: str | None = None, request: str | None = None, log: Path | None = None
+    bag: Path,
+    index: int,
+    *,
+    namespace: str | None = None,
+    request: str | None = None,
+    log: Path | None = None,
+    config: BagConfig = DEFAULT,
 ) -> Regenerated:
     """Make scenario `index` of a bag again and compare it with the recorded SHA-256.
 
@@ -74,12 +81,22 @@ def regenerate_scenario(
         namespace: where several hold such an index.
         request: id, likewise.
         log: the raw log.
+        config: what is read of the bag at most.
 
     Raises:
         InputError: the bag, the index, or something that is needed is not there or ambiguous; the log is another one.
         ScenarioGenError: it comes out differently (another version or processor); the message names what differs.
     """
-    found = _find(bag, index, namespace, request)
+    with within(bag):
+        return _regenerate(bag, _find(bag, index, namespace, request, config), index, log)
+
+
+def _regenerate(bag: Path, found: "_Found", index: int, log: Path | None) -> Regenerated:
+    """Make the scenario that was found.
+
+    Raises:
+        InputError, ScenarioGenError: as `regenerate_scenario`.
+    """
     what = f"{bag}: request {found.entry.values['request']}"
     account, seed = found.account.values, int(found.entry.values["seed"])
     asked = Request(**{name: account.get(name, "") for name in ("ego", "starts", "goals")})
@@ -141,43 +158,46 @@ class _Found:
         return newest
 
 
-def _find(bag: Path, index: int, namespace: str | None, request: str | None) -> _Found:
+def _find(bag: Path, index: int, namespace: str | None, request: str | None, config: BagConfig) -> _Found:
     """Find the one scenario of that index.
 
     Raises:
         InputError: there is none, several, or its request was not closed.
     """
     entries, accounts = [], {}
-    for message in read_messages(bag, lambda topic: topic.endswith("/scenarios/info")):
+    for message in read_messages(bag, lambda topic: topic.endswith("/scenarios/info"), config):
         where = message.topic.removesuffix("/scenarios/info")
         for status in decode_diagnostics(message.data, message.topic)[1]:
             if "published" in status.values:
-                accounts[where, status.values["request"]] = status
+                accounts[where, status.values.get("request", "")] = status
             elif "sha256" in status.values:
+                for key in ("index", "seed"):
+                    count_in(status.values, key, f"{bag}: {message.topic}, {status.message}")
                 entries.append((where, status, message))
     if not entries:
         raise InputError(
             f"{bag}: no scenario has an account on `scenarios/info`; only what this suite published can be made again"
         )
-    own = [e for e in entries if namespace in (None, e[0]) and request in (None, e[1].values["request"])]
+    own = [e for e in entries if namespace in (None, e[0]) and request in (None, e[1].values.get("request"))]
     same = [e for e in own if e[1].values["index"] == str(index)]
     if not same:
         known = sorted({int(status.values["index"]) for _, status, _ in own})
         some = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")
         raise InputError(f"{bag}: no scenario of index {index}; there are: {some or 'none in that namespace and request'}")
     if len(same) > 1:
-        places = "; ".join(f"--namespace '{where}' --request {status.values['request']}" for where, status, _ in same)
+        places = "; ".join(f"--namespace '{where}' --request {status.values.get('request')}" for where, status, _ in same)
         raise InputError(f"{bag}: {len(same)} scenarios have index {index}; choose one: {places}")
     where, entry, info = same[0]
-    account = accounts.get((where, entry.values["request"]))
+    name = text_in(entry.values, "request", f"{bag}: {where}/scenarios/info, {entry.message}")
+    account = accounts.get((where, name))
     if account is None:
-        raise InputError(
-            f"{bag}: request {entry.values['request']} was not closed on {where}/scenarios/info: its parameters are missing"
-        )
-    return _Found(where, entry, account, tuple(_belonging(bag, where, entry, info, account)))
+        raise InputError(f"{bag}: request {name} was not closed on {where}/scenarios/info: its parameters are missing")
+    return _Found(where, entry, account, tuple(_belonging(bag, where, entry, info, account, config)))
 
 
-def _belonging(bag: Path, where: str, entry: Status, info: BagMessage, account: Status) -> Iterator[BagMessage]:
+def _belonging(
+    bag: Path, where: str, entry: Status, info: BagMessage, account: Status, config: BagConfig
+) -> Iterator[BagMessage]:
     """What bears the scenario's stamp in its namespace: the newest of each topic, then the scenario and the two accounts.
 
     Raises:
@@ -186,7 +206,7 @@ def _belonging(bag: Path, where: str, entry: Status, info: BagMessage, account: 
     stamp = CdrReader(info.data, info.topic).stamp()
     newest: dict[str, BagMessage] = {}
     scenario = None
-    for message in read_messages(bag, lambda topic: topic.startswith(f"{where}/")):
+    for message in read_messages(bag, lambda topic: topic.startswith(f"{where}/"), config):
         topic = message.topic.removeprefix(f"{where}/")
         if topic == "scenarios" and digest(message.data) == entry.values["sha256"]:
             scenario = message

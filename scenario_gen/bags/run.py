@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 from msg_conventions.changepoints import encode_changepoints, encode_posterior
 from msg_conventions.diagnostics import (
     asked_values,
+    count_in,
     decode_diagnostics,
     encode_diagnostics,
     fit_statuses,
@@ -31,6 +32,7 @@ from msg_conventions.diagnostics import (
     scenario_status,
     Status,
     take_entry,
+    text_in,
 )
 from msg_conventions.ego import ego_messages, ego_values
 from msg_conventions.fits import anchor_stamps, encode_fit
@@ -42,7 +44,7 @@ from msg_conventions.scenarios import decode_scenario, digest, encode_scenario
 from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.bags.metadata import qos_yaml
-from scenario_gen.bags.reader import read_messages
+from scenario_gen.bags.reader import read_messages, within
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
@@ -147,6 +149,11 @@ def read_scenario_set(folder: Path, namespace: str = "") -> ScenarioSet:
     Raises:
         InputError: the bag cannot be read, no request was closed in it, or a scenario of the request is missing.
     """
+    with within(folder):
+        return _read_scenario_set(folder, namespace)
+
+
+def _read_scenario_set(folder: Path, namespace: str) -> ScenarioSet:
     wanted = (f"{namespace}/scenarios", f"{namespace}/scenarios/info")
     by_digest: dict[str, bytes] = {}
     entries: list[Status] = []
@@ -155,19 +162,20 @@ def read_scenario_set(folder: Path, namespace: str = "") -> ScenarioSet:
             by_digest[digest(message.data)] = message.data
         else:
             entries += decode_diagnostics(message.data, wanted[1])[1]
+    what = f"{folder}: {wanted[1]}"
     closing = next((entry for entry in reversed(entries) if "published" in entry.values), None)
     if closing is None:
         raise InputError(f"{folder}: no request was closed on {wanted[1]}")
     own: dict[str, Mapping[str, str]] = {}
     for entry in entries:
-        if "sha256" in entry.values and entry.values["request"] == closing.values["request"]:
-            take_entry(own, entry.values)
+        if "sha256" in entry.values and entry.values.get("request") == closing.values.get("request"):
+            take_entry(own, {key: text_in(entry.values, key, what) for key in ("request", "index", "seed", "sha256")})
     scenarios: list[Scenario] = []
     for values in own.values():
         if values["sha256"] not in by_digest:
             raise InputError(f"{folder}: scenario {values['index']} of request {values['request']} is not on {wanted[0]}")
         data = by_digest[values["sha256"]]
-        scenarios.append(decode_scenario(data, seed=int(values["seed"]), index=int(values["index"]))[1])
-    if len(scenarios) != int(closing.values["published"]):
+        scenarios.append(decode_scenario(data, seed=count_in(values, "seed", what), index=count_in(values, "index", what))[1])
+    if len(scenarios) != count_in(closing.values, "published", what):
         raise InputError(f"{folder}: {closing.values['published']} scenarios were published, {len(scenarios)} are on {wanted[0]}")
     return read_request(closing, tuple(scenarios))

@@ -19,6 +19,7 @@ Nothing of it is needed for a figure; what is missing, damaged or of another tem
 
 from collections.abc import Mapping, Sequence
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -30,12 +31,15 @@ from msg_conventions.fits import anchor_stamps, decode_fit
 from msg_conventions.names import tokens
 from msg_conventions.paths import decode_route
 from msg_conventions.topics import vehicle_topic
-from scenario_gen.bags.reader import read_messages
+from scenario_gen.arrays import Floats
+from scenario_gen.bags.reader import DEFAULT, read_messages
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.fitting.result import Fit, FittedVehicle
+from scenario_gen.guard import guarded
 from scenario_gen.planning.route import Route
 from scenario_gen.segmentation import Segmentation
+from scenario_gen.storage import BagConfig
 
 Values = Mapping[str, str]
 OUTCOME = ("request", "requested", "published", "candidates")
@@ -92,14 +96,14 @@ def request_sentence(account: Values) -> str:
     return f"{told}, refused: {', '.join(refused).replace('_', ' ')}" if refused else told
 
 
-def told_provenance(bag: Path) -> dict[str, str]:
+def told_provenance(bag: Path, config: BagConfig = DEFAULT) -> dict[str, str]:
     """Return what the bag says of how its scenarios were made: logs, seed, versions, parameters; several answers side by side.
 
     Raises:
         InputError: the bag cannot be read.
     """
     found: dict[str, list[str]] = {}
-    for message in read_messages(bag, lambda topic: f"/{topic}".endswith("/scenarios/info")):
+    for message in read_messages(bag, lambda topic: f"/{topic}".endswith("/scenarios/info"), config):
         for account in told_requests([message.data]):
             for key, value in account.items():
                 if key not in OUTCOME and not key.startswith((REFUSED, "adaptation.", "ego")):
@@ -134,7 +138,13 @@ def told_segmentation(
 
 
 def told_fit(
-    bag: Path, namespace: str, encounter: Encounter, segmentation: Segmentation, fits: Sequence[bytes], told: Mapping[str, Values]
+    bag: Path,
+    namespace: str,
+    encounter: Encounter,
+    segmentation: Segmentation,
+    fits: Sequence[bytes],
+    told: Mapping[str, Values],
+    config: BagConfig = DEFAULT,
 ) -> tuple[Fit | None, tuple[Route, ...]]:
     """Return fit and routes, or None and nothing where the bag does not have both with all that the fitting decided.
 
@@ -145,18 +155,9 @@ def told_fit(
         data = next(data for data in reversed(fits) if CdrReader(data, "fit").stamp() == encounter.start_ns)
         _, _, asked, anchors = decode_fit(data)
         decided = [told[f"fit of {vehicle.id}"] for vehicle in encounter.vehicles]
-        fitted = tuple(
-            FittedVehicle(
-                anchors=poses,
-                moved=np.array(json.loads(values["moved_m"]), dtype=np.float64),
-                stands=np.array(json.loads(values["stands"]), dtype=np.bool_),
-                scale=float(values["scale"]),
-                manoeuvre=values["manoeuvre"],
-            )
-            for poses, values in zip(anchors, decided, strict=True)
-        )
+        fitted = tuple(_fitted(poses, values) for poses, values in zip(anchors, decided, strict=True))
         stamps = anchor_stamps(encounter, segmentation.changepoints)
-        routes = _routes(bag, namespace, encounter, stamps)
+        routes = _routes(bag, namespace, encounter, stamps, config)
     except (StopIteration, KeyError, ValueError, InputError):
         return None, ()
     if any(len(vehicle.anchors) != len(stamps) or len(vehicle.moved) != len(stamps) for vehicle in fitted):
@@ -165,7 +166,22 @@ def told_fit(
     return Fit(encounter.vehicles, fitted, index, asked, tuple(told.get("fit", {}).values())), routes
 
 
-def _routes(bag: Path, namespace: str, encounter: Encounter, stamps: Sequence[int]) -> tuple[Route, ...]:
+def _fitted(poses: Floats, values: Values) -> FittedVehicle:
+    """Return what the fitting decided of a vehicle.
+
+    Raises:
+        KeyError, ValueError, InputError: it is not told, or damaged.
+    """
+    with guarded("fit"):
+        moved = np.array(json.loads(values["moved_m"]), dtype=np.float64)
+        stands = np.array(json.loads(values["stands"]), dtype=np.bool_)
+    scale = float(values["scale"])
+    if moved.ndim != 1 or stands.ndim != 1 or not np.isfinite(moved).all() or not 0.0 < scale < math.inf:
+        raise InputError("fit: damaged")
+    return FittedVehicle(anchors=poses, moved=moved, stands=stands, scale=scale, manoeuvre=values["manoeuvre"])
+
+
+def _routes(bag: Path, namespace: str, encounter: Encounter, stamps: Sequence[int], config: BagConfig) -> tuple[Route, ...]:
     """Return the last route of this template of every vehicle.
 
     Raises:
@@ -175,7 +191,7 @@ def _routes(bag: Path, namespace: str, encounter: Encounter, stamps: Sequence[in
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
     topics = [f"{namespace}/{vehicle_topic(name, 'route')}" for name in names]
     last: dict[str, bytes] = {}
-    for message in read_messages(bag, lambda topic: topic in topics):
+    for message in read_messages(bag, lambda topic: topic in topics, config):
         if CdrReader(message.data, message.topic).stamp() == encounter.start_ns:
             last[message.topic] = message.data
     return tuple(decode_route(last[topic], stamps, topic)[1] for topic in topics)

@@ -22,7 +22,6 @@ left out for an ego. Where there are accounts on `scenarios/info`, each scenario
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-import json
 from pathlib import Path
 
 import numpy as np
@@ -30,17 +29,19 @@ import numpy as np
 from msg_conventions import trajectory
 from msg_conventions.cdr import CdrReader
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.diagnostics import decode_diagnostics
+from msg_conventions.diagnostics import decode_diagnostics, states_of
 from msg_conventions.names import tokens
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.arrays import Floats
 from scenario_gen.bags.contents import Contents, read_namespaces
+from scenario_gen.bags.reader import DEFAULT, within
 from scenario_gen.errors import InputError
 from scenario_gen.interaction import Conflict, find_conflicts, find_waits, Wait
 from scenario_gen.roads.road import Road
 from scenario_gen.scenario import BoundaryStates, Scenario
+from scenario_gen.storage import BagConfig
 from scenario_gen.validity import Checker, Limits
 
 REFERENCES = ("tracks", "changepoints", "map", "fit")
@@ -114,26 +115,23 @@ def asked_by_digest(infos: Sequence[tuple[str, bytes]]) -> dict[str, BoundarySta
         for status in decode_diagnostics(data, what)[1]:
             values = status.values
             if {"sha256", "asked_start", "asked_end"} <= set(values):
-                try:
-                    rows = (np.array(json.loads(values[key]), dtype=np.float64) for key in ("asked_start", "asked_end"))
-                    found[values["sha256"]] = BoundaryStates(*(row.reshape(-1, 4) for row in rows))
-                except ValueError as error:
-                    raise InputError(f"{what}: the asked states of {status.message} are no rows of numbers ({error})") from None
+                where = f"{what}: the asked states of {status.message}"
+                found[values["sha256"]] = BoundaryStates(*(states_of(values[key], where) for key in ("asked_start", "asked_end")))
     return found
 
 
-def validate_bag(path: Path, limits: Limits | None = None) -> tuple[Validation, ...]:
-    """Check every scenario of every namespace that holds any.
+def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = DEFAULT) -> tuple[Validation, ...]:
+    """Check every scenario of every namespace that holds any; `config` says how much is read at most.
 
     Raises:
         InputError: the bag is missing or damaged, holds no scenarios, or one of its tracks, maps, … cannot be read.
     """
-    found = {
-        name: topics for name, topics in read_namespaces(path, (*REFERENCES, "scenarios", INFO)).items() if topics["scenarios"]
-    }
+    contents = read_namespaces(path, (*REFERENCES, "scenarios", INFO), config)
+    found = {name: topics for name, topics in contents.items() if topics["scenarios"]}
     if not found:
         raise InputError(f"{path}: no topic `scenarios` in any namespace; there is nothing to check")
-    return tuple(_validate(namespace, topics, limits) for namespace, topics in found.items())
+    with within(path):
+        return tuple(_validate(namespace, topics, limits) for namespace, topics in found.items())
 
 
 def _validate(namespace: str, topics: Contents, limits: Limits | None) -> Validation:

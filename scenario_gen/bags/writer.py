@@ -53,7 +53,7 @@ class BagWriter:
         self._compression = CompressionType.ZSTD if compress else CompressionType.NONE
         self._chunk_bytes = chunk_bytes
         self._split = split
-        self._topics: dict[str, tuple[TopicInfo, str]] = {}
+        self._topics: dict[str, tuple[TopicInfo, tuple[str, str]]] = {}
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
@@ -77,7 +77,7 @@ class BagWriter:
         self._writer.finish()
         self._stream.close()
 
-    def add_topic(self, name: str, kind: str, qos: str = "", type_hash: str = "") -> None:
+    def add_topic(self, name: str, kind: str, qos: str = "", type_hash: str = "", schema: tuple[str, str] | None = None) -> None:
         """Announce a topic; a second time is ignored.
 
         Args:
@@ -85,24 +85,28 @@ class BagWriter:
             kind: its type, e.g. `nav_msgs/msg/Path`.
             qos: YAML list of the offered QoS profiles.
             type_hash: RIHS01 hash, if it is known better than by the definition.
+            schema: encoding and text of the type's definition, if it need not be looked up.
 
         Raises:
             InputError: no definition of the type can be found.
         """
         if name in self._topics:
             return
-        text, known_hash = definition(kind)
+        known_hash = ""
+        if schema is None:
+            text, known_hash = definition(kind)
+            schema = ("ros2msg", text)
         topic = TopicInfo(name, kind, qos, type_hash or known_hash)
-        self._topics[name] = (topic, text)
+        self._topics[name] = (topic, schema)
         self.info.topics.append(topic)
         self._channel(name)
 
     def _channel(self, name: str) -> int:
         """Return the channel of a topic in the current file, made at its first use."""
         if name not in self._channels:
-            topic, text = self._topics[name]
+            topic, (encoding, text) = self._topics[name]
             if topic.type not in self._schemas:
-                self._schemas[topic.type] = self._writer.register_schema(topic.type, "ros2msg", text.encode())
+                self._schemas[topic.type] = self._writer.register_schema(topic.type, encoding, text.encode())
             metadata = {"offered_qos_profiles": topic.qos, "topic_type_hash": topic.type_hash}
             self._channels[name] = self._writer.register_channel(name, "cdr", self._schemas[topic.type], metadata)
         return self._channels[name]

@@ -16,14 +16,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-import json
 import math
 from pathlib import Path
 
+from scenario_gen.documents import read_json
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation.bootstrap import Interval
 from scenario_gen.evaluation.report import WITH
-from scenario_gen.evaluation.result import Evaluation, formatted, Metric
+from scenario_gen.evaluation.result import Evaluation, formatted, Metric, SCHEMA
+
+FILE_SCHEMA = {  # evaluation.json of a run, or one evaluation alone
+    "type": "object",
+    "if": {"required": ["cases"]},
+    "then": {"properties": {"cases": {"type": "array", "minItems": 1, "items": SCHEMA}}},
+    "else": SCHEMA,
+}
 
 
 @dataclass(frozen=True)
@@ -108,14 +115,8 @@ def read_evaluations(path: Path) -> tuple[Evaluation, ...]:
     """Read the figures of a run: its folder, its evaluation.json, or one evaluation as JSON.
 
     Raises:
-        InputError: there is no such file, or it is not one.
+        InputError: there is no such file, or it is not one; the message names the path inside the document.
     """
     file = path / "evaluation.json" if path.is_dir() else path
-    try:
-        document = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file} cannot be read as figures of a run: {error}") from error
-    cases = document.get("cases", [document]) if isinstance(document, dict) else []
-    if not cases:
-        raise InputError(f"{file} holds no case")
-    return tuple(Evaluation.from_json(json.dumps(case)) for case in cases)
+    document = read_json(file, FILE_SCHEMA, f"{file} is no evaluation")
+    return tuple(Evaluation.from_document(case) for case in document.get("cases", [document]))

@@ -21,11 +21,63 @@ import json
 import math
 from typing import Any, Literal
 
-from scenario_gen.errors import InputError
+from scenario_gen.documents import COUNT, NUMBER, parse_json
 from scenario_gen.evaluation.bootstrap import Interval
 from scenario_gen.scenario import Cause, ScenarioSet, Verdict
 
 Better = Literal["lower", "higher", ""]
+TEXT = {"type": "string", "maxLength": 10_000}
+METRIC_KEYS = ("id", "label", "unit", "better", "group", "meaning")
+NUMBER_OR_NULL = {"anyOf": [NUMBER, {"type": "null"}]}
+SCHEMA = {
+    "type": "object",
+    "required": [
+        *("encounter", "road", "vehicles", "duration_s", "changepoints"),
+        *("confidence_level", "resamples", "seed", "metrics", "rows"),
+    ],
+    "properties": {
+        "encounter": TEXT,
+        "road": TEXT,
+        "vehicles": {"type": "array", "items": TEXT},
+        "duration_s": {**NUMBER, "minimum": 0.0},
+        "changepoints": COUNT,
+        "confidence_level": {**NUMBER, "exclusiveMinimum": 0.0, "exclusiveMaximum": 1.0},
+        "resamples": COUNT,
+        "seed": COUNT,
+        "metrics": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "required": list(METRIC_KEYS),
+                "properties": {
+                    **dict.fromkeys(("id", "label", "unit", "group", "meaning"), TEXT),
+                    "better": {"enum": ["lower", "higher", ""]},
+                },
+            },
+        },
+        "rows": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "required": ["name", "samples", "notes", "values"],
+                "properties": {
+                    "name": TEXT,
+                    "samples": COUNT,
+                    "notes": {"type": "array", "items": TEXT},
+                    "values": {
+                        "type": "object",
+                        "additionalProperties": {
+                            "type": "object",
+                            "required": ["value", "low", "high"],
+                            "properties": dict.fromkeys(("value", "low", "high"), NUMBER_OR_NULL),
+                        },
+                    },
+                },
+            },
+        },
+    },
+}
+"""Of the JSON that `to_json` writes."""
 TEMPLATE = "template"
 """Name of the row that `evaluate` adds: the recorded encounter itself."""
 
@@ -153,28 +205,29 @@ class Evaluation:
         return json.dumps(document, indent=indent, ensure_ascii=False, allow_nan=False)
 
     @classmethod
-    def from_json(cls, text: str) -> "Evaluation":
+    def from_json(cls, text: str, what: str = "not an evaluation") -> "Evaluation":
         """Read what `to_json` wrote.
 
         Raises:
-            InputError: the text is not such a document.
+            InputError: the text is not such a document; the message names `what` and the path inside it.
         """
-        try:
-            document = json.loads(text)
-            return cls(
-                encounter=document["encounter"],
-                road=document["road"],
-                vehicles=tuple(document["vehicles"]),
-                duration=document["duration_s"],
-                changepoints=document["changepoints"],
-                level=document["confidence_level"],
-                resamples=document["resamples"],
-                seed=document["seed"],
-                metrics=tuple(Metric(**metric) for metric in document["metrics"]),
-                rows=tuple(_row(row) for row in document["rows"]),
-            )
-        except (ValueError, KeyError, TypeError) as error:
-            raise InputError(f"this is not an evaluation as scenario-gen writes it ({error!r})") from error
+        return cls.from_document(parse_json(text, what, SCHEMA))
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> "Evaluation":
+        """Return the evaluation that a document says, which keeps `SCHEMA`."""
+        return cls(
+            encounter=document["encounter"],
+            road=document["road"],
+            vehicles=tuple(document["vehicles"]),
+            duration=document["duration_s"],
+            changepoints=document["changepoints"],
+            level=document["confidence_level"],
+            resamples=document["resamples"],
+            seed=document["seed"],
+            metrics=tuple(Metric(**{key: metric[key] for key in METRIC_KEYS}) for metric in document["metrics"]),
+            rows=tuple(_row(row) for row in document["rows"]),
+        )
 
     def to_markdown(self) -> str:
         """Return a table: metrics down, rows across, each figure with its interval."""

@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.rosbag2 import Reader
 from rosbags.typesys import get_typestore, Stores
 
 from msg_conventions import trajectory
@@ -31,9 +30,11 @@ from msg_conventions.yaw import yaw
 from scenario_gen import exact
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
+from scenario_gen.guard import guarded
+from scenario_gen.logs.budgets import check_size, check_vehicles
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.files import bag_files
 from scenario_gen.logs.raw import RawLog, Rows, Segment
+from scenario_gen.storage import BagConfig, open_bag
 
 FIX = "sensor_msgs/msg/NavSatFix"
 TWIST = "geometry_msgs/msg/TwistStamped"
@@ -54,46 +55,43 @@ class Topic:
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     """Read the topics that this project knows; several bags are one log."""
-    topics = read_topics([file for path in paths for file in bag_files(path)], config)
+    topics = read_topics(paths, config)
     label = str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
     tracks = [topic for topic in topics if topic.type == trajectory.TYPE]
     name = paths[0].stem if paths[0].is_file() else paths[0].name
     if tracks:
         return read_tracks(tracks, name, label, others=[topic.name for topic in topics if topic not in tracks])
-    return read_streams(topics, name, label)
+    return read_streams(topics, name, label, config)
 
 
-def read_topics(files: Sequence[Path], config: LogConfig) -> list[Topic]:
+def read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
     """Read the messages of all topics that can be used, sorted by name.
 
     Raises:
-        InputError: a file is damaged, or no topic can be used.
+        InputError: a file is damaged or too large, or no topic can be used.
     """
     wanted = [name.strip() for name in config.topics.split(",") if name.strip()]
     found: dict[str, Topic] = {}
     seen: dict[str, str] = {}
-    for file in files:
-        if file.is_file() and file.stat().st_size == 0:
-            raise InputError(f"{file} is empty (0 bytes); record or copy it again")
-        try:
-            with Reader(file) as reader:
-                seen |= {connection.topic: connection.msgtype for connection in reader.connections}
-                used = [c for c in reader.connections if is_used(c.topic, c.msgtype, wanted)]
-                for connection, stamp, data in reader.messages(used) if used else ():
-                    topic = found.setdefault(connection.topic, Topic(connection.topic, connection.msgtype))
-                    topic.stamps.append(stamp)
-                    topic.data.append(bytes(data))
-        except Exception as error:  # a damaged file may fail anywhere inside the readers
-            what = f"{file}, {file.stat().st_size} bytes" if file.is_file() else str(file)
-            raise InputError(f"{what}: cut off or damaged, no bag ({error or type(error).__name__})") from error
+    bounds = BagConfig(most_bytes=config.size_limit << 20)
+    rows = 0
+    for path in paths:
+        with open_bag(path, bounds, "log.size_limit") as bag:
+            seen |= {topic.name: topic.type for topic in bag.topics()}
+            for message in bag.messages(lambda name, kind: is_used(name, kind, wanted)):
+                rows += 1
+                check_size(str(path), 0, rows, config)
+                topic = found.setdefault(message.topic, Topic(message.topic, message.type))
+                topic.stamps.append(message.stamp_ns)
+                topic.data.append(message.data)
     for name in wanted:
         if name not in seen:
-            raise InputError(f"parameter topics: {files[0]} has no topic {name!r}; it has {listing(seen)}")
+            raise InputError(f"parameter topics: {paths[0]} has no topic {name!r}; it has {listing(seen)}")
         if seen[name] not in USED:
-            raise InputError(f"{files[0]}, topic {name}: type {seen[name]} is not one of {', '.join(USED)}")
+            raise InputError(f"{paths[0]}, topic {name}: type {seen[name]} is not one of {', '.join(USED)}")
     if not found:
         raise InputError(
-            f"{files[0]}: no topic to read. It has {listing(seen)}. Needed is {FIX} with {TWIST}, or {ODOMETRY}, one per "
+            f"{paths[0]}: no topic to read. It has {listing(seen)}. Needed is {FIX} with {TWIST}, or {ODOMETRY}, one per "
             f"vehicle, or a topic named tracks of {trajectory.TYPE}; the parameter topics chooses by name"
         )
     return [found[name] for name in sorted(found)]
@@ -117,7 +115,7 @@ def vehicle_id(topic: str) -> str:
     return namespace.rpartition("/")[2].removeprefix("vehicle_") or topic.strip("/")
 
 
-def read_streams(topics: list[Topic], name: str, label: str) -> RawLog:
+def read_streams(topics: list[Topic], name: str, label: str, config: LogConfig) -> RawLog:
     """Collect fixes, speeds and odometry per vehicle."""
     if len({topic.type == ODOMETRY for topic in topics if topic.type != TWIST}) > 1:
         mixed = listing({topic.name: topic.type for topic in topics})
@@ -126,6 +124,7 @@ def read_streams(topics: list[Topic], name: str, label: str) -> RawLog:
     segments: list[Segment] = []
     unstamped: list[str] = []
     owners = own(topics, label)
+    check_vehicles(label, len(set(owners.values())), config)
     row = 0
     for topic in topics:
         segments.append(Segment(row, f"{label}, topic {topic.name}", "message", 1))
@@ -173,11 +172,8 @@ def collect(topic: Topic, take: Callable[[Any, Rows, int, int], None], vehicle: 
     """Decode the messages of a topic; return whether their headers bear no stamps."""
     unstamped = False
     for number, (received, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
-        try:
+        with guarded(f"{label}, topic {topic.name}, message {number + 1}: not a {topic.type}"):
             message: Any = STORES.deserialize_cdr(data, topic.type)
-        except Exception as error:  # damaged bytes may fail anywhere inside the decoder
-            where = f"{label}, topic {topic.name}, message {number + 1}"
-            raise InputError(f"{where}: not a {topic.type} ({error or type(error).__name__})") from error
         stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
         unstamped |= stamp == 0
         take(message, vehicle, stamp or received, row + number)

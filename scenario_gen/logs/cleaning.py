@@ -23,12 +23,14 @@ from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.errors import InputError
 from scenario_gen.geodesy import local_frame
+from scenario_gen.logs.budgets import check_clock, LATEST_NS
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import Observations, RawLog
 
 FASTEST = 70.0  # m/s: no road vehicle's measured speed is above it (an SPMD unit sends 163.8 for "unknown")
 JUMP_SLACK = 3.0  # m that a fix may lie beyond what the speeds allow: GPS noise
 JUMP_SPEED = 10.0  # m/s by which a measured speed may be wrong before a fix counts as a jump
+FARTHEST = 1e8  # m from the origin of any frame: a quarter of the way to the moon
 RELOCATED = 5  # so many fixes in a row that agree with each other are a new place, not jumps
 
 
@@ -89,7 +91,9 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Track, ...], Drops, tup
     if not any(len(vehicle.fix_ns) for vehicle in sound):
         raise InputError(f"{log.name}: no position between {config.start:g} s and {config.end:g} s; parameters start and end")
     origin, sound = to_metres(log, sound, config)
-    tracks = [without_jumps(in_order(vehicle, log, drops), drops, config) for vehicle in sound]
+    sound = [in_order(vehicle, log, drops) for vehicle in sound]
+    check_clock(sound, log, config)
+    tracks = [without_jumps(vehicle, drops, config) for vehicle in sound]
     if config.strict and drops.count:
         reason = next(iter(drops.count))
         raise InputError(f"{log.where(drops.first[reason])}: {reason} ({drops.count[reason]} such rows), and strict is set")
@@ -109,18 +113,29 @@ def chosen(log: RawLog, config: LogConfig) -> tuple[Observations, ...]:
 def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) -> Observations:
     """Leave out values that are no position or no speed."""
     fix, speed = vehicle.fix, vehicle.speed
-    checks: list[tuple[str, Any]] = [("position is not a number", ~np.isfinite(fix).all(axis=1))]
+    checks: list[tuple[str, Any]] = [
+        ("stamp is out of range", beyond(vehicle.fix_ns)),
+        ("position is not a number", ~np.isfinite(fix).all(axis=1)),
+    ]
     if geographic:
         checks.append(("position is (0, 0)", (np.abs(fix) < 1e-6).all(axis=1)))
         checks.append(("position is off the globe", (np.abs(fix[:, 0]) > 90.0) | (np.abs(fix[:, 1]) > 180.0)))
+    else:
+        checks.append(("position is off the globe", (np.abs(fix) > FARTHEST).any(axis=1)))
     keep = judge(checks, vehicle.fix_row, drops)
     slow_checks: list[tuple[str, Any]] = [
+        ("stamp is out of range", beyond(vehicle.speed_ns)),
         ("speed is not a number", ~np.isfinite(speed)),
         ("speed is negative", speed < 0.0),
         (f"speed is above {FASTEST:g} m/s", speed > FASTEST),
     ]
     keep_speed = judge(slow_checks, vehicle.speed_row, drops)
     return select(vehicle, keep, keep_speed)
+
+
+def beyond(stamps: Ints) -> Bools:
+    """Return which stamps [ns] are too far from 1970 to be subtracted from each other."""
+    return (stamps < -LATEST_NS) | (stamps > LATEST_NS)
 
 
 def judge(checks: list[tuple[str, Any]], rows: Ints, drops: Drops) -> Bools:
@@ -158,7 +173,9 @@ def time_window(sound: list[Observations], log: RawLog, drops: Drops, config: Lo
     if not stamps:
         causes = "; ".join(f"{reason}: {n}, first at {log.where(drops.first[reason])}" for reason, n in drops.count.items())
         raise InputError(
-            f"{log.segments[0].label} holds no usable position among {log.rows} rows" + (f" ({causes})" if causes else "")
+            f"{log.segments[0].label} holds no usable position among {log.rows} rows"
+            + (f" ({causes})" if causes else "")
+            + "; check it, or name columns and units with the parameter columns"
         )
     first, last = min(int(s.min()) for s in stamps), max(int(s.max()) for s in stamps)
     if config.end and config.end <= config.start:

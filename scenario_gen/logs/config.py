@@ -58,6 +58,10 @@ class LogConfig:
     travel: float = parameter(5.0, "distance that at least one vehicle of an encounter covers", unit="m", low=0.0, high=1000.0)
     standstill: float = parameter(10.0, "when all stand longer than this, the encounter is over", unit="s", low=1.0, high=600.0)
     most_vehicles: int = parameter(4, "largest number of vehicles in an encounter cut from a longer log", low=2, high=64)
+    size_limit: int = parameter(256, "largest log that is read, counted decompressed", unit="MiB", low=1, high=1_000_000)
+    row_limit: int = parameter(2_000_000, "most rows or messages of a log", low=1)
+    vehicle_limit: int = parameter(10_000, "most vehicles of a log", low=2)
+    tick_limit: int = parameter(2_000_000, "most ticks of the common clock, over all vehicles, from first to last stamp", low=1)
 
     def __post_init__(self) -> None:
         check(self)

@@ -16,9 +16,8 @@
 
 from pathlib import Path
 
-from scenario_gen.errors import InputError
+from scenario_gen.storage.files import files_of
 
-BAGS = (".mcap", ".db3")
 TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
 # Of a basic safety message in the files of the Safety Pilot Model Deployment.
 COLUMNS = (
@@ -46,33 +45,7 @@ COLUMNS = (
 
 def is_bag(path: Path) -> bool:
     """Return whether it is a bag's folder or a bare .mcap or .db3 file."""
-    return bool(bag_files(path))
-
-
-def bag_files(path: Path) -> list[Path]:
-    """Return the files of a bag in order: those that metadata.yaml lists, or else those in the folder; none if it is no bag.
-
-    The files are opened one by one: through the folder rosbags 0.11 passes over messages whose quality of service reads
-    differently in metadata.yaml and in the file. A compressed bag is opened through its folder.
-    """
-    if path.is_file():
-        return [path] if path.suffix.lower() in BAGS else []
-    metadata = path / "metadata.yaml"
-    if not metadata.is_file():
-        return sorted((file for file in path.iterdir() if file.suffix.lower() in BAGS), key=lambda f: (len(f.name), f.name))
-    import yaml
-
-    try:
-        info = yaml.safe_load(metadata.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
-        files = [path / Path(name).name for name in info["relative_file_paths"]]
-    except (yaml.YAMLError, KeyError, TypeError, UnicodeDecodeError) as error:
-        raise InputError(f"{metadata} is no metadata of a bag ({error!r}); delete it to read the files alone") from error
-    if info.get("compression_mode"):
-        return [path]
-    for file in files:
-        if not file.is_file():
-            raise InputError(f"{metadata} lists {file.name}, which is not there")
-    return files
+    return bool(files_of(path).files)
 
 
 def is_spmd(path: Path) -> bool:

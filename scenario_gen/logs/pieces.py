@@ -21,6 +21,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
+from scenario_gen.logs.budgets import SLOWEST
 from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, Track
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.intervals import runs
@@ -86,7 +87,7 @@ def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Pie
 
 def longest_bridge(seconds: Floats, config: LogConfig) -> float:
     """Return the longest gap [s] that is bridged in a track whose fixes are `seconds` apart."""
-    return max(config.longest_gap, 2.5 * float(np.median(seconds))) + 1e-6
+    return max(config.longest_gap, 2.5 * min(float(np.median(seconds)), SLOWEST)) + 1e-6
 
 
 def reversals(track: Track, config: LogConfig) -> Bools:

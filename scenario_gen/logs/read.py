@@ -55,7 +55,13 @@ def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogCon
     Raises:
         InputError: the log cannot be used; the message names the file and the row or topic, and what to do.
     """
-    return encounters_of(read_raw([Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)], config), config)
+    paths = [Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)]
+    try:
+        return encounters_of(read_raw(paths, config), config)
+    except InputError as error:  # what is wrong with an encounter, or with a vehicle's clock, knows of no files
+        if any(str(known) in str(error) for known in paths) or str(error).startswith("parameter "):
+            raise
+        raise InputError(f"{paths[0]}: {error}") from error
 
 
 def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
@@ -75,7 +81,10 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     pieces: list[Piece] = []
     vehicles = []
     for track in tracks:
-        own, quality = pieces_of(track, origin_ns, config)
+        try:
+            own, quality = pieces_of(track, origin_ns, config)
+        except InputError as error:
+            raise InputError(f"{log.segments[0].label}, vehicle {track.id}: {error}") from error
         pieces += own
         vehicles.append(quality)
     groups, notes = find_groups(pieces, config)

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scenario_gen.errors import InputError
+from scenario_gen.guard import guarded
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.files import is_bag, is_spmd, is_table, TABLES
 from scenario_gen.logs.raw import LogSource, RawLog
@@ -42,21 +43,36 @@ def source(name: str) -> LogSource:
 
 def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
     """Read one log from files or a folder with the first source that accepts all of them."""
-    for path in paths:
-        if not path.exists():
-            raise InputError(f"{path} does not exist")
-        if path.is_dir() and not any(path.iterdir()):
-            raise InputError(f"{path} is an empty folder")
-        if path.is_file() and path.stat().st_size == 0:
-            raise InputError(f"{path} is empty (0 bytes); record or copy it again")
-    files = [file for path in paths for file in expand(path)]
-    for name, accepts in ACCEPTS.items():
-        if name == config.format or (config.format == "auto" and all(accepts(file) for file in files)):
-            return source(name).read(files, config)
+    with guarded(str(paths[0]), OSError):  # no permission, a name too long, a file that goes away
+        files = [file for path in paths for file in present(path)]
+        suited = [
+            name
+            for name, accepts in ACCEPTS.items()
+            if name == config.format or (config.format == "auto" and all(accepts(file) for file in files))
+        ]
+    if suited:
+        return source(suited[0]).read(files, config)
     raise InputError(
         f"{paths[0]} is none of the known logs: {', '.join(TABLES)} tables and SPMD files, "
         "rosbag2 folders, .mcap, .db3; set the parameter format if its name misleads"
     )
+
+
+def present(path: Path) -> list[Path]:
+    """Return the files to read of a path.
+
+    Raises:
+        InputError: there is nothing there that can be read.
+    """
+    if not path.exists():
+        raise InputError(f"{path} does not exist")
+    if not (path.is_file() or path.is_dir()):
+        raise InputError(f"{path} is neither a file nor a folder")
+    if path.is_dir() and not any(path.iterdir()):
+        raise InputError(f"{path} is an empty folder")
+    if path.is_file() and path.stat().st_size == 0:
+        raise InputError(f"{path} is empty (0 bytes); record or copy it again")
+    return expand(path)
 
 
 def expand(path: Path) -> list[Path]:

@@ -22,36 +22,34 @@ import numpy as np
 import pandas as pd
 
 from scenario_gen.errors import InputError
+from scenario_gen.logs.budgets import check_size
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.files import COLUMNS
 from scenario_gen.logs.raw import RawLog, Segment
-from scenario_gen.logs.table import from_frame, vehicle_name
+from scenario_gen.logs.table import from_frame, read_text, reals, vehicle_name
 
 EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime counts microseconds from there
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     """Read the files as one log; a vehicle is a TxDevice."""
-    frames, segments, row = [], [], 0
+    frames, segments, row, size = [], [], 0, 0
     for path in paths:
-        frames.append(read_messages(path))
+        size += path.stat().st_size
+        check_size(str(path), size, row, config)
+        frames.append(read_messages(path, row, config))
         segments.append(Segment(row, str(path), "line", 1))
         row += len(frames[-1])
-    return from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments))
+    return from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
 
 
-def read_messages(path: Path) -> pd.DataFrame:
+def read_messages(path: Path, before: int, config: LogConfig) -> pd.DataFrame:
     """Read one file into the columns of the table reader: time [ns], vehicle, lat, lon, speed, heading (ours).
 
     Raises:
         InputError: the file is empty or a line has not 19 fields.
     """
-    try:
-        raw = pd.read_csv(path, header=None, dtype=str, skipinitialspace=True, skip_blank_lines=False, encoding="utf-8-sig")
-    except pd.errors.EmptyDataError as error:
-        raise InputError(f"{path} is empty; it should hold basic safety messages of 19 columns") from error
-    except (pd.errors.ParserError, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path} is not a file of basic safety messages: {str(error).strip()}") from error
+    raw = read_text(path, before, config, sep=",", header=None, dtype=str)
     if raw.shape[1] != len(COLUMNS):
         raise InputError(
             f"{path} has {raw.shape[1]} columns on line 1; basic safety messages have {len(COLUMNS)}: {', '.join(COLUMNS)}"
@@ -59,7 +57,7 @@ def read_messages(path: Path) -> pd.DataFrame:
     raw.columns = pd.Index(COLUMNS)
 
     def numbers(name: str) -> "pd.Series[float]":
-        return pd.to_numeric(raw[name], errors="coerce").astype(float)
+        return reals(raw[name])
 
     stamps = numbers("Gentime")  # microseconds stay exact in float64 until the year 2289
     known = stamps.notna() & (stamps.abs() < 8e15)

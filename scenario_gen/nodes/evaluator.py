@@ -20,7 +20,16 @@ import math
 import sys
 
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, read_request, Status, take_entry
+from msg_conventions.diagnostics import (
+    count_in,
+    decode_diagnostics,
+    encode_diagnostics,
+    Level,
+    read_request,
+    Status,
+    take_entry,
+    text_in,
+)
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import InputError
@@ -65,10 +74,14 @@ class Evaluator(StageNode):
                 self._scenarios.pop(next(iter(self._scenarios)))
         elif topic == "scenarios/info":
             for status in decode_diagnostics(data)[1]:
+                if not {"published", "sha256"} & set(status.values):
+                    continue
+                request = text_in(status.values, "request", f"{topic}, {status.name}")
                 if "published" in status.values:
                     self._closed.append(status)
-                elif "sha256" in status.values:
-                    take_entry(self._open.setdefault(status.values["request"], {}), status.values)
+                else:
+                    entry = {key: text_in(status.values, key, f"{topic}, {status.name}") for key in ("index", "seed", "sha256")}
+                    take_entry(self._open.setdefault(request, {}), entry)
         else:
             self._newest[topic] = data
         for status in list(self._closed):
@@ -87,7 +100,10 @@ class Evaluator(StageNode):
     def _evaluate(self, messages: Mapping[str, bytes], scenarios: Told, status: Status) -> None:
         encounter = decode_tracks(messages["tracks"])
         segmentation = decode_changepoints(messages["changepoints"], encounter)
-        decoded = [decode_scenario(data, seed=int(v["seed"]), index=int(v["index"])) for data, v in scenarios]
+        told = "scenarios/info"
+        decoded = [
+            decode_scenario(data, seed=count_in(v, "seed", told), index=count_in(v, "index", told)) for data, v in scenarios
+        ]
         if any(stamp != encounter.start_ns for stamp, _ in decoded):
             raise InputError(f"request {status.values['request']}: its scenarios are not those of the newest tracks")
         account = read_request(status, tuple(scenario for _, scenario in decoded))

@@ -43,7 +43,9 @@ from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.parameters import check, parameter
+from scenario_gen.storage import BagConfig
 
+STREAMED = BagConfig(most_bytes=2**62)  # a message is published and forgotten, so a bag may be of any size
 TICK = 0.01  # seconds between two clock messages
 KINDS = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
 
@@ -87,7 +89,7 @@ class Player(Node):  # type: ignore[misc]
         config: Config = self.parameters.config
         if not config.bag:
             raise InputError("parameter bag is empty; name the bag to play")
-        for topic in bag_topics(Path(config.bag)):
+        for topic in bag_topics(Path(config.bag), STREAMED):
             name = topic.name if topic.name.startswith("/") else f"/{topic.name}"
             if not re.fullmatch(config.topics, name):
                 continue
@@ -127,7 +129,7 @@ class Player(Node):  # type: ignore[misc]
         """Yield the messages from the offset on; before the first, publish what latched topics hold by then."""
         latched: dict[str, deque[bytes]] = {}
         begin: int | None = None
-        for message in read_messages(Path(config.bag), lambda topic: topic in self._offered):
+        for message in read_messages(Path(config.bag), lambda topic: topic in self._offered, STREAMED):
             begin = message.stamp_ns if begin is None else begin
             if message.stamp_ns - begin < config.start_offset * 1e9:
                 _, transient_local, depth = self._offered[message.topic]

@@ -21,7 +21,7 @@ from scenario_gen.parameters import check, parameter
 
 @dataclass(frozen=True)
 class RoadConfig:
-    """Parameters of the built-in roads and of `corridor`; a map read from a file keeps its own geometry."""
+    """Parameters of the built-in roads and of `corridor`, and what is read of a map; a map keeps its own geometry."""
 
     lane_width: float = parameter(3.5, "width of a lane", unit="m", low=2.0, high=1000.0)
     lanes: int = parameter(0, "lanes per direction; 0: as many as the template needs", low=0, high=6)
@@ -34,6 +34,8 @@ class RoadConfig:
     )
     corridor_run_out: float = parameter(6.0, "how far a corridor goes on beyond a path's ends", unit="m", low=1.0, high=50.0)
     paper: bool = parameter(False, "straight and t_intersection as in the paper: a grid of 1000 x 1000 cells, lengths in cells")
+    max_cells: int = parameter(25_000_000, "most cells (pixels) of a map that is read", low=1, high=80_000_000)
+    image_outside_folder: bool = parameter(False, "read also a map's image that lies outside the folder of its YAML file")
 
     def __post_init__(self) -> None:
         check(self)

@@ -17,52 +17,53 @@
 import math
 from pathlib import Path
 from typing import Any
+import warnings
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
-import yaml
+from PIL import Image
 
 from scenario_gen.arrays import Bools, Floats
+from scenario_gen.documents import read_yaml, shown
 from scenario_gen.errors import InputError
+from scenario_gen.guard import guarded
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.openings import find_openings
 from scenario_gen.roads.road import Road
 
 _MODES = ("trinary", "scale", "raw")
+_FORMATS = ("PPM", "PNG", "BMP", "JPEG")  # by Pillow's names; PPM is PGM, PBM and PPM
+_FORMATS_SAID = "PGM, PPM, PBM, PNG, BMP or JPEG"
+_BLOCK = 1 << 20  # pixels worked on at a time, so that a large map takes little more memory than its cells
+_LARGEST_CELL = 10.0  # metres: nothing is seen of a vehicle in larger ones
+_FARTHEST = 1e8  # metres from the frame's origin: more than any geodetic grid has
 
 
 def read_map(path: Path, config: RoadConfig) -> Road:
     """Read a map_server YAML and its image; what is free there is drivable, what is occupied or unknown is not.
 
     Raises:
-        InputError: a file is missing or broken, or a key is missing or has a value that cannot be used.
+        InputError: a file is missing, broken or too large, a key is missing or has a value that cannot be used, or the image
+            lies outside the folder of the YAML file.
     """
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"map {path}: cannot be read ({error.strerror or error})") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"map {path}: not a YAML file ({str(error).splitlines()[0]})") from error
+    content = read_yaml(path, f"map {path}")
     if not isinstance(content, dict):
         raise InputError(f"map {path}: expected keys image, resolution, origin, negate, occupied_thresh, free_thresh")
-    resolution = _number(path, content, "resolution", low=1e-6)
+    resolution = _number(path, content, "resolution", low=1e-6, high=_LARGEST_CELL)
     origin = _origin(path, content)
     mode = content.get("mode", "trinary")
     if mode not in _MODES:
-        raise InputError(f"map {path}: key mode is {mode!r}; choose one of {', '.join(_MODES)}")
+        raise InputError(f"map {path}: key mode is {shown(mode)!r}; choose one of {', '.join(_MODES)}")
     negate = content.get("negate", 0)
     if negate not in (0, 1):  # True and False too
-        raise InputError(f"map {path}: key negate is {negate!r}; it must be 0 or 1")
+        raise InputError(f"map {path}: key negate is {shown(negate)}; it must be 0 or 1")
     occupied = _number(path, content, "occupied_thresh", low=0.0, high=1.0, default=0.65)
     free = _number(path, content, "free_thresh", low=0.0, high=1.0, default=0.25)
     if free >= occupied:
         raise InputError(f"map {path}: key free_thresh ({free}) must be below occupied_thresh ({occupied})")
-    image_name = content.get("image")
-    if not isinstance(image_name, str):
-        raise InputError(f"map {path}: key image is missing or not a file name")
-    drivable = _free_cells(path, path.parent / image_name, mode, bool(negate), free)
+    image = _image_file(path, content.get("image"), config)
+    drivable = _free_cells(path, image, mode, bool(negate), free, config.max_cells)
     if not drivable.any():
-        raise InputError(f"map {path}: no cell of {image_name} is free with free_thresh {free} and negate {negate}")
+        raise InputError(f"map {path}: no cell of {image.name} is free with free_thresh {free} and negate {negate}")
     resolution = float(np.float32(resolution))
     entries, exits = find_openings(drivable, resolution, origin, config)
     return Road(
@@ -75,7 +76,7 @@ def _number(
 ) -> float:
     value = content.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"map {path}: key {key} is {value!r}; a number is needed")
+        raise InputError(f"map {path}: key {key} is {shown(value)}; a number is needed")
     if not low <= value <= high:
         raise InputError(
             f"map {path}: key {key} is {value}; it must be at least {low:g}" + (f", at most {high:g}" if high < math.inf else "")
@@ -87,32 +88,78 @@ def _origin(path: Path, content: dict[Any, Any]) -> Floats:
     value = content.get("origin")
     numbers = isinstance(value, list) and all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
     if not isinstance(value, list) or len(value) not in (2, 3) or not numbers or not all(math.isfinite(v) for v in value):
-        raise InputError(f"map {path}: key origin is {value!r}; a list of x, y and yaw is needed")
+        raise InputError(f"map {path}: key origin is {shown(value)}; a list of x, y and yaw is needed")
+    if max(abs(v) for v in value) > _FARTHEST:
+        raise InputError(f"map {path}: key origin is {shown(value)}; at most {_FARTHEST:g} m from the frame's origin are read")
     if len(value) == 3 and value[2] != 0.0:
         raise InputError(f"map {path}: key origin has yaw {value[2]}; rotated maps are not supported, export it with yaw 0")
     return np.array(value[:2], dtype=np.float64)
 
 
-def _free_cells(path: Path, image_path: Path, mode: str, negate: bool, free: float) -> Bools:
-    """(H, W) free cells, row 0 the lowest y; as map_server's map_io reads them."""
-    try:
-        with Image.open(image_path) as image:
+def _image_file(path: Path, name: Any, config: RoadConfig) -> Path:
+    """Return the image that the key `image` names.
+
+    Raises:
+        InputError: the key is no file name, there is no such file, or it lies outside the YAML's folder without being allowed to.
+    """
+    if not isinstance(name, str) or not name.strip() or "\0" in name:
+        raise InputError(f"map {path}: key image is missing or not a file name")
+    image = path.parent / name
+    where = f"map {path}: key image is {shown(name)!r}"
+    with guarded(where, OSError, RuntimeError):  # a name that is too long; links in a circle
+        real = image.resolve()
+        inside = any(real.is_relative_to(folder.resolve()) for folder in (path.parent, path.resolve().parent))
+        is_file = real.is_file()
+    lexical = Path(name).is_absolute() or ".." in Path(name).parts
+    if (lexical or not inside) and not config.image_outside_folder:
+        raise InputError(f"{where}, outside the folder of the map; put it there, or set road.image_outside_folder=true")
+    if not is_file:
+        raise InputError(f"{where}, which is not there or no file")
+    return image
+
+
+def _free_cells(path: Path, image_path: Path, mode: str, negate: bool, free: float, max_cells: int) -> Bools:
+    """(H, W) free cells, row 0 the lowest y; as map_server's map_io reads them.
+
+    Raises:
+        InputError: the image cannot be read, is of another format, or has more pixels than `max_cells`.
+    """
+    where = f"map {path}: image {image_path.name} cannot be read"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Pillow's, of large or odd images: what is too large is refused here
+        with guarded(where, remedy=f"give {_FORMATS_SAID}"):
+            opened = Image.open(image_path, formats=_FORMATS)
+        with opened as image:
+            width, height = image.size
+            if width * height > max_cells:
+                raise InputError(
+                    f"map {path}: image {image_path.name} has {width} x {height} pixels, more than road.max_cells ({max_cells}); "
+                    "crop it or make it coarser, or set road.max_cells"
+                )
+            with guarded(where):
+                image.load()
             bands = image.getbands()
             transparent = "A" in bands or "transparency" in image.info
-            pixels = np.asarray(image.convert("RGBA" if transparent else "RGB"), dtype=np.float64)
-    except FileNotFoundError as error:
-        raise InputError(f"map {path}: key image names {image_path.name}, which is not there") from error
-    except (UnidentifiedImageError, OSError, ValueError) as error:
-        raise InputError(f"map {path}: image {image_path.name} cannot be read ({error})") from error
+            rows = max(1, _BLOCK // width)
+            blocks = []
+            for top in range(0, height, rows):
+                with guarded(where):
+                    block = image.crop((0, top, width, min(top + rows, height))).convert("RGBA" if transparent else "RGB")
+                    pixels = np.asarray(block, dtype=np.float64)
+                blocks.append(_free(pixels, mode, negate, free, transparent=transparent))
+    return np.ascontiguousarray(np.concatenate(blocks)[::-1])
+
+
+def _free(pixels: Floats, mode: str, negate: bool, free: float, *, transparent: bool) -> Bools:
+    """(H, W) free cells of pixels (H, W, 3 or 4), 0 to 255."""
     colour = pixels[..., :3].mean(axis=-1)
     if mode == "raw":
         value = 255.0 - colour if negate else colour
-        cells = (value <= 100.0) & (value < 100.0 * free)
-    else:
-        if transparent and mode == "trinary":  # map_server averages alpha in
-            colour = pixels.mean(axis=-1)
-        occupancy = colour / 255.0 if negate else 1.0 - colour / 255.0
-        cells = occupancy < free
-        if transparent and mode == "scale":
-            cells &= pixels[..., 3] > 0.0
-    return np.ascontiguousarray(cells[::-1])
+        return np.asarray((value <= 100.0) & (value < 100.0 * free))
+    if transparent and mode == "trinary":  # map_server averages alpha in
+        colour = pixels.mean(axis=-1)
+    occupancy = colour / 255.0 if negate else 1.0 - colour / 255.0
+    cells = occupancy < free
+    if transparent and mode == "scale":
+        cells &= pixels[..., 3] > 0.0
+    return np.asarray(cells)

@@ -17,9 +17,11 @@
 import numpy as np
 
 from scenario_gen.arrays import Bools, Floats
+from scenario_gen.errors import InputError
 from scenario_gen.roads.config import RoadConfig
 
 _MIN_WIDTH = 2.5  # metres: narrower gaps are no way in for a car
+_MOST_LANES = 1000  # at the whole border: 3.5 km of openings
 
 
 def find_openings(drivable: Bools, resolution: float, origin: Floats, config: RoadConfig) -> tuple[Floats, Floats]:
@@ -27,6 +29,9 @@ def find_openings(drivable: Bools, resolution: float, origin: Floats, config: Ro
 
     Every run of drivable cells on the grid's edge that a car can pass is an opening. It is divided into lanes of about
     `lane_width`: traffic keeps to its side, and a lane in the middle serves both ways.
+
+    Raises:
+        InputError: there are more lanes than any road has.
     """
     height, width = drivable.shape
     low, high = np.asarray(origin), np.asarray(origin) + np.array([width, height]) * resolution
@@ -38,6 +43,7 @@ def find_openings(drivable: Bools, resolution: float, origin: Floats, config: Ro
         (drivable[-1], 0, high[1], np.pi / 2.0, 1),
         (drivable[:, 0], 1, low[0], np.pi, 1),
     )
+    total = 0
     keep_right = 1 if config.traffic_side == "right" else -1
     for cells, axis, fixed, outward, right in edges:
         for first, last in _runs(cells):
@@ -45,6 +51,12 @@ def find_openings(drivable: Bools, resolution: float, origin: Floats, config: Ro
             if size < _MIN_WIDTH:
                 continue
             lanes = max(round(size / config.lane_width), 1)
+            total += lanes
+            if total > _MOST_LANES:
+                raise InputError(
+                    f"the openings at the map's border have room for more than {_MOST_LANES} lanes of {config.lane_width:g} m at "
+                    f"{resolution:g} m per cell; check the resolution, or crop the map to a road"
+                )
             for k in range(lanes):
                 along = low[axis] + first * resolution + (k + 0.5) * size / lanes
                 at = [along, fixed] if axis == 0 else [fixed, along]

@@ -25,8 +25,10 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints
+from scenario_gen.documents import check_shape, COUNT, NUMBER, read_json
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
+from scenario_gen.guard import guarded
 from scenario_gen.segmentation.descriptions import describe_accelerations, describe_segments
 from scenario_gen.segmentation.features import driving_features
 from scenario_gen.segmentation.posterior import in_order
@@ -35,6 +37,31 @@ from scenario_gen.segmentation.segmenter import cut, DEFAULT, on_trends, relabel
 from scenario_gen.segmentation.series import segment_series
 
 FORMAT = "scenario_gen primitive library 1"
+_ROW = {"type": "array", "minItems": 1, "items": {**NUMBER, "minimum": -1e9, "maximum": 1e9}}  # of accelerations, speeds, seconds
+_SHARES = {"type": "array", "minItems": 1, "items": {"type": "number", "minimum": 0.0, "maximum": 1.0}}
+SCHEMA: dict[str, Any] = {
+    "type": "object",
+    "properties": {
+        "format": {"const": FORMAT},
+        "vehicles": {**COUNT, "minimum": 2, "maximum": 64},
+        "means": {"type": "array", "minItems": 1, "maxItems": 1000, "items": _ROW},
+        "covariances": {"type": "array", "items": {"type": "array", "items": _ROW}},
+        "transition": {"type": "array", "items": _SHARES},
+        "initial": _SHARES,
+        "segments": {"type": "array", "items": COUNT},
+        "seconds": _ROW,
+        "weight": {"type": "number", "exclusiveMinimum": 0.0, "maximum": 1.0},
+        "windows": {
+            "type": "array",
+            "minItems": 4,
+            "maxItems": 4,
+            "items": {"type": "number", "minimum": 0.0, "maximum": 3600.0},
+        },
+        "descriptions": {"type": "array", "items": {"type": "string", "maxLength": 10_000}},
+    },
+}
+SCHEMA["required"] = list(SCHEMA["properties"])
+"""Of the JSON that `save` writes; that the shapes agree is checked beside it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,15 +123,28 @@ class PrimitiveLibrary:
         Raises:
             InputError: the file cannot be read or is no such library.
         """
-        try:
-            values = json.loads(path.read_text(encoding="utf-8"))
-            if values.pop("format") != FORMAT:
-                raise KeyError("format")
-            return cls(**values | {"descriptions": tuple(values["descriptions"])})
-        except OSError as error:
-            raise InputError(f"cannot read the primitive library {path}: {error.strerror}") from error
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise InputError(f"{path} is not a primitive library: {error}") from error
+        what = f"{path} is not a primitive library"
+        values = read_json(path, SCHEMA, what)
+        k, width = len(values["means"]), 3 * values["vehicles"]
+        shapes = {
+            "means": (k, width),
+            "covariances": (k, width, width),
+            "transition": (k, k),
+            **dict.fromkeys(("initial", "segments", "seconds", "descriptions"), (k,)),
+        }
+        for name, shape in shapes.items():
+            check_shape(values[name], shape, f"{what}: {name}")
+        for name, one in (("transition", "row"), ("initial", "list")):
+            sums = np.sum(values[name], axis=-1)
+            if (np.abs(sums - 1.0) > 1e-6).any():
+                raise InputError(f"{what}: {name} holds probabilities; each {one} must sum to 1, not {np.ravel(sums)[0]:g}")
+        with guarded(f"{what}: covariances", remedy="each must be symmetric and positive definite"):
+            covariances = np.array(values["covariances"])
+            np.linalg.cholesky(covariances)
+        if not np.allclose(covariances, covariances.swapaxes(1, 2)):
+            raise InputError(f"{what}: covariances must be symmetric")
+        known = {name: values[name] for name in cls.__dataclass_fields__}
+        return cls(**known | {"descriptions": tuple(values["descriptions"])})
 
 
 @dataclass(frozen=True, eq=False)

@@ -238,7 +238,7 @@ def test_missing_files_and_metadata(tmp_path):
     with pytest.raises(InputError, match=r"metadata\.yaml lists bag\.mcap, which is not there"):
         read_log(bag)
     (bag / "metadata.yaml").write_text("- nonsense")
-    with pytest.raises(InputError, match=r"metadata\.yaml is no metadata of a bag"):
+    with pytest.raises(InputError, match=r"metadata\.yaml: damaged"):
         read_log(bag)
 
 

@@ -102,6 +102,83 @@ def test_broken_files_are_errors_too(tmp_path):
         build_road(write(tmp_path, [[0, 0]]), None)
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a: &a [1]\nimage: map.pgm\norigin: *a\n", "line 3, column 9: the alias"),
+        ("[" * 5000, "nested more than 32 deep"),
+        ("image: map.pgm\nresolution: !!float x\n", "does not suit its tag"),
+        ("image: map.pgm\nresolution: 0.5\norigin: !!timestamp x\n", "line 3.*the tag"),
+        (f"resolution: {'9' * 5000}\n", "does not suit"),
+        ("resolution: 0xffffffffffffffffffff\n", "64 bits"),
+        ("x" * 1_100_000, "at most 524288"),
+    ],
+    ids=range(7),
+)
+def test_yaml_has_bounds(tmp_path, text, said):
+    (tmp_path / "map.yaml").write_text(text)
+    with pytest.raises(InputError, match=said) as error:
+        build_road(str(tmp_path / "map.yaml"), None)
+    assert "map.yaml" in str(error.value)
+
+
+def test_an_image_outside_the_folder_is_read_if_that_is_asked_for(tmp_path):
+    folder = tmp_path / "maps"
+    folder.mkdir()
+    Image.fromarray(np.array([[254, 0]], dtype=np.uint8)).save(tmp_path / "other.pgm")
+    (folder / "link.pgm").symlink_to(tmp_path / "other.pgm")
+    (folder / "loop.pgm").symlink_to(folder / "loop.pgm")
+    for name in ("../other.pgm", str(tmp_path / "other.pgm"), "link.pgm"):
+        path = write(folder, image=name)
+        with pytest.raises(InputError, match=r"road\.image_outside_folder=true"):
+            build_road(path, None)
+        assert build_road(path, None, RoadConfig(image_outside_folder=True)).drivable.sum() == 1
+    with pytest.raises(InputError, match="loop"):
+        build_road(write(folder, image="loop.pgm"), None)
+
+
+def test_a_folder_of_links_as_colcon_installs_it_is_no_outside(tmp_path):
+    source, installed = tmp_path / "source", tmp_path / "installed"
+    source.mkdir()
+    installed.mkdir()
+    write(source, [[254, 0]])
+    for name in ("map.yaml", "map.pgm"):
+        (installed / name).symlink_to(source / name)
+    assert build_road(str(installed / "map.yaml"), None).drivable.sum() == 1
+
+
+def test_large_images_are_refused_before_they_are_read(tmp_path):
+    path = write(tmp_path, np.full((30, 40), 254))
+    with pytest.raises(InputError, match=r"40 x 30 pixels, more than road\.max_cells \(1199\)"):
+        build_road(path, None, RoadConfig(max_cells=1199))
+    assert build_road(path, None, RoadConfig(max_cells=1200)).drivable.all()
+    (tmp_path / "bomb.pgm").write_bytes(b"P5 20000 20000 255\n")
+    with pytest.raises(InputError, match=r"bomb\.pgm.*400000000 pixels"):
+        build_road(write(tmp_path, image="bomb.pgm"), None)
+
+
+def test_images_of_other_formats_are_refused_by_name(tmp_path):
+    Image.fromarray(np.full((4, 4), 254, dtype=np.uint8)).save(tmp_path / "map.tga")
+    with pytest.raises(InputError, match=r"map\.tga.*give PGM, PPM, PBM, PNG, BMP or JPEG"):
+        build_road(write(tmp_path, image="map.tga"), None)
+
+
+def test_blocks_of_a_large_image_are_put_together_as_they_lay(tmp_path, monkeypatch):
+    pixels = np.random.default_rng(3).integers(0, 255, (50, 7))
+    path = write(tmp_path, pixels)
+    whole = build_road(path, None).drivable
+    monkeypatch.setattr("scenario_gen.roads.nav2._BLOCK", 20)
+    assert (build_road(path, None).drivable == whole).all()
+    assert (whole == (1.0 - pixels[::-1] / 255.0 < 0.25)).all()
+
+
+def test_more_lanes_than_any_road_has_are_refused(tmp_path):
+    with pytest.raises(InputError, match="1000 lanes"):
+        find_openings(np.ones((500, 500), dtype=bool), 5.0, np.zeros(2), RoadConfig())
+    with pytest.raises(InputError, match="resolution"):
+        build_road(write(tmp_path, [[254, 0]], resolution="1e9"), None)
+
+
 def test_openings_keep_to_the_side_of_the_road():
     drivable = np.zeros((100, 200), dtype=bool)
     drivable[30:65, :] = True  # 7 m of road along x at 0.2 m

@@ -73,5 +73,5 @@ def test_refusals(built, encounter_of, tmp_path):
     broken.write_text("{}")
     with pytest.raises(InputError, match="not a primitive library"):
         PrimitiveLibrary.load(broken)
-    with pytest.raises(InputError, match="cannot read"):
+    with pytest.raises(InputError, match="cannot be read"):
         PrimitiveLibrary.load(tmp_path / "missing.json")

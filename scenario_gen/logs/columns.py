@@ -1,0 +1,140 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which column of a table holds which quantity, and in which unit: by option, or by name and suffix."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+from scenario_gen.errors import InputError
+
+# Names a quantity goes by, the preferred one first; a clock that all files share is preferred to one that starts with the file.
+NAMES: dict[str, tuple[str, ...]] = {
+    "time": ("utc", "stamp", "unix", "gentime", "clock", "t", "time", "timestamp", "global_time"),
+    "vehicle": ("vehicle", "vehicle_id", "vehicle_name", "txdevice", "track_id", "id", "name", "agent_id", "object_id"),
+    "lat": ("lat", "latitude"),
+    "lon": ("lon", "lng", "longitude"),
+    "x": ("x", "e", "east", "easting", "pos_x", "position_x"),
+    "y": ("y", "n", "north", "northing", "pos_y", "position_y"),
+    "speed": ("speed", "v", "velocity", "vel"),
+    "heading": ("heading", "yaw", "theta", "course", "bearing"),
+    "length": ("length", "len", "vehicle_length"),
+    "width": ("width", "vehicle_width"),
+}
+# Factor to seconds, metres, m/s, radians or degrees (positions); a name without a suffix has the first unit.
+UNITS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "sec": 1.0, "ns": 1e-9, "us": 1e-6, "ms": 1e-3},
+    "vehicle": {},
+    "lat": {"deg": 1.0, "rad": math.degrees(1.0)},
+    "lon": {"deg": 1.0, "rad": math.degrees(1.0)},
+    "x": {"m": 1.0, "km": 1e3, "ft": 0.3048, "cm": 0.01},
+    "y": {"m": 1.0, "km": 1e3, "ft": 0.3048, "cm": 0.01},
+    "speed": {
+        "mps": 1.0,
+        "ms": 1.0,
+        "m_s": 1.0,
+        "kmh": 1 / 3.6,
+        "kph": 1 / 3.6,
+        "mph": 0.44704,
+        "kn": 1852 / 3600,
+        "fps": 0.3048,
+    },
+    "heading": {"rad": 1.0, "deg": math.pi / 180.0, "north_deg": math.nan, "cw_deg": math.nan},
+    "length": {"m": 1.0, "ft": 0.3048, "cm": 0.01, "mm": 0.001},
+    "width": {"m": 1.0, "ft": 0.3048, "cm": 0.01, "mm": 0.001},
+}
+CLOCKWISE = ("course", "bearing")  # by convention degrees clockwise from north
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table, the factor to our unit, and whether it is a heading clockwise from north."""
+
+    name: str
+    factor: float
+    clockwise: bool = False
+
+
+def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Column]:
+    """Return which column holds which quantity, by option first and by name otherwise.
+
+    Raises:
+        InputError: a needed column is missing, or the option names one that is not there.
+    """
+    names = {name.strip().lower(): name for name in header}
+    found: dict[str, Column] = {}
+    without: set[str] = set()
+    for part in filter(None, (p.strip() for p in option.split(","))):
+        quantity, _, name = (p.strip() for p in part.partition("="))
+        if quantity not in NAMES:
+            raise InputError(f"parameter columns: {quantity!r} is none of {', '.join(NAMES)} (write quantity=column, …)")
+        if name == "none":
+            without.add(quantity)
+            continue
+        name, _, unit = (name, "", "") if name.lower() in names else name.rpartition(":")
+        if name.lower() not in names:
+            asked = part.partition("=")[2].strip()
+            raise InputError(f"{path} has no column {asked!r} (asked for as {quantity}); it has {', '.join(names.values())}")
+        if unit and unit not in UNITS[quantity]:
+            raise InputError(f"parameter columns: {quantity} has no unit {unit!r}; choose one of {', '.join(UNITS[quantity])}")
+        found[quantity] = as_column(quantity, names[name.lower()], unit)
+    for quantity, aliases in NAMES.items():
+        if quantity not in found and quantity not in without:
+            candidates = [
+                candidate for alias in aliases for candidate in (alias, *(f"{alias}_{unit}" for unit in UNITS[quantity]))
+            ]
+            match = next((names[candidate] for candidate in candidates if candidate in names), None)
+            if match is not None:
+                found[quantity] = as_column(quantity, match)
+    if (
+        found.get("time", Column("", 1.0)).name.strip().lower() == "gentime" and "heading" in found
+    ):  # basic safety messages with a header
+        found["heading"] = Column(found["heading"].name, math.pi / 180.0, clockwise=True)
+    return complete(found, without, path, names)
+
+
+def complete(found: dict[str, Column], without: set[str], path: Path, names: dict[str, str]) -> dict[str, Column]:
+    """Check that all needed columns are there; latitude and longitude win over x and y."""
+    if "lat" in found and "lon" in found:
+        found = {quantity: column for quantity, column in found.items() if quantity not in ("x", "y")}
+    elif "x" in found and "y" in found:
+        found = {quantity: column for quantity, column in found.items() if quantity not in ("lat", "lon")}
+    else:
+        raise InputError(missing("position (lat and lon, or x and y)", "x=…,y=…", path, names))
+    for quantity in ("time", "speed"):
+        if quantity not in found and (quantity == "time" or quantity not in without):
+            hint = f"{quantity}=…" + (" or speed=none to take it from the positions" if quantity == "speed" else "")
+            raise InputError(missing(quantity, hint, path, names))
+    return found
+
+
+def missing(quantity: str, hint: str, path: Path, names: dict[str, str]) -> str:
+    """Say which column is missing and what to do."""
+    return f"{path} has no column for {quantity}; it has {', '.join(names.values())}. Name it with the parameter columns, {hint}"
+
+
+def as_column(quantity: str, name: str, unit: str = "") -> Column:
+    """Return the column with the unit given, or else the one that its suffix says."""
+    lower = name.strip().lower()
+    unit = unit or max((unit for unit in UNITS[quantity] if lower.endswith("_" + unit)), key=len, default="")
+    if quantity == "heading":
+        base = lower.removesuffix("_" + unit)
+        if unit in ("north_deg", "cw_deg") or base in CLOCKWISE:
+            return Column(name, 1.0 if unit == "rad" else math.pi / 180.0, clockwise=True)
+        return Column(name, UNITS["heading"].get(unit, 1.0))
+    if quantity == "time" and not unit and lower == "gentime":
+        return Column(name, 1e-6)
+    return Column(name, UNITS[quantity].get(unit, 1.0))

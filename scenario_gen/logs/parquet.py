@@ -1,0 +1,140 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parquet through Arrow, column by column: only what is needed is read, and every kind of column is taken or refused by name.
+
+What pandas leaves in a file about its own types is not needed and not believed.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from pyarrow import compute, parquet
+
+from scenario_gen.errors import InputError
+from scenario_gen.guard import guarded
+from scenario_gen.logs.budgets import check_size
+from scenario_gen.logs.columns import Column, find_columns
+from scenario_gen.logs.config import LogConfig
+
+BATCH = 1 << 16  # rows
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # of the units of time in Arrow
+
+
+def read_columns(path: Path, before: int, config: LogConfig) -> tuple[pd.DataFrame, dict[str, Column]]:
+    """Read the columns that are needed; `before` rows were read from other files.
+
+    Returns:
+        A table of numbers and texts, and the columns with the factors to our units; those of times as Arrow says.
+
+    Raises:
+        InputError: the file is damaged or too large, or a column is of no kind that its quantity can have.
+    """
+    with guarded(f"{path} cannot be read as a Parquet table"):
+        schema = parquet.read_schema(path)
+        names = list(schema.names)
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{path} has more than one column {name!r}; rename all but one")
+    columns = find_columns(names, path, config.columns)
+    batches = read_batches(path, schema, sorted({column.name for column in columns.values()}), before, config)
+    frame, found = {}, {}
+    for quantity, column in columns.items():
+        with guarded(f"{path}, column {column.name!r} ({quantity}) cannot be read"):
+            values = pa.chunked_array([batch.column(column.name) for batch in batches])
+        factor = unit_of(values.type) if quantity == "time" else None
+        check_kind(values, quantity, column, path)
+        with guarded(f"{path}, column {column.name!r} ({quantity}) cannot be read"):
+            frame[column.name] = to_series(values)
+        found[quantity] = column if factor is None else replace(column, factor=factor)
+    return pd.DataFrame(frame), found
+
+
+def read_batches(path: Path, schema: pa.Schema, names: list[str], before: int, config: LogConfig) -> list[Any]:
+    """Read some columns batch by batch; texts as dictionaries, so that one that repeats takes its room once.
+
+    Raises:
+        InputError: the file is damaged or too large.
+    """
+    texts = [name for name in names if is_text(schema.field(name).type)]
+    with guarded(f"{path} cannot be read as a Parquet table"):
+        file = parquet.ParquetFile(path, read_dictionary=texts)
+        groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
+        parts = [group.column(k) for group in groups for k in range(group.num_columns)]
+        declared = sum(max(part.total_uncompressed_size, 0) for part in parts if part.path_in_schema.split(".")[0] in names)
+        rows, source = file.metadata.num_rows, file.iter_batches(BATCH, columns=names, use_threads=False)
+    check_size(str(path), declared, before + rows, config)
+    found: list[Any] = []
+    rows = size = 0
+    while True:
+        with guarded(f"{path} cannot be read as a Parquet table, after row {rows}"):
+            batch = next(source, None)
+            if batch is None:
+                break
+            rows, size = rows + batch.num_rows, size + batch.nbytes
+        check_size(str(path), size, before + rows, config)
+        found.append(batch)
+    if not rows:
+        raise InputError(f"{path} has a header but no rows")
+    return found
+
+
+def is_text(kind: pa.DataType) -> bool:
+    """Return whether a type of Arrow is text."""
+    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind))
+
+
+def unit_of(kind: pa.DataType) -> float | None:
+    """Return the seconds of a date's or timestamp's unit, None for other types."""
+    if pa.types.is_timestamp(kind):
+        return SECONDS[kind.unit]
+    if pa.types.is_date(kind):
+        return 86400.0 if pa.types.is_date32(kind) else SECONDS["ms"]
+    return None
+
+
+def check_kind(values: pa.ChunkedArray, quantity: str, column: Column, path: Path) -> None:
+    """Refuse a column that holds neither numbers nor texts, nor times where those are wanted.
+
+    Raises:
+        InputError: it does; names the column and its type.
+    """
+    kind = values.type.value_type if pa.types.is_dictionary(values.type) else values.type
+    sound = is_text(kind) or any(
+        is_kind(kind) for is_kind in (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.types.is_null)
+    )
+    if not (sound or (quantity == "time" and unit_of(kind) is not None)):
+        raise InputError(f"{path}, column {column.name!r} ({quantity}): a {kind} is no {quantity}; name another column")
+
+
+def to_series(values: pa.ChunkedArray) -> "pd.Series[Any]":
+    """Return numbers (integers stay exact, and may be missing) or texts; times as integers of their unit."""
+    if pa.types.is_dictionary(values.type):
+        if is_text(values.type.value_type):
+            return values.to_pandas().astype(object)
+        values = compute.cast(values, values.type.value_type)
+    if pa.types.is_null(values.type):
+        return pd.Series(np.full(len(values), np.nan))
+    if is_text(values.type):
+        return values.to_pandas()
+    if pa.types.is_date32(values.type):
+        values = values.cast(pa.int32())
+    if not (unit_of(values.type) or pa.types.is_integer(values.type)):
+        return values.cast(pa.float64(), safe=False).to_pandas()
+    whole = pa.uint64() if pa.types.is_uint64(values.type) else pa.int64()
+    return values.cast(whole).to_pandas(types_mapper={pa.int64(): pd.Int64Dtype(), pa.uint64(): pd.UInt64Dtype()}.get)

@@ -1,0 +1,21 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Bags of rosbag2, MCAP and SQLite, whole and damaged, read with bounds; no message is decoded here."""
+
+from scenario_gen.storage.bag import open_bag, StoredBag, StoredMessage, StoredTopic
+from scenario_gen.storage.config import BagConfig
+from scenario_gen.storage.files import BagFiles, files_of, remark
+
+__all__ = ["BagConfig", "BagFiles", "StoredBag", "StoredMessage", "StoredTopic", "files_of", "open_bag", "remark"]

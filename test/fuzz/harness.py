@@ -1,0 +1,282 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Fuzzing: readers get damaged inputs, and nothing but an error of ours may come out, in little time and little memory.
+
+A target is a reader with valid inputs and ways to damage them (modules `targets_*.py`). Input number k of a target is made from
+k alone, so a run can be stopped and go on, and a failure can be made again. Executions happen in a child process that is forked
+once and tells its parent which number it is at; so a crash of native code or a hang is seen and known by its input.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+import contextlib
+from dataclasses import asdict, dataclass, field
+import importlib
+import json
+import mmap
+import os
+from pathlib import Path
+import random
+import re
+import resource
+import shutil
+import signal
+import struct
+import tempfile
+import time
+import traceback
+import warnings
+
+from scenario_gen.errors import LONGEST, ScenarioGenError
+
+HERE = Path(__file__).resolve().parent
+DATA = Path(os.environ.get("SCENARIO_GEN_DATA", HERE.parents[2] / "shared" / "data"))
+CRASHES = DATA.parent / "crashes"
+SECONDS = 5.0  # of CPU that one execution may take
+MEMORY = 1 << 30  # bytes that the process may hold at its peak
+HEADROOM = 3 << 30  # bytes of address space that an execution may ask for: more is refused, so that the machine lives on
+SILENT = 60.0  # s without progress after which the child hangs outside of Python
+BATCH = 5000  # executions of one child
+
+Mutator = Callable[[random.Random, bytes, Sequence[bytes]], bytes]
+
+
+@dataclass(frozen=True)
+class Target:
+    """A reader to fuzz.
+
+    Attributes:
+        name: for people and for the names of files.
+        seeds: valid inputs; gets an empty folder to make them in.
+        run: reads an input; gets an empty folder to put it in. An error of ours is as good as a result.
+        mutators: ways to damage an input: (random numbers, input, all seeds) -> input.
+        crashes: globs of files below shared/crashes that are seeds, too.
+    """
+
+    name: str
+    seeds: Callable[[Path], Sequence[bytes]]
+    run: Callable[[bytes, Path], object]
+    mutators: Sequence[Mutator]
+    crashes: Sequence[str] = ()
+
+
+@dataclass
+class Failure:
+    """What came out where nothing but an error of ours may: the first input that shows it, and how many there were."""
+
+    signature: str
+    message: str
+    file: str
+    count: int = 1
+
+
+@dataclass
+class Record:
+    """How far the fuzzing of a target has come."""
+
+    target: str
+    executions: int = 0
+    seconds: float = 0.0
+    failures: dict[str, Failure] = field(default_factory=dict)
+
+
+class OverTimeError(BaseException):
+    """An execution took too long; no handler of `Exception` may swallow it."""
+
+
+def targets() -> dict[str, Target]:
+    """Return all targets by name."""
+    modules = [importlib.import_module(path.stem) for path in sorted(HERE.glob("targets_*.py"))]
+    return {target.name: target for module in modules for target in module.TARGETS}
+
+
+def corpus(target: Target) -> list[bytes]:
+    """Return the valid inputs of a target and the files that once broke it."""
+    with tempfile.TemporaryDirectory() as folder:
+        seeds = list(target.seeds(Path(folder)))
+    files = sorted(file for pattern in target.crashes for file in CRASHES.glob(pattern) if file.is_file())
+    return seeds + [file.read_bytes() for file in files]
+
+
+def damaged(target: Target, seeds: Sequence[bytes], number: int) -> bytes:
+    """Return input `number` of a target: first the seeds as they are, then damaged ones."""
+    if number < len(seeds):
+        return seeds[number]
+    rng = random.Random(f"{target.name}/{number}")
+    data = rng.choice(seeds)
+    for _ in range(rng.choice((1, 1, 1, 2, 3, 6))):
+        data = rng.choice(target.mutators)(rng, data, seeds)
+    return data
+
+
+def execute(target: Target, data: bytes, folder: Path) -> tuple[str, str] | None:
+    """Run a target on one input in this process; return signature and message of what must not come out, or None."""
+    folder.mkdir()
+    signal.setitimer(signal.ITIMER_PROF, SECONDS)
+    try:
+        target.run(data, folder)
+    except ScenarioGenError as error:
+        said = str(error)
+        if not 0 < len(said) <= LONGEST:
+            return "LongMessage", f"{len(said)} characters: {said[:200]}"
+    except (Exception, OverTimeError) as error:
+        return signature(error), str(error)[:LONGEST]
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        shutil.rmtree(folder, ignore_errors=True)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    return ("Memory", f"{peak / 2**20:.0f} MiB at the peak") if peak > MEMORY else None
+
+
+def signature(error: BaseException) -> str:
+    """Return kind and place of an error: where it left our code, and where it was raised."""
+    frames = traceback.extract_tb(error.__traceback__)
+    places = [f"{Path(frame.filename).name}:{frame.lineno} {frame.name}" for frame in frames]
+    ours = [
+        place for place, frame in zip(places, frames, strict=True) if re.search("scenario_gen/|msg_conventions/", frame.filename)
+    ]
+    return f"{type(error).__name__} @ {(ours or places)[-1]} <- {places[-1]}"
+
+
+def over_time(_signal: int, _frame: object) -> None:
+    """Interrupt an execution."""
+    raise OverTimeError(f"more than {SECONDS:g} s")
+
+
+def child(target: Target, seeds: Sequence[bytes], first: int, last: int, progress: mmap.mmap, pipe: int) -> None:
+    """Execute inputs `first` to before `last`; write the number of each before it runs, and failures to the pipe."""
+    warnings.simplefilter("ignore")
+    signal.signal(signal.SIGPROF, over_time)
+    size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (size + HEADROOM, size + HEADROOM))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    quiet = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(quiet, 1)
+    os.dup2(quiet, 2)
+    with tempfile.TemporaryDirectory() as scratch, os.fdopen(pipe, "w") as out:
+        for number in range(first, last):
+            progress[:8] = struct.pack("<q", number)
+            found = execute(target, damaged(target, seeds, number), Path(scratch) / "input")
+            if found:
+                out.write(json.dumps([number, *found]) + "\n")
+                out.flush()
+                if found[0] == "Memory":  # the peak stays: a new child has its own
+                    return
+        progress[:8] = struct.pack("<q", last)
+
+
+def batch(target: Target, seeds: Sequence[bytes], first: int, last: int, until: float) -> Iterator[tuple[int, str, str] | int]:
+    """Fork a child for some executions.
+
+    Yields:
+        Its failures as (number, signature, message), and at last the number to go on at.
+    """
+    progress = mmap.mmap(-1, 8)
+    progress[:8] = struct.pack("<q", first)
+    reading, writing = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        code = 1
+        try:
+            os.close(reading)
+            child(target, seeds, first, last, progress, writing)
+            code = 0
+        finally:
+            os._exit(code)
+    os.close(writing)
+    status, died = watch(pid, progress, until)
+    number = int(struct.unpack("<q", progress[:8])[0])
+    with os.fdopen(reading) as lines:
+        found = [json.loads(line) for line in lines if line.endswith("\n")]
+    yield from (tuple(entry) for entry in found)
+    if died:
+        yield number, died, ""
+        number += 1
+    elif found and found[-1][0] == number:  # it stopped by itself after this one
+        number += 1
+    elif status and number < last and not os.WIFSIGNALED(status):
+        yield number, f"exit code {os.waitstatus_to_exitcode(status)}", ""
+        number += 1
+    yield number
+
+
+def watch(pid: int, progress: mmap.mmap, until: float) -> tuple[int, str]:
+    """Wait for a child; return its status, and what killed it, if that was its input."""
+    seen, since = progress[:8], time.monotonic()
+    while True:
+        done, status = os.waitpid(pid, os.WNOHANG)
+        if done:
+            return status, f"signal {os.WTERMSIG(status)}" if os.WIFSIGNALED(status) else ""
+        now = time.monotonic()
+        if progress[:8] != seen:
+            seen, since = progress[:8], now
+            over = now > until
+        else:
+            over = now - since > SILENT
+        if over:
+            os.kill(pid, signal.SIGKILL)
+            os.waitpid(pid, 0)
+            return status, "hangs in native code" if now - since > SILENT else ""
+        time.sleep(0.01)
+
+
+def fuzz(target: Target, state: Path, executions: int, seconds: float) -> Record:
+    """Fuzz a target until it has had so many executions or so much time, those of earlier runs on `state` included.
+
+    Args:
+        target: the reader.
+        state: folder that keeps progress and the inputs that failed.
+        executions: at most so many.
+        seconds: at most so long (real time; ends after the execution that runs).
+
+    Returns:
+        What was done so far.
+    """
+    state.mkdir(parents=True, exist_ok=True)
+    record = load(state, target.name)
+    seeds = corpus(target)
+    while record.executions < executions and record.seconds < seconds:
+        started = time.monotonic()
+        last = min(record.executions + BATCH, executions)
+        for found in batch(target, seeds, record.executions, last, started + seconds - record.seconds):
+            if isinstance(found, int):
+                record.executions = found
+                continue
+            number, kind, message = found
+            known = record.failures.get(kind)
+            if known:
+                known.count += 1
+                continue
+            file = state / f"{target.name}_{re.sub(r'[^0-9A-Za-z]+', '_', kind)[:100]}"
+            file.write_bytes(damaged(target, seeds, number))
+            record.failures[kind] = Failure(kind, message, file.name)
+        record.seconds += time.monotonic() - started
+        save(state, record)
+    return record
+
+
+def load(state: Path, name: str) -> Record:
+    """Return the record that a state folder keeps of a target, or an empty one."""
+    with contextlib.suppress(FileNotFoundError):
+        values = json.loads((state / f"{name}.json").read_text())
+        failures = {kind: Failure(**failure) for kind, failure in values["failures"].items()}
+        return Record(**(values | {"failures": failures}))
+    return Record(name)
+
+
+def save(state: Path, record: Record) -> None:
+    """Keep a record; a run that is stopped while writing leaves the one before."""
+    path = state / f"{record.target}.json"
+    path.with_suffix(".new").write_text(json.dumps(asdict(record), indent=2) + "\n")
+    path.with_suffix(".new").replace(path)

@@ -1,0 +1,247 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Ways to damage an input: bytes of any format, cells of a table in text, columns of Parquet, values of SQLite."""
+
+from collections.abc import Callable, Sequence
+import contextlib
+import io
+import math
+import random
+import re
+import sqlite3
+import struct
+import tempfile
+
+import pyarrow as pa
+from pyarrow import parquet as pq
+
+TEXTS = """nan NaN inf -inf 1e308 -1e308 1e-320 -0 0 1 -1 None null NA True false 9223372036854775807 9223372036854775808
+    -9223372036854775809 18446744073709551616 1e400 0x10 1_000 1,5 12:30:05 2024-02-30 9999-12-31 0001-01-01T00:00:00Z
+    2024-05-01T12:00:00+02:00 1700000000000 1700000000 １２ \u0660 é \ud7ff \u202e \x1b[31m \" \"\" ' a,b =1+1 \\ \U0001f697"""
+NUMBERS = (*re.split(r"\s+", TEXTS), "", " ", "a\tb", "1" * 400, "x" * 3000)
+WORDS = (
+    *(text.encode("utf-8", "surrogatepass") for text in NUMBERS),
+    *(
+        b"\x00",
+        b"\x00" * 8,
+        b"\xff" * 4,
+        b"\xff" * 8,
+        b"\xef\xbb\xbf",
+        b"\xff\xfe",
+        b"\n",
+        b"\r",
+        b"\r\n",
+        b",",
+        b";",
+        b"\t",
+        b"#",
+    ),
+    *(struct.pack("<d", value) for value in (math.nan, math.inf, 1e308, -0.0, 5e-324)),
+    *(struct.pack("<q", value) for value in (-(2**63), 2**63 - 1, 2**31, 2**32 - 1)),
+)
+REALS = (None, 0.0, -1.0, 1e308, -0.0, 5e-324, math.nan, math.inf, -math.inf, 2.0**53)
+WHOLE = (None, 0, 1, -1, 127, 2**31, 2**53, 2**62, 2**63 - 1, -(2**63))
+TYPES = (
+    *(pa.int8(), pa.int64(), pa.uint64(), pa.uint8(), pa.float32(), pa.float64(), pa.float16(), pa.bool_(), pa.null()),
+    *(pa.string(), pa.large_string(), pa.binary(), pa.dictionary(pa.int32(), pa.string()), pa.decimal128(38, 6)),
+    *(pa.timestamp("s"), pa.timestamp("ms", "UTC"), pa.timestamp("us"), pa.timestamp("us", "Europe/Berlin"), pa.timestamp("ns")),
+    *(pa.timestamp("ns", "+05:30"), pa.date32(), pa.date64(), pa.time32("ms"), pa.time64("ns"), pa.duration("us")),
+    *(pa.list_(pa.int64()), pa.struct([("a", pa.int64())]), pa.map_(pa.string(), pa.int64())),
+)
+PANDAS = (b"{}", b"[]", b"null", b"{", b'{"columns": 3, "index_columns": []}', b'{"index_columns": ["t_s"], "columns": []}')
+
+
+def flip(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Change a few bits or bytes."""
+    out = bytearray(data)
+    for _ in range(rng.choice((1, 1, 2, 4, 16, 64))):
+        if out:
+            at = rng.randrange(len(out))
+            out[at] = rng.choice((out[at] ^ (1 << rng.randrange(8)), rng.randrange(256), 0, 255))
+    return bytes(out)
+
+
+def cut(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Cut off the end, or a piece out of the middle."""
+    if not data:
+        return data
+    at = rng.randrange(len(data))
+    return data[:at] if rng.random() < 0.5 else data[:at] + data[at + rng.choice((1, 2, 4, 8, rng.randrange(len(data)) + 1)) :]
+
+
+def splice(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Put a piece of a seed, or of itself, somewhere."""
+    other = rng.choice((data, rng.choice(seeds)))
+    if not other or not data:
+        return other
+    begin, at = rng.randrange(len(other)), rng.randrange(len(data))
+    piece = other[begin : begin + rng.choice((1, 4, 16, 64, 256, 1024, 4096))]
+    return data[:at] + piece + data[at + (len(piece) if rng.random() < 0.7 else 0) :]
+
+
+def token(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Write or insert a word that readers know."""
+    word, at = rng.choice(WORDS), rng.randrange(len(data) + 1)
+    return data[:at] + word + data[at + (len(word) if rng.random() < 0.7 else 0) :]
+
+
+def integer(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Write an extreme length or number of 1, 2, 4 or 8 bytes, or one near the one that is there."""
+    size = rng.choice((1, 2, 4, 8))
+    if len(data) < size:
+        return data
+    at, order = rng.randrange(len(data) - size + 1), rng.choice(("little", "big"))
+    there = int.from_bytes(data[at : at + size], order)
+    top = 1 << 8 * size
+    value = (
+        rng.choice((0, 1, top - 1, top // 2, top // 2 - 1, there + 1, there - 1, there * 2, there << 8, rng.randrange(top))) % top
+    )
+    return data[:at] + value.to_bytes(size, order) + data[at + size :]
+
+
+BYTES = (flip, cut, splice, token, integer)
+
+
+def lines_of(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Shuffle, repeat, reverse, drop or exchange the lines of a text."""
+    lines = data.split(b"\n")
+    head, rows = lines[:1], lines[1:]
+    match rng.randrange(6):
+        case 0:
+            rng.shuffle(rows)
+        case 1:
+            rows *= rng.choice((2, 5))
+        case 2:
+            rows.reverse()
+        case 3:
+            rows = rows[:: rng.choice((2, 3, 10, 50))]
+        case 4:
+            head, rows = [], lines
+        case _:
+            rows.insert(rng.randrange(len(rows) + 1), rng.choice(lines))
+    return b"\n".join(head + rows)
+
+
+def cells(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Write words into cells: one, some or all of a column, or the header; scale or shift numbers."""
+    table = [line.split(b",") for line in data.split(b"\n")]
+    full = [k for k, row in enumerate(table) if len(row) > 1]
+    if not full:
+        return token(rng, data, seeds)
+    column = rng.randrange(len(table[full[0]]))
+    one, some = [rng.choice(full)], rng.sample(full, max(len(full) // 3, 1))
+    rows = rng.choice((one, one, one, full[1:], some, full[:1]))
+    word = rng.choice(NUMBERS).encode("utf-8", "surrogatepass")
+    factor = rng.choice((0.0, -1.0, 1e-9, 1e-3, 10.0, 1e3, 1e6, 1e9, 1e300, 1.0000001))
+    written: Callable[[bytes], bytes] = lambda _: word  # noqa: E731
+    multiplied: Callable[[bytes], bytes] = lambda cell: scaled(cell, factor, 0.0)  # noqa: E731
+    shifted: Callable[[bytes], bytes] = lambda cell: scaled(cell, 1.0, factor)  # noqa: E731
+    change = rng.choice((written, written, multiplied, shifted))
+    for k in rows:
+        if column < len(table[k]):
+            table[k][column] = change(table[k][column])
+    return b"\n".join(b",".join(row) for row in table)
+
+
+def scaled(cell: bytes, factor: float, shift: float) -> bytes:
+    """Return a cell with its number multiplied and shifted; other cells as they are."""
+    try:
+        return repr(float(cell) * factor + shift).encode()
+    except ValueError:
+        return cell
+
+
+TEXT = (*BYTES, lines_of, cells, cells, cells)
+
+
+def columns(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Write a Parquet table anew with a column of another type, other values, another name, or none; with other metadata."""
+    try:
+        table = changed(rng, pq.read_table(io.BytesIO(data), use_threads=False))
+        out = io.BytesIO()
+        packing = rng.choice(("none", "snappy", "gzip", "zstd"))
+        pq.write_table(table, out, compression=packing, use_dictionary=rng.random() < 0.5)
+    except Exception:  # it is damaged already, or there is no such conversion
+        return rng.choice(BYTES)(rng, data, seeds)
+    return out.getvalue()
+
+
+def changed(rng: random.Random, table: pa.Table) -> pa.Table:
+    """Return an Arrow table with one thing wrong."""
+    at = rng.randrange(table.num_columns)
+    name, values = table.column_names[at], table.column(at)
+    match rng.randrange(8):
+        case 0:
+            return table.set_column(at, name, values.cast(rng.choice(TYPES), safe=False))
+        case 1:
+            few = rng.choice((WHOLE, REALS, NUMBERS))
+            return table.set_column(at, name, pa.array([rng.choice(few) for _ in range(len(values))]))
+        case 2:
+            return table.set_column(
+                at, name, pa.array([None if rng.random() < 0.1 else v.as_py() for v in values], type=values.type)
+            )
+        case 3:
+            numbers = values.cast(pa.float64(), safe=False).to_numpy() * rng.choice((0.0, -1.0, 1e-9, 1e3, 1e6, 1e9, 1e300))
+            return table.set_column(at, name, pa.array(numbers).cast(values.type, safe=False))
+        case 4:
+            names = [*table.column_names, "t_s", "time", "utc", "lat", "id", "speed", "", "\x00", "x" * 3000]
+            return table.set_column(at, rng.choice(names), values)
+        case 5:
+            return table.remove_column(at)
+        case 6:
+            return table.replace_schema_metadata({b"pandas": rng.choice(PANDAS)})
+        case _:
+            return table.take([rng.randrange(table.num_rows) for _ in range(table.num_rows)])
+
+
+def records(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Change an SQLite file through SQL: values of any type in any column, columns and tables renamed, added or dropped."""
+    try:
+        with tempfile.NamedTemporaryFile(suffix=".db3") as file:
+            file.write(data)
+            file.flush()
+            with contextlib.closing(sqlite3.connect(file.name)) as base:
+                base.text_factory = bytes
+                base.execute("pragma journal_mode = off")
+                statement, values = sentence(rng, base)
+                base.execute(statement, values)
+                base.commit()
+            file.seek(0)
+            return file.read()
+    except (sqlite3.Error, UnicodeError, IndexError, OverflowError, ValueError):
+        return rng.choice(BYTES)(rng, data, seeds)
+
+
+def sentence(rng: random.Random, base: sqlite3.Connection) -> tuple[str, tuple[object, ...]]:
+    """Return an SQL statement that damages one table, with its values."""
+    table = rng.choice([name.decode() for (name,) in base.execute("select name from sqlite_master where type = 'table'")])
+    column = rng.choice([entry[1].decode() for entry in base.execute(f'pragma table_info("{table}")')])
+    value = rng.choice(
+        (*WHOLE, *REALS, "text", "", b"", b"\xff\x00", b"\x00\x01\x00\x00", "é" * 2000, rng.randbytes(40), "{", "[]")
+    )
+    name = rng.choice(("id", "data", "x", "timestamp", "name", "type", "topic_id"))
+    some = f"rowid * {rng.randrange(1, 97)} % 97 < {rng.choice((1, 10, 97))}"
+    return rng.choice(
+        (
+            (f'update "{table}" set "{column}" = ? where {some}', (value,)),
+            (f'update "{table}" set "{column}" = ? where {some}', (value,)),
+            (f'alter table "{table}" rename column "{column}" to "{name}"', ()),
+            (f'alter table "{table}" drop column "{column}"', ()),
+            (f'alter table "{table}" rename to "{name}"', ()),
+            (f'drop table "{table}"', ()),
+            (f'delete from "{table}" where {some}', ()),
+            (f'insert into "{table}" select * from "{table}" limit 3', ()),
+        )
+    )

@@ -1,0 +1,154 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The readers of logs as targets: tables in text and Parquet, basic safety messages, bags in MCAP and SQLite."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from harness import Target
+from mutators import BYTES, columns, records, TEXT
+import numpy as np
+import pandas as pd
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+
+from msg_conventions.odometry import encode_state
+from msg_conventions.tracks import encode_tracks
+from msg_conventions.tracks import TYPE as TRACKS
+from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs.bag import ODOMETRY, STORES
+from scenario_gen.logs.files import COLUMNS
+from scenario_gen.logs.synthetic import bundled
+
+SHORT = LogConfig(shortest=1.0, travel=1.0)
+
+
+def cars() -> pd.DataFrame:
+    """Rows of two cars that meet: 6 s at 10 Hz, one driving east at 8 m/s, one driving north and braking."""
+    time = np.arange(61) / 10.0
+    east = {"t_s": 1000.0 + time, "vehicle_id": "a", "x_m": 8.0 * time - 40.0, "y_m": 0.0, "speed_mps": 8.0, "heading_rad": 0.0}
+    braking = 6.0 * time - 0.5 * time**2
+    north = {
+        "t_s": 1000.0 + time,
+        "vehicle_id": "b",
+        "x_m": 10.0,
+        "y_m": braking - 30.0,
+        "speed_mps": 6.0 - time,
+        "heading_rad": 1.57,
+    }
+    return (
+        pd.concat([pd.DataFrame(east), pd.DataFrame(north).assign(heading_rad=1.57)])
+        .sort_values(["t_s", "vehicle_id"], ignore_index=True)
+        .round(3)
+    )
+
+
+def on_globe(rows: pd.DataFrame) -> pd.DataFrame:
+    """The same rows with latitude and longitude, stamps in milliseconds since 1970, speeds in km/h and headings as courses."""
+    return pd.DataFrame(
+        {
+            "time_ms": (1_700_000_000_000 + rows["t_s"] * 1000.0).round().astype(np.int64),
+            "id": (rows["vehicle_id"] == "a") + 7,
+            "latitude": (48.0 + rows["y_m"] / 111_320.0).round(8),
+            "longitude": (11.0 + rows["x_m"] / 74_490.0).round(8),
+            "speed_kmh": rows["speed_mps"] * 3.6,
+            "course": 90.0 - np.degrees(rows["heading_rad"]),
+        }
+    )
+
+
+def variants() -> list[pd.DataFrame]:
+    """Tables with stamps of different kinds."""
+    rows = cars()
+    dates = pd.to_datetime(rows["t_s"], unit="s", utc=True)
+    return [
+        rows,
+        on_globe(rows),
+        rows.assign(timestamp=dates.astype(str)).drop(columns="t_s"),
+        rows.assign(timestamp=dates).drop(columns="t_s"),
+        rows.assign(time_ns=(rows["t_s"] * 1e9).round().astype(np.int64).astype("Int64")).drop(columns="t_s"),
+    ]
+
+
+def texts(_folder: Path) -> list[bytes]:
+    """Tables in text with commas, semicolons and tabs."""
+    tables = [rows.to_csv(index=False).encode() for rows in variants()[:3]]
+    return [*tables, cars().to_csv(index=False, sep=";").encode(), cars().to_csv(index=False, sep="\t").encode()]
+
+
+def parquets(_folder: Path) -> list[bytes]:
+    """Parquet tables, one of them with its stamps as pandas' index."""
+    return [rows.to_parquet() for rows in (*variants(), cars().set_index("t_s"))]
+
+
+def safety_messages(_folder: Path) -> list[bytes]:
+    """Basic safety messages of two units."""
+    rows = on_globe(cars())
+    table = pd.DataFrame(0, index=rows.index, columns=list(COLUMNS)).astype(object)
+    table["TxDevice"], table["Gentime"] = rows["id"], 300_000_000_000_000 + (cars()["t_s"] * 1e6).round().astype(np.int64)
+    table["Latitude"], table["Longitude"] = rows["latitude"], rows["longitude"]
+    table["Speed"], table["Heading"] = cars()["speed_mps"], rows["course"]
+    return [table.to_csv(index=False, header=False).encode()]
+
+
+def bags(storage: StoragePlugin, folder: Path) -> list[bytes]:
+    """Bags of one storage: streams of fixes and speeds, odometry of two vehicles, and a message of tracks; a few seconds each."""
+    (folder / "log.csv").write_bytes(texts(folder)[0])
+    (encounter,) = read_log(folder / "log.csv", SHORT).encounters
+    with Reader(bundled("b")) as reader:
+        until = reader.start_time + 7 * 10**9
+        streams = [(c.topic, c.msgtype, stamp, bytes(data)) for c, stamp, data in reader.messages(stop=until)]
+    tracks = [("/tracks", TRACKS, until, encode_tracks(encounter))]
+    odometry = []
+    for vehicle, *track in zip(encounter.vehicles, encounter.position, encounter.heading, encounter.speed, strict=True):
+        for k, state in enumerate(np.column_stack(track)):
+            stamp = encounter.start_ns + k * encounter.dt_ns
+            odometry.append((f"/vehicle_{vehicle.id}/odom", ODOMETRY, stamp, encode_state(state, "car", "map", stamp)))
+    return [written(folder / name, storage, content) for name, content in (("s", streams), ("t", tracks), ("o", odometry))]
+
+
+def written(bag: Path, storage: StoragePlugin, messages: Sequence[tuple[str, str, int, bytes]]) -> bytes:
+    """Write messages (topic, type, stamp, CDR bytes) as a bag; return its one file."""
+    with Writer(bag, version=9, storage_plugin=storage) as writer:
+        kinds = {topic: kind for topic, kind, _, _ in messages}
+        connections = {topic: writer.add_connection(topic, kind, typestore=STORES) for topic, kind in kinds.items()}
+        for topic, _, stamp, data in messages:
+            writer.write(connections[topic], stamp, data)
+    (file,) = (file for file in bag.iterdir() if file.suffix in (".mcap", ".db3"))
+    return file.read_bytes()
+
+
+def read_as(name: str, config: LogConfig = SHORT) -> Callable[[bytes, Path], None]:
+    """Return a target's `run` that reads the input as a log of this file name."""
+
+    def run(data: bytes, folder: Path) -> None:
+        (folder / name).write_bytes(data)
+        read_log(folder / name, config)
+
+    return run
+
+
+NAMELESS = replace(SHORT, columns="speed=none,vehicle=none")
+SPMD = replace(SHORT, format="spmd")
+TARGETS = (
+    Target("table", texts, read_as("log.csv"), TEXT, ("table/*.csv", "table_*.csv")),
+    Target("table_asked", texts, read_as("log.txt", NAMELESS), TEXT, ("table/*.csv",)),
+    Target("spmd", safety_messages, read_as("log.csv"), TEXT, ("spmd/*.csv", "spmd_*.csv")),
+    Target("spmd_asked", safety_messages, read_as("log.csv", SPMD), TEXT, ("spmd/*.csv",)),
+    Target("parquet", parquets, read_as("log.parquet"), (*BYTES, *[columns] * 5), ("parquet/*", "*.parquet")),
+    Target("mcap_log", partial(bags, StoragePlugin.MCAP), read_as("log.mcap"), BYTES, ("mcap_reader/*", "*.mcap")),
+    Target("sqlite_log", partial(bags, StoragePlugin.SQLITE3), read_as("log.db3"), (*BYTES, *[records] * 5), ("sqlite/*",)),
+)
