@@ -140,7 +140,8 @@ class PrimitiveLibrary:
                 raise InputError(f"{what}: {name} holds probabilities; each {one} must sum to 1, not {np.ravel(sums)[0]:g}")
         with guarded(f"{what}: covariances", remedy="each must be symmetric and positive definite"):
             covariances = np.array(values["covariances"])
-            np.linalg.cholesky(covariances)
+            for covariance in covariances:
+                exact.cholesky(covariance)
         if not np.allclose(covariances, covariances.swapaxes(1, 2)):
             raise InputError(f"{what}: covariances must be symmetric")
         known = {name: values[name] for name in cls.__dataclass_fields__}

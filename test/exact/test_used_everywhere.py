@@ -47,10 +47,14 @@ SCIPY = {  # that only add, multiply and compare
 SPARSE = {"scenario_gen/logs/motion.py"}  # @ of sparse matrices is a plain loop
 COUNTS = {  # sum() of whole numbers
     "scenario_gen/bags/evaluation.py",
+    "scenario_gen/bags/reindex.py",
     "scenario_gen/evaluation/evaluate.py",
     "scenario_gen/evaluation/report.py",
     "scenario_gen/evaluation/result.py",
     "scenario_gen/evaluation/summary.py",
+    "scenario_gen/logs/budgets.py",
+    "scenario_gen/logs/parquet.py",
+    "scenario_gen/storage/bag.py",
 }
 EXEMPT = {
     "scenario_gen/planning/ompl_solve.py": "OMPL's planners are not the same on every machine, and say so",
