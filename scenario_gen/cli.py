@@ -40,7 +40,7 @@ from scenario_gen.evaluation import Case, comparison_table, read_evaluations, Re
 from scenario_gen.evaluation import compare as compare_sets
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.parameters import assigned, flatten, read_parameter_file, updated
+from scenario_gen.parameters import assigned, flatten, loaded
 from scenario_gen.pipeline import generate as run_pipeline
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.requests import Request
@@ -72,7 +72,7 @@ def configured(parameters: Path | None, assignments: list[str]) -> PipelineConfi
     """
     config = PipelineConfig()
     if parameters is not None:
-        config = updated(config, read_parameter_file(parameters))
+        config = loaded(config, parameters)
     for assignment in assignments:
         config = assigned(config, assignment)
     return config

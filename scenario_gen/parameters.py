@@ -117,6 +117,19 @@ def assigned(config: Config, assignment: str) -> Config:
     return updated(config, {name: text if is_text else parse_yaml(text, f"--set {name}={shown(text)}")})
 
 
+def loaded(config: Config, path: Path) -> Config:
+    """Return a copy of `config` with what a parameter file sets.
+
+    Raises:
+        InputError: the file cannot be read, a name is unknown or a value does not suit; the message names file and parameter.
+    """
+    values = read_parameter_file(path)
+    try:
+        return updated(config, values)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
 def read_parameter_file(path: Path) -> dict[str, Any]:
     """Return {dotted name: value} of a ROS 2 parameter file (`/**: ros__parameters: ...`).
 

@@ -22,7 +22,7 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags.contents import read_namespaces
-from scenario_gen.bags.reader import DEFAULT
+from scenario_gen.bags.reader import DEFAULT, within
 from scenario_gen.bags.told import request_sentence, told_fit, told_numbers, told_requests, told_segmentation, told_values
 from scenario_gen.bags.validation import Reference
 from scenario_gen.errors import InputError
@@ -59,9 +59,9 @@ def bag_cases(
     if not whole:
         raise InputError(f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare")
     common = found.get("", {}).get(DIAGNOSTICS, [])  # nodes speak on one topic for all namespaces
-    return tuple(
-        _case(path, name, topics, common, config or EvaluationConfig(), limits, seed, bag) for name, topics in whole.items()
-    )
+    config = config or EvaluationConfig()
+    with within(path):
+        return tuple(_case(path, name, topics, common, config, limits, seed, bag) for name, topics in whole.items())
 
 
 def _case(

@@ -15,15 +15,17 @@
 """Any rosbag2 bag, MCAP or SQLite, as raw messages."""
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from msg_conventions.topics import Quality
+from scenario_gen.errors import InputError
 from scenario_gen.storage import BagConfig, open_bag
 from scenario_gen.storage import StoredMessage as BagMessage
 from scenario_gen.storage.qos import is_reliable, is_transient_local, profiles
 
-__all__ = ["BagMessage", "BagTopic", "bag_topics", "read_messages"]
+__all__ = ["BagMessage", "BagTopic", "bag_topics", "read_messages", "within"]
 
 DEFAULT = BagConfig()
 
@@ -36,6 +38,17 @@ class BagTopic:
     type: str
     quality: Quality
     count: int
+
+
+@contextmanager
+def within(path: Path) -> Iterator[None]:
+    """Name the bag in errors about what lies in it: a decoder knows the topic only."""
+    try:
+        yield
+    except InputError as error:
+        if str(path) in str(error):
+            raise
+        raise InputError(f"{path}: {error}") from error
 
 
 def bag_topics(path: Path, config: BagConfig = DEFAULT) -> tuple[BagTopic, ...]:

@@ -27,7 +27,7 @@ from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.bags.provenance import Config, read_parameters, sha256_of, versions
-from scenario_gen.bags.reader import BagMessage, DEFAULT, read_messages
+from scenario_gen.bags.reader import BagMessage, DEFAULT, read_messages, within
 from scenario_gen.bags.template import read_template
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.encounter import Encounter
@@ -87,7 +87,16 @@ def regenerate_scenario(
         InputError: the bag, the index, or something that is needed is not there or ambiguous; the log is another one.
         ScenarioGenError: it comes out differently (another version or processor); the message names what differs.
     """
-    found = _find(bag, index, namespace, request, config)
+    with within(bag):
+        return _regenerate(bag, _find(bag, index, namespace, request, config), index, log)
+
+
+def _regenerate(bag: Path, found: "_Found", index: int, log: Path | None) -> Regenerated:
+    """Make the scenario that was found.
+
+    Raises:
+        InputError, ScenarioGenError: as `regenerate_scenario`.
+    """
     what = f"{bag}: request {found.entry.values['request']}"
     account, seed = found.account.values, int(found.entry.values["seed"])
     asked = Request(**{name: account.get(name, "") for name in ("ego", "starts", "goals")})

@@ -44,7 +44,7 @@ from msg_conventions.scenarios import decode_scenario, digest, encode_scenario
 from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.bags.metadata import qos_yaml
-from scenario_gen.bags.reader import read_messages
+from scenario_gen.bags.reader import read_messages, within
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
@@ -149,6 +149,11 @@ def read_scenario_set(folder: Path, namespace: str = "") -> ScenarioSet:
     Raises:
         InputError: the bag cannot be read, no request was closed in it, or a scenario of the request is missing.
     """
+    with within(folder):
+        return _read_scenario_set(folder, namespace)
+
+
+def _read_scenario_set(folder: Path, namespace: str) -> ScenarioSet:
     wanted = (f"{namespace}/scenarios", f"{namespace}/scenarios/info")
     by_digest: dict[str, bytes] = {}
     entries: list[Status] = []

@@ -47,7 +47,7 @@ def read_template(messages: Mapping[str, bytes]) -> Template:
     """Return the template that the messages (by topic) describe; the road's entries and exits may be missing.
 
     Raises:
-        InputError: a message is damaged, or in another frame than the map.
+        InputError: a message is damaged, in another frame than the map, or missing.
     """
     encounter = decode_tracks(messages["tracks"])
     segmentation = decode_changepoints(messages["changepoints"], encounter)
@@ -57,6 +57,8 @@ def read_template(messages: Mapping[str, bytes]) -> Template:
     routes = []
     for name in tokens(vehicle.id for vehicle in encounter.vehicles):
         topic = vehicle_topic(name, "route")
+        if topic not in messages:
+            raise InputError(f"{topic} is missing, though tracks has a vehicle {name!r}")
         route_frame, route = decode_route(messages[topic], anchors, topic)
         if {frame, route_frame} != {road.frame_id}:
             raise InputError(f"{topic}: frame {route_frame!r}, fit {frame!r} and map {road.frame_id!r} must be one and the same")

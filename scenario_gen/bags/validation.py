@@ -36,7 +36,7 @@ from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.arrays import Floats
 from scenario_gen.bags.contents import Contents, read_namespaces
-from scenario_gen.bags.reader import DEFAULT
+from scenario_gen.bags.reader import DEFAULT, within
 from scenario_gen.errors import InputError
 from scenario_gen.interaction import Conflict, find_conflicts, find_waits, Wait
 from scenario_gen.roads.road import Road
@@ -130,7 +130,8 @@ def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = D
     found = {name: topics for name, topics in contents.items() if topics["scenarios"]}
     if not found:
         raise InputError(f"{path}: no topic `scenarios` in any namespace; there is nothing to check")
-    return tuple(_validate(namespace, topics, limits) for namespace, topics in found.items())
+    with within(path):
+        return tuple(_validate(namespace, topics, limits) for namespace, topics in found.items())
 
 
 def _validate(namespace: str, topics: Contents, limits: Limits | None) -> Validation:

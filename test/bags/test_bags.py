@@ -21,6 +21,7 @@ from pathlib import Path
 import subprocess
 import sys
 
+from bag_examples import hand_made_run
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 import numpy as np
@@ -37,44 +38,13 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags import bag_topics, BagWriter, read_messages, read_scenario_set, reindex, Run, Split, write_run
-from scenario_gen.encounter import Encounter, Vehicle
+from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
-from scenario_gen.fitting.result import Fit, FittedVehicle
-from scenario_gen.planning.route import Route
-from scenario_gen.roads.road import Road
-from scenario_gen.scenario import BoundaryStates, Cause, Scenario, ScenarioSet
-from scenario_gen.segmentation.result import Segmentation
 
 
 @pytest.fixture
 def run() -> Run:
-    """A small run, made by hand: two vehicles pass each other on a straight road."""
-    n, t, k = 2, 61, np.array([20, 45])
-    time = np.arange(t) * 0.1
-    x = np.stack([5.0 * time, 40.0 - 6.0 * time])
-    position = np.stack([x, np.array([[-2.0], [2.0]]) * np.ones_like(x)], axis=-1)
-    heading = np.array([[0.0], [np.pi]]) * np.ones_like(x)
-    speed = np.array([[5.0], [6.0]]) * np.ones_like(x)
-    vehicles = (Vehicle("1"), Vehicle("bus 2", 12.0, 2.5))
-    encounter = Encounter("made by hand", vehicles, 1_600_000_000_000_000_000, 100_000_000, position, heading, speed)
-    labels = np.searchsorted(k, np.arange(t), side="right")
-    segmentation = Segmentation(labels, k, np.isin(np.arange(t), k) * 0.9, ("a", "b", "c"))
-    index = np.array([0, *k, t - 1])
-    anchors = np.concatenate([position, heading[..., None]], axis=-1)[:, index]
-    fitted = tuple(FittedVehicle(a, np.zeros(4), np.zeros(3, dtype=bool), 1.0, "straight") for a in anchors)
-    states = np.concatenate([anchors, speed[:, index, None]], axis=-1)
-    asked = BoundaryStates(states[:, 0], states[:, -1])
-    fit = Fit(vehicles, fitted, index, asked, ("both keep right",))
-    routes = tuple(
-        Route(np.column_stack([p[::2], h[::2]]), np.array([0, 10, 22, 30]), np.abs(p[::2, 0] - p[0, 0]))
-        for p, h in zip(position[:, : t + 1], heading, strict=True)
-    )
-    road = Road("straight", np.ones((50, 300), dtype=bool), 0.2, np.array([-10.0, -5.0]), anchors[:, 0], anchors[:, -1])
-    scenarios = tuple(
-        Scenario(vehicles, time, position + 0.01 * i, heading, speed, np.zeros((n, t)), seed=7, index=i) for i in range(5)
-    )
-    result = ScenarioSet(5, scenarios, 8, Counter({Cause.OVERLAP: 3}))
-    return Run(encounter, road, segmentation, fit, routes, result, seed=7)
+    return hand_made_run()
 
 
 def test_every_message_decodes_in_every_reader(run, tmp_path):

@@ -1,0 +1,38 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Files that once broke a reader, as parameters of tests; where they are missing the test skips and says so."""
+
+from harness import CRASHES
+import pytest
+
+from scenario_gen.errors import InputError, LONGEST
+
+
+def crash_files(*patterns: str) -> list:
+    """Return one parameter per file; one that skips where there is none."""
+    found = sorted(file for pattern in patterns for file in CRASHES.glob(pattern) if file.is_file())
+    missing = pytest.mark.skip(reason=f"no files that broke a reader at {CRASHES}: {', '.join(patterns)}")
+    return [pytest.param(file, id=file.name) for file in found] or [pytest.param(None, marks=missing)]
+
+
+def is_refused(read, *said: str) -> bool:
+    """Whether reading ends in an error of ours, which names what it should; anything else that is raised goes on."""
+    try:
+        read()
+    except InputError as error:
+        assert 0 < len(str(error)) <= LONGEST
+        assert all(text in str(error) for text in said), str(error)
+        return True
+    return False

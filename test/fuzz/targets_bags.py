@@ -1,0 +1,390 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The readers of bags, maps, parameters and JSON as targets."""
+
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+import io
+import json
+from pathlib import Path
+import random
+import struct
+import tempfile
+
+from bag_examples import hand_made_run
+from harness import Target
+from mutators import BYTES, records, TEXT, TEXTS, WORDS
+import numpy as np
+from PIL import Image
+from rosbags.rosbag2 import StoragePlugin
+from targets_logs import bags
+
+from msg_conventions.topics import topic_entry
+from scenario_gen.bags import bag_topics, BagWriter, read_messages, read_scenario_set, reindex, write_run
+from scenario_gen.bags.evaluation import bag_cases
+from scenario_gen.bags.metadata import qos_yaml
+from scenario_gen.bags.regenerate import regenerate_scenario
+from scenario_gen.bags.told import told_provenance
+from scenario_gen.bags.validation import validate_bag
+from scenario_gen.errors import ScenarioGenError
+from scenario_gen.evaluation import compare, comparison_table, EvaluationConfig, read_evaluations
+from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
+from scenario_gen.parameters import assigned, flatten, loaded
+from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.results import as_run, provenance_of
+from scenario_gen.roads import build_road
+from scenario_gen.segmentation import assign, build_library, PrimitiveLibrary
+
+CONFIG = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False))
+PARTED = b"\n# ---- image ----\n"  # a map as one input: its YAML, this, and its image
+MAGIC = b"\x89MCAP0\r\n"
+OPCODE = struct.Struct("<BQ")
+
+
+def runs(folder: Path) -> list[bytes]:
+    """Bags of the conventions, with chunks and without compression."""
+    found = []
+    for k, options in enumerate(({}, {"compress": False, "chunk_bytes": 3000})):
+        whole = write_run(folder / "whole", hand_made_run())
+        with BagWriter(folder / f"bag{k}", **options) as bag:
+            for message in read_messages(whole):
+                bag.add_topic(message.topic, message.type, qos_yaml(topic_entry(message.topic)[1]))
+                bag.write(message.topic, message.data, message.stamp_ns)
+        found.append((folder / f"bag{k}" / f"bag{k}_0.mcap").read_bytes())
+    return found
+
+
+def generated(folder: Path) -> list[bytes]:
+    """A bag that a scenario can be made from again."""
+    (encounter,) = read_log([bundled("b")]).encounters
+    case = generate(encounter, "t_intersection", CONFIG, count=2, seed=7)
+    bag = write_run(folder / "bag", as_run(case, 7, "", provenance_of([bundled("b")], 7, 2, ["t_intersection"], CONFIG)))
+    return [(bag / "bag_0.mcap").read_bytes()]
+
+
+def messages(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Write a bag anew with messages damaged, dropped, twice, at other stamps or under other topics."""
+    try:
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            (folder / "in.mcap").write_bytes(data)
+            found = list(read_messages(folder / "in.mcap"))
+            chosen = {rng.randrange(len(found)) for _ in range(rng.choice((1, 1, 2, 5)))}
+            how = rng.randrange(8)
+            with BagWriter(folder / "out", compress=False) as bag:
+                for k, message in enumerate(found):
+                    topic, kind, content, stamp = message.topic, message.type, message.data, message.stamp_ns
+                    if k in chosen:
+                        if how == 0:
+                            continue
+                        if how == 1:
+                            topic = rng.choice(found).topic
+                        elif how == 2:
+                            stamp = rng.choice((0, 1, 2**62, stamp + 1, rng.randrange(2**40)))
+                        elif how == 3:
+                            content = rng.choice(found).data
+                        elif how == 4:
+                            kind = rng.choice(found).type
+                        else:
+                            content = rng.choice(BYTES)(rng, content, [message.data for message in found])
+                    bag.add_topic(topic, kind)
+                    bag.write(topic, content, stamp)
+            return (folder / "out" / "out_0.mcap").read_bytes()
+    except (ScenarioGenError, ValueError, IndexError):
+        return rng.choice(BYTES)(rng, data, seeds)
+
+
+def framing(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Drop, repeat, exchange or damage whole records of an MCAP file, or bytes inside of one."""
+    parts, at = [], len(MAGIC)
+    while at + OPCODE.size <= len(data) - len(MAGIC) and len(parts) < 10_000:
+        _opcode, length = OPCODE.unpack_from(data, at)
+        if length > len(data) - at:
+            break
+        parts.append(data[at : at + OPCODE.size + length])
+        at += OPCODE.size + length
+    if not parts:
+        return rng.choice(BYTES)(rng, data, seeds)
+    k, other = rng.randrange(len(parts)), rng.randrange(len(parts))
+    match rng.randrange(6):
+        case 0:
+            del parts[k]
+        case 1:
+            parts.insert(other, parts[k])
+        case 2:
+            parts[k], parts[other] = parts[other], parts[k]
+        case 3:
+            length = rng.choice((0, 1, 2**31, 2**32, 2**63, 2**64 - 1, rng.randrange(2**20)))
+            parts[k] = OPCODE.pack(rng.choice((parts[k][0], rng.randrange(256))), length) + parts[k][OPCODE.size :]
+        case 4:
+            inner = rng.choice(BYTES)(rng, parts[k][OPCODE.size :], seeds)
+            parts[k] = OPCODE.pack(parts[k][0], len(inner)) + inner
+        case _:
+            parts = parts[:k]
+    return MAGIC + b"".join(parts) + data[at:]
+
+
+MCAP = (*BYTES, *[framing] * 3)
+BAG = (*BYTES, framing, *[messages] * 6)
+
+
+def in_file(name: str, read: Callable[[Path], object]) -> Callable[[bytes, Path], None]:
+    """Return a target's `run` that reads the input as a file of this name."""
+
+    def run(data: bytes, folder: Path) -> None:
+        (folder / name).write_bytes(data)
+        read(folder / name)
+
+    return run
+
+
+def read_bag(path: Path) -> None:
+    """Read all that a bag has."""
+    for each in (lambda: bag_topics(path), lambda: list(read_messages(path)), lambda: told_provenance(path)):
+        with_errors(each)
+    read_scenario_set(path)
+
+
+def with_errors(call: Callable[[], object]) -> None:
+    """Call; an error of ours is not the end."""
+    try:
+        call()
+    except ScenarioGenError as error:
+        assert 0 < len(str(error)) <= 500
+
+
+def save_and_read(path: Path) -> None:
+    """Save what is whole, and read that: it must be a sound bag."""
+    saved = reindex(path.parent, path.parent / "saved")
+    try:
+        found = list(read_messages(path.parent / "saved"))
+    except ScenarioGenError as error:
+        raise AssertionError(str(error)) from error
+    assert len(found) == saved.messages
+    assert [m.stamp_ns for m in found] == sorted(m.stamp_ns for m in found)
+    assert all(isinstance(line, str) for line in saved.lines())
+
+
+def measure(path: Path) -> None:
+    """Evaluate a bag, down to the text."""
+    for case in bag_cases(path, CONFIG.evaluation):
+        case.evaluation.to_markdown()
+        case.evaluation.to_json()
+
+
+def metadata(folder: Path) -> list[bytes]:
+    """metadata.yaml of a bag."""
+    return [(write_run(folder / "bag", hand_made_run()) / "metadata.yaml").read_bytes()]
+
+
+@cache
+def one_file() -> bytes:
+    """The file of a bag."""
+    with tempfile.TemporaryDirectory() as folder:
+        return (write_run(Path(folder) / "bag", hand_made_run()) / "bag_0.mcap").read_bytes()
+
+
+def read_folder(path: Path) -> None:
+    """Read a bag whose metadata.yaml is the input."""
+    (path.parent / "bag_0.mcap").write_bytes(one_file())
+    list(read_messages(path.parent))
+
+
+def maps(_folder: Path) -> list[bytes]:
+    """Maps with images of several formats."""
+    rng = np.random.default_rng(1)
+    pixels = np.where(rng.random((48, 60)) < 0.2, 0, 254).astype(np.uint8)
+    pixels[20:30] = 254
+    found = []
+    grey = Image.fromarray(pixels)
+    alpha = Image.merge("LA", (grey, Image.fromarray(np.full_like(pixels, 255))))
+    for name, image in (
+        *(("map.pgm", grey), ("map.png", grey), ("map.png", alpha), ("map.bmp", grey), ("map.jpg", grey)),
+        *(("map.png", grey.convert("P")), ("map.pbm", grey.convert("1")), ("map.ppm", grey.convert("RGB"))),
+    ):
+        text = f"image: {name}\nresolution: 0.2\norigin: [-5.0, 2.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+        file = io.BytesIO()
+        image.save(file, {".jpg": "JPEG", ".png": "PNG", ".bmp": "BMP"}.get(name[-4:], "PPM"))
+        found.append(text.encode() + PARTED + file.getvalue())
+    return found
+
+
+def read_map(data: bytes, folder: Path) -> None:
+    """Read a map from its two parts."""
+    text, _, image = data.partition(PARTED)
+    (folder / "map.yaml").write_bytes(text)
+    for suffix in ("pgm", "png", "bmp", "jpg", "pbm", "ppm"):
+        (folder / f"map.{suffix}").write_bytes(image)
+    build_road(str(folder / "map.yaml"), None)
+
+
+def parameter_files(_folder: Path) -> list[bytes]:
+    """The parameters of all stages, and a few of them."""
+    whole = Path(__file__).resolve().parents[2] / "config" / "default.yaml"
+    few = b"/**:\n  ros__parameters:\n    log: {start: 1.5, strict: true}\n    sampling:\n      attempts: 5\n"
+    return [whole.read_bytes(), few]
+
+
+def assignments(_folder: Path) -> list[bytes]:
+    """One assignment for each parameter, and values of all kinds."""
+    values = (
+        *TEXTS.split(),
+        "",
+        "'",
+        '"',
+        "[1, 2]",
+        "{a: [}",
+        "!!int ''",
+        "!!bool x",
+        "*a",
+        "&a [*a]",
+        "%YAML 9.9",
+        "...",
+        "2024-99-99",
+    )
+    names = list(flatten(PipelineConfig()))
+    kept = [f"{name}={value}" for name, (_, value) in flatten(PipelineConfig()).items()]
+    odd = [f"{names[k * 7 % len(names)]}={value}" for k, value in enumerate(values)]
+    return [text.encode("utf-8", "surrogatepass") for text in (*kept, *odd)]
+
+
+def assign_one(data: bytes, _folder: Path) -> None:
+    """Set one parameter."""
+    assigned(PipelineConfig(), data.decode("utf-8", "surrogateescape"))
+
+
+@cache
+def encounters() -> tuple:
+    """Two short encounters of the bundled log."""
+    return tuple(read_log([bundled(case)]).encounters[0] for case in "bc")
+
+
+def libraries(folder: Path) -> list[bytes]:
+    """A primitive library."""
+    library, _ = build_library(encounters(), seed=1)
+    library.save(folder / "library.json")
+    return [(folder / "library.json").read_bytes()]
+
+
+def use_library(path: Path) -> None:
+    """Read a library and use it."""
+    assign(encounters()[0], PrimitiveLibrary.load(path))
+
+
+def evaluations(folder: Path) -> list[bytes]:
+    """evaluation.json of a run, and one evaluation alone."""
+    found = [case.evaluation.to_json() for case in bag_cases(write_run(folder / "bag", hand_made_run()), CONFIG.evaluation)]
+    return [json.dumps({"provenance": {}, "cases": [json.loads(text) for text in found]}).encode(), found[0].encode()]
+
+
+def compare_with_itself(path: Path) -> None:
+    """Read figures, show them and compare them."""
+    found = read_evaluations(path)
+    for evaluation in found:
+        evaluation.to_markdown()
+        evaluation.to_json()
+    rows = [row.name for row in found[0].rows]
+    if rows:
+        comparison_table(compare(found, found, rows[-1]))
+
+
+def values(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Change a value anywhere in a JSON document: another kind, an extreme, shorter, longer, deeper, gone."""
+    try:
+        document = json.loads(data)
+        holder, place = None, None
+        node = document
+        while isinstance(node, dict | list) and node and (holder is None or rng.random() < 0.85):
+            holder, place = node, rng.choice(list(node) if isinstance(node, dict) else range(len(node)))
+            node = node[place]
+        if holder is None:
+            return rng.choice(BYTES)(rng, data, seeds)
+        extremes = [
+            0,
+            -1,
+            1,
+            2**53,
+            2**63,
+            2**70,
+            10**400,
+            1e308,
+            -1e308,
+            1e-320,
+            0.5,
+            None,
+            True,
+            "",
+            "x",
+            "é" * 500,
+            [],
+            {},
+            [[]],
+        ]
+        more = [float("nan"), float("inf"), [node], {"a": node}, [node] * 3, node[:-1] if isinstance(node, list) else node]
+        if rng.random() < 0.15:
+            del holder[place]
+        else:
+            holder[place] = rng.choice(extremes + more)
+        return json.dumps(document).encode()
+    except (ValueError, RecursionError, TypeError):
+        return rng.choice(BYTES)(rng, data, seeds)
+
+
+def deep(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Put brackets, anchors or tags somewhere, few or very many."""
+    words = (
+        b"[",
+        b"{a: ",
+        b"- ",
+        b"? ",
+        b'{"a":',
+        b"&a ",
+        b"*a",
+        b"!!float ",
+        b"!!binary ",
+        b"!!set ",
+        b"<<: ",
+        b"|\n",
+        b"%TAG ! x\n",
+    )
+    at, word = rng.randrange(len(data) + 1), rng.choice((*words, *WORDS))
+    return data[:at] + word * rng.choice((1, 2, 40, 3000)) + data[at:]
+
+
+JSON = (*BYTES, deep, *[values] * 6)
+YAML = (*TEXT, deep, deep)
+TARGETS = (
+    Target("mcap_reader", runs, in_file("a.mcap", read_bag), MCAP, ("mcap_reader/*", "mcap_zstd*", "reindex_huge*")),
+    Target(
+        "sqlite_reader", partial(bags, StoragePlugin.SQLITE3), in_file("a.db3", read_bag), (*BYTES, *[records] * 5), ("sqlite/*",)
+    ),
+    Target("reindex", runs, in_file("a.mcap", save_and_read), MCAP, ("reindex/*", "reindex_*", "mcap_zstd*")),
+    Target("validate", runs, in_file("a.mcap", validate_bag), BAG, ("validate/*",)),
+    Target("evaluate", runs, in_file("a.mcap", measure), BAG),
+    Target("regenerate", generated, in_file("a.mcap", lambda path: regenerate_scenario(path, 1)), BAG),
+    Target("metadata", metadata, in_file("metadata.yaml", read_folder), YAML, ("meta/*",)),
+    Target("map", maps, read_map, (*BYTES, deep), ("map/*.yaml", "*.yaml")),
+    Target(
+        "parameters",
+        parameter_files,
+        in_file("p.yaml", lambda path: loaded(PipelineConfig(), path)),
+        YAML,
+        ("params/*",),
+    ),
+    Target("assignment", assignments, assign_one, (*BYTES, deep)),
+    Target("library", libraries, in_file("library.json", use_library), JSON, ("library/*",)),
+    Target("evaluation_json", evaluations, in_file("evaluation.json", compare_with_itself), JSON, ("result/*",)),
+)

@@ -1,0 +1,148 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The decoders of messages as targets, one per type; and what is made of their texts."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from bag_examples import hand_made_run
+from harness import Target
+from message_examples import encounter, route, scenario, segmentation
+from mutators import BYTES
+import numpy as np
+from rosbags.typesys import get_typestore, Stores
+
+from msg_conventions.changepoints import (
+    decode_changepoints,
+    decode_posterior,
+    encode_changepoints,
+    encode_posterior,
+    POSTERIOR_TYPE,
+)
+from msg_conventions.diagnostics import decode_diagnostics, read_request
+from msg_conventions.diagnostics import TYPE as DIAGNOSTICS_TYPE
+from msg_conventions.ego import ego_messages
+from msg_conventions.fits import decode_fit
+from msg_conventions.odometry import decode_state
+from msg_conventions.odometry import TYPE as ODOMETRY_TYPE
+from msg_conventions.paths import decode_path, decode_route, encode_route
+from msg_conventions.paths import TYPE as PATH_TYPE
+from msg_conventions.pictures import decode_footprint, encode_footprint, FOOTPRINT_TYPE
+from msg_conventions.roads import decode_map, decode_poses, MAP_TYPE, POSES_TYPE
+from msg_conventions.scenarios import decode_scenario, encode_scenario
+from msg_conventions.streams import decode_fix, decode_speed, encode_fix, encode_speed
+from msg_conventions.topics import FIX_TYPE, TWIST_TYPE
+from msg_conventions.tracks import decode_tracks, encode_tracks
+from msg_conventions.trajectory import TYPE as TRAJECTORY_TYPE
+from scenario_gen.bags import run_messages
+from scenario_gen.bags.template import read_template
+from scenario_gen.bags.told import told_numbers, told_requests, told_values
+from scenario_gen.bags.validation import asked_by_digest
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+TEMPLATE = encounter(3)
+STAMPS = [TEMPLATE.start_ns + k * TEMPLATE.dt_ns for k in (0, 12, 13, 14, 39)]
+
+
+def seeds(kind: str, examples: Callable[[], Sequence[bytes]], _folder: Path) -> list[bytes]:
+    """Our bytes, and those of rosbags' serialisation of the same messages."""
+    own = list(examples())
+    return own + [bytes(STORE.serialize_cdr(STORE.deserialize_cdr(data, kind), kind)) for data in own]
+
+
+def of_run(*topics: str) -> list[bytes]:
+    """The messages of some topics of a run."""
+    return [data for topic, data, _ in run_messages(hand_made_run()) if topic in topics]
+
+
+def ego(topic: str) -> list[bytes]:
+    """A message of the ego slot."""
+    return [data for name, data in ego_messages(scenario(5, n=1), 7_000_000_000) if name == topic]
+
+
+def told(data: bytes) -> None:
+    """Decode diagnostics, and all that is read from their texts."""
+    stamp, statuses = decode_diagnostics(data)
+    told_values([data], stamp)
+    told_requests([data])
+    told_numbers([data])
+    asked_by_digest([("info", data)])
+    for status in statuses:
+        read_request(status)
+
+
+def template(messages: dict[str, bytes], topic: str, data: bytes) -> None:
+    """Read a template of whose messages one is damaged."""
+    read_template(messages | {topic: data})
+
+
+def decoder(name: str, kind: str, examples: Callable[[], Sequence[bytes]], decode: Callable[[bytes], object]) -> Target:
+    """Return the target of a decoder."""
+    return Target(name, partial(seeds, kind, examples), lambda data, _folder: decode(data), BYTES)
+
+
+def template_targets() -> tuple[Target, ...]:
+    """Return one target per message of a template."""
+    messages = {topic: data for topic, data, _ in run_messages(hand_made_run())}
+    kinds = {"tracks": TRAJECTORY_TYPE, "changepoints": TRAJECTORY_TYPE, "fit": TRAJECTORY_TYPE, "map": MAP_TYPE}
+    kinds |= {"vehicle_1/route": PATH_TYPE, "road/entries": POSES_TYPE}
+    return tuple(
+        decoder(f"template_{topic.replace('/', '_')}", kind, partial(of_run, topic), partial(template, messages, topic))
+        for topic, kind in kinds.items()
+    )
+
+
+TARGETS = (
+    decoder("message_tracks", TRAJECTORY_TYPE, lambda: [encode_tracks(encounter(k)) for k in (1, 2)], decode_tracks),
+    decoder(
+        "message_changepoints",
+        TRAJECTORY_TYPE,
+        lambda: [encode_changepoints(TEMPLATE, segmentation(k)) for k in (1, 2)],
+        lambda data: decode_changepoints(data, TEMPLATE),
+    ),
+    decoder(
+        "message_posterior",
+        POSTERIOR_TYPE,
+        lambda: [encode_posterior(TEMPLATE, segmentation(1))],
+        decode_posterior,
+    ),
+    decoder(
+        "message_scenarios",
+        TRAJECTORY_TYPE,
+        lambda: [encode_scenario(scenario(k), 5) for k in (1, 2)] + ego("ego/track"),
+        decode_scenario,
+    ),
+    decoder("message_diagnostics", DIAGNOSTICS_TYPE, lambda: of_run("diagnostics", "scenarios/info"), told),
+    decoder(
+        "message_route",
+        PATH_TYPE,
+        lambda: [encode_route(route(k), STAMPS, "map") for k in (1, 2)],
+        lambda data: (decode_path(data), decode_route(data, STAMPS)),
+    ),
+    decoder("message_map", MAP_TYPE, lambda: of_run("map"), decode_map),
+    decoder("message_poses", POSES_TYPE, lambda: of_run("road/entries", "road/exits"), decode_poses),
+    decoder("message_odometry", ODOMETRY_TYPE, lambda: ego("ego/start") + ego("ego/goal"), decode_state),
+    decoder("message_fit", TRAJECTORY_TYPE, lambda: of_run("fit"), decode_fit),
+    decoder("message_fix", FIX_TYPE, lambda: [encode_fix(48.1, 11.2, 5, "vehicle_1")], decode_fix),
+    decoder("message_speed", TWIST_TYPE, lambda: [encode_speed(8.5, 5, "vehicle_1")], decode_speed),
+    decoder(
+        "message_footprint",
+        FOOTPRINT_TYPE,
+        lambda: [encode_footprint(TEMPLATE.vehicles[0], 5, "vehicle_1")],
+        lambda data: np.isfinite(decode_footprint(data)),
+    ),
+    *template_targets(),
+)

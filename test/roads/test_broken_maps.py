@@ -1,0 +1,31 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Maps that once broke the reader, and bombs: an error that names the map, or a road."""
+
+import shutil
+
+from crash_files import crash_files, is_refused
+import pytest
+
+from scenario_gen.roads import build_road
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("file", crash_files("map/*.yaml", "*.yaml"))
+def test_a_broken_map_is_named(file, tmp_path):
+    shutil.copy(file, tmp_path / file.name)
+    for image in (*file.parent.glob(f"{file.stem}__*"), *file.parent.glob("b?.png")):
+        shutil.copy(image, tmp_path / image.name.rpartition("__")[2])
+    assert is_refused(lambda: build_road(str(tmp_path / file.name), None), file.name)
