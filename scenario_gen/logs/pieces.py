@@ -87,7 +87,9 @@ def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Pie
 
 def laps(track: Track, config: LogConfig) -> Bools:
     """(F-1,) where a track of hours is cut, so that the memory which smoothing takes does not grow with it."""
-    return np.diff((track.fix_ns - track.fix_ns[0]) // round(MOST_TICKS * config.period * 1e9)) > 0
+    lap = (track.fix_ns - track.fix_ns[0]) // round(MOST_TICKS * config.period * 1e9)
+    new: Bools = np.diff(lap) > 0
+    return new
 
 
 def longest_bridge(seconds: Floats, config: LogConfig) -> float:

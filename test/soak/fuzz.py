@@ -23,10 +23,9 @@ import sys
 
 from figures import Figure
 
-FUZZ = Path(__file__).resolve().parents[1] / "fuzz"
-sys.path.append(str(FUZZ))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "fuzz"))
 
-from harness import fuzz, MEMORY, SECONDS, targets
+from harness import fuzz, HERE, MEMORY, SECONDS, targets
 
 EXECUTIONS, MINUTES = 1_000_000, 10.0
 
@@ -51,7 +50,7 @@ def guided(name: str, state: Path) -> list[str]:
     done = state / f"{name}.done"
     if find_spec("atheris") and not done.exists():
         state.mkdir(parents=True, exist_ok=True)
-        command = [sys.executable, str(FUZZ / "guided.py"), name, str(state), str(60.0 * MINUTES)]
+        command = [sys.executable, str(HERE / "guided.py"), name, str(state), str(60.0 * MINUTES)]
         with (state / f"{name}.log").open("w") as log:
             subprocess.run(command, stdout=log, stderr=log, check=False)
         done.touch()
