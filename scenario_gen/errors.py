@@ -14,6 +14,9 @@
 
 """The errors that a person sees; each message names the place (file, row, topic, parameter) and what to do."""
 
+LONGEST = 500
+"""Characters of a message on the terminal."""
+
 
 class ScenarioGenError(Exception):
     """Base of every error this project raises on purpose; the command line prints it without a traceback and exits with 2."""
@@ -27,3 +30,21 @@ class InputError(ScenarioGenError):
 
 class RefusedError(ScenarioGenError):
     """The input is sound but what was asked cannot be done with it, e.g. a template that fits no road."""
+
+
+def of_system(error: OSError, name: object = None, advice: str = "") -> InputError:
+    """Return an error of the operating system as one of ours: file (`name`, or the one it names itself), reason, advice."""
+    file = error.filename if name is None else name
+    place = "" if file is None else f"{file}: "
+    return InputError(f"{place}{error.strerror or error}{advice}")
+
+
+def printable(text: str) -> str:
+    """Return the text with what would steer a terminal (control characters, bidi marks) written as in Python source."""
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+
+
+def shown(error: object) -> str:
+    """Return the message of an error as a terminal gets it: printable, its middle left out where it is too long."""
+    text = printable(str(error))
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 201]}…{text[-200:]}"

@@ -26,7 +26,7 @@ PACKAGE = ROOT / "scenario_gen"
 
 # The data flow, first to last; modules of one tuple may import each other.
 ORDER = (
-    ("errors", "arrays", "blas", "kernels", "parameters"),
+    ("errors", "arrays", "blas", "interrupts", "folders", "kernels", "parameters"),
     ("encounter", "scenario", "interaction"),
     ("logs",),
     ("segmentation",),
@@ -40,7 +40,7 @@ ORDER = (
     ("pipeline",),
     ("bags",),
     ("results", "reproduce"),
-    ("nodes", "cli"),
+    ("nodes", "terminal", "cli", "__main__"),
 )
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])

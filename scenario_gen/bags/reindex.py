@@ -23,6 +23,9 @@ from mcap.stream_reader import StreamReader
 
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.errors import InputError
+from scenario_gen.folders import Kind
+
+REINDEXED = Kind("reindexed bag")
 
 
 def whole_records(path: Path) -> Iterator[Schema | Channel | Message]:
@@ -46,7 +49,7 @@ def reindex(folder: Path, target: Path) -> int:
     if not files:
         raise InputError(f"{folder}: no .mcap file here; name the folder of a recorded bag")
     saved = 0
-    with AtomicBag(target) as bag:
+    with AtomicBag(target, REINDEXED, [folder]) as bag:
         for path in files:
             schemas: dict[int, Schema] = {}
             channels: dict[int, Channel] = {}
