@@ -34,7 +34,7 @@ import tempfile
 import time
 
 from scenario_gen.errors import InputError
-from scenario_gen.folders.disk import discard, naming
+from scenario_gen.folders.disk import discard, is_gone, is_there, naming
 from scenario_gen.folders.marker import is_marked, objection
 
 PREFIX, GUARD = ".scenario_gen-", ".scenario_gen.lock"
@@ -83,9 +83,11 @@ class Claim:
 
     def release(self) -> None:
         """Remove all that is not in its place; but an earlier result that could not be put back stays for the next run."""
-        if not (self.old.exists() and not os.path.lexists(self.place)):
-            _remove(self.folder)
-        os.close(self.lock)
+        try:
+            if is_gone(self.old) or is_there(self.place):
+                _remove(self.folder)
+        finally:
+            os.close(self.lock)
 
 
 def _locked(path: Path) -> int:
@@ -148,9 +150,11 @@ def claim(place: Path) -> Claim:
         made = Claim(place, folder, lock)
         made.new.mkdir(parents=True)
     except BaseException:
-        _remove(folder)
-        if lock >= 0:
-            os.close(lock)
+        try:
+            _remove(folder)
+        finally:
+            if lock >= 0:
+                os.close(lock)
         raise
     return made
 
@@ -197,7 +201,7 @@ def _finish(dead: Claim) -> None:
     if any(set(above.iterdir()) - {own} for own in (dead.new, dead.old) if (above := own.parent).is_dir()):
         return
     if dead.old.exists():
-        if not os.path.lexists(dead.place):
+        if is_gone(dead.place):
             dead.old.rename(dead.place)
         elif dead.new.exists():
             return  # somebody has put something else there since
@@ -207,7 +211,11 @@ def _finish(dead: Claim) -> None:
 
 
 def _remove(folder: Path) -> None:
-    """Remove a claim, its owner last, so that it can be known as ours until it is gone."""
-    discard(folder / NEW, folder / OLD, folder / OWNER)
-    with suppress(OSError):
-        folder.rmdir()
+    """Remove a claim, its owner when nothing else is left: so it can be known as ours until it is gone."""
+    inside = (folder / NEW, folder / OLD)
+    for path in inside:
+        discard(path)
+    if all(is_gone(path) for path in inside):
+        discard(folder / OWNER)
+        with suppress(OSError):
+            folder.rmdir()

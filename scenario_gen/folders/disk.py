@@ -81,11 +81,30 @@ def exchange(one: Path, other: Path) -> bool:
     raise OSError(number, os.strerror(number), str(other))
 
 
-def discard(*paths: Path) -> None:
-    """Remove files and folders as far as that is possible."""
-    for path in paths:
+def is_there(path: Path) -> bool:
+    """Say whether there surely is something of that name."""
+    try:
+        path.lstat()
+    except OSError:
+        return False
+    return True
+
+
+def is_gone(path: Path) -> bool:
+    """Say whether there surely is nothing of that name."""
+    try:
+        path.lstat()
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
+def discard(path: Path) -> None:
+    """Remove a file or a folder as far as that is possible."""
+    with suppress(OSError):
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path, ignore_errors=True)
         else:
-            with suppress(OSError):
-                path.unlink()
+            path.unlink()

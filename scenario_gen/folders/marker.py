@@ -22,7 +22,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from scenario_gen.folders.disk import sync_tree, write_text
+from scenario_gen.folders.disk import is_gone, sync_tree, write_text
 
 MARKER = ".scenario_gen.json"
 FORMAT = 1
@@ -63,8 +63,8 @@ def entries(folder: Path, above: str = "") -> Iterator[str]:
 
 
 def is_marked(folder: Path) -> bool:
-    """Say whether a folder bears a marker, whatever is in it."""
-    return os.path.lexists(folder / MARKER)
+    """Say whether a folder bears a marker, whatever is in it, or may bear one."""
+    return not is_gone(folder / MARKER)
 
 
 def objection(folder: Path, kind: Kind | None) -> str:

@@ -22,7 +22,7 @@ import stat
 
 from scenario_gen.errors import InputError, of_system
 from scenario_gen.folders.claim import alone, Claim, claim, GUARD, PREFIX, settle
-from scenario_gen.folders.disk import exchange, sync
+from scenario_gen.folders.disk import exchange, is_gone, sync
 from scenario_gen.folders.marker import finish, Kind, objection
 from scenario_gen.interrupts import uninterrupted
 
@@ -116,7 +116,7 @@ def _above(place: Path, path: Path) -> bool:
 
 def _check(target: Path, place: Path, kind: Kind) -> None:
     """Raise InputError if there is what may not be replaced."""
-    if os.path.lexists(place) and (reason := objection(place, kind)):
+    if not is_gone(place) and (reason := objection(place, kind)):
         raise InputError(f"{target} is not replaced: {reason}; move that away, or name another folder")
 
 
