@@ -18,8 +18,10 @@ from collections.abc import Callable
 import errno
 import os
 from pathlib import Path
+import signal
 import subprocess
 import tempfile
+import time
 
 from failing_disk import CHANGES, content, Failing, LOOKS, write_bag, write_nothing, write_texts
 import pytest
@@ -144,6 +146,30 @@ def test_a_process_is_killed_at_every_call(folder, name):
         if code == 0:
             break
     assert k > 40
+
+
+def test_a_process_is_killed_at_any_time(folder):
+    """The short form of `make soak PART=kills`: one that writes both results in turn, again and again."""
+
+    def child(target):
+        try:
+            while True:
+                for size in (5, 2):
+                    write_texts(target, size)
+        finally:
+            os._exit(1)
+
+    case = Case(folder, write_texts, earlier=True)
+    target = case.target(0)
+    for k in range(20):
+        pid = os.fork()
+        if pid == 0:
+            child(target)
+        time.sleep(0.002 * k)
+        os.kill(pid, signal.SIGKILL)
+        assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == -signal.SIGKILL
+        assert content(target) in case.whole
+        case.settled(target)
 
 
 def test_a_disk_of_any_size_that_is_full(tmp_path):
