@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import hashlib
 import json
 import os
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from scenario_gen.folders.disk import is_gone, sync_tree, write_text
@@ -88,10 +88,13 @@ def objection(folder: Path, kind: Kind | None) -> str:
         return f"its {MARKER} is not one that this version writes, so it is not an earlier result"
     if kind is not None and marker["kind"] != kind.name:
         return f"it is a result of another kind ({marker['kind']}, not {kind.name})"
+    emptied = {f"{above}/" for file in marker["files"] for above in PurePosixPath(file).parents}  # by a removal cut short
     for name in found:
-        if name != MARKER and name not in marker["files"]:
+        if name == MARKER or name in emptied:
+            continue
+        if name not in marker["files"]:
             return f"it holds {name}, which is not of the earlier result there"
-        if name != MARKER and marker["files"][name] != _digest(folder / name):
+        if marker["files"][name] != _digest(folder / name):
             return f"{name} in it was changed since it was written"
     return ""
 

@@ -166,7 +166,7 @@ def _system_errors(target: Path, folder: Path) -> Iterator[None]:
 
 def _failed(target: Path, error: Exception) -> InputError:
     """Return an error of the system as one of ours, with a file in the making named as if it were in the target already."""
-    advice = f"; what was in {target} is untouched; make room, or name another folder"
+    advice = "; what was there is untouched; make room, or name another folder"
     if not isinstance(error, OSError):
         return InputError(f"{target}: {error}{advice}")
     path = target if error.filename is None else Path(os.fsdecode(error.filename))

@@ -90,8 +90,7 @@ def file_made_a_link(out):
 
 
 def other_kind(out):
-    with suppress(OSError):
-        (out / MARKER).write_text((out / MARKER).read_text().replace('"test"', '"another"'))
+    (out / MARKER).write_text((out / MARKER).read_text().replace('"test"', '"another"'))
     return "another kind (another, not test)"
 
 
@@ -257,6 +256,19 @@ def test_what_a_killed_run_left_is_removed_by_the_next_one(out, holder, next_one
     write_texts(out.with_name(next_one), 3)
     assert {path.name for path in out.parent.iterdir()} == {"out", next_one}
     assert (out / "one.txt").read_text() == "one.txt" * (3 if next_one == "out" else 2)
+
+
+@pytest.mark.parametrize("gone", [("inner/two.txt",), ("one.txt",), (MARKER,), ("inner/two.txt", MARKER)])
+def test_an_earlier_result_whose_removal_was_cut_short_is_removed(out, gone):
+    write_texts(out.with_name("earlier"), 3)
+    left = out.parent / f"{PREFIX}dead"
+    (left / "new").mkdir(parents=True)
+    (left / OWNER).write_text(json.dumps({"target": "out", "pid": 1, "host": "h", "since": "s"}))
+    out.with_name("earlier").rename(left / "new" / "out")
+    for name in gone:
+        (left / "new" / "out" / name).unlink()
+    write_nothing(out)
+    assert list(out.parent.iterdir()) == [out]
 
 
 def test_leftovers_that_may_be_another_s_stay(out):
