@@ -15,14 +15,17 @@
 """Random SIGKILLs of the commands that write results, each onto an earlier result: that or the new one is whole afterwards.
 
 One half of the kills comes at any time of a run, the other shortly after the first file of the new result is there. After each,
-what the next run does first is done, so that leftovers are known to go; every tenth time a whole run follows.
+what the next run does first is done, so that leftovers are known to go; every tenth time a whole run follows, as users start it.
 """
 
 from collections import Counter
 from collections.abc import Iterable
+from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass
 import hashlib
+from io import StringIO
 import json
+import os
 from pathlib import Path
 import random
 import signal
@@ -32,6 +35,7 @@ import time
 
 from figures import Figure
 
+from scenario_gen.__main__ import main
 from scenario_gen.folders import replaced_folder
 from scenario_gen.folders.claim import PREFIX
 from scenario_gen.logs.synthetic import bundled
@@ -53,22 +57,38 @@ class Target:
     def out(self) -> Path:
         return self.folder / "out"
 
-    def start(self, which: int, out: Path | None = None) -> "subprocess.Popen[bytes]":
-        """Begin a run that writes the first or the second result."""
+    def words(self, which: int, out: Path) -> list[str]:
+        """Return the command line that writes the first or the second result."""
         rest = {
             "generate": [str(bundled("c")), "--road", "straight", "--count", "2", "--seed", str(which)],
             "evaluate": [str(self.sources[which] / "bag")],
             "regenerate": [str(self.sources[0] / "bag"), str(which)],
         }[self.command]
-        words = [sys.executable, "-m", "scenario_gen", self.command, *rest, "--out", str(out or self.out)]
-        return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        return [self.command, *rest, "--out", str(out)]
+
+    def start(self, which: int) -> int:
+        """Begin a run in a process of its own, forked from this one, which has all libraries loaded; return its id."""
+        pid = os.fork()
+        if pid:
+            return pid
+        code = 1
+        try:
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, 1)
+            os.dup2(null, 2)
+            sys.argv = ["scenario-gen", *self.words(which, self.out)]
+            main()
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else 1
+        finally:
+            os._exit(code)
 
     def finish(self, which: int, out: Path | None = None) -> str:
-        """Let a run come to its end; return what is there then."""
-        process = self.start(which, out)
-        _, said = process.communicate()
-        if process.returncode:
-            raise RuntimeError(f"{self.command}: {said.decode()}")
+        """Let a run come to its end, as a user starts it; return what is there then."""
+        command = [sys.executable, "-m", "scenario_gen", *self.words(which, out or self.out)]
+        ended = subprocess.run(command, capture_output=True, text=True, check=False)
+        if ended.returncode:
+            raise RuntimeError(f"{self.command}: {ended.stderr}")
         return digest(out or self.out)
 
     def settle(self) -> None:
@@ -111,16 +131,16 @@ def writing(folder: Path) -> bool:
 def kill_once(target: Target, which: int, duration: float, chance: random.Random) -> str:
     """Begin a run and kill it; return when that was: "computing", "writing" or "ended" (before the kill)."""
     at_any_time = chance.random() < 0.5
-    process = target.start(which)
+    pid = target.start(which)
     if at_any_time:
         time.sleep(chance.uniform(0.0, duration))
     else:
-        while process.poll() is None and not writing(target.folder):
+        while not (ended := os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT)) and not writing(target.folder):
             time.sleep(0.001)
-        time.sleep(chance.uniform(0.0, 0.15 * duration))
-    process.send_signal(signal.SIGKILL)
-    process.communicate()
-    if process.returncode != -signal.SIGKILL:
+        if not ended:
+            time.sleep(chance.uniform(0.0, 0.5 * duration))
+    os.kill(pid, signal.SIGKILL)
+    if os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) != -signal.SIGKILL:
         return "ended"
     return "writing" if writing(target.folder) or not at_any_time else "computing"
 
@@ -135,10 +155,16 @@ def prepared(command: str, state: Path) -> tuple[Target, dict[str, int], float]:
             Target("generate", state, sources).finish(which, source)
     target = Target(command, folder, sources)
     known: dict[str, int] = {}
-    started = time.monotonic()
     for which in (0, 1):
         known[target.finish(which, state / f"{command}_{which}" / "out")] = which
-    return target, known, (time.monotonic() - started) / 2
+    duration = 0.0
+    for which in (0, 1):  # twice in this process, so that it has loaded everything
+        sys.argv = ["scenario-gen", *target.words(which, target.out)]
+        started = time.monotonic()
+        with redirect_stdout(StringIO()), suppress(SystemExit):
+            main()
+        duration = time.monotonic() - started
+    return target, known, duration
 
 
 def kills(command: str, state: Path, count: int, seed: int = 1) -> Counter[str]:
