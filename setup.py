@@ -47,7 +47,7 @@ setup(
     zip_safe=False,
     entry_points={
         "console_scripts": [
-            "scenario-gen = scenario_gen.cli:main",
+            "scenario-gen = scenario_gen.__main__:main",
             *(f"{node} = scenario_gen.nodes.start:{node}" for node in NODES),
         ],
     },

@@ -14,38 +14,48 @@
 
 """The command line: `scenario-gen generate`, `scenario-gen demo`; a thin layer over the pipeline."""
 
+from contextlib import nullcontext, suppress
 from functools import partial
-import json
+import os
 from pathlib import Path
 import sys
-import tempfile
-from typing import Annotated
+from typing import Annotated, NoReturn
 
-from rich.console import Console
 from rich.markdown import Markdown
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 import typer
 
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags import read_messages, reindex
 from scenario_gen.bags.evaluation import bag_cases
-from scenario_gen.bags.provenance import sha256_of
 from scenario_gen.bags.regenerate import regenerate_scenario, write_regenerated
-from scenario_gen.bags.told import told_provenance
 from scenario_gen.bags.validation import validate_bag
 from scenario_gen.encounter import Encounter
-from scenario_gen.errors import InputError, RefusedError, ScenarioGenError
-from scenario_gen.evaluation import Case, comparison_table, read_evaluations, ReportInput, summary, write_report
+from scenario_gen.errors import InputError, of_system, presentable, printable, RefusedError, ScenarioGenError
+from scenario_gen.evaluation import Case, comparison_table, read_evaluations, summary
 from scenario_gen.evaluation import compare as compare_sets
+from scenario_gen.folders import replaced_folder
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.parameters import assigned, flatten, loaded
 from scenario_gen.pipeline import generate as run_pipeline
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.requests import Request
-from scenario_gen.results import BAG, check_folder, FIGURES, namespaces, provenance_of, REPORT, write_results
+from scenario_gen.results import (
+    as_table,
+    BAG,
+    EVALUATED,
+    GENERATED,
+    namespaces,
+    provenance_of,
+    REPORT,
+    write_evaluation,
+    write_results,
+)
 from scenario_gen.storage import remark
+from scenario_gen.terminal import Terminal
 
 app = typer.Typer(
     help="Turn recorded vehicle encounters into new, valid ones on other roads.",
@@ -53,7 +63,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-console = Console()
+console = Terminal()
 
 DEMO = (("a", "t_intersection"), ("b", "t_intersection"), ("c", "straight"))
 
@@ -86,8 +96,9 @@ def parameters() -> None:
         bounds = [str(meta[end]) if meta[end] is not None else "" for end in ("low", "high")]
         allowed = " | ".join(meta["choices"]) or ("…".join(bounds) if any(bounds) else "")
         console.print(
-            f"[bold]{name}[/] = {value!r} {meta['unit']} {f'({allowed})' if allowed else ''}\n    {meta['meaning']}",
-            highlight=False,
+            Text(name, style="bold"),
+            f" = {value!r} {meta['unit']} {f'({allowed})' if allowed else ''}\n    {meta['meaning']}",
+            sep="",
         )
 
 
@@ -117,20 +128,21 @@ def generate(
     """Generate new encounters from a log: bag, report and figures in one folder."""
     config = configured(parameter_file, assignments or [])
     request = Request(ego, "; ".join(start or []), "; ".join(goal or []))
-    check_folder(out)
-    found = read_log(log, config.log)
-    templates = chosen(found.encounters, encounter or [])
-    cases, refusals = run_all(templates, road, config, count=count, seed=seed, request=request)
-    if not cases:
-        raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
-    write_results(
-        out,
-        cases,
-        seed=seed,
-        title=", ".join(path.stem for path in log),
-        quality=(*found.quality.lines(), *refusals),
-        provenance=provenance_of(log, seed, count, road, config, request),
-    )
+    inputs = [*log, *map(Path, road), *([parameter_file] if parameter_file else ())]
+    with replaced_folder(out, GENERATED, inputs) as partial_out:
+        found = read_log(log, config.log)
+        templates = chosen(found.encounters, encounter or [])
+        cases, refusals = run_all(templates, road, config, count=count, seed=seed, request=request)
+        if not cases:
+            raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
+        write_results(
+            partial_out,
+            cases,
+            seed=seed,
+            title=", ".join(path.stem for path in log),
+            quality=(*found.quality.lines(), *refusals),
+            provenance=provenance_of(log, seed, count, road, config, request),
+        )
     conclude(cases, refusals, out)
 
 
@@ -151,9 +163,9 @@ def regenerate(
     remind(bag)
     config = configured(parameter_file, assignments or []).bag
     made = regenerate_scenario(bag, index, namespace=namespace, request=request, log=log, config=config)
-    console.print(f"scenario {index}: the same {len(made.data)} bytes, sha256 {made.sha256}", highlight=False, soft_wrap=True)
+    console.print(f"scenario {index}: the same {len(made.data)} bytes, sha256 {made.sha256}", soft_wrap=True)
     if out is not None:
-        console.print(f"bag: {write_regenerated(made, out)}", highlight=False, soft_wrap=True)
+        console.print(f"bag: {write_regenerated(made, out, [bag, *([log] if log else ())])}", soft_wrap=True)
 
 
 @app.command()
@@ -165,31 +177,27 @@ def demo(
 ) -> None:
     """Run the main job on the bundled synthetic log: the paper's three cases, on a T-intersection and a straight road."""
     config = PipelineConfig()
-    check_folder(out)
     logs = [bundled(case) for case, _ in DEMO]
     roads = [road for _, road in DEMO]
-    found = [read_log(log, config.log) for log in logs]
-    with tempfile.TemporaryDirectory() as scratch:
-        bag = None
+    with replaced_folder(out, GENERATED, logs) as partial_out:
+        found = [read_log(log, config.log) for log in logs]
         if ros:
-            bag = Path(scratch) / "bag"
-            run_nodes(list(zip(logs, roads, strict=True)), config, count, seed, bag)
+            run_nodes(list(zip(logs, roads, strict=True)), config, count, seed, partial_out / BAG)
         cases: list[Case] = []
         refusals: list[str] = []
         for result, road in zip(found, roads, strict=True):
             more, refused = run_all(list(result.encounters), [road], config, count=count, seed=seed)
             cases, refusals = cases + more, refusals + refused
+        if ros:
+            compare_with_nodes(cases, partial_out / BAG)
         write_results(
-            out,
+            partial_out,
             cases,
             seed=seed,
             title="Demo: new encounters from the bundled synthetic log",
             quality=[line for result in found for line in result.quality.lines()],
             provenance=provenance_of(logs, seed, count, roads, config),
-            bag=bag,
         )
-        if bag is not None:
-            compare_with_nodes(cases, out / BAG)
     conclude(cases, refusals, out)
 
 
@@ -202,7 +210,7 @@ def run_nodes(jobs: list[tuple[Path, str]], config: PipelineConfig, count: int, 
 
     asked = [Job(namespace, log, road) for namespace, (log, road) in zip(namespaces(len(jobs)), jobs, strict=True)]
     with console.status("starting the nodes") as status:
-        run_suite(asked, config, count=count, seed=seed, bag=bag, progress=status.update)
+        run_suite(asked, config, count=count, seed=seed, bag=bag, progress=lambda text: status.update(Text(printable(text))))
 
 
 def compare_with_nodes(cases: list[Case], bag: Path) -> None:
@@ -234,9 +242,7 @@ def reproduce(
     logs = [log] if log else [[bundled(case)] for case, _ in DEMO]
     from scenario_gen.reproduce import reproduce as reproduce_figures  # its charting library takes a second to import
 
-    reproduce_figures(
-        logs, out, count=count, seed=seed, say=partial(console.print, highlight=False, markup=False, soft_wrap=True)
-    )
+    reproduce_figures(logs, out, count=count, seed=seed, say=partial(console.print, soft_wrap=True))
 
 
 @app.command()
@@ -249,17 +255,12 @@ def evaluate(
     """Measure the scenarios of a bag against the tracks in it, and check them anew."""
     config = configured(parameter_file, assignments or [])
     remind(bag)
-    cases = bag_cases(bag, config.evaluation, config.limits, bag=config.bag)
-    found = [case.evaluation for case in cases]
-    text = "\n\n".join(evaluation.to_markdown() for evaluation in found)
-    console.print(Markdown(text))
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        (out / "evaluation.md").write_text(text + "\n", encoding="utf-8")
-        figures = [json.loads(evaluation.to_json()) for evaluation in found]
-        (out / FIGURES).write_text(json.dumps({"cases": figures}, indent=2) + "\n", encoding="utf-8")
-        facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | told_provenance(bag, config.bag)
-        write_report(out / REPORT, ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts))
+    inputs = [bag, *([parameter_file] if parameter_file else ())]
+    with nullcontext() if out is None else replaced_folder(out, EVALUATED, inputs) as partial_out:
+        cases = bag_cases(bag, config.evaluation, config.limits, bag=config.bag)
+        if partial_out is not None:
+            write_evaluation(partial_out, cases, bag, config.bag)
+    console.print(Markdown(printable(as_table(cases))))
 
 
 @app.command()
@@ -273,16 +274,14 @@ def validate(
     remind(bag)
     found = validate_bag(bag, config.limits, config.bag)
     for one in found:
-        console.print(
-            f"{one.namespace or '/'}: {one.scenarios - one.invalid} of {one.scenarios} scenarios are valid", highlight=False
-        )
+        console.print(f"{one.namespace or '/'}: {one.scenarios - one.invalid} of {one.scenarios} scenarios are valid")
         table = Table("cause", "scenarios", "first", "what")
         for cause, entry in one.found.items():
             table.add_row(cause, str(entry.count), str(entry.scenario), entry.message)
         if one.found:
             console.print(table)
         for sentence, count in one.left_out.items():
-            console.print(f"  not applicable to {count}: {sentence}", highlight=False)
+            console.print(f"  not applicable to {count}: {sentence}")
     if any(one.invalid for one in found):
         raise typer.Exit(1)
 
@@ -295,11 +294,11 @@ def save_bag(
     parameter_file: ParametersOption = None,
 ) -> None:
     """Save the messages that are whole in a bag that was not closed or is damaged; the old files stay as they are."""
-    target = out or bag.with_name(f"{bag.name}_reindexed")
+    target = out or bag.resolve().with_name(f"{bag.resolve().name}_reindexed")
     made = reindex(bag, target, configured(parameter_file, assignments or []).bag)
-    console.print(f"{made.messages} messages: {target}", highlight=False, soft_wrap=True)
+    console.print(f"{made.messages} messages: {target}", soft_wrap=True)
     for line in made.lines():
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
+        console.print(line, soft_wrap=True)
 
 
 @app.command()
@@ -317,13 +316,13 @@ def compare(
 ) -> None:
     """Put two sets of scenarios side by side: two seeds, two parameters, two versions."""
     differences = compare_sets(read_evaluations(first), read_evaluations(second))
-    console.print(Markdown(comparison_table(differences, (first.name, second.name))))
+    console.print(Markdown(printable(comparison_table(differences, (first.name, second.name)))))
 
 
 def remind(bag: Path) -> None:
     """Say what is missing of a bag that is read all the same."""
     if said := remark(bag):
-        console.print(said, highlight=False, markup=False, soft_wrap=True)
+        console.print(said, soft_wrap=True)
 
 
 def chosen(encounters: tuple[Encounter, ...], names: list[str]) -> list[Encounter]:
@@ -354,7 +353,7 @@ def run_all(
     with progress_bar() as bar:
         for template in templates:
             for road in roads:
-                task = bar.add_task(f"{template.name} on {Path(road).stem}", total=count)
+                task = bar.add_task(printable(f"{template.name} on {Path(road).stem}"), total=count)
 
                 def advance(done: int, total: int, task: TaskID = task) -> None:
                     bar.update(task, completed=done, total=total)
@@ -391,7 +390,7 @@ def causes(case: Case) -> str:
 def conclude(cases: list[Case], refusals: list[str], out: Path) -> None:
     """Print the summary; raise RefusedError if anything asked for is missing."""
     console.print(summary(cases))
-    console.print(f"report: {out / 'report.html'}\nbag:    {out / 'bag'}", highlight=False, soft_wrap=True)
+    console.print(f"report: {out / REPORT}\nbag:    {out / BAG}", soft_wrap=True)
     if refusals:
         raise RefusedError("not everything that was asked for could be had:\n" + "\n".join(refusals))
 
@@ -399,22 +398,45 @@ def conclude(cases: list[Case], refusals: list[str], out: Path) -> None:
 def progress_bar() -> Progress:
     """Return the progress bar of long work (silent where nobody watches)."""
     return Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
-        console=Console(stderr=True),
+        console=Terminal(stderr=True),
         transient=True,
     )
 
 
 def main() -> None:
-    """Run the command line; an error of ours is one message and an exit code, never a traceback."""
+    """Run the command line; an error of ours, or of the system, is one message and an exit code, never a traceback."""
     try:
-        app()
+        try:
+            for word in sys.argv[1:]:
+                if any("\ud800" <= letter <= "\udfff" for letter in word):
+                    raise InputError(f"{word}: a name that is no UTF-8 text cannot go into a bag or a page; rename the file")
+            app()
+        finally:
+            sys.stdout.flush()
     except ScenarioGenError as error:
-        Console(stderr=True).print(f"[bold red]error:[/] {error}", highlight=False, soft_wrap=True)
-        sys.exit(error.exit_code)
+        fail(error)
+    except MemoryError:
+        fail(InputError("there is not enough memory; take less at once: a shorter log, fewer scenarios, a smaller map"))
+    except BrokenPipeError:
+        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - nobody listens any more
+        sys.exit(1)
+    except OSError as error:
+        fail(of_system(error, error.filename or "standard output, or a file that the system does not name"))
+
+
+def fail(error: ScenarioGenError) -> NoReturn:
+    """Say what is wrong and end."""
+    with suppress(OSError):
+        Terminal(stderr=True).print(Text("error:", style="bold red"), presentable(str(error)), soft_wrap=True)
+    try:
+        sys.stdout.flush()
+    except OSError:  # a full disk, or nobody listens: what is left goes nowhere, so that the interpreter ends in peace
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(error.exit_code)
 
 
 if __name__ == "__main__":

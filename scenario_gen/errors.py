@@ -38,12 +38,22 @@ def presentable(text: str) -> str:
     """Return a message with at most `LONGEST` characters, all of which print, or are line breaks."""
     if len(text) > LONGEST:  # at first roughly, for a quoted field may hold megabytes
         text = text[:LONGEST] + text[-LONGEST:]
-    shown = "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode("ascii") for c in text)
-    if len(shown) <= LONGEST:
-        return shown
+    text = printable(text)
     half = (LONGEST - 3) // 2
-    return f"{shown[:half]} … {shown[-half:]}"
+    return text if len(text) <= LONGEST else f"{text[:half]} … {text[-half:]}"
 
 
 class RefusedError(ScenarioGenError):
     """The input is sound but what was asked cannot be done with it, e.g. a template that fits no road."""
+
+
+def of_system(error: OSError, name: object = None, advice: str = "") -> InputError:
+    """Return an error of the operating system as one of ours: file (`name`, or the one it names itself), reason, advice."""
+    file = error.filename if name is None else name
+    place = "" if file is None else f"{file}: "
+    return InputError(f"{place}{error.strerror or error}{advice}")
+
+
+def printable(text: str) -> str:
+    """Return the text with what would steer a terminal (control characters, bidi marks) written as in Python source."""
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)

@@ -12,71 +12,94 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a request leaves behind: a bag, a report and the figures, whole or not at all."""
+"""What a request leaves behind: a bag, a report and the figures."""
 
 from collections.abc import Mapping, Sequence
 import json
 from pathlib import Path
-import shutil
 
-from scenario_gen.bags import Run, write_run
+from scenario_gen.bags import add_runs, BagWriter, Run
 from scenario_gen.bags.provenance import parameter_texts, sha256_of, versions
+from scenario_gen.bags.told import told_provenance
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import Case, ReportInput, write_report
+from scenario_gen.evaluation import Case, read_evaluations, ReportInput, write_report
+from scenario_gen.folders import Kind, write_text
 from scenario_gen.parameters import flatten
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.requests import Request
+from scenario_gen.storage import BagConfig
 
-BAG, REPORT, FIGURES = "bag", "report.html", "evaluation.json"
+BAG, REPORT, FIGURES, TABLE = "bag", "report.html", "evaluation.json", "evaluation.md"
 
 
 def write_results(
-    folder: Path,
-    cases: Sequence[Case],
-    *,
-    seed: int,
-    title: str,
-    quality: Sequence[str],
-    provenance: Mapping[str, str],
-    bag: Path | None = None,
+    folder: Path, cases: Sequence[Case], *, seed: int, title: str, quality: Sequence[str], provenance: Mapping[str, str]
 ) -> None:
-    """Write bag, report and figures of all cases to `folder`, replacing results that are there.
+    """Write bag, report and figures of all cases to `folder`.
 
     Args:
-        folder: where to; it is made, and nothing is left half-written if something fails.
+        folder: that `replaced_folder` gives; if it has a bag already, which was recorded, that one stays.
         cases: one per encounter and road; with several, each has its own namespace in the bag.
         seed: of the request.
         title: heading of the report.
         quality: the log's data-quality summary, in lines.
         provenance: what is needed to do it again.
-        bag: a bag that was recorded already, moved into place; without it one is written here.
 
     Raises:
-        InputError: the folder holds something that is not an earlier result.
+        OSError: the disk is full, or fails.
     """
-    check_folder(folder)
-    partial = folder.with_name(f".{folder.name}.partial")
-    shutil.rmtree(partial, ignore_errors=True)
-    partial.mkdir(parents=True)
+    if not (folder / BAG).exists():
+        names = namespaces(len(cases))
+        with BagWriter(folder / BAG) as bag:
+            add_runs(bag, [as_run(case, seed, name, provenance) for case, name in zip(cases, names, strict=True)])
+    write_report(folder / REPORT, ReportInput(cases, title, quality, provenance))
+    figures = {"provenance": dict(provenance), "cases": [json.loads(case.evaluation.to_json()) for case in cases]}
+    write_text(folder / FIGURES, json.dumps(figures, indent=2) + "\n")
+
+
+def write_evaluation(folder: Path, cases: Sequence[Case], bag: Path, config: BagConfig) -> None:
+    """Write report, figures and table of what a bag was found to hold to `folder`, which `replaced_folder` gives.
+
+    Raises:
+        OSError: the disk is full, or fails.
+    """
+    found = [case.evaluation for case in cases]
+    write_text(folder / TABLE, as_table(cases) + "\n")
+    write_text(folder / FIGURES, json.dumps({"cases": [json.loads(one.to_json()) for one in found]}, indent=2) + "\n")
+    facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | told_provenance(bag, config)
+    write_report(folder / REPORT, ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts))
+
+
+def as_table(cases: Sequence[Case]) -> str:
+    """Return the figures of all cases as Markdown."""
+    return "\n\n".join(case.evaluation.to_markdown() for case in cases)
+
+
+def _is_generated(folder: Path) -> bool:
+    """Say whether a folder without a marker is what `write_results` left there: these names, and its figures."""
+    if {path.name for path in folder.iterdir()} != {BAG, REPORT, FIGURES} or not (folder / BAG).is_dir():
+        return False
+    names = {path.name for path in (folder / BAG).iterdir()}
+    files = {f"{BAG}_{k}.mcap" for k in range(len(names) - 1)}
+    return names == {"metadata.yaml", *files} and _has_figures(folder, {"provenance", "cases"})
+
+
+def _is_evaluated(folder: Path) -> bool:
+    """Say the same of `write_evaluation`."""
+    return {path.name for path in folder.iterdir()} == {TABLE, REPORT, FIGURES} and _has_figures(folder, {"cases"})
+
+
+def _has_figures(folder: Path, keys: set[str]) -> bool:
     try:
-        if bag is None:
-            names = namespaces(len(cases))
-            write_run(partial / BAG, [as_run(case, seed, name, provenance) for case, name in zip(cases, names, strict=True)])
-        else:
-            shutil.copytree(bag, partial / BAG)
-        write_report(partial / REPORT, ReportInput(cases, title, quality, provenance))
-        figures = [json.loads(case.evaluation.to_json()) for case in cases]
-        (partial / FIGURES).write_text(json.dumps({"provenance": dict(provenance), "cases": figures}, indent=2) + "\n")
-        shutil.rmtree(folder, ignore_errors=True)
-        partial.rename(folder)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
+        document = json.loads((folder / FIGURES).read_text(encoding="utf-8"))
+        read_evaluations(folder)
+    except (OSError, ValueError, InputError):
+        return False
+    return set(document) == keys and {"scenario_gen", "seed"} <= set(document.get("provenance", ("scenario_gen", "seed")))
 
 
-def check_folder(folder: Path) -> None:
-    """Raise InputError if `folder` holds anything but an earlier result."""
-    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / REPORT).exists())):
-        raise InputError(f"{folder} exists and is not an earlier result; choose another --out")
+GENERATED = Kind("generated", _is_generated)
+EVALUATED = Kind("evaluated", _is_evaluated)
 
 
 def as_run(case: Case, seed: int, namespace: str = "", provenance: Mapping[str, str] | None = None) -> Run:

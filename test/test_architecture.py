@@ -26,7 +26,7 @@ PACKAGE = ROOT / "scenario_gen"
 
 # The data flow, first to last; modules of one tuple may import each other.
 ORDER = (
-    ("errors", "guard", "documents", "arrays", "kernels", "parameters"),
+    ("errors", "guard", "documents", "arrays", "interrupts", "folders", "kernels", "parameters"),
     ("exact",),
     ("geodesy", "storage"),
     ("encounter", "scenario", "interaction"),
@@ -42,7 +42,7 @@ ORDER = (
     ("pipeline",),
     ("bags",),
     ("results", "reproduce"),
-    ("nodes", "cli"),
+    ("nodes", "terminal", "cli", "__main__"),
 )
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])

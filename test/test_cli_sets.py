@@ -20,6 +20,7 @@ import sys
 import pytest
 
 from scenario_gen import cli
+from scenario_gen.folders import MARKER
 from scenario_gen.logs.synthetic import bundled
 
 
@@ -70,7 +71,7 @@ def test_sets_without_a_case_in_common_are_refused(results, tmp_path, capsys):
 def test_a_bag_is_evaluated_to_a_page_figures_and_a_table(results, tmp_path, capsys):
     out = tmp_path / "again"
     assert run("evaluate", results / "seed_1" / "bag", "--out", out) == 0
-    assert sorted(path.name for path in out.iterdir()) == ["evaluation.json", "evaluation.md", "report.html"]
+    assert sorted(path.name for path in out.iterdir()) == [MARKER, "evaluation.json", "evaluation.md", "report.html"]
     page = (out / "report.html").read_text()
     assert page.startswith("<!doctype html>") and "<b>6</b> of 6 scenarios asked for" in page
     made = json.loads((results / "seed_1" / "evaluation.json").read_text())["cases"][0]

@@ -27,6 +27,7 @@ import pytest
 from scenario_gen import cli
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import UNIFORM, WITH, WITHOUT
+from scenario_gen.folders import MARKER
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.reproduce import claims_of, refusals, reproduce, run_case, write_page
@@ -126,7 +127,7 @@ def test_the_command_writes_page_and_figures_and_spares_other_folders(tmp_path, 
     assert not end.value.code
     said = capsys.readouterr().out
     assert "synthetic_c on straight" in said and "figure 5, as claimed" in said
-    assert sorted(path.name for path in out.iterdir()) == ["reproduce.html", "reproduce.json"]
+    assert sorted(path.name for path in out.iterdir()) == [MARKER, "reproduce.html", "reproduce.json"]
     assert "log synthetic_c" in json.loads((out / "reproduce.json").read_text())["provenance"]
-    with pytest.raises(InputError, match="another --out"):
+    with pytest.raises(InputError, match="name another folder"):
         reproduce([[Path(bundled("c"))]], Path(bundled("c")), count=4, seed=1)

@@ -16,7 +16,7 @@
 
 from scenario_gen.bags.reader import bag_topics, BagMessage, BagTopic, read_messages
 from scenario_gen.bags.reindex import reindex
-from scenario_gen.bags.run import read_scenario_set, Run, run_messages, write_run
+from scenario_gen.bags.run import add_runs, read_scenario_set, Run, run_messages, write_run
 from scenario_gen.bags.writer import AtomicBag, BagWriter, Split
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
     "BagWriter",
     "Run",
     "Split",
+    "add_runs",
     "bag_topics",
     "read_messages",
     "read_scenario_set",

@@ -25,6 +25,7 @@ import yaml
 
 import scenario_gen
 from scenario_gen.errors import InputError
+from scenario_gen.folders import MARKER
 from scenario_gen.parameters import flatten, updated
 
 Config = TypeVar("Config")
@@ -69,6 +70,6 @@ def sha256_of(path: Path) -> str:
     """Return the SHA-256 of a file, or of a folder's files in order of their names."""
     digest = hashlib.sha256()
     for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
-        if file.is_file():
+        if file.is_file() and file.name != MARKER:  # which is about the files, and not in every bag
             digest.update(file.read_bytes())
     return digest.hexdigest()

@@ -14,7 +14,7 @@
 
 """One published scenario again, bit for bit, from what its bag says: template, road, parameters, seed and index."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -33,6 +33,7 @@ from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.fitting import FittingConfig
+from scenario_gen.folders import Kind
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.planning import PlanningConfig
 from scenario_gen.requests import Chain, Request
@@ -120,17 +121,52 @@ def _regenerate(bag: Path, found: "_Found", index: int, log: Path | None) -> Reg
     return Regenerated(scenario, data, found.messages, digest(data))
 
 
-def write_regenerated(made: Regenerated, folder: Path) -> Path:
+def write_regenerated(made: Regenerated, folder: Path, inputs: Sequence[Path] = ()) -> Path:
     """Write the scenario, its account and its template to a bag of its own; return `folder`.
 
+    Args:
+        made: the scenario.
+        folder: of the bag; one that this function wrote there earlier is replaced.
+        inputs: the bag, and the log, it was made from.
+
     Raises:
-        InputError: the folder is there and is no bag, or cannot be written.
+        InputError: the folder is there and is something else, holds an input, or cannot be written.
     """
-    with AtomicBag(folder) as bag:
+    with AtomicBag(folder, REGENERATED, inputs) as bag:
         for message in made.messages:
             bag.add_topic(message.topic, message.type, qos_yaml(topic_entry(message.topic)[1]))
             bag.write(message.topic, message.data, message.stamp_ns)
     return folder
+
+
+def _is_regenerated(folder: Path) -> bool:
+    """Say whether a bag without a marker was written by `write_regenerated`.
+
+    Nothing is there but one file; every topic is one of the template's with one message, but for the two accounts, which were
+    logged at the same instant: those of a recording never are.
+    """
+    if {path.name for path in folder.iterdir()} != {"metadata.yaml", f"{folder.name}_0.mcap"}:
+        return False
+    try:
+        messages = list(read_messages(folder))
+        (info,) = {message.topic for message in messages if message.topic.endswith("/scenarios/info")}
+        where = info.removesuffix("/scenarios/info")
+        one, closing = (message for message in messages if message.topic == info)
+        account = decode_diagnostics(closing.data)[1][0].values
+    except (InputError, ValueError, IndexError):
+        return False
+    topics = [message.topic.removeprefix(f"{where}/") for message in messages if message.topic != info]
+    known = all(_is_kept(topic) or topic == "scenarios" for topic in topics) and len(set(topics)) == len(topics)
+    whole = {"scenarios", *TEMPLATE} <= set(topics) and account.get("published") == "1"
+    return known and whole and one.stamp_ns == closing.stamp_ns
+
+
+REGENERATED = Kind("regenerated bag", _is_regenerated)
+
+
+def _is_kept(topic: str) -> bool:
+    """Say whether what is on the topic belongs to the template."""
+    return topic in (*TEMPLATE, *ROAD_ENDS) or fnmatchcase(topic, "vehicle_*/route") or topic.startswith("ego/")
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,8 +246,7 @@ def _belonging(
         topic = message.topic.removeprefix(f"{where}/")
         if topic == "scenarios" and digest(message.data) == entry.values["sha256"]:
             scenario = message
-        kept = topic in (*TEMPLATE, *ROAD_ENDS) or fnmatchcase(topic, "vehicle_*/route") or topic.startswith("ego/")
-        if kept and (topic == "map" or CdrReader(message.data, message.topic).stamp() == stamp):
+        if _is_kept(topic) and (topic == "map" or CdrReader(message.data, message.topic).stamp() == stamp):
             if topic == "map" and topic in newest and CdrReader(message.data, message.topic).stamp() != stamp:
                 continue
             newest[topic] = message

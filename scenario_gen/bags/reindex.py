@@ -26,6 +26,7 @@ from scenario_gen.bags.types import definition
 from scenario_gen.bags.writer import AtomicBag, BagWriter
 from scenario_gen.documents import read_yaml, shown
 from scenario_gen.errors import InputError
+from scenario_gen.folders import Kind
 from scenario_gen.storage import BagConfig
 from scenario_gen.storage.config import Allowance
 from scenario_gen.storage.files import METADATA
@@ -34,6 +35,7 @@ from scenario_gen.storage.qos import profiles
 from scenario_gen.storage.records import Channel, DamagedError, Schema
 from scenario_gen.storage.salvage import Gap, Salvage, salvage
 
+REINDEXED = Kind("reindexed bag")
 MOST_LINES = 20  # of what was lost, on a terminal
 
 
@@ -84,7 +86,7 @@ def reindex(folder: Path, target: Path, config: BagConfig = BagConfig()) -> Rein
         raise InputError(f"{folder}: no .mcap file here; name the folder of a recorded bag")
     with ExitStack() as stack:
         found = _salvaged(files, config, stack)
-        with AtomicBag(target) as bag:
+        with AtomicBag(target, REINDEXED, [folder]) as bag:
             saved, untold = _write(bag, found, _types(found, folder))
             if not saved:
                 gaps = [gap for _, part in found for gap in part.gaps]

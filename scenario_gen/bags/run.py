@@ -45,7 +45,7 @@ from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.bags.reader import read_messages, within
-from scenario_gen.bags.writer import AtomicBag
+from scenario_gen.bags.writer import AtomicBag, BagWriter
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.scenario import Scenario, ScenarioSet
@@ -123,22 +123,27 @@ def segmentation_status(segmentation: "Segmentation", node: str = "/segmenter") 
 def write_run(folder: Path, runs: Run | Sequence[Run]) -> Path:
     """Write one or several runs (of different namespaces) to the bag `folder`, whole or not at all; return `folder`.
 
-    Same runs, same bytes. A bag already there is replaced.
+    Same runs, same bytes. A bag that this function wrote there earlier is replaced.
 
     Raises:
-        InputError: the folder is there and is no bag, cannot be written, or two runs share a namespace.
+        InputError: the folder is there and is something else, cannot be written, or two runs share a namespace.
     """
     runs = (runs,) if isinstance(runs, Run) else tuple(runs)
     if len({run.namespace for run in runs}) != len(runs):
         raise InputError(f"{folder}: two runs share a namespace; give each its own")
     with AtomicBag(folder) as bag:
-        for run in runs:
-            for topic, data, stamp_ns in run_messages(run):
-                kind, quality = topic_entry(topic)
-                name = f"{run.namespace}/{topic}"
-                bag.add_topic(name, kind, qos_yaml(quality))
-                bag.write(name, data, stamp_ns)
+        add_runs(bag, runs)
     return folder
+
+
+def add_runs(bag: BagWriter, runs: Sequence[Run]) -> None:
+    """Write all messages of the runs to a bag."""
+    for run in runs:
+        for topic, data, stamp_ns in run_messages(run):
+            kind, quality = topic_entry(topic)
+            name = f"{run.namespace}/{topic}"
+            bag.add_topic(name, kind, qos_yaml(quality))
+            bag.write(name, data, stamp_ns)
 
 
 def read_scenario_set(folder: Path, namespace: str = "") -> ScenarioSet:

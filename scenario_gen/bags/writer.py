@@ -14,11 +14,10 @@
 
 """A bag as rosbag2 (Jazzy) writes it: MCAP files of raw CDR messages, and metadata.yaml."""
 
-from contextlib import suppress
+from collections.abc import Iterable
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-import shutil
-import tempfile
 from types import TracebackType
 from typing import Any, Self
 
@@ -27,8 +26,10 @@ from mcap.writer import CompressionType, Writer
 from scenario_gen.bags.metadata import BagInfo, FileInfo, metadata_yaml, TopicInfo
 from scenario_gen.bags.types import definition
 from scenario_gen.errors import InputError
+from scenario_gen.folders import Kind, naming, replaced_folder, sync, write_text
 
 CHUNK_BYTES = 1024 * 1024
+WRITTEN = Kind("bag")
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,8 @@ class BagWriter:
         """Create `folder` and its first file.
 
         Raises:
-            InputError: the folder exists or cannot be made.
+            InputError: the folder exists.
+            OSError: it cannot be made.
         """
         self.folder = folder
         self.info = BagInfo()
@@ -54,28 +56,32 @@ class BagWriter:
         self._chunk_bytes = chunk_bytes
         self._split = split
         self._topics: dict[str, tuple[TopicInfo, tuple[str, str]]] = {}
+        self._broken = False
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
             raise InputError(f"{folder} exists already; name another folder for the bag, or remove it") from None
-        except OSError as error:
-            raise InputError(f"{folder}: {error.strerror}; choose a folder that can be written") from None
         self._open()
 
     def _open(self) -> None:
         self._file = FileInfo(f"{self.folder.name}_{len(self.info.files)}.mcap")
         self._bytes = 0
         self.info.files.append(self._file)
-        self._stream = (self.folder / self._file.path).open("wb")
-        self._writer = Writer(self._stream, chunk_size=self._chunk_bytes, compression=self._compression)
-        self._writer.start(profile="ros2", library="scenario_gen")
+        path = self.folder / self._file.path
+        with naming(path):
+            self._stream = path.open("xb")
+            self._writer = Writer(self._stream, chunk_size=self._chunk_bytes, compression=self._compression)
+            self._writer.start(profile="ros2", library="scenario_gen")
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
 
     def _close_file(self) -> None:
-        self._writer.add_metadata("rosbag2", {"serialized_metadata": metadata_yaml(self.info)})
-        self._writer.finish()
-        self._stream.close()
+        path = self.folder / self._file.path
+        with naming(path):
+            self._writer.add_metadata("rosbag2", {"serialized_metadata": metadata_yaml(self.info)})
+            self._writer.finish()
+            self._stream.close()
+        sync(path)
 
     def add_topic(self, name: str, kind: str, qos: str = "", type_hash: str = "", schema: tuple[str, str] | None = None) -> None:
         """Announce a topic; a second time is ignored.
@@ -116,27 +122,48 @@ class BagWriter:
 
         Raises:
             InputError: the stamp is negative, which an MCAP file cannot hold.
+            OSError: the disk is full, or fails; nothing more can be written.
         """
         if stamp_ns < 0:
             raise InputError(f"{name}: stamp {stamp_ns} ns is before 1970; an MCAP file cannot hold it")
+        try:
+            self._write(name, data, stamp_ns)
+        except OSError:  # a record may be there in part
+            self._broken = True
+            raise
+
+    def _write(self, name: str, data: bytes, stamp_ns: int) -> None:
         full = self._split.bytes and self._bytes >= self._split.bytes
         long = self._split.seconds and self._file.count and stamp_ns - self._file.start_ns >= self._split.seconds * 1e9
         if full or long:
             self._close_file()
             self._open()
         topic, _ = self._topics[name]
-        self._writer.add_message(self._channel(name), log_time=stamp_ns, data=data, publish_time=stamp_ns, sequence=topic.count)
-        self._stream.flush()  # of what the writer has let go: a chunk once it is full
+        with naming(self.folder / self._file.path):
+            channel = self._channel(name)
+            self._writer.add_message(channel, log_time=stamp_ns, data=data, publish_time=stamp_ns, sequence=topic.count)
+            self._stream.flush()  # of what the writer has let go: a chunk once it is full
         self._file.add(stamp_ns)
         self._bytes += len(data)
         topic.count += 1
 
     def close(self) -> None:
-        """Write indexes and metadata.yaml."""
-        self._close_file()
-        partial = self.folder / "metadata.yaml.partial"
-        partial.write_text(metadata_yaml(self.info), encoding="utf-8")
-        partial.replace(self.folder / "metadata.yaml")
+        """Write indexes and metadata.yaml; where a write has failed, leave the files as they are, for `reindex`.
+
+        Raises:
+            OSError: the disk is full, or fails.
+        """
+        try:
+            if not self._broken:
+                self._close_file()
+                partial = self.folder / "metadata.yaml.partial"
+                write_text(partial, metadata_yaml(self.info))
+                sync(partial)
+                partial.replace(self.folder / "metadata.yaml")
+                sync(self.folder)
+        finally:
+            with suppress(OSError):
+                self._stream.close()
 
     def __enter__(self) -> Self:
         return self
@@ -146,39 +173,36 @@ class BagWriter:
 
 
 class AtomicBag:
-    """A bag that is there whole or not at all: written beside its place under another name, then moved there.
+    """A bag that is there whole or not at all, in the place of nothing or of an earlier one of the same kind."""
 
-    A bag of an earlier run in the same place is replaced; a folder that is no bag is not touched.
-    """
+    def __init__(self, folder: Path, kind: Kind = WRITTEN, inputs: Iterable[Path] = (), **options: Any) -> None:
+        """Prepare the bag.
 
-    def __init__(self, folder: Path, **options: Any) -> None:
-        """Begin the bag (options: BagWriter's).
-
-        Raises:
-            InputError: `folder` exists and is no bag, or its place cannot be written.
+        Args:
+            folder: where it will be.
+            kind: of result; only an earlier one of that kind is replaced.
+            inputs: what is read for it, and may not lie in `folder`.
+            options: BagWriter's.
         """
-        self._target = folder
-        if folder.exists() and not (folder / "metadata.yaml").is_file():
-            raise InputError(f"{folder} exists and is no bag; name another folder, or remove it")
-        try:
-            folder.parent.mkdir(parents=True, exist_ok=True)
-            self._scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
-        except OSError as error:
-            raise InputError(f"{folder}: {error.strerror}; choose a folder that can be written") from None
-        self._writer = BagWriter(self._scratch / folder.name, **options)
+        self._folder, self._options = replaced_folder(folder, kind, inputs), options
 
     def __enter__(self) -> BagWriter:
-        return self._writer
+        """Begin it.
+
+        Raises:
+            InputError: `folder` is there and may not be replaced, or its place cannot be written.
+        """
+        with ExitStack() as stack:
+            partial = stack.enter_context(self._folder)
+            partial.rmdir()  # the writer makes its own
+            writer = stack.enter_context(BagWriter(partial, **self._options))
+            self._stack = stack.pop_all()
+        return writer
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        try:
-            if kind is not None:
-                with suppress(Exception):
-                    self._writer.close()
-            else:
-                self._writer.close()
-                if self._target.exists():
-                    self._target.replace(self._scratch / "replaced")
-                self._writer.folder.replace(self._target)
-        finally:
-            shutil.rmtree(self._scratch, ignore_errors=True)
+        """Put it to its place, unless the body failed.
+
+        Raises:
+            InputError: the disk is full, or fails.
+        """
+        self._stack.__exit__(kind, error, trace)

@@ -23,7 +23,7 @@ from scenario_gen.documents import read_json
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation.bootstrap import Interval
 from scenario_gen.evaluation.report import WITH
-from scenario_gen.evaluation.result import Evaluation, formatted, Metric, SCHEMA
+from scenario_gen.evaluation.result import as_markdown, Evaluation, formatted, Metric, SCHEMA
 
 FILE_SCHEMA = {  # evaluation.json of a run, or one evaluation alone
     "type": "object",
@@ -94,12 +94,13 @@ def comparison_table(differences: Sequence[Difference], names: tuple[str, str] =
     """Return Markdown: one table per case; the better one is named where the intervals do not overlap."""
     lines: list[str] = []
     case = ("", "")
+    names = (as_markdown(names[0]), as_markdown(names[1]))
     for entry in differences:
         if (entry.encounter, entry.road) != case:
             case = (entry.encounter, entry.road)
             lines += [
                 "",
-                f"## {case[0]} on {case[1]}",
+                f"## {as_markdown(case[0])} on {as_markdown(case[1])}",
                 "",
                 f"| metric | {names[0]} | {names[1]} | clearly better |",
                 "|---|---|---|---|",

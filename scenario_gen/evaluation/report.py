@@ -30,6 +30,7 @@ from scenario_gen.evaluation.bootstrap import Interval
 from scenario_gen.evaluation.report_data import case_data
 from scenario_gen.evaluation.result import Evaluation, formatted
 from scenario_gen.fitting.result import Fit
+from scenario_gen.folders import write_text
 from scenario_gen.planning.route import Route
 from scenario_gen.roads.road import Road
 from scenario_gen.scenario import Scenario, ScenarioSet
@@ -109,7 +110,7 @@ class ReportInput:
 
 def write_report(path: Path, report: ReportInput) -> None:
     """Write the page to `path`; the same input gives the same bytes."""
-    path.write_text(render(report), encoding="utf-8")
+    write_text(path, render(report))
 
 
 def render(report: ReportInput) -> str:

@@ -19,9 +19,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 import json
 import math
+import re
 from typing import Any, Literal
 
 from scenario_gen.documents import COUNT, NUMBER, parse_json
+from scenario_gen.errors import printable
 from scenario_gen.evaluation.bootstrap import Interval
 from scenario_gen.scenario import Cause, ScenarioSet, Verdict
 
@@ -232,7 +234,7 @@ class Evaluation:
     def to_markdown(self) -> str:
         """Return a table: metrics down, rows across, each figure with its interval."""
         lines = [
-            f"# {self.encounter} on {self.road}",
+            f"# {as_markdown(self.encounter)} on {as_markdown(self.road)}",
             "",
             f"{len(self.vehicles)} vehicles, {self.duration:.1f} s, K = {self.changepoints} changepoints; "
             f"{self.level:.0%} bootstrap intervals in brackets ({self.resamples} resamples, seed {self.seed}).",
@@ -250,6 +252,11 @@ class Evaluation:
             lines.append(f"| {metric.label}{unit} | {metric.better} | " + " | ".join(cells) + " |")
         notes = [f"- {row.name}: {note}" for row in self.rows for note in row.notes]
         return "\n".join([*lines, "", *notes]).rstrip() + "\n"
+
+
+def as_markdown(name: str) -> str:
+    """Return a name so that Markdown shows it letter by letter."""
+    return re.sub(r"([\\`*\[\]<>|]|^[_#]|_$)", r"\\\1", printable(name).replace("\n", " "))
 
 
 def formatted(estimate: Interval | None, unit: str, *, bounds: bool = True) -> str:

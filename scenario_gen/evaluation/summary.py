@@ -21,6 +21,7 @@ import math
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from scenario_gen.errors import printable
 from scenario_gen.evaluation.report import Case, WITH, WITHOUT
 from scenario_gen.evaluation.result import formatted
 from scenario_gen.scenario import Cause
@@ -44,7 +45,7 @@ def _case(case: Case) -> tuple[Text, Text]:
     """The name of a case, and its figures."""
     made, found = case.with_changepoints, case.evaluation.row(WITH)
     order = formatted(found.values.get("order_kept"), "%", bounds=False) if found else "–"
-    title = Text(case.title, style="bold")
+    title = Text(printable(case.title), style="bold")
     title.append(f"  {len(case.encounter.vehicles)} vehicles, {case.encounter.duration:.1f} s", style="dim")
     complete = len(made.scenarios) >= made.requested
     figures = Text.assemble(

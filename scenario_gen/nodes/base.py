@@ -29,10 +29,10 @@ from rclpy.utilities import remove_ros_args
 
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.topics import LATCHED, Quality, topic_entry
-from scenario_gen.errors import ScenarioGenError
+from scenario_gen.errors import of_system, presentable, ScenarioGenError
+from scenario_gen.interrupts import interrupt, Interrupted
 from scenario_gen.nodes.answering import Answers
 from scenario_gen.nodes.compiling import compile_kernels
-from scenario_gen.nodes.interrupts import interrupt
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.ros_parameters import ConfigParameters
@@ -243,6 +243,13 @@ def namespaces(arguments: Sequence[str]) -> list[str | None]:
     return [name or None for name in rest[1::2]] or [None]
 
 
+def _told(error: ScenarioGenError | OSError) -> int:
+    """Say on standard error what is wrong; return the exit code."""
+    own = of_system(error) if isinstance(error, OSError) else error
+    print(f"error: {presentable(str(own))}", file=sys.stderr)
+    return own.exit_code
+
+
 Maker = Callable[[str | None], Any]
 
 
@@ -265,18 +272,20 @@ def run_nodes(make: Maker | Sequence[Maker], arguments: Sequence[str] | None = N
         for node in nodes:
             node.autostart()
         executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except (Interrupted, KeyboardInterrupt, ExternalShutdownException):
         pass
-    except ScenarioGenError as error:
-        print(f"error: {error}", file=sys.stderr)
-        code = error.exit_code
+    except (ScenarioGenError, OSError) as error:
+        code = _told(error)
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)  # a second Ctrl-C does not disturb the clean end
         for node in nodes:
             getattr(node, "cancel", list)()  # all at once, so that none is waited for before another is told
         for node in nodes:
-            node.destroy_node()
+            try:
+                node.destroy_node()
+            except (ScenarioGenError, OSError) as error:  # a bag that cannot be closed, say
+                code = _told(error)
         executor.shutdown(timeout_sec=1.0)
         rclpy.try_shutdown()
     return code

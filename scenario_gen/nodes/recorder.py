@@ -15,9 +15,13 @@
 """recorder: any topics of any type, as raw CDR, to a bag; `~/start` and `~/stop` begin and end one.
 
 What a publisher offers decides how it is subscribed, so latched topics are recorded from late on too. Messages are logged at the
-time they arrive. The bag is closed on `~/stop`, on Ctrl-C and on SIGTERM; a killed recorder leaves all but the last chunk.
+time they arrive. The bag is closed on `~/stop`, on Ctrl-C and on SIGTERM; a killed recorder leaves all but the last chunk. What
+is at the bag's place already is never touched. Where the disk is full recording ends with an error on /diagnostics; what was
+written stays, for `scenario-gen reindex`.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 import re
@@ -33,9 +37,9 @@ from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.topics import topic_entry
 from scenario_gen.bags import BagWriter, Split
 from scenario_gen.bags.metadata import qos_yaml
-from scenario_gen.errors import InputError
+from scenario_gen.errors import InputError, of_system
+from scenario_gen.interrupts import uninterrupted
 from scenario_gen.nodes.base import qos, run_nodes
-from scenario_gen.nodes.interrupts import uninterrupted
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.offered import offered
 from scenario_gen.nodes.ros_parameters import ConfigParameters
@@ -65,6 +69,15 @@ class Config:
             raise InputError(f"parameter topics is no regular expression: {error}") from None
 
 
+@contextmanager
+def _disk_errors() -> Iterator[None]:
+    """Turn the system's errors into ours."""
+    try:
+        yield
+    except OSError as error:
+        raise of_system(error, advice="; `scenario-gen reindex` saves what is whole in the bag") from error
+
+
 class Recorder(Node):  # type: ignore[misc]
     """Records what matches."""
 
@@ -88,24 +101,32 @@ class Recorder(Node):  # type: ignore[misc]
 
     def _start(self, folder: Path) -> None:
         config = self.parameters.config
-        self._bag = BagWriter(folder, compress=config.compress, split=Split(config.split_bytes, config.split_seconds))
+        with _disk_errors():
+            self._bag = BagWriter(folder, compress=config.compress, split=Split(config.split_bytes, config.split_seconds))
         self.get_logger().info(f"recording to {folder}")
         self._look_around()
 
     def stop(self) -> str:
-        """Close the bag, if one is open; return its folder."""
+        """Close the bag, if one is open; return its folder.
+
+        Raises:
+            InputError: the disk is full, or fails.
+        """
         for topic in list(self._listening):
             self.destroy_subscription(self._listening.pop(topic))
         bag, self._bag = self._bag, None
         if bag is None:
             return ""
-        bag.close()
+        with _disk_errors():
+            bag.close()
         return str(bag.folder)
 
     def destroy_node(self) -> None:
         """Close the bag, then the node."""
-        self.stop()
-        super().destroy_node()
+        try:
+            self.stop()
+        finally:
+            super().destroy_node()
 
     def _look_around(self) -> None:
         """Subscribe to topics that have come up since."""
@@ -142,8 +163,18 @@ class Recorder(Node):  # type: ignore[misc]
     def _write(self, topic: str, data: bytes) -> None:
         if self._bag is not None:
             now: Time = self.get_clock().now()
-            with uninterrupted():
-                self._bag.write(topic, data, now.nanoseconds)
+            try:
+                with uninterrupted(), _disk_errors():
+                    self._bag.write(topic, data, now.nanoseconds)
+            except InputError as error:
+                self._give_up(error)
+
+    def _give_up(self, error: InputError) -> None:
+        """Say what is wrong and record no more; the node, and others in its process, live on."""
+        self.stop()  # nothing more is written to such a bag
+        self.get_logger().error(str(error))
+        told = Status(f"{self.get_fully_qualified_name()}: recording", Level.ERROR, str(error), {"error": "InputError"})
+        self._counts.publish(encode_diagnostics([told], self.get_clock().now().nanoseconds))
 
     def _start_service(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         now = self.get_clock().now().nanoseconds
@@ -158,8 +189,11 @@ class Recorder(Node):  # type: ignore[misc]
         return response
 
     def _stop_service(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        folder = self.stop()
-        response.success, response.message = bool(folder), folder or "nothing is being recorded"
+        try:
+            folder = self.stop()
+            response.success, response.message = bool(folder), folder or "nothing is being recorded"
+        except InputError as error:
+            response.success, response.message = False, str(error)
         return response
 
 

@@ -24,7 +24,7 @@ import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from scenario_gen.errors import InputError
+from scenario_gen.folders import Kind, write_text
 from scenario_gen.reproduce.claims import Claim, claims_of
 from scenario_gen.reproduce.measure import PaperCase
 
@@ -43,14 +43,23 @@ def write_page(folder: Path, cases: Sequence[PaperCase], *, quality: Sequence[st
         "provenance": dict(provenance),
         "cases": [_figures(case, found) for case, found in zip(cases, claims, strict=True)],
     }
-    (folder / FIGURES).write_text(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
-    (folder / PAGE).write_text(_render(cases, claims, quality, provenance), encoding="utf-8")
+    write_text(folder / FIGURES, json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(folder / PAGE, _render(cases, claims, quality, provenance))
 
 
-def check_place(folder: Path) -> None:
-    """Raise InputError if `folder` holds anything but an earlier page."""
-    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / PAGE).exists())):
-        raise InputError(f"{folder} exists and holds no earlier {PAGE}; choose another --out")
+def _is_reproduced(folder: Path) -> bool:
+    """Say whether a folder without a marker is what `write_page` left there: these names, and figures with their provenance."""
+    if {path.name for path in folder.iterdir()} != {PAGE, FIGURES}:
+        return False
+    try:
+        document = json.loads((folder / FIGURES).read_text(encoding="utf-8"))
+        cases = [set(case) for case in document["cases"]]
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+    return set(document) == {"provenance", "cases"} and all(c == {"encounter", "road", "refused", "figures"} for c in cases)
+
+
+REPRODUCED = Kind("reproduced", _is_reproduced)
 
 
 def refusals(case: PaperCase) -> list[str]:

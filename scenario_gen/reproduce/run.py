@@ -18,13 +18,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from scenario_gen.errors import RefusedError
+from scenario_gen.folders import replaced_folder
 from scenario_gen.logs import read_log
 from scenario_gen.parameters import flatten
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.reproduce.chain import ROADS
 from scenario_gen.reproduce.claims import claims_of
 from scenario_gen.reproduce.measure import run_case
-from scenario_gen.reproduce.page import check_place, PAGE, refusals, write_page
+from scenario_gen.reproduce.page import PAGE, refusals, REPRODUCED, write_page
 from scenario_gen.results import provenance_of
 
 VERDICTS = {True: ", as claimed", False: ", not as claimed", None: ""}
@@ -46,13 +47,14 @@ def reproduce(
         InputError: a log cannot be read, or `out` holds something else.
         RefusedError: not one encounter could be placed on a road of the paper; the page is written all the same.
     """
-    check_place(out)
     config = PipelineConfig()
-    found = [read_log(list(group), config.log) for group in logs]
-    cases = [run_case(encounter, count=count, seed=seed) for one in found for encounter in one.encounters]
-    facts = provenance_of([path for group in logs for path in group], seed, count, ROADS, config)
-    own = {name: value for name, value in facts.items() if name not in flatten(config)}  # the paper's parameters are fixed
-    write_page(out, cases, quality=[line for one in found for line in one.quality.lines()], provenance=own)
+    files = [path for group in logs for path in group]
+    with replaced_folder(out, REPRODUCED, files) as partial:
+        found = [read_log(list(group), config.log) for group in logs]
+        cases = [run_case(encounter, count=count, seed=seed) for one in found for encounter in one.encounters]
+        facts = provenance_of(files, seed, count, ROADS, config)
+        own = {name: value for name, value in facts.items() if name not in flatten(config)}  # the paper's parameters are fixed
+        write_page(partial, cases, quality=[line for one in found for line in one.quality.lines()], provenance=own)
     for case in cases:
         say(f"{case.encounter.name} on {case.road.name if case.road else 'no road'}")
         for line in refusals(case):

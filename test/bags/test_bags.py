@@ -165,7 +165,8 @@ def test_nothing_half_written_and_no_folder_of_others_is_touched(run, tmp_path):
     write_run(tmp_path / "bag", run)
     assert [p.name for p in tmp_path.iterdir()] == ["bag"]
     (tmp_path / "mine").mkdir()
-    with pytest.raises(InputError, match="is no bag"):
+    (tmp_path / "mine" / "notes.txt").touch()
+    with pytest.raises(InputError, match=r"holds notes\.txt and is not an earlier result"):
         write_run(tmp_path / "mine", run)
     with pytest.raises(InputError, match="share a namespace"):
         write_run(tmp_path / "two", [run, run])

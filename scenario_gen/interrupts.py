@@ -16,28 +16,38 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+import signal
 
 _held = False
-_pending = False
+_pending = 0
 
 
-def interrupt(_number: int, _frame: object) -> None:
-    """Signal handler: raise KeyboardInterrupt, at once or when `uninterrupted` work is done."""
+class Interrupted(BaseException):
+    """A signal asks for the end; no Exception, so that no handler of errors swallows it."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"stopped by {signal.Signals(number).name}")
+        self.exit_code = 128 + number  # as a shell says it
+
+
+def interrupt(number: int, _frame: object) -> None:
+    """Signal handler: raise Interrupted, at once or when `uninterrupted` work is done."""
     global _pending  # noqa: PLW0603 - a signal has no other place to be noted
     if _held:
-        _pending = True
+        _pending = number
     else:
-        raise KeyboardInterrupt
+        raise Interrupted(number)
 
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
     """Let the work inside be finished before a signal takes effect; not to be nested."""
-    global _held  # noqa: PLW0603
+    global _held, _pending  # noqa: PLW0603
     _held = True
     try:
         yield
     finally:
         _held = False
     if _pending:
-        raise KeyboardInterrupt
+        number, _pending = _pending, 0
+        raise Interrupted(number)

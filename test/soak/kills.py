@@ -1,0 +1,216 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Random SIGKILLs of the commands that write results, each onto an earlier result: that or the new one is whole afterwards.
+
+One half of the kills comes at any time of a run, the other shortly after the first file of the new result is there. After each,
+what the next run does first is done, so that leftovers are known to go; every tenth time a whole run follows, as users start it.
+"""
+
+from collections import Counter
+from collections.abc import Iterable
+from contextlib import redirect_stdout, suppress
+from dataclasses import dataclass
+import hashlib
+from io import StringIO
+import json
+import os
+from pathlib import Path
+import random
+import signal
+import subprocess
+import sys
+import time
+
+from figures import Figure
+
+from scenario_gen.__main__ import main
+from scenario_gen.folders import replaced_folder
+from scenario_gen.folders.claim import PREFIX
+from scenario_gen.logs.synthetic import bundled
+
+COUNT = 100
+COMMANDS = ("generate", "evaluate", "regenerate")
+KINDS = {"generate": "generated", "evaluate": "evaluated", "regenerate": "regenerated bag"}
+
+
+@dataclass
+class Target:
+    """One command with two results that it may write to `out`."""
+
+    command: str
+    folder: Path
+    sources: tuple[Path, Path]
+
+    @property
+    def out(self) -> Path:
+        return self.folder / "out"
+
+    def words(self, which: int, out: Path) -> list[str]:
+        """Return the command line that writes the first or the second result."""
+        rest = {
+            "generate": [str(bundled("c")), "--road", "straight", "--count", "2", "--seed", str(which)],
+            "evaluate": [str(self.sources[which] / "bag")],
+            "regenerate": [str(self.sources[0] / "bag"), str(which)],
+        }[self.command]
+        return [self.command, *rest, "--out", str(out)]
+
+    def start(self, which: int) -> int:
+        """Begin a run in a process of its own, forked from this one, which has all libraries loaded; return its id."""
+        pid = os.fork()
+        if pid:
+            return pid
+        code = 1
+        try:
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, 1)
+            os.dup2(null, 2)
+            sys.argv = ["scenario-gen", *self.words(which, self.out)]
+            main()
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else 1
+        finally:
+            os._exit(code)
+
+    def finish(self, which: int, out: Path | None = None) -> str:
+        """Let a run come to its end, as a user starts it; return what is there then."""
+        command = [sys.executable, "-m", "scenario_gen", *self.words(which, out or self.out)]
+        ended = subprocess.run(command, capture_output=True, text=True, check=False)
+        if ended.returncode:
+            raise RuntimeError(f"{self.command}: {ended.stderr}")
+        return digest(out or self.out)
+
+    def settle(self) -> None:
+        """Do what the next run does first."""
+        from scenario_gen.bags.regenerate import REGENERATED
+        from scenario_gen.results import EVALUATED, GENERATED
+
+        kind = next(kind for kind in (GENERATED, EVALUATED, REGENERATED) if kind.name == KINDS[self.command])
+        try:
+            with replaced_folder(self.out, kind):
+                raise _EnoughError
+        except _EnoughError:
+            pass
+
+
+class _EnoughError(Exception):
+    """Nothing is to be written."""
+
+
+def digest(folder: Path) -> str:
+    """Return one SHA-256 of all names and bytes below, "" where there is no folder."""
+    if not folder.is_dir():
+        return ""
+    found = hashlib.sha256()
+    for path in sorted(folder.rglob("*")):
+        found.update(f"{path.relative_to(folder)}\0".encode() + (path.read_bytes() if path.is_file() else b""))
+    return found.hexdigest()
+
+
+def names(folder: Path) -> list[str]:
+    """Return what is in a folder."""
+    return [path.name for path in folder.iterdir()]
+
+
+def writing(folder: Path) -> bool:
+    """Say whether a file of a new result is there."""
+    return any(folder.glob(f"{PREFIX}*/new/out/*"))
+
+
+def kill_once(target: Target, which: int, duration: float, chance: random.Random) -> str:
+    """Begin a run and kill it; return when that was: "computing", "writing" or "ended" (before the kill)."""
+    at_any_time = chance.random() < 0.5
+    pid = target.start(which)
+    if at_any_time:
+        time.sleep(chance.uniform(0.0, duration))
+    else:
+        while not (ended := os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT)) and not writing(target.folder):
+            time.sleep(0.001)
+        if not ended:
+            time.sleep(chance.uniform(0.0, 0.5 * duration))
+    os.kill(pid, signal.SIGKILL)
+    if os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) != -signal.SIGKILL:
+        return "ended"
+    return "writing" if writing(target.folder) or not at_any_time else "computing"
+
+
+def prepared(command: str, state: Path) -> tuple[Target, dict[str, int], float]:
+    """Return a command's target, its two results by digest, and how long a run takes [s]."""
+    folder = state / command
+    folder.mkdir(parents=True, exist_ok=True)
+    sources = (state / "source_0", state / "source_1")
+    for which, source in enumerate(sources):
+        if command != "generate" and not (source / "bag").exists():
+            Target("generate", state, sources).finish(which, source)
+    target = Target(command, folder, sources)
+    known: dict[str, int] = {}
+    for which in (0, 1):
+        known[target.finish(which, state / f"{command}_{which}" / "out")] = which
+    duration = 0.0
+    for which in (0, 1):  # twice in this process, so that it has loaded everything
+        sys.argv = ["scenario-gen", *target.words(which, target.out)]
+        started = time.monotonic()
+        with redirect_stdout(StringIO()), suppress(SystemExit):
+            main()
+        duration = time.monotonic() - started
+    return target, known, duration
+
+
+def kills(command: str, state: Path, count: int, seed: int = 1) -> Counter[str]:
+    """Kill so many runs of a command; return how often what was seen. What was done before counts, too."""
+    log = state / f"{command}.json"
+    seen: Counter[str] = Counter(json.loads(log.read_text())) if log.exists() else Counter()
+    if seen["kills"] >= count:
+        return seen
+    target, known, duration = prepared(command, state)
+    target.settle()
+    if not target.out.exists():
+        target.finish(0)
+    while seen["kills"] < count:
+        chance = random.Random(f"{seed} {command} {seen.total()}")
+        earlier = known[digest(target.out)]
+        when = kill_once(target, 1 - earlier, duration, chance)
+        seen["kills" if when != "ended" else "ended before the kill"] += 1
+        seen[f"while {when}"] += when != "ended"
+        found = known.get(digest(target.out))
+        seen["whole"] += found is not None and when != "ended"
+        seen["new in place"] += found == 1 - earlier and when != "ended"
+        if found is None:
+            raise RuntimeError(f"{target.out} is neither the earlier result nor the new one; look at it there")
+        seen["left something"] += names(target.folder) != ["out"]
+        target.settle()
+        if seen["kills"] % 10 == 0:
+            target.finish(1 - found)
+        seen["not cleaned"] += names(target.folder) != ["out"] or digest(target.out) not in known
+        log.write_text(json.dumps(seen))
+    return seen
+
+
+def run(state: Path) -> Iterable[Figure]:
+    """Kill every command COUNT times."""
+    for command in COMMANDS:
+        seen = kills(command, state, COUNT)
+        yield Figure(
+            f"a kill of `{command} --out` loses nothing",
+            f"{COUNT} kills, one of the two results whole after each",
+            f"{seen['whole']} of {seen['kills']} whole ({seen['while writing']} killed while writing, the new one in place after "
+            f"{seen['new in place']})",
+            seen["whole"] == seen["kills"] >= COUNT,
+        )
+        yield Figure(
+            f"the next `{command}` removes what a killed one left",
+            "nothing left",
+            f"{seen['left something']} left something, {seen['not cleaned']} still there after the next run",
+            not seen["not cleaned"],
+        )
