@@ -14,7 +14,7 @@
 
 """The chain up to the sampler over every recorded encounter and several roads."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import os
 from pathlib import Path
@@ -84,12 +84,12 @@ def cases() -> Iterator[Prepared | str]:
             yield Prepared(name, road_name, encounter, segmentation, road, fit, routes, conflicts, waits)
 
 
-def displacement(scenarios: tuple[Scenario, ...]) -> float:
+def displacement(scenarios: Sequence[Scenario]) -> float:
     """Mean distance [m] between the same vehicle at the same share of the duration in two samples, without the clock's part."""
     return _apart(np.stack([at_count(s, 101).position for s in scenarios]))
 
 
-def displacement_at_instants(scenarios: tuple[Scenario, ...]) -> float:
+def displacement_at_instants(scenarios: Sequence[Scenario]) -> float:
     """Mean distance [m] between the same vehicle at the same instant in two samples, up to the end of the shortest."""
     count = min(s.time.size for s in scenarios)
     return _apart(np.stack([s.position[:, :count] for s in scenarios]))
@@ -100,7 +100,7 @@ def _apart(position: Floats) -> float:
     return float(np.linalg.norm(position[pairs[0]] - position[pairs[1]], axis=-1).mean())
 
 
-def arrival_spread(case: Prepared, scenarios: tuple[Scenario, ...]) -> float:
+def arrival_spread(case: Prepared, scenarios: Sequence[Scenario]) -> float:
     """Largest standard deviation [s] of the second vehicle's entry over the conflicts that are not following; NaN if none."""
     spreads = []
     for conflict in case.conflicts:
@@ -114,7 +114,7 @@ def arrival_spread(case: Prepared, scenarios: tuple[Scenario, ...]) -> float:
     return max(spreads, default=float("nan"))
 
 
-def divergences(case: Prepared, scenarios: tuple[Scenario, ...]) -> dict[str, float]:
+def divergences(case: Prepared, scenarios: Sequence[Scenario]) -> dict[str, float]:
     """Jensen-Shannon divergence [bit] of each quantity between the samples and the fitted template."""
     period = case.encounter.dt
     template = values_of(at_period(replay(case.encounter, case.fit), period))
