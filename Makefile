@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: demo test soak bench install tools clean
+.PHONY: demo test soak bench audit licences install tools clean
 
 demo: $(READY)
 	$(BIN)/scenario-gen demo --ros --out out/demo
@@ -22,6 +22,18 @@ soak: $(READY)
 bench: $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-bench.lock
 	$(BIN)/python -m benchmarks all
+
+# Known vulnerabilities of all that is locked. It fails, too, where it could not look everything up.
+audit: .venv-audit/.ready
+	.venv-audit/bin/python test/packaging/audit.py requirements.lock requirements-bench.lock requirements-audit.lock
+
+.venv-audit/.ready: requirements-audit.lock
+	$(PYTHON) -m venv .venv-audit
+	.venv-audit/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-audit.lock
+	@touch .venv-audit/.ready
+
+licences: $(READY)
+	$(BIN)/python test/packaging/licences.py
 
 install: $(READY)
 
@@ -46,4 +58,4 @@ tools:
 	  echo "Not here, and the tests that need it will be skipped: $$need"
 
 clean:
-	rm -rf .venv build install log out
+	rm -rf .venv .venv-audit build install log out

@@ -32,7 +32,7 @@ setup(
     license="Apache-2.0",
     maintainer="The scenario_gen developers",
     maintainer_email="scenario_gen@users.noreply.github.com",
-    python_requires=">=3.11",
+    python_requires=">=3.11,<3.14",
     packages=find_packages(include=["scenario_gen*", "msg_conventions*"]),
     package_data={NAME: ["py.typed", "resources/*", "resources/**/*", "evaluation/assets/*", "nodes/*.xml"]},
     data_files=[

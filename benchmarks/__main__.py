@@ -12,10 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`python -m benchmarks NAME [--json]`: run one benchmark (or `all`); `--list` names them."""
+"""`python -m benchmarks NAME [--json] [--quick]`: run one benchmark (or `all`); `--list` names them."""
 
 import argparse
-from dataclasses import asdict
 import importlib
 import inspect
 import json
@@ -28,6 +27,7 @@ import numpy
 import scipy
 
 import benchmarks
+from benchmarks._size import QUICK
 from benchmarks.row import Row
 
 FRAME = {"__main__", "row"}
@@ -72,6 +72,7 @@ def main() -> int:
     parser.add_argument("--list", action="store_true", help="name the benchmarks")
     parser.add_argument("--json", action="store_true", help="end with one JSON object on the last line")
     parser.add_argument("--count", type=int, help="how many, where a benchmark counts something (scenarios to re-check)")
+    parser.add_argument("--quick", action="store_true", help="next to nothing of each, to see that it runs; figures say nothing")
     arguments = parser.parse_args()
     known = names()
     if arguments.list or arguments.name is None:
@@ -80,13 +81,15 @@ def main() -> int:
     if arguments.name != "all" and arguments.name not in known:
         print(f"unknown benchmark {arguments.name!r}; choose one of: all, {', '.join(known)}", file=sys.stderr)
         return 2
+    if arguments.quick:
+        os.environ[QUICK] = "1"  # before the benchmarks are imported
     for name in known if arguments.name == "all" else [arguments.name]:
         run = importlib.import_module(f"benchmarks.{name}").run
         counted = arguments.count is not None and "count" in inspect.signature(run).parameters
         rows: list[Row] = run(arguments.count) if counted else run()
         if arguments.json:
-            report = [asdict(row) | {"met": row.met} for row in rows]
-            print(json.dumps({"benchmark": name, "rows": report, "machine": machine()}), flush=True)
+            report = {"benchmark": name, "quick": arguments.quick, "rows": [row.document() for row in rows], "machine": machine()}
+            print(json.dumps(report, allow_nan=False), flush=True)
         else:
             print(f"{name}\n{table(rows)}\n", flush=True)
     return 0

@@ -21,6 +21,7 @@ from pathlib import Path
 import re
 from time import process_time
 
+from benchmarks._size import sized
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.evaluation import Case, evaluate, Evaluation, ORACLE, render, replay, ReportInput, UNIFORM, WITH, WITHOUT
@@ -30,7 +31,8 @@ from scenario_gen.pipeline import Arm, PipelineConfig, run_arm, without_changepo
 from scenario_gen.roads import build_road, Road
 from scenario_gen.segmentation import segment, Segmentation
 
-COUNT, SEEDS = 50, (7, 8, 9)
+COUNT, SEEDS = sized((50, (7, 8, 9)), quick=(4, (7,)))
+LOGS = sized(None, quick=1)
 OTHER_ROADS = ("t_intersection", "four_way", "straight")
 LINEAR = "best linear pieces"
 
@@ -57,7 +59,7 @@ def encounters(data: Path) -> Iterator[tuple[Encounter, list[str]]]:
     bundled = sorted(
         Path(str(path)) for path in (files("scenario_gen") / "resources").iterdir() if path.name.startswith("synthetic")
     )
-    for path in [*bundled, *sorted(data.glob("trajectories/*/encounter_*.csv"))]:
+    for path in [*bundled, *sorted(data.glob("trajectories/*/encounter_*.csv"))][:LOGS]:
         place = re.search(r"(Lanker|Peach)-\d+_\d+", path.name)
         maps = sorted(data.glob(f"maps/occupancy_grids/USA_{place[0]}_*.yaml")) if place else []
         yield read_log(path).encounters[0], ["corridor", *map(str, maps)]

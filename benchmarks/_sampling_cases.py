@@ -14,13 +14,14 @@
 
 """The chain up to the sampler over every recorded encounter and several roads."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import os
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks._size import sized
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import ScenarioGenError
@@ -38,6 +39,7 @@ from scenario_gen.segmentation import segment, Segmentation
 from scenario_gen.validity import Checker
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+LOGS = sized(None, quick=1)
 ROADS = ("corridor", "straight", "t_intersection", "four_way")
 
 
@@ -67,7 +69,7 @@ class Prepared:
 
 def cases() -> Iterator[Prepared | str]:
     """Every recorded encounter on every road that it can be fitted to and planned on; else a sentence why not."""
-    for path in sorted((DATA / "trajectories").glob("*/encounter_*.csv")):
+    for path in sorted((DATA / "trajectories").glob("*/encounter_*.csv"))[:LOGS]:
         encounter = read_log(path).encounters[0]
         segmentation = segment(encounter)
         conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
@@ -84,12 +86,12 @@ def cases() -> Iterator[Prepared | str]:
             yield Prepared(name, road_name, encounter, segmentation, road, fit, routes, conflicts, waits)
 
 
-def displacement(scenarios: tuple[Scenario, ...]) -> float:
+def displacement(scenarios: Sequence[Scenario]) -> float:
     """Mean distance [m] between the same vehicle at the same share of the duration in two samples, without the clock's part."""
     return _apart(np.stack([at_count(s, 101).position for s in scenarios]))
 
 
-def displacement_at_instants(scenarios: tuple[Scenario, ...]) -> float:
+def displacement_at_instants(scenarios: Sequence[Scenario]) -> float:
     """Mean distance [m] between the same vehicle at the same instant in two samples, up to the end of the shortest."""
     count = min(s.time.size for s in scenarios)
     return _apart(np.stack([s.position[:, :count] for s in scenarios]))
@@ -100,7 +102,7 @@ def _apart(position: Floats) -> float:
     return float(np.linalg.norm(position[pairs[0]] - position[pairs[1]], axis=-1).mean())
 
 
-def arrival_spread(case: Prepared, scenarios: tuple[Scenario, ...]) -> float:
+def arrival_spread(case: Prepared, scenarios: Sequence[Scenario]) -> float:
     """Largest standard deviation [s] of the second vehicle's entry over the conflicts that are not following; NaN if none."""
     spreads = []
     for conflict in case.conflicts:
@@ -114,7 +116,7 @@ def arrival_spread(case: Prepared, scenarios: tuple[Scenario, ...]) -> float:
     return max(spreads, default=float("nan"))
 
 
-def divergences(case: Prepared, scenarios: tuple[Scenario, ...]) -> dict[str, float]:
+def divergences(case: Prepared, scenarios: Sequence[Scenario]) -> dict[str, float]:
     """Jensen-Shannon divergence [bit] of each quantity between the samples and the fitted template."""
     period = case.encounter.dt
     template = values_of(at_period(replay(case.encounter, case.fit), period))

@@ -24,6 +24,7 @@ import warnings
 import numpy as np
 import scipy.linalg
 
+from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.arrays import Floats
 from scenario_gen.sampling.gp import Features, Observations, Regression, squared_exponential
@@ -61,7 +62,7 @@ def _against_dense(x: Floats, y: Floats, noise: Floats, at: Floats):  # type: ig
     mean, cov = _dense(x, y, noise, at)
     ours = _ours(x, y, noise, at)
     z = np.random.default_rng(0).standard_normal((SAMPLES, ours.factor.shape[1]))
-    return ours, mean, cov, min(_seconds(lambda: _ours(x, y, noise, at).sample(z)) for _ in range(25))
+    return ours, mean, cov, min(_seconds(lambda: _ours(x, y, noise, at).sample(z)) for _ in range(sized(25, quick=1)))
 
 
 def _data(n: int, m: int) -> tuple[Floats, Floats, Floats, Floats]:

@@ -29,11 +29,12 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from benchmarks._figure5 import LINEAR, measure, Measured, SEEDS
+from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.evaluation import dtw_distance, feature_matrix, UNIFORM, WITH, WITHOUT
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
-STEPS = 3000
+STEPS = sized(3000, quick=100)
 SIGNIFICANT = 0.03  # below it, E without changepoints leaves nothing to gain
 
 
@@ -120,7 +121,7 @@ def _ratio(cases: Sequence[Measured], arm: str, key: str) -> float:
     return float(np.median(known)) if known else float("nan")
 
 
-def _fastest(call: Callable[[], Any], repeats: int = 7) -> tuple[float, Any]:
+def _fastest(call: Callable[[], Any], repeats: int = sized(7, quick=1)) -> tuple[float, Any]:
     """Return the least CPU time of some calls, and what they returned."""
     times, result = [], None
     for _ in range(repeats):

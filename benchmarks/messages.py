@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks._messages_processes import nodes, publisher
+from benchmarks._size import sized
 from benchmarks.row import Row
 from msg_conventions.paths import encode_path
 from msg_conventions.scenarios import decode_scenario, encode_scenario
@@ -39,11 +40,12 @@ from scenario_gen.nodes.domain import free_domain, this_host_only
 from scenario_gen.scenario import Scenario
 
 POINTS = 200
-SCENARIOS = 1000
-SMALL = 6000  # messages sent to the recorder
+SCENARIOS = sized(1000, quick=20)
+SMALL = sized(6000, quick=20)  # messages sent to the recorder
 RATE = 2000.0  # a second
 INTERRUPT, TERMINATE = signal.SIGINT, signal.SIGTERM
-EXITS = (("Ctrl-C", INTERRUPT), ("Ctrl-C twice", INTERRUPT, INTERRUPT), ("SIGTERM", TERMINATE))
+CALLS = sized(40, quick=2)
+EXITS = (("Ctrl-C", INTERRUPT), ("Ctrl-C twice", INTERRUPT, INTERRUPT), ("SIGTERM", TERMINATE))[: sized(None, quick=1)]
 
 
 def run() -> list[Row]:
@@ -71,7 +73,7 @@ def _scenario(n: int) -> Scenario:
 def _cpu(work: Callable[[], object], rounds: int) -> float:
     """CPU seconds of one call: the best of five times `rounds`."""
     best = np.inf
-    for _ in range(5):
+    for _ in range(sized(5, quick=1)):
         started = process_time()
         for _ in range(rounds):
             work()
@@ -238,14 +240,14 @@ def _calls(domain: int, folder: Path) -> list[Row]:
             if not (answer.map.data if kind is GetMap else answer.plan.poses if kind is GetPlan else answer.result.names):
                 raise RuntimeError(f"{name} answers with nothing")
             running, taken = generate.call_async(request), []
-            for _ in range(40):
+            for _ in range(CALLS):
                 if running.done():
                     running = generate.call_async(request)
                 started = time.perf_counter()
                 _done(service.call_async(call))
                 taken.append(time.perf_counter() - started)
             _done(running)
-            words = f"median {1e3 * float(np.median(taken)):.1f} ms; 40 calls while generations of 50 run"
+            words = f"median {1e3 * float(np.median(taken)):.1f} ms; {CALLS} calls while generations of 50 run"
             rows.append(Row(f"{kind.__name__} round trip, 95th percentile", 1e3 * _high(taken), "ms", "lower", 200.0, words))
     return rows
 

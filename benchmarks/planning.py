@@ -31,6 +31,7 @@ from time import process_time
 import numpy as np
 
 from benchmarks._planning_maps import clutter, enters_blocked, lane, optimum, recorded_maps, road_of, t_intersection
+from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Vehicle
@@ -45,8 +46,12 @@ from scenario_gen.roads.flood import component_at, components, connected
 from scenario_gen.roads.road import Road
 from scenario_gen.scenario import BoundaryStates
 
-SEEDS = 20
-BUDGETS = (0.01, 0.1, 1.0)  # [s] of CPU time
+SEEDS = sized(20, quick=1)
+BUDGETS = sized((0.01, 0.1, 1.0), quick=(0.01,))  # [s] of CPU time
+FEW, MORE, MANY = sized((20_000, 100_000, 1_000_000), quick=(8000, 9000, 10_000))  # iterations of one tree
+QUERIES, QUERIES_OF_A_MAP = sized((100_000, 500), quick=(100, 2))
+MAPS = sized(None, quick=1)
+TURNS = sized(10, quick=2)
 STEP = RrtStarConnectConfig(step=5.0, pull=False)
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 Case = tuple[Road, Floats, float]
@@ -149,16 +154,16 @@ def _throughput(cases: dict[str, Case]) -> list[Row]:
     rows = []
     for name in ("T", "clutter"):
         road, ends, _ = cases[name]
-        default = _per_iteration(road, ends, RrtStarConnectConfig(), 20_000)
-        few, more, many = (_per_iteration(road, ends, PAPER, n) for n in (20_000, 100_000, 1_000_000))
+        default = _per_iteration(road, ends, RrtStarConnectConfig(), FEW)
+        few, more, many = (_per_iteration(road, ends, PAPER, n) for n in (FEW, MORE, MANY))
         for cost, label in ((default, "default"), (few, "paper preset")):
             rows.append(Row(f"{name}: iterations per second, {label}", 1.0 / cost, "1/s", "higher", 1e5))
         for base, start, target, told in (
-            (few, 2e4, 1.0, _growth_of_ompl(road, ends) if name == "T" else None),
-            (more, 1e5, None, "from where eq 10, not zeta, sets the radius"),
+            (few, FEW, 1.0, _growth_of_ompl(road, ends) if name == "T" else None),
+            (more, MORE, None, "from where eq 10, not zeta, sets the radius"),
         ):
-            growth = many / base / (np.log(1e6) / np.log(start))
-            label = f"{name}: cost per iteration at 10⁶ over {start:.0e}, over log n"
+            growth = many / base / (np.log(MANY) / np.log(start))
+            label = f"{name}: cost per iteration at {MANY:.0e} over {start:.0e}, over log n"
             rows.append(Row(label, growth, "×", "lower", target, told))
     return rows
 
@@ -178,16 +183,16 @@ def _growth_of_ompl(road: Road, ends: Floats) -> str:
     told = []
     for name in ("ompl_rrt_star", "ompl_informed_rrt_star"):
         cost = []
-        for iterations in (20_000, 100_000):
+        for iterations in (FEW, MORE):
             started = process_time()
             until = partial(lt, iterations)  # so many have been made
             solve(clearance_in_cells(road), ends, 0.0, name, until, step=5.0, simplify=False)
             cost.append((process_time() - started) / iterations)
-        told.append(f"{PLANNERS[name]} {cost[1] / cost[0] / (np.log(1e5) / np.log(2e4)):.2f}")
-    return f"OMPL at 10⁵ over 2·10⁴: {', '.join(told)}"
+        told.append(f"{PLANNERS[name]} {cost[1] / cost[0] / (np.log(MORE) / np.log(FEW)):.2f}")
+    return f"OMPL at {MORE:.0e} over {FEW:.0e}: {', '.join(told)}"
 
 
-def _soundness(queries: int = 100_000) -> list[Row]:
+def _soundness(queries: int = QUERIES) -> list[Row]:
     """Random queries on random grids, re-checked by the exact rasteriser."""
     rng = np.random.default_rng(0)
     planner = RrtStarConnect(RrtStarConnectConfig(step=4.0))
@@ -213,10 +218,10 @@ def _soundness(queries: int = 100_000) -> list[Row]:
     return [Row(f"paths into occupied cells, of {asked} random queries", float(hits), "", "lower", 0.0, told)]
 
 
-def _recorded(queries: int = 500) -> list[Row]:
+def _recorded(queries: int = QUERIES_OF_A_MAP) -> list[Row]:
     """Random queries on the recorded maps."""
     rows = []
-    for road in recorded_maps(DATA / "maps" / "occupancy_grids") if DATA.is_dir() else ():
+    for road in recorded_maps(DATA / "maps" / "occupancy_grids")[:MAPS] if DATA.is_dir() else ():
         for radius in (0.0, 1.25):
             rng = np.random.default_rng(5)
             cells = np.argwhere(components(road, radius) > 0)
@@ -259,7 +264,7 @@ def _drivable() -> list[Row]:
         states = BoundaryStates(*(np.append(pose, 5.0)[None] for pose in poses))
         fit = Fit((Vehicle("a"),), (fitted,), np.array([0, 1]), states, ())
         times = []
-        for seed in range(10):
+        for seed in range(TURNS):
             started = process_time()
             (route,) = plan_routes(road, fit, config, seed)
             times.append(process_time() - started)

@@ -14,8 +14,9 @@
 
 """One measured figure."""
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import asdict, dataclass
+import math
+from typing import Any, Literal
 
 
 @dataclass(frozen=True)
@@ -32,9 +33,17 @@ class Row:
     target: float | None = None
     peer: str | None = None
 
+    def __post_init__(self) -> None:  # numbers of numpy are no numbers of JSON
+        object.__setattr__(self, "value", float(self.value))
+        object.__setattr__(self, "target", None if self.target is None else float(self.target))
+
     @property
     def met(self) -> bool | None:
         """True if the value is at least as good as the target."""
         if self.target is None:
             return None
         return self.value >= self.target if self.better == "higher" else self.value <= self.target
+
+    def document(self) -> dict[str, Any]:
+        """Return what stands in the JSON line; null for a value that is not finite, which JSON cannot say."""
+        return asdict(self) | {"value": self.value if math.isfinite(self.value) else None, "met": self.met}

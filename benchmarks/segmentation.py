@@ -33,6 +33,7 @@ from benchmarks import _segmentation_peers as peers
 from benchmarks._segmentation_calibration import calibrate
 from benchmarks._segmentation_data import CELLS, driving, gaussian_hmm
 from benchmarks._segmentation_scores import changes, f1, hamming, smoother
+from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.segmentation import (
@@ -43,13 +44,15 @@ from scenario_gen.segmentation import (
     SegmentationConfig,
 )
 
-SEEDS = range(9101, 9113)
-SEEDS_OF_A = range(9101, 9141)  # short sequences, so more of them
+SEEDS = range(9101, sized(9113, quick=9102))
+SEEDS_OF_A = range(9101, sized(9141, quick=9102))  # short sequences, so more of them
+PRIORS, TICKS = sized((400, 36_000), quick=(5, 80))  # sequences of the calibration, samples of the online hour
+LABELLED = sized(None, quick=1)  # recordings of a set
 TARGET_SPEED = {"A": 60.0, "B": 40.0, "D": 50.0}
 TARGET_HAMMING = {"A": 0.01, "B": 0.01, "C": 0.02}
 TARGET_F1 = {"A": 0.03, "B": 0.03, "C": 0.05}
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")) / "labelled_series"
-LABELLED_SEEDS = range(1, 6)
+LABELLED_SEEDS = range(1, sized(6, quick=2))
 NOT_INSTALLED = "peer not installed"
 
 
@@ -81,7 +84,7 @@ def _first_call() -> Row:
         "all imports": "import numpy, scenario_gen.segmentation",
         "first answer": "import numpy, scenario_gen.segmentation as s; s.segment_series(numpy.eye(50)[:, :2])",
     }
-    spent = {name: float(np.median([_fresh(code) for _ in range(3)])) for name, code in parts.items()}
+    spent = {name: float(np.median([_fresh(code) for _ in range(sized(3, quick=1))])) for name, code in parts.items()}
     text = "CPU after: " + ", ".join(f"{name} {seconds:.2f} s" for name, seconds in spent.items())
     return Row("first call in a fresh process", spent["first answer"], "s", "lower", 2.0, text)
 
@@ -138,7 +141,7 @@ def _driving(seconds: dict[str, float]) -> list[Row]:
         spent.append(time.process_time() - started)
         scores.append(f1(sequence.changepoints, found.changepoints, 5))
         ratios.append(len(found.changepoints) / len(sequence.changepoints))
-        rivals = peers.ruptures(np.gradient(sequence.x[:, [2, 5]], axis=0)) if seed < SEEDS[3] else None
+        rivals = peers.ruptures(np.gradient(sequence.x[:, [2, 5]], axis=0)) if seed < SEEDS[0] + 3 else None
         if rivals is not None:
             pelt.append(f1(sequence.changepoints, rivals, 5))
     seconds["D"] = float(np.median(spent))
@@ -180,7 +183,7 @@ def _speed(seconds: dict[str, float]) -> list[Row]:
 
 def _calibration() -> list[Row]:
     """Sequences from the model's own prior: are probabilities and intervals right?"""
-    found = calibrate(range(SEEDS[0], SEEDS[0] + 400), d=1)
+    found = calibrate(range(SEEDS[0], SEEDS[0] + PRIORS), d=1)
     table = ", ".join(f"{p:.2f}: {o:.2f} ({n})" for p, o, n in zip(found.predicted, found.observed, found.counts, strict=True))
     return [
         Row(
@@ -230,14 +233,14 @@ def _hour() -> list[Row]:
     speed = np.concatenate([e.speed for e in four])
     online = OnlineSegmenter(8, 0.1)
     sizes, started = [], time.process_time()
-    for t in range(36_000):
+    for t in range(TICKS):
         online.push(position[:, t % 6000], speed[:, t % 6000])
-        if t in (9000, 35_999):
+        if t in (TICKS // 4, TICKS - 1):
             sizes.append(len(pickle.dumps(online)))
     spent = time.process_time() - started
     return [
         Row("online: growth of its state over an hour, 8 vehicles", (sizes[1] - sizes[0]) / 1024.0, "KiB", "lower", 64.0),
-        Row("online: CPU per sample, 8 vehicles", 1e3 * spent / 36_000, "ms", "lower", 100.0),
+        Row("online: CPU per sample, 8 vehicles", 1e3 * spent / TICKS, "ms", "lower", 100.0),
     ]
 
 
@@ -261,7 +264,7 @@ def _labelled() -> list[Row]:
     """Labelled recordings; each peer's figure beside ours is the target."""
     if not DATA.is_dir():
         return []
-    mocap, bees = list(_mocap6()), list(_bee_dance())
+    mocap, bees = list(_mocap6())[:LABELLED], list(_bee_dance())[:LABELLED]
     moves = [[segment_series(x, seed=seed) for x, _ in mocap] for seed in LABELLED_SEEDS]
     dancing = SamplerConfig(emission="autoregressive", order=2)
     dances = [[segment_series(x, dancing, seed=seed) for x, _ in bees] for seed in LABELLED_SEEDS]

@@ -20,6 +20,7 @@ from time import process_time
 import numpy as np
 
 from benchmarks._recheck import recheck_published
+from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Vehicle
@@ -40,7 +41,7 @@ PLATOONS: tuple[Drive, ...] = tuple((13.0 * i - 90, -1.75, 0, 4) for i in range(
 )
 
 
-def run(count: int = 1000) -> list[Row]:
+def run(count: int = sized(1000, quick=4)) -> list[Row]:
     """Measure; `count` published scenarios of recorded encounters are re-checked (100,000 take some 15 min of CPU time)."""
     rows = []
     for name, drives in CASES.items():
@@ -113,7 +114,7 @@ def _seconds_per_check(drives: tuple[Drive, ...], samples: int) -> float:
 def _seconds(work: Callable[[], object]) -> float:
     """CPU seconds of one call: the best of five rounds of at least 50 ms."""
     best, calls = np.inf, 1
-    for _ in range(5):
+    for _ in range(sized(5, quick=1)):
         started, done = process_time(), 0
         while process_time() - started < 0.05:
             for _ in range(calls):

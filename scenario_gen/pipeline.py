@@ -26,6 +26,7 @@ from scenario_gen.evaluation import (
     CheckCounts,
     evaluate,
     EvaluationConfig,
+    MEASURED,
     ORACLE,
     replay,
     UNIFORM,
@@ -141,7 +142,7 @@ def with_ablation(
 ) -> Case:
     """Run the chain again without changepoints and, unless `evaluation.uniform` is off, with uniform ones; evaluate all.
 
-    Beside them stands the fitted template (the oracle row).
+    Beside them stands the fitted template (the oracle row). Of these references no more are made than are measured.
     """
     others = {WITHOUT: without_changepoints(arm.segmentation)}
     if config.evaluation.uniform and arm.segmentation.changepoints.size:
@@ -149,7 +150,8 @@ def with_ablation(
     arms, refused = {WITH: arm}, {}
     for name, segmentation in others.items():
         try:
-            arms[name] = run_arm(encounter, segmentation, road, config, count=count, seed=seed, request=request, reference=True)
+            few = min(count, MEASURED)
+            arms[name] = run_arm(encounter, segmentation, road, config, count=few, seed=seed, request=request, reference=True)
         except RefusedError as error:
             refused[name] = str(error)
     made = {name: one.scenarios for name, one in arms.items()}

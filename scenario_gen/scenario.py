@@ -121,10 +121,11 @@ class ScenarioSet:
 
     `refused` counts refused candidates by their first cause; `adaptations` names what was changed to get there. `ego` is the
     template track of the vehicle that was left out for a planner under test, if one was: a scenario of that vehicle alone.
+    The scenarios of a large set are not in memory but drawn again whenever they are looked at.
     """
 
     requested: int
-    scenarios: tuple[Scenario, ...]
+    scenarios: Sequence[Scenario]
     candidates: int
     refused: Counter[Cause] = field(default_factory=Counter)
     adaptations: Sequence[str] = ()

@@ -15,6 +15,7 @@
 """rosbag2's metadata.yaml, version 9, and the QoS profiles as it writes them."""
 
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import yaml
@@ -78,6 +79,7 @@ def dump(value: Any) -> str:
     return text
 
 
+@cache
 def qos_yaml(quality: Quality) -> str:
     """Return the offered QoS profile as the list that rosbag2 writes."""
     profile = {

@@ -16,7 +16,7 @@
 
 from scenario_gen.evaluation.compare import compare, comparison_table, Difference, read_evaluations
 from scenario_gen.evaluation.dtw import Alignment, dtw, dtw_distance, feature_matrix
-from scenario_gen.evaluation.evaluate import evaluate, EvaluationConfig
+from scenario_gen.evaluation.evaluate import evaluate, EvaluationConfig, MEASURED
 from scenario_gen.evaluation.oracle import replay
 from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints
 from scenario_gen.evaluation.report import Case, ORACLE, render, ReportInput, UNIFORM, WITH, WITHOUT, write_report
@@ -24,6 +24,7 @@ from scenario_gen.evaluation.result import CheckCounts, Evaluation, Metric, Row
 from scenario_gen.evaluation.summary import summary
 
 __all__ = [
+    "MEASURED",
     "ORACLE",
     "UNIFORM",
     "WITH",

@@ -16,6 +16,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -32,6 +33,10 @@ from scenario_gen.evaluation.result import CheckCounts, Evaluation, Row, TEMPLAT
 from scenario_gen.parameters import check, parameter
 from scenario_gen.scenario import Cause, Scenario
 from scenario_gen.segmentation.result import Segmentation
+
+MEASURED = 1000
+"""Scenarios of a set that are measured; of a larger one this many, in RUNS evenly spaced runs of consecutive ones."""
+RUNS = 20
 
 
 @dataclass(frozen=True)
@@ -82,7 +87,7 @@ def evaluate(
         encounter: the recorded template.
         segmentation: its primitives; only their number is used, since more changepoints always fit better.
         rows: sets of scenarios by name, e.g. "with changepoints", "without changepoints", "oracle". An empty set gives an
-            empty row, with a note.
+            empty row, with a note. Of a set of more than MEASURED scenarios that many are measured, see `measured`.
         checks: the checker's account of the candidates of a row, where there is one.
         oracle: the row whose first scenario is the fitted template, to which displacements are measured.
         road: name of the road, for the heading.
@@ -98,6 +103,8 @@ def evaluate(
     Raises:
         InputError: a scenario has a vehicle that the encounter has not.
     """
+    sizes = {name: len(scenarios) for name, scenarios in rows.items()}
+    rows = {name: measured(scenarios) for name, scenarios in rows.items()}
     steps = min(encounter.speed.shape[1], config.max_steps)
     ids = shared_vehicles(encounter, rows)
     clocked = chosen(at_period(encounter, config.period), ids)
@@ -106,7 +113,7 @@ def evaluate(
     motion = chosen(at_count(encounter, steps), ids)
     reference = _Reference(motion, values_of(clocked), critical, fitted, config, seed)
     counts = checks or {}
-    measured = [_measure(name, scenarios, reference, counts.get(name)) for name, scenarios in rows.items()]
+    found = [_measure(name, scenarios, sizes[name], reference, counts.get(name)) for name, scenarios in rows.items()]
     return Evaluation(
         encounter=encounter.name,
         road=road,
@@ -117,8 +124,21 @@ def evaluate(
         resamples=config.resamples,
         seed=seed,
         metrics=METRICS,
-        rows=(_template_row(reference, steps < encounter.speed.shape[1], steps), *measured),
+        rows=(_template_row(reference, steps < encounter.speed.shape[1], steps), *found),
     )
+
+
+def measured(scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
+    """Return the scenarios of a set that the figures are taken of: all, or MEASURED of a larger one.
+
+    Those are RUNS runs of consecutive scenarios, evenly spaced from the first to the last: whatever changes along the set is in
+    them, and nearly every scenario has its mirror image beside it, as in a smaller set.
+    """
+    if len(scenarios) <= MEASURED:
+        return scenarios
+    length = MEASURED // RUNS
+    starts = [k * (len(scenarios) - length) // (RUNS - 1) for k in range(RUNS)]
+    return tuple(chain.from_iterable(scenarios[start : start + length] for start in starts))
 
 
 def shared_vehicles(encounter: Encounter, rows: Mapping[str, Sequence[Scenario]]) -> tuple[str, ...]:
@@ -156,7 +176,8 @@ def _template_row(reference: _Reference, resampled: bool, steps: int) -> Row:
     return Row(TEMPLATE, 1, {key: Interval(value) for key, value in values.items()}, notes)
 
 
-def _measure(name: str, scenarios: Sequence[Scenario], reference: _Reference, counts: CheckCounts | None) -> Row:
+def _measure(name: str, scenarios: Sequence[Scenario], size: int, reference: _Reference, counts: CheckCounts | None) -> Row:
+    """The row of scenarios that are all of a set of this size, or those of it that are measured."""
     config, fitted = reference.config, reference.fitted
     values = _rates(counts, config.level) if counts else {}
     if not scenarios:
@@ -174,7 +195,7 @@ def _measure(name: str, scenarios: Sequence[Scenario], reference: _Reference, co
     if fitted is not None:
         error = variety.displacement_to(position, fitted.position)
         values["min_ade"] = bootstrap.interval(lambda weights: variety.least(error, weights))
-    return Row(name, len(scenarios), values, _notes(len(scenarios), values, config))
+    return Row(name, len(scenarios), values, _notes(len(scenarios), size, values, config))
 
 
 def _pairs(scenarios: Sequence[Scenario]) -> Ints:
@@ -241,8 +262,10 @@ def _rates(counts: CheckCounts, level: float) -> dict[str, Interval]:
     }
 
 
-def _notes(samples: int, values: Mapping[str, Interval], config: EvaluationConfig) -> tuple[str, ...]:
+def _notes(samples: int, size: int, values: Mapping[str, Interval], config: EvaluationConfig) -> tuple[str, ...]:
     notes = []
+    if samples < size:
+        notes.append(f"measured on {samples:,} of {size:,} scenarios, in {RUNS} evenly spaced runs; candidates are all counted")
     if 1 < samples < config.enough:
         notes.append(f"few samples: every figure, E included, comes from {samples}, not {config.enough}")
     if np.isnan(values["min_distance"].value):

@@ -27,6 +27,7 @@ from plotly.offline import get_plotlyjs
 
 from scenario_gen.encounter import Encounter
 from scenario_gen.evaluation.bootstrap import Interval
+from scenario_gen.evaluation.policy import content_policy
 from scenario_gen.evaluation.report_data import case_data
 from scenario_gen.evaluation.result import Evaluation, formatted
 from scenario_gen.fitting.result import Fit
@@ -130,6 +131,7 @@ def render(report: ReportInput) -> str:
     environment.filters["estimate"] = _estimate
     views = [_view(index, case) for index, case in enumerate(report.cases)]
     data = [case_data(case, MAX_SAMPLES) for case in report.cases]
+    scripts = [get_plotlyjs(), *(asset(name) for name in ("scene.js", "charts.js", "page.js"))]
     return environment.get_template("report.html.j2").render(
         report=report,
         views=views,
@@ -138,8 +140,8 @@ def render(report: ReportInput) -> str:
         facts=[fact for fact in report.provenance.items() if not _is_parameter(fact[0])],
         parameters=[fact for fact in report.provenance.items() if _is_parameter(fact[0])],
         css=Markup(asset("report.css")),
-        plotly=Markup(get_plotlyjs()),
-        scripts=[Markup(asset(name)) for name in ("scene.js", "charts.js", "page.js")],
+        policy=Markup(content_policy(scripts)),
+        scripts=[Markup(script) for script in scripts],
         data=Markup(json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")),
     )
 

@@ -48,6 +48,7 @@ def _case(case: Case) -> tuple[Text, Text]:
     title = Text(printable(case.title), style="bold")
     title.append(f"  {len(case.encounter.vehicles)} vehicles, {case.encounter.duration:.1f} s", style="dim")
     complete = len(made.scenarios) >= made.requested
+    measured = f" (of {found.samples:,}, evenly spaced)" if found and found.samples < len(made.scenarios) else ""
     figures = Text.assemble(
         "  ",
         (f"{len(made.scenarios)}/{made.requested} valid", "green" if complete else "red"),
@@ -55,7 +56,7 @@ def _case(case: Case) -> tuple[Text, Text]:
         _errors(case, "e_position"),
         "   speed ",
         _errors(case, "e_speed"),
-        f"   order {order if order == '–' else order + ' %'}",
+        f"   order {order if order == '–' else order + ' %'}{measured}",
     )
     return title, figures
 

@@ -24,6 +24,7 @@ import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
+from scenario_gen.evaluation.policy import content_policy
 from scenario_gen.folders import Kind, write_text
 from scenario_gen.reproduce.claims import Claim, claims_of
 from scenario_gen.reproduce.measure import PaperCase
@@ -100,12 +101,14 @@ def _render(
     }
     for drawing in drawings.values():
         drawing["layout"].pop("template", None)
+    scripts = [get_plotlyjs(), (assets / "reproduce.js").read_text(encoding="utf-8")]
     return template.render(
         cases=views,
         quality=quality,
         provenance=provenance,
         settings=SETTINGS,
         css=Markup((assets / "report.css").read_text(encoding="utf-8")),
-        plotly=Markup(get_plotlyjs()),
+        policy=Markup(content_policy(scripts)),
+        scripts=[Markup(script) for script in scripts],
         data=Markup(json.dumps(drawings, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")),
     )

@@ -22,6 +22,8 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
 
+DENSE = 1 << 18  # positions times edges that are looked at together: a table of them takes 2 MB
+
 
 @dataclass(frozen=True, eq=False)
 class Curve:
@@ -82,13 +84,18 @@ class Curve:
         edge = np.diff(line, axis=0)
         size = exact.hypot(edge[:, 0], edge[:, 1])
         along = edge / size[:, None]
-        rel = xy[:, None, :] - line[None, :-1, :]
-        t = np.clip(rel[..., 0] * along[:, 0] + rel[..., 1] * along[:, 1], 0.0, size)
-        gap = exact.hypot(rel[..., 0] - t * along[:, 0], rel[..., 1] - t * along[:, 1])
-        best = np.argmin(gap, axis=1)
-        rows = np.arange(len(xy))
-        side = along[best, 0] * rel[rows, best, 1] - along[best, 1] * rel[rows, best, 0]
-        return at[best] + t[rows, best], np.sign(side) * gap[rows, best]
+        found = [np.zeros((2, 0))]
+        rows = max(DENSE // len(size), 1)
+        for part in (xy[first : first + rows] for first in range(0, len(xy), rows)):
+            rel = part[:, None, :] - line[None, :-1, :]
+            t = np.clip(rel[..., 0] * along[:, 0] + rel[..., 1] * along[:, 1], 0.0, size)
+            gap = exact.hypot(rel[..., 0] - t * along[:, 0], rel[..., 1] - t * along[:, 1])
+            best = np.argmin(gap, axis=1)
+            row = np.arange(len(part))
+            side = along[best, 0] * rel[row, best, 1] - along[best, 1] * rel[row, best, 0]
+            found.append(np.array([at[best] + t[row, best], np.sign(side) * gap[row, best]]))
+        station, offset = np.concatenate(found, axis=1)
+        return station, offset
 
     def reversed(self) -> "Curve":
         """The same curve driven the other way."""

@@ -14,20 +14,24 @@
 
 """The loop: draw candidates, have them checked, keep the valid ones, account for the others."""
 
+from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+import itertools
 
 import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
 from scenario_gen.interaction import Wait
 from scenario_gen.planning.route import Route
 from scenario_gen.roads.road import Road
 from scenario_gen.sampling.candidates import Batch, CandidateModel, Scale
 from scenario_gen.sampling.config import SamplingConfig
+from scenario_gen.sampling.drawn import Drawn
 from scenario_gen.sampling.ego import ego_track
 from scenario_gen.sampling.prepare import prepare
 from scenario_gen.scenario import BoundaryStates, Cause, Scenario, ScenarioSet, Verdict
@@ -42,10 +46,31 @@ LEVELS = (
     Scale(lateral=0.25, longitudinal=0.25, time=0.5),
     Scale(lateral=0.1, longitudinal=0.1, time=0.25),
 )
-LEVEL_SIZE = 1 << 20  # a scenario's index is level * LEVEL_SIZE + the candidate's number at that level
+LEVEL_SIZE = 1 << 20  # candidates of one level whose indices follow each other
+LEVEL_SLOTS = 8  # levels that an index has room for; after them come the next LEVEL_SIZE candidates of the first
+KEPT = 1000  # scenarios up to which a set stays in memory
 BLOCK = 32  # candidates whose random numbers are drawn together
 PILOT = 2 * BLOCK  # candidates by which a level is judged
 ENOUGH = 0.3  # share of valid candidates below which the next level is tried
+
+
+def index_of(level: int, candidate: int) -> int:
+    """Return the index of a level's candidate: level * LEVEL_SIZE + candidate while that suffices, and unique beyond."""
+    page, within = divmod(candidate, LEVEL_SIZE)
+    return (page * LEVEL_SLOTS + level) * LEVEL_SIZE + within
+
+
+def place_of(index: int) -> tuple[int, int]:
+    """Return level and number of the candidate with this index.
+
+    Raises:
+        InputError: no candidate has it.
+    """
+    slot, within = divmod(index, LEVEL_SIZE)
+    page, level = divmod(slot, LEVEL_SLOTS)
+    if index < 0 or level >= len(LEVELS):
+        raise InputError(f"no candidate has the index {index}; take one of `scenarios/info`")
+    return level, page * LEVEL_SIZE + within
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,15 +83,22 @@ class Sampler:
 
     def block(self, level: int, number: int) -> tuple[Batch, list[int]]:
         """Candidates number·BLOCK … of a level, and their indices."""
-        first = level * LEVEL_SIZE + number * BLOCK
+        first = index_of(level, number * BLOCK)
         return self.model.draw(self._normal(level, number), LEVELS[level]), list(range(first, first + BLOCK))
 
     def scenario(self, index: int) -> Scenario | None:
         """The candidate with this index, bit for bit as in a whole set; None if it has no speed profile."""
-        level, within = divmod(index, LEVEL_SIZE)
-        number, row = divmod(within, BLOCK)
+        level, candidate = place_of(index)
+        number, row = divmod(candidate, BLOCK)
         batch = self.model.draw(self._normal(level, number)[row : row + 1], LEVELS[level])
         return batch.scenarios(self.seed, [index], self.frame_id)[0]
+
+    def again(self, index: Sequence[int]) -> list[Scenario]:
+        """The scenarios of indices that are of one block, bit for bit as in a whole set."""
+        level, candidate = place_of(index[0])
+        batch, own = self.block(level, candidate // BLOCK)
+        drawn = batch.scenarios(self.seed, own, self.frame_id)
+        return [scenario for scenario in (drawn[one - own[0]] for one in index) if scenario is not None]
 
     def _normal(self, level: int, number: int) -> Floats:
         """Standard normal numbers (BLOCK, size), every other row the mirror image of the one before.
@@ -113,7 +145,8 @@ def sample_scenarios(
         cancelled: asked now and then; if True, the set so far is returned.
 
     Returns:
-        At most `count` scenarios; fewer if the budget did not suffice, which the account (`refused`) explains.
+        At most `count` scenarios; fewer if the budget did not suffice, which the account (`refused`) explains. Of more than KEPT
+        only the indices are kept, so that memory hardly grows with their number.
 
     Raises:
         InputError: routes, segmentation and encounter disagree.
@@ -126,7 +159,7 @@ def sample_scenarios(
     loop = _Loop(Sampler(prepared.model, seed, road.frame_id), check, count, progress, cancelled)
     loop.run(config.attempts * count)
     said = (*prepared.adaptations, *loop.adaptations)
-    return ScenarioSet(count, tuple(loop.valid), loop.candidates, loop.refused, said, track)
+    return ScenarioSet(count, loop.scenarios(), loop.candidates, loop.refused, said, track)
 
 
 def regenerate(
@@ -160,7 +193,8 @@ class _Loop:
     ) -> None:
         self.sampler, self.check, self.count = sampler, check, count
         self.progress, self.cancelled = progress, cancelled
-        self.valid: list[Scenario] = []
+        self.kept: list[Scenario] = []  # the first KEPT
+        self.index = array("q")  # of all that are valid
         self.refused: Counter[Cause] = Counter()
         self.candidates = 0
         self.damped = 0
@@ -180,35 +214,41 @@ class _Loop:
             pass
         self._say(best, len(share))
 
+    def scenarios(self) -> Sequence[Scenario]:
+        """The valid candidates: themselves, or, where they are many, what draws them again."""
+        if len(self.index) <= KEPT:
+            return tuple(self.kept)
+        return Drawn(self.sampler.again, np.array(self.index, dtype=np.int64), BLOCK)
+
     def _done(self, budget: int) -> bool:
-        return len(self.valid) >= self.count or self.candidates >= budget or bool(self.cancelled and self.cancelled())
+        return len(self.index) >= self.count or self.candidates >= budget or bool(self.cancelled and self.cancelled())
 
     def _blocks(self, level: int) -> Iterator[tuple[Batch, list[int]]]:
-        for number in range(LEVEL_SIZE // BLOCK):
+        for number in itertools.count():
             yield self.sampler.block(level, number)
 
     def _spend(self, blocks: Iterator[tuple[Batch, list[int]]], most: int) -> tuple[int, int]:
         """Check up to `most` candidates, whole blocks at a time; how many were seen, and how many of them were valid."""
         seen = good = 0
-        while seen < most and len(self.valid) < self.count and not (self.cancelled and self.cancelled()):
-            batch, index = next(blocks, (None, []))
-            if batch is None:
-                break
+        while seen < most and len(self.index) < self.count and not (self.cancelled and self.cancelled()):
+            batch, index = next(blocks)
             drawn = batch.scenarios(self.sampler.seed, index, self.sampler.frame_id)
             verdicts = iter(self.check([s for s in drawn if s is not None]))
-            for scenario, damping in zip(drawn, batch.damping, strict=True):
-                if seen == most or len(self.valid) == self.count:
+            for number, scenario, damping in zip(index, drawn, batch.damping, strict=True):
+                if seen == most or len(self.index) == self.count:
                     break
                 seen += 1
                 self.damped += damping < 1.0
                 verdict = None if scenario is None else next(verdicts)
                 if scenario is not None and verdict is not None and verdict.valid:
                     good += 1
-                    self.valid.append(scenario)
+                    self.index.append(number)
+                    if len(self.kept) < KEPT:
+                        self.kept.append(scenario)
                 else:
                     self.refused[verdict.violations[0].cause if verdict else Cause.TIME_LAW] += 1
             if self.progress:
-                self.progress(len(self.valid), self.count)
+                self.progress(len(self.index), self.count)
         self.candidates += seen
         return seen, good
 

@@ -13,6 +13,10 @@ const LAYOUT = {
 const HEAT = ["#313695", "#4575b4", "#74add1", "#abd9e9", "#ffffbf", "#fdae61", "#f46d43", "#d73027", "#a50026"].map((c, i) => [i / 8, c]);
 const GRID = { gridcolor: "#e2e8f0", zeroline: false };
 
+/** A name or sentence out of the data for plotly, which takes some HTML and %{…} in its texts: all of it is shown as it is. */
+const PLAIN = { "&": "&amp;", "<": "&lt;", ">": "&gt;", "{": "&#123;" };
+const plain = (text) => text.replace(/[&<>{]/g, (sign) => PLAIN[sign]);
+
 function plot(place, traces, layout) {
   if (place) Plotly.newPlot(place, traces, { ...LAYOUT, ...layout }, PLOT);
 }
@@ -30,8 +34,8 @@ function speeds(set, sample, vehicle) {
 function drawTemplate(place, data, template) {
   const { bounds, labels, descriptions, probability, probability_step: step } = data.template;
   const traces = data.vehicles.map((vehicle, n) => ({
-    x: clock(template, 0), y: speeds(template, 0, n), name: vehicle.id, mode: "lines",
-    line: { color: vehicleColour(n), width: 2.5 }, hovertemplate: "%{y:.1f} m/s at %{x:.1f} s<extra>" + vehicle.id.replace(/[<>&]/g, "") + "</extra>",
+    x: clock(template, 0), y: speeds(template, 0, n), name: plain(vehicle.id), mode: "lines",
+    line: { color: vehicleColour(n), width: 2.5 }, hovertemplate: "%{y:.1f} m/s at %{x:.1f} s<extra>" + plain(vehicle.id) + "</extra>",
   }));
   traces.push({
     x: probability.map((_, i) => +(i * step).toFixed(2)), y: probability, yaxis: "y2", name: "changepoint probability",
@@ -46,7 +50,7 @@ function drawTemplate(place, data, template) {
   }));
   traces.push({
     x: labels.map((_, k) => (bounds[k] + bounds[k + 1]) / 2), y: labels.map(() => 0), mode: "markers",
-    marker: { size: 14, opacity: 0 }, text: descriptions, hovertemplate: "%{text}<extra></extra>",
+    marker: { size: 14, opacity: 0 }, text: descriptions.map(plain), hovertemplate: "%{text}<extra></extra>",
   });
   plot(place, traces, {
     shapes,
@@ -93,8 +97,8 @@ function drawFeature(place, text, duration, vehicles) {
   const axis = { ticks: "", showgrid: false, zeroline: false, nticks: 4, tickfont: { size: 10 } };
   plot(place, [trace], {
     margin: { l: 34, r: 4, t: 4, b: 32 },
-    xaxis: { ...axis, title: { text: `${short(vehicles[1])} [s]`, font: { size: 10 }, standoff: 2 } },
-    yaxis: { ...axis, title: { text: `${short(vehicles[0])} [s]`, font: { size: 10 }, standoff: 2 }, scaleanchor: "x", constrain: "domain" },
+    xaxis: { ...axis, title: { text: `${plain(short(vehicles[1]))} [s]`, font: { size: 10 }, standoff: 2 } },
+    yaxis: { ...axis, title: { text: `${plain(short(vehicles[0]))} [s]`, font: { size: 10 }, standoff: 2 }, scaleanchor: "x", constrain: "domain" },
   });
 }
 

@@ -1,0 +1,69 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Every benchmark in its quick form: it runs, and its last line is one JSON object that says what was measured."""
+
+import json
+import math
+from pathlib import Path
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from benchmarks.__main__ import names
+from benchmarks.row import Row
+
+ROOT = Path(__file__).resolve().parents[2]
+WITH_ROS = "messages"
+
+
+def quickly(name):
+    """What a benchmark writes, line by line."""
+    command = [sys.executable, "-m", "benchmarks", name, "--json", "--quick"]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr[-2000:]
+    return run.stdout.splitlines()
+
+
+@pytest.mark.parametrize("name", names())
+def test_the_last_line_is_one_json_object(name):
+    if name == WITH_ROS:
+        pytest.importorskip("rclpy", reason="rclpy is not in this environment")
+
+    def no_number(word):
+        raise AssertionError(f"{word} is no JSON")
+
+    said = json.loads(quickly(name)[-1], parse_constant=no_number)
+    assert said["benchmark"] == name and said["quick"] is True
+    assert said["machine"]["cores"] >= 1
+    assert said["rows"]
+    for row in said["rows"]:
+        assert set(row) == {"id", "value", "unit", "better", "target", "peer", "met"}
+        assert row["value"] is None or isinstance(row["value"], float)
+        assert row["met"] in (None, True, False) and (row["met"] is None) == (row["target"] is None)
+        assert row["better"] in ("higher", "lower")
+
+
+@pytest.mark.parametrize("value", [np.float32(2.0), np.int64(2), np.bool_(True), 2])
+def test_a_row_takes_the_numbers_of_numpy(value):
+    row = Row("a", value, "", "higher", np.float64(1.0))
+    assert json.loads(json.dumps(row.document(), allow_nan=False)) == row.document()
+    assert row.document()["met"] is True and type(row.document()["value"]) is float
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_what_is_not_finite_is_null(value):
+    row = Row("a", value, "", "lower", 1.0)
+    assert row.document()["value"] is None and row.document()["met"] is (value == -math.inf)

@@ -1,0 +1,137 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Licences of every locked package, from the metadata of what is installed: `make licences` writes docs/licences.md."""
+
+from collections.abc import Iterator, Mapping
+from importlib.metadata import Distribution, distributions, PackageNotFoundError
+from pathlib import Path
+import re
+import xml.etree.ElementTree as ET
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).resolve().parents[2]
+LOCK, PAGE = ROOT / "requirements.lock", ROOT / "docs" / "licences.md"
+TOLD = {  # what metadata does not say, or says only on Windows; looked up in the projects themselves
+    "colorama": "BSD-3-Clause",
+    "coloredlogs": "MIT",
+    "humanfriendly": "MIT",
+    "pyreadline3": "BSD-3-Clause",
+    "pywin32": "PSF-2.0",
+    "apsw": "any OSI-approved licence",
+    "empy": "BSD",
+    "setuptools": "MIT",
+    "docutils": "public domain, BSD-2-Clause; one file GPL-3.0",
+    "ros-fastcdr": "Apache-2.0",
+    "ros-fastrtps": "Apache-2.0",
+}
+SHORT = {
+    "Apache Software License": "Apache-2.0",
+    "BSD License": "BSD",
+    "MIT License": "MIT",
+    "Python Software Foundation License": "PSF-2.0",
+    "Mozilla Public License 2.0 (MPL 2.0)": "MPL-2.0",
+    "ISC License (ISCL)": "ISC",
+    "GNU General Public License v2 (GPLv2)": "GPL-2.0",
+    "Apache License 2.0": "Apache-2.0",
+    "Apache License, Version 2.0": "Apache-2.0",
+    "GNU GENERAL PUBLIC LICENSE": "GPL",
+}
+COPYLEFT = re.compile(r"\bA?GPL")
+INTRO = """# Licences
+
+The project itself is under Apache-2.0. It ships no other's code but one: the HTML pages that it writes contain plotly.js (MIT).
+What it needs is installed from wheels; this table lists every package of `requirements.lock` with the licence that its metadata
+states (`make licences` writes it; a test holds it against the lock). *Run time* is what `setup.py` asks for, the extra `ros`
+included, and all that follows from it; the rest builds and tests. Under the GPL are two linters and one file of docutils, which
+no user needs; nothing is under the AGPL.
+
+Not in the table: the peers of `requirements-bench.lock` and the tools of `requirements-audit.lock`, which are installed by
+`make bench` and `make audit` alone and with which nothing is built or shipped.
+
+| package | version | licence | needed |
+|---|---|---|---|
+"""
+
+
+def locked() -> dict[str, str]:
+    """Return {name: version} of the lock; versions that differ by Python version are joined."""
+    found: dict[str, list[str]] = {}
+    for name, version in re.findall(r"^([\w.\-]+)==([^\s;\\]+)", LOCK.read_text(encoding="utf-8"), re.MULTILINE):
+        found.setdefault(canonicalize_name(name), []).append(version)
+    return {name: ", ".join(versions) for name, versions in sorted(found.items())}
+
+
+def installed() -> dict[str, Distribution]:
+    """Return what is installed, by name."""
+    return {canonicalize_name(found.metadata["Name"]): found for found in distributions()}
+
+
+def licence(name: str, found: Distribution | None) -> str:
+    """Return the licence of a package, "" if it cannot be told."""
+    if name in TOLD or found is None:
+        return TOLD.get(name, "")
+    stated = found.metadata.get("License-Expression")
+    classified = [
+        text.rpartition(" :: ")[2] for text in found.metadata.get_all("Classifier") or () if text.startswith("License ::")
+    ]
+    text = stated or " and ".join(SHORT.get(one, one) for one in classified if one != "OSI Approved")
+    text = text or (found.metadata.get("License") or "").strip().partition("\n")[0] or " and ".join(_of_manifests(found))
+    return SHORT.get(text, text)
+
+
+def _of_manifests(found: Distribution) -> Iterator[str]:
+    """Licences in the package.xml files that a ROS package installs; a package of packages has none, and says ROS's own."""
+    manifests = [file for file in found.files or () if file.name == "package.xml"]
+    said = {entry.text or "" for file in manifests for entry in ET.parse(Path(str(file.locate()))).getroot().findall("license")}
+    yield from sorted(SHORT.get(text.strip(), text.strip()) for text in said)
+    if not manifests and found.metadata["Name"].startswith("ros-"):
+        yield "Apache-2.0"
+
+
+def needed_at_run_time(known: Mapping[str, Distribution]) -> set[str]:
+    """Return the names of all that the requirements of setup.py lead to on this platform, the extra `ros` included."""
+    listed = (ROOT / "requirements.in").read_text(encoding="utf-8").partition("# to build and to test")[0]
+    open_ = [Requirement(line) for line in listed.splitlines() if line and not line.startswith("#")]
+    found: set[str] = set()
+    seen: set[tuple[str, str]] = set()
+    while open_:
+        wanted = open_.pop()
+        name = canonicalize_name(wanted.name)
+        if name not in known:
+            raise PackageNotFoundError(f"{name}: not installed; run `make install`")
+        found.add(name)
+        for extra in sorted({"", *wanted.extras} - {extra for one, extra in seen if one == name}):
+            seen.add((name, extra))
+            for text in known[name].requires or ():
+                required = Requirement(text)
+                if required.marker is None or required.marker.evaluate({"extra": extra}):
+                    open_.append(required)
+    return found
+
+
+def page() -> str:
+    """Return the text of docs/licences.md."""
+    known = installed()
+    run_time = needed_at_run_time(known)
+    rows = []
+    for name, version in locked().items():
+        stated, need = licence(name, known.get(name)) or "unknown", "run time" if name in run_time else "to test"
+        rows.append(f"| {name} | {version} | {stated} | {need} |")
+    return INTRO + "\n".join(rows) + "\n"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

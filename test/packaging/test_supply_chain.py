@@ -1,0 +1,92 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""What we depend on: bounds, licences, and an audit that never says yes without having looked."""
+
+import json
+import re
+
+import pytest
+from source_files import ROOT
+
+pytest.importorskip("packaging", reason="packaging is not in this environment")
+from audit import CLEAN, judge, NOT_MADE, VULNERABLE
+from licences import COPYLEFT, installed, licence, locked, needed_at_run_time, PAGE
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+RUN_TIME = (ROOT / "requirements.in").read_text().partition("# to build and to test")[0]
+NEEDED = [Requirement(line) for line in RUN_TIME.splitlines() if line and not line.startswith("#")]
+LOCKS = ("requirements.lock", "requirements-bench.lock", "requirements-audit.lock")
+
+
+@pytest.mark.parametrize("wanted", NEEDED, ids=str)
+def test_what_is_needed_at_run_time_has_a_lower_bound_that_the_lock_meets(wanted):
+    assert [one.operator for one in wanted.specifier] == [">="]
+    versions = locked()[canonicalize_name(wanted.name)].split(", ")
+    assert all(wanted.specifier.contains(version) for version in versions)
+
+
+def test_setup_py_asks_for_the_same():
+    setup = (ROOT / "setup.py").read_text()
+    assert 'python_requires=">=3.11,<3.14"' in setup
+    assert 'Path("requirements.in")' in setup
+
+
+@pytest.mark.parametrize("name", LOCKS)
+def test_a_lock_has_hashes_and_names_no_place(name):
+    text = (ROOT / name).read_text()
+    pinned = re.findall(r"^\S+==.*$", text, re.MULTILINE)
+    assert pinned and all(line.endswith("\\") for line in pinned), "each pin is followed by its hashes"
+    assert "://" not in text
+
+
+def test_every_locked_package_is_listed_with_its_licence():
+    rows = re.findall(r"^\| ([\w.\-]+) \| ([^|]+) \| ([^|]+) \| (run time|to test) \|$", PAGE.read_text(), re.MULTILINE)
+    assert {name: version for name, version, *_ in rows} == locked(), "make licences"
+    assert not [name for name, _, stated, _ in rows if stated.strip() in ("", "unknown")]
+    assert not [name for name, _, stated, need in rows if need == "run time" and COPYLEFT.search(stated)]
+
+
+def test_nothing_that_is_needed_at_run_time_is_under_the_gpl():
+    known = installed()
+    for name in needed_at_run_time(known):
+        stated = licence(name, known[name])
+        assert stated and not COPYLEFT.search(stated), f"{name}: {stated or 'no licence stated'}"
+
+
+def audited(*packages):
+    return json.dumps({"dependencies": list(packages), "fixes": []})
+
+
+FINE = {"name": "a", "version": "1", "vulns": []}
+SKIPPED = {"name": "b", "skip_reason": "Dependency not found and could not be audited: b (1)"}
+KNOWN = {"name": "c", "version": "2", "vulns": [{"id": "CVE-1", "fix_versions": ["3"]}]}
+
+
+@pytest.mark.parametrize(
+    ("code", "out", "err", "expected", "said"),
+    [
+        (0, audited(FINE), "", CLEAN, "1 packages, none with a known vulnerability"),
+        (1, audited(FINE, KNOWN), "", VULNERABLE, "c 2: CVE-1"),
+        (0, audited(FINE, SKIPPED), "", NOT_MADE, "1 of 2 packages were skipped"),
+        (1, audited(KNOWN, SKIPPED), "", NOT_MADE, "skipped"),
+        (0, audited(), "", NOT_MADE, "it lists none"),
+        (1, "", "Traceback\nProxyError: refused", NOT_MADE, "pip-audit ended with 1 (ProxyError: refused)"),
+        (0, "[]", "", NOT_MADE, "it said nothing"),
+        (1, audited(FINE), "", VULNERABLE, "0 known"),
+    ],
+)
+def test_an_audit_that_did_not_look_is_no_success(code, out, err, expected, said):
+    found, sentence = judge("requirements.lock", code, out, err)
+    assert found == expected and said in sentence and len(sentence) <= 500

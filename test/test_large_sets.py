@@ -1,0 +1,151 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Sets of any size: scenarios drawn again instead of kept, indices for any number of candidates, memory that stays."""
+
+from collections import Counter
+from io import StringIO
+import json
+import sys
+import tracemalloc
+
+from hypothesis import given
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from rich.console import Console
+
+from scenario_gen import pipeline
+from scenario_gen.bags import Run, write_run
+from scenario_gen.errors import InputError
+from scenario_gen.evaluation import EvaluationConfig, MEASURED, render, ReportInput, summary, UNIFORM, WITH, WITHOUT
+from scenario_gen.evaluation.evaluate import measured
+from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
+from scenario_gen.requests import Chain, Request, run_request
+from scenario_gen.roads import build_road
+from scenario_gen.sampling import sample
+from scenario_gen.sampling.sample import BLOCK, index_of, LEVEL_SIZE, LEVELS, place_of
+from scenario_gen.segmentation import segment
+
+FIELDS = ("time", "position", "heading", "speed", "acceleration")
+
+
+@pytest.fixture(scope="module")
+def chain():
+    encounter = read_log([bundled("b")]).encounters[0]
+    return Chain(encounter, segment(encounter, seed=7), build_road("t_intersection", encounter), 7)
+
+
+def made(chain, count):
+    return run_request(chain, Request(), count=count).scenarios
+
+
+def same(one, other):
+    return one.index == other.index and all(getattr(one, f).tobytes() == getattr(other, f).tobytes() for f in FIELDS)
+
+
+def test_drawn_again_are_the_same_bits(chain, monkeypatch):
+    kept = made(chain, 70)
+    monkeypatch.setattr(sample, "KEPT", 20)
+    again = made(chain, 70)
+    assert isinstance(kept.scenarios, tuple) and not isinstance(again.scenarios, tuple)
+    assert (again.requested, again.candidates, again.refused) == (kept.requested, kept.candidates, kept.refused)
+    assert len(again.scenarios) == 70
+    assert all(same(*pair) for pair in zip(kept.scenarios, again.scenarios, strict=True))
+    assert all(same(*pair) for pair in zip(kept.scenarios[5:60:3], again.scenarios[5:60:3], strict=True))
+    assert same(kept.scenarios[-1], again.scenarios[-1]) and same(kept.scenarios[33], again.scenarios[33])
+    with pytest.raises(IndexError):
+        again.scenarios[70]
+
+
+@given(st.integers(0, len(LEVELS) - 1), st.integers(0, 1 << 40))
+def test_an_index_is_wide_enough_for_any_candidate(level, candidate):
+    index = index_of(level, candidate)
+    assert place_of(index) == (level, candidate)
+    assert index < 1 << 63
+    if candidate < LEVEL_SIZE:
+        assert index == level * LEVEL_SIZE + candidate
+
+
+def test_an_index_of_no_candidate_is_refused():
+    for index in (-1, len(LEVELS) * LEVEL_SIZE):
+        with pytest.raises(InputError, match="scenarios/info"):
+            place_of(index)
+
+
+def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
+    """Beyond LEVEL_SIZE candidates numbering goes on behind the last level, and each one can be had again."""
+    plain = made(chain, 200)
+    monkeypatch.setattr(sample, "LEVEL_SIZE", 2 * BLOCK)
+    beyond = made(chain, 200)
+    assert len(beyond.scenarios) == 200
+    assert len({s.index for s in beyond.scenarios}) == 200
+    assert max(s.index for s in beyond.scenarios) >= sample.LEVEL_SLOTS * 2 * BLOCK
+    assert all(a.position.tobytes() == b.position.tobytes() for a, b in zip(plain.scenarios, beyond.scenarios, strict=True))
+    last = beyond.scenarios[-1]
+    _, routes = chain.place(Request())
+    fit, _ = chain.place(Request())
+    assert same(chain.scenario(Request(), routes, fit.asked, last.index), last)
+
+
+@given(st.integers(MEASURED + 1, 10**12))
+def test_of_a_large_set_evenly_spaced_runs_are_measured(size):
+    taken = np.array(measured(range(size)))
+    assert len(taken) == len(set(taken)) == MEASURED
+    assert taken[0] == 0 and taken[-1] == size - 1
+    steps = Counter(np.diff(taken).tolist())
+    assert steps[1] >= MEASURED - 20
+    gaps = [step for step in steps if step != 1]
+    assert not gaps or max(gaps) - min(gaps) <= 1
+
+
+def test_memory_does_not_grow_with_the_number_of_scenarios(chain, monkeypatch, tmp_path):
+    """Sampled, checked and written: 1,200 scenarios more, of some 15 kB each, raise the peak by less than a tenth of that."""
+    monkeypatch.setattr(sample, "KEPT", 100)
+    segmentation, road = chain.segmentation, chain.road
+
+    def peak(count):
+        tracemalloc.reset_peak()
+        outcome = run_request(chain, Request(), count=count)
+        assert len(outcome.scenarios.scenarios) == count
+        run = Run(chain.encounter, road, segmentation, outcome.fit, outcome.routes, outcome.scenarios, seed=7)
+        write_run(tmp_path / str(count), run)
+        return tracemalloc.get_traced_memory()[1]
+
+    peak(200)  # what is loaded and compiled once
+    tracemalloc.start()
+    try:
+        few, many = peak(300), peak(1500)
+    finally:
+        tracemalloc.stop()
+    assert many - few < 1_500_000, f"{few} bytes for 300 scenarios, {many} for 1500"
+
+
+def test_that_only_a_part_was_measured_is_said(chain, monkeypatch):
+    """In the terminal, the page and the figures; the references are made no larger than they are measured."""
+    evaluating = sys.modules[measured.__module__]  # the package has a function of that name
+    for module in (evaluating, pipeline):
+        monkeypatch.setattr(module, "MEASURED", 10)
+    monkeypatch.setattr(evaluating, "RUNS", 2)
+    config = pipeline.PipelineConfig(evaluation=EvaluationConfig(resamples=20))
+    case = pipeline.generate(chain.encounter, "t_intersection", config, count=24, seed=7)
+    rows = {row["name"]: row for row in json.loads(case.evaluation.to_json())["rows"]}
+    assert [rows[name]["samples"] for name in (WITH, WITHOUT, UNIFORM)] == [10, 10, 10]
+    said = "measured on 10 of 24 scenarios, in 2 evenly spaced runs; candidates are all counted"
+    assert said in rows[WITH]["notes"] and not rows[WITHOUT]["notes"][1:]
+    assert said in render(ReportInput([case]))
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(summary([case]))
+    assert "24/24 valid" in (text := console.export_text()) and "(of 10, evenly spaced)" in text
+    assert len(case.without_changepoints.scenarios) == 10
