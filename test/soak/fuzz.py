@@ -22,9 +22,6 @@ import subprocess
 import sys
 
 from figures import Figure
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "fuzz"))
-
 from harness import fuzz, HERE, MEMORY, SECONDS, targets
 
 EXECUTIONS, MINUTES = 1_000_000, 10.0
