@@ -27,7 +27,7 @@ NEEDED = [line for line in LISTED if line and not line.startswith("#")]
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="New multi-vehicle traffic encounters from recorded ones, as ROS 2 nodes and as one command",
     license="Apache-2.0",
     maintainer="The scenario_gen developers",

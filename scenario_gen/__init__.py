@@ -14,4 +14,4 @@
 
 """Turn a handful of recorded vehicle encounters into any number of new, valid ones on other roads."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -86,7 +86,7 @@ def regenerate_scenario(
 
     Raises:
         InputError: the bag, the index, or something that is needed is not there or ambiguous; the log is another one.
-        ScenarioGenError: it comes out differently (another version or processor); the message names what differs.
+        ScenarioGenError: it comes out differently (another version); the message names what differs.
     """
     with within(bag):
         return _regenerate(bag, _find(bag, index, namespace, request, config), index, log)
@@ -116,7 +116,7 @@ def _regenerate(bag: Path, found: "_Found", index: int, log: Path | None) -> Reg
     if scenario is None or digest(data) != found.entry.values["sha256"]:
         now = versions()
         other = [f"{name} {account[name]} there, {now[name]} here" for name in now if account.get(name, now[name]) != now[name]]
-        why = ", ".join(other) or "the versions agree, so the bag was changed or another processor made it"
+        why = ", ".join(other) or "the versions agree, so the bag was changed"
         raise ScenarioGenError(f"{what}: scenario {index} comes out differently: {why}")
     return Regenerated(scenario, data, found.messages, digest(data))
 

@@ -22,14 +22,16 @@ Source of the factorisations: Golub & Van Loan, Matrix Computations, 4th ed., al
 """
 
 import math
-from typing import Any, Literal
+from typing import Any, Literal, TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicHermiteSpline
 
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import B, F2, F3, kernel, OUT1, OUT2, OUT3, OUTI1
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline
 
 Numbers = npt.NDArray[Any]  # floats or whole numbers; they become floats
 
@@ -349,7 +351,9 @@ def _solve_tridiagonal(below: Floats, diagonal: Floats, above: Floats, x: Floats
             x[i, m] = (x[i, m] - above[i] * x[i + 1, m]) / diagonal[i]
 
 
-def cubic_spline(x: Floats, y: Floats, ends: tuple[Floats, Floats] | Literal["not-a-knot"] = "not-a-knot") -> CubicHermiteSpline:
+def cubic_spline(
+    x: Floats, y: Floats, ends: tuple[Floats, Floats] | Literal["not-a-knot"] = "not-a-knot"
+) -> "CubicHermiteSpline":
     """Return the C2 cubic spline through y (n, d) or (n,) at x (n,), as scipy's CubicSpline, whose solver is LAPACK's.
 
     Args:
@@ -357,6 +361,8 @@ def cubic_spline(x: Floats, y: Floats, ends: tuple[Floats, Floats] | Literal["no
         y: values.
         ends: the slopes (d,) at both ends, or "not-a-knot" (with three points the parabola, with two the line).
     """
+    from scipy.interpolate import CubicHermiteSpline  # slow to import, and segmentation needs none
+
     values = np.asarray(y, dtype=np.float64).reshape(len(x), -1)
     step = np.diff(x)
     chord = np.diff(values, axis=0) / step[:, None]

@@ -32,7 +32,7 @@ from typing import Any
 OK, WARNING, ERROR = "ok", "warning", "error"
 PYTHONS = ((3, 11), (3, 13))
 MODULES = (
-    *("numpy", "scipy", "numba", "ompl", "daqp", "clarabel", "mcap", "mcap_ros2", "rosbags", "pandas", "pyarrow", "pyproj"),
+    *("numpy", "scipy", "numba", "ompl", "daqp", "clarabel", "mcap", "mcap_ros2", "rosbags", "pandas", "pyarrow"),
     *("shapely", "PIL", "yaml", "jinja2", "plotly", "typer", "rich"),
 )
 INTERFACES = (

@@ -26,7 +26,7 @@ from scenario_gen.encounter import Vehicle
 from scenario_gen.segmentation.online import OnlineConfig, OnlineSegmenter
 from scenario_gen.segmentation.trends import course
 
-if TYPE_CHECKING:  # logs bring pyproj and shapely, which a segmentation does not need
+if TYPE_CHECKING:  # logs bring pandas and shapely, which a segmentation does not need
     from scenario_gen.logs.streams import Sample
 
 
