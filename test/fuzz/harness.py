@@ -99,10 +99,16 @@ class OverTimeError(BaseException):
     """An execution took too long; no handler of `Exception` may swallow it."""
 
 
-def targets() -> dict[str, Target]:
-    """Return all targets by name; their modules find what the tests find."""
+def tests_on_path() -> None:
+    """Let modules of tests find each other as they do under pytest."""
     project = tomllib.loads((HERE.parents[1] / "pyproject.toml").read_text())
-    sys.path += [str(HERE.parents[1] / folder) for folder in project["tool"]["pytest"]["ini_options"]["pythonpath"]]
+    folders = [str(HERE.parents[1] / folder) for folder in project["tool"]["pytest"]["ini_options"]["pythonpath"]]
+    sys.path += [folder for folder in folders if folder not in sys.path]
+
+
+def targets() -> dict[str, Target]:
+    """Return all targets by name."""
+    tests_on_path()
     modules = [importlib.import_module(path.stem) for path in sorted(HERE.glob("targets_*.py"))]
     return {target.name: target for module in modules for target in module.TARGETS}
 
