@@ -46,5 +46,5 @@ def said(error: Exception) -> str:
     """Return what an error says in one line, with its kind where it says little or nothing."""
     if isinstance(error, MemoryError):
         return "asks for more memory than there is"
-    text = " ".join(str(error).split())
+    text = " ".join(str((isinstance(error, OSError) and error.strerror) or error).split())
     return text if len(text.split()) > 1 else f"{type(error).__name__} {text}".strip()

@@ -30,6 +30,15 @@ def data() -> Path:
     return DATA
 
 
+@pytest.fixture(scope="session")
+def crashes() -> Path:
+    """The folder of files that once broke a reader, beside the recorded data; the test skips where it is missing."""
+    folder = DATA.parent / "crashes"
+    if not folder.is_dir():
+        pytest.skip(f"files that broke a reader not found at {folder}; set SCENARIO_GEN_DATA to the folder beside it")
+    return folder
+
+
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]):
     """In CI a skipped test is a failed one."""

@@ -28,6 +28,7 @@ from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing
 
 TURNED = np.radians(120.0)  # who drives off from a stop this far from where it came from has reversed, or turned on the spot
+MOST_TICKS = 100_000  # of a piece: smoothing takes 3 kB for each
 LEVER = 3.0  # m over which that direction is measured
 
 
@@ -52,7 +53,7 @@ def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Pie
     step = np.hypot(*np.diff(track.fix, axis=0).T)
     gaps = (seconds > longest) | (step > JUMP_SLACK + FASTEST * seconds)
     back = reversals(track, config)
-    cuts = gaps | back
+    cuts = gaps | back | laps(track, config)
     bridged = (seconds > 1.5 * max(usual, config.period)) & ~gaps
     pieces = []
     for part in parts(track, cuts):
@@ -82,6 +83,13 @@ def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Pie
         moved_most=max((float(smooth.moved.max()) for smooth in smooths), default=0.0),
     )
     return pieces, quality
+
+
+def laps(track: Track, config: LogConfig) -> Bools:
+    """(F-1,) where a track of hours is cut, so that the memory which smoothing takes does not grow with it."""
+    lap = (track.fix_ns - track.fix_ns[0]) // round(MOST_TICKS * config.period * 1e9)
+    new: Bools = np.diff(lap) > 0
+    return new
 
 
 def longest_bridge(seconds: Floats, config: LogConfig) -> float:

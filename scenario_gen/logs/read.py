@@ -58,7 +58,7 @@ def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogCon
     try:
         return encounters_of(read_raw(paths, config), config)
     except InputError as error:  # what is wrong with an encounter, or with a vehicle's clock, knows of no files
-        if any(str(known) in str(error) for known in paths) or str(error).startswith("parameter "):
+        if str(error).startswith(("parameter ", *(str(known)[:100] for known in paths))):
             raise
         raise InputError(f"{paths[0]}: {error}") from error
 

@@ -173,7 +173,8 @@ class Streams:
 
     def _place(self, vehicle: str) -> str:
         """The first sound fix of a vehicle, to about a metre, as an origin for all that follows."""
-        _, _, latitude, longitude, _ = min(row for row in self._recent[vehicle].fixes if np.isfinite(row[2:4]).all())
+        on_globe = (row for row in self._recent[vehicle].fixes if 0.0 < abs(row[2]) <= 90.0 and abs(row[3]) <= 180.0)
+        _, _, latitude, longitude, _ = min(on_globe)
         return f"{latitude:.5f},{longitude:.5f}"
 
     def _forget(self, before: int) -> None:

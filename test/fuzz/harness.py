@@ -33,8 +33,10 @@ import resource
 import shutil
 import signal
 import struct
+import sys
 import tempfile
 import time
+import tomllib
 import traceback
 import warnings
 
@@ -62,6 +64,7 @@ class Target:
         run: reads an input; gets an empty folder to put it in. An error of ours is as good as a result.
         mutators: ways to damage an input: (random numbers, input, all seeds) -> input.
         crashes: globs of files below shared/crashes that are seeds, too.
+        named: what every message must hold, e.g. the file's name; not asked of messages about a parameter.
     """
 
     name: str
@@ -69,6 +72,7 @@ class Target:
     run: Callable[[bytes, Path], object]
     mutators: Sequence[Mutator]
     crashes: Sequence[str] = ()
+    named: str = ""
 
 
 @dataclass
@@ -95,8 +99,16 @@ class OverTimeError(BaseException):
     """An execution took too long; no handler of `Exception` may swallow it."""
 
 
+def tests_on_path() -> None:
+    """Let modules of tests find each other as they do under pytest."""
+    project = tomllib.loads((HERE.parents[1] / "pyproject.toml").read_text())
+    folders = [str(HERE.parents[1] / folder) for folder in project["tool"]["pytest"]["ini_options"]["pythonpath"]]
+    sys.path += [folder for folder in folders if folder not in sys.path]
+
+
 def targets() -> dict[str, Target]:
     """Return all targets by name."""
+    tests_on_path()
     modules = [importlib.import_module(path.stem) for path in sorted(HERE.glob("targets_*.py"))]
     return {target.name: target for module in modules for target in module.TARGETS}
 
@@ -130,6 +142,8 @@ def execute(target: Target, data: bytes, folder: Path) -> tuple[str, str] | None
         said = str(error)
         if not 0 < len(said) <= LONGEST:
             return "LongMessage", f"{len(said)} characters: {said[:200]}"
+        if target.named not in said and not said.startswith("parameter "):
+            return "NoPlace", said
     except (Exception, OverTimeError) as error:
         return signature(error), str(error)[:LONGEST]
     finally:

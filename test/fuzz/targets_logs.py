@@ -15,9 +15,11 @@
 """The readers of logs as targets: tables in text and Parquet, basic safety messages, bags in MCAP and SQLite."""
 
 from collections.abc import Callable, Sequence
+import contextlib
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+import struct
 
 from harness import Target
 from mutators import BYTES, columns, records, TEXT
@@ -28,11 +30,13 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from msg_conventions.odometry import encode_state
 from msg_conventions.tracks import encode_tracks
 from msg_conventions.tracks import TYPE as TRACKS
-from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.errors import ScenarioGenError
+from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams
 from scenario_gen.logs.bag import ODOMETRY, STORES
 from scenario_gen.logs.files import COLUMNS
 from scenario_gen.logs.synthetic import bundled
 
+RECORD = "<BBqdd"  # vehicle, kind, stamp [ns], two values
 SHORT = LogConfig(shortest=1.0, travel=1.0)
 
 
@@ -141,14 +145,44 @@ def read_as(name: str, config: LogConfig = SHORT) -> Callable[[bytes, Path], Non
     return run
 
 
+def put(data: bytes, _folder: Path) -> None:
+    """Feed records (vehicle, kind, stamp, two values) to streams as they come, and read what they amount to."""
+    streams = Streams(SHORT)
+    whole = len(data) // struct.calcsize(RECORD) * struct.calcsize(RECORD)
+    for number, (vehicle, kind, stamp, a, b) in enumerate(struct.iter_unpack(RECORD, data[:whole])):
+        streams.breaks(stamp)
+        if kind % 2:
+            streams.put_speed(str(vehicle % 5), stamp, a)
+        else:
+            streams.put_fix(str(vehicle % 5), stamp, a, b)
+        if number % 16 == 0:
+            with contextlib.suppress(ScenarioGenError):  # said, and survived
+                streams.samples()
+    log = streams.take("live")
+    if log is not None:
+        encounters_of(log, streams.config)
+
+
+def heard(_folder: Path) -> list[bytes]:
+    """Records of two vehicles that drive for 4 s."""
+    found = bytearray()
+    for row in on_globe(cars()).head(80).itertuples():
+        found += struct.pack(RECORD, row.id, 0, row.time_ms * 10**6, row.latitude, row.longitude)
+        found += struct.pack(RECORD, row.id, 1, row.time_ms * 10**6, row.speed_kmh / 3.6, 0.0)
+    return [bytes(found)]
+
+
 NAMELESS = replace(SHORT, columns="speed=none,vehicle=none")
 SPMD = replace(SHORT, format="spmd")
+PARQUET, SQLITE = (*BYTES, *[columns] * 5), (*BYTES, *[records] * 5)
+MCAP_BAGS, SQLITE_BAGS = partial(bags, StoragePlugin.MCAP), partial(bags, StoragePlugin.SQLITE3)
 TARGETS = (
-    Target("table", texts, read_as("log.csv"), TEXT, ("table/*.csv", "table_*.csv")),
-    Target("table_asked", texts, read_as("log.txt", NAMELESS), TEXT, ("table/*.csv",)),
-    Target("spmd", safety_messages, read_as("log.csv"), TEXT, ("spmd/*.csv", "spmd_*.csv")),
-    Target("spmd_asked", safety_messages, read_as("log.csv", SPMD), TEXT, ("spmd/*.csv",)),
-    Target("parquet", parquets, read_as("log.parquet"), (*BYTES, *[columns] * 5), ("parquet/*", "*.parquet")),
-    Target("mcap_log", partial(bags, StoragePlugin.MCAP), read_as("log.mcap"), BYTES, ("mcap_reader/*", "*.mcap")),
-    Target("sqlite_log", partial(bags, StoragePlugin.SQLITE3), read_as("log.db3"), (*BYTES, *[records] * 5), ("sqlite/*",)),
+    Target("table", texts, read_as("log.csv"), TEXT, ("table/*.csv", "table_*.csv"), "log.csv"),
+    Target("table_asked", texts, read_as("log.txt", NAMELESS), TEXT, ("table/*.csv",), "log.txt"),
+    Target("spmd", safety_messages, read_as("log.csv"), TEXT, ("spmd/*.csv", "spmd_*.csv"), "log.csv"),
+    Target("spmd_asked", safety_messages, read_as("log.csv", SPMD), TEXT, ("spmd/*.csv",), "log.csv"),
+    Target("parquet", parquets, read_as("log.parquet"), PARQUET, ("parquet/*", "*.parquet"), "log.parquet"),
+    Target("mcap_log", MCAP_BAGS, read_as("log.mcap"), BYTES, ("mcap_reader/*", "*.mcap"), "log.mcap"),
+    Target("sqlite_log", SQLITE_BAGS, read_as("log.db3"), SQLITE, ("sqlite/*",), "log.db3"),
+    Target("streams", heard, put, BYTES),
 )

@@ -117,6 +117,15 @@ def test_nothing_but_nonsense_gives_no_sample():
     assert streams.take("live") is None
 
 
+def test_a_first_fix_off_the_globe_is_no_origin():
+    streams, found = Streams(), []
+    for k in range(60):
+        for number, vehicle in enumerate(("1", "2")):
+            streams.put_fix(vehicle, 10**18 + k * TICK, 300.0 if k == 0 else 42.0 + 1e-6 * k, -83.0 + 1e-4 * number)
+        found += streams.samples()
+    assert found and streams.origin.startswith("42.0")
+
+
 def test_a_clock_that_runs_backwards_is_said_and_survived():
     streams = Streams()
     for k in range(50):

@@ -17,15 +17,11 @@
 from collections.abc import Iterator
 from pathlib import Path
 import shutil
-import sys
 
+from cut_bags import chunk_ends, small_bag
 from figures import Figure
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "bags"))
-
-from cut_bags import chunk_ends, small_bag
 
 from scenario_gen.bags import read_messages, reindex
 from scenario_gen.errors import InputError

@@ -1,0 +1,279 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Damaged and hostile logs: each file that once broke a reader, and what a small file may ask for."""
+
+import os
+from pathlib import Path
+
+from log_builders import crossing, geographic, save
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from pyarrow import parquet
+import pytest
+
+from scenario_gen.errors import InputError, LONGEST
+from scenario_gen.logs import LogConfig, read_log
+
+FILES = (
+    *("spmd/*.csv", "table/*.csv", "parquet/*.parquet", "sqlite/*.db3", "mcap_reader/*.mcap", "reindex/*.mcap"),
+    *("*.csv", "*.parquet", "*.mcap"),
+)
+READINGS = {
+    "plain": LogConfig(),
+    "nothing but positions": LogConfig(columns="speed=none,vehicle=none,heading=none"),
+}
+
+
+def refused_or_read(path, config):
+    """Read a log; what is wrong must be told in a message that is short and names the file."""
+    try:
+        assert read_log(path, config).encounters
+    except InputError as error:
+        assert len(str(error)) <= LONGEST
+        assert path.name in str(error), error
+        assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize("pattern", FILES)
+@pytest.mark.parametrize("reading", READINGS)
+def test_files_that_broke_a_reader(crashes, pattern, reading):
+    found = sorted(crashes.glob(pattern))
+    assert found, pattern
+    for path in found:
+        refused_or_read(path, READINGS[reading])
+
+
+def test_the_spmd_reader_takes_any_text(crashes):
+    for path in sorted(crashes.glob("table/*.csv")):
+        refused_or_read(path, LogConfig(format="spmd"))
+
+
+def test_a_stamp_of_another_age_is_named_before_the_clock_is_made(tmp_path):
+    rows = crossing()
+    rows.loc[40, "t_s"] += 3e8
+    with pytest.raises(
+        InputError, match=r"log\.csv, line 42: the stamp of vehicle a is 3e\+08 s after .* at most 2000000 .*tick_limit"
+    ):
+        read_log(save(rows, tmp_path))
+
+
+def test_the_clock_of_all_vehicles_counts(tmp_path):
+    path = save(crossing(seconds=12.0), tmp_path)
+    assert read_log(path, LogConfig(tick_limit=240)).encounters
+    with pytest.raises(InputError, match=r"240 ticks of 0\.1 s in all; at most 239 are made"):
+        read_log(path, LogConfig(tick_limit=239))
+
+
+@pytest.mark.parametrize(
+    ("factor", "name", "unit"), [(1e3, "milliseconds", "ms"), (1e6, "microseconds", "us"), (1e9, "nanoseconds", "ns")]
+)
+def test_another_unit_of_time_is_recognised(tmp_path, factor, name, unit):
+    rows = crossing(start=0.0)
+    rows["t_s"] = (rows["t_s"] * factor).round()
+    path = save(rows, tmp_path)
+    with pytest.raises(InputError, match=f"this looks like {name} .*:{unit}"):
+        read_log(path)
+    assert len(read_log(path, LogConfig(columns=f"time=t_s:{unit}")).encounters) == 1
+
+
+@pytest.mark.parametrize(
+    ("limit", "said"),
+    [
+        ({"row_limit": 100}, r"holds \d+ rows or more; at most 100 are read.* parameter row_limit"),
+        ({"vehicle_limit": 2}, "3 vehicles, at most 2 .* parameter vehicle_limit"),
+    ],
+)
+@pytest.mark.parametrize("name", ["log.csv", "log.parquet"])
+def test_limits_are_named_with_the_figure(tmp_path, limit, said, name):
+    rows = pd.concat([crossing(), crossing().query("vehicle_id == 'a'").assign(vehicle_id="c", y_m=20.0)])
+    path = tmp_path / name
+    rows.to_csv(path, index=False) if name == "log.csv" else rows.to_parquet(path)
+    with pytest.raises(InputError, match=said):
+        read_log(path, LogConfig(**limit))
+    assert read_log(path).encounters
+
+
+def test_rows_of_several_files_count_together(tmp_path):
+    for k in range(3):
+        crossing(start=1000.0 + 20.0 * k).to_csv(tmp_path / f"{k}.csv", index=False)
+    with pytest.raises(InputError, match=r"2\.csv.* rows or more; at most 500 are read"):
+        read_log(tmp_path, LogConfig(row_limit=500))
+
+
+def test_a_large_file_is_not_opened(tmp_path):
+    path = tmp_path / "log.csv"
+    with path.open("wb") as file:
+        file.write(b"t,x,y,speed\n")
+        file.truncate(300 << 20)
+    with pytest.raises(InputError, match=r"300\.0 MiB .* at most 256 MiB .*size_limit"):
+        read_log(path)
+
+
+def test_parquet_that_grows_a_thousandfold_is_refused_by_its_own_figures(tmp_path):
+    """A few kilobytes of repetition: 500 MB of numbers, or of text that repeats."""
+    count = 2_000_000
+    columns = {name: pa.array(np.zeros(count)) for name in ("x_m", "y_m", "speed_mps")}
+    columns |= {"t_s": pa.array(np.repeat(np.arange(4.0), count // 4)), "vehicle_id": pa.array(["a", "b"] * (count // 2))}
+    parquet.write_table(pa.table(columns), tmp_path / "log.parquet", compression="zstd")
+    assert (tmp_path / "log.parquet").stat().st_size < 1 << 20
+    with pytest.raises(InputError, match=r"log\.parquet holds 2000000 rows or more; at most 1000000"):
+        read_log(tmp_path / "log.parquet", LogConfig(row_limit=1_000_000))
+    with pytest.raises(InputError, match=r"log\.parquet holds .* MiB .*; at most 8 MiB"):
+        read_log(tmp_path / "log.parquet", LogConfig(size_limit=8))
+
+
+def table_with(tmp_path, stamps):
+    """The crossing as Parquet with an Arrow array of stamps, row by row of `crossing`."""
+    rows = pa.Table.from_pandas(crossing(start=1_700_000_000.0).drop(columns="t_s"), preserve_index=False)
+    path = tmp_path / "log.parquet"
+    parquet.write_table(rows.append_column("time", stamps), path)
+    return path
+
+
+NS = (crossing(start=1_700_000_000.0)["t_s"] * 1000.0).round().astype(np.int64).to_numpy() * 10**6
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        *(
+            pa.timestamp("ms"),
+            pa.timestamp("us"),
+            pa.timestamp("ns"),
+            pa.timestamp("us", "UTC"),
+            pa.timestamp("ns", "Europe/Berlin"),
+        ),
+        *(pa.timestamp("ms", "+05:30"), pa.float64(), pa.decimal128(30, 9), pa.string(), pa.large_string()),
+        pa.dictionary(pa.int32(), pa.string()),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("missing", [False, True])
+def test_kinds_of_stamps_are_read_alike(tmp_path, kind, missing):
+    """Each kind gives the same instants, with rows that miss theirs left out and counted."""
+    stamps = pa.array([None if missing and k == 60 else int(ns) for k, ns in enumerate(NS)])
+    if pa.types.is_timestamp(kind):
+        values = stamps.cast(pa.timestamp("ns")).cast(pa.timestamp(kind.unit)).cast(pa.int64()).cast(kind)
+    else:
+        seconds = [None if value is None else f"{value // 10**9}.{value % 10**9:09d}" for value in stamps.to_pylist()]
+        values = pa.array(seconds).dictionary_encode() if pa.types.is_dictionary(kind) else pa.array(seconds).cast(kind)
+    result = read_log(table_with(tmp_path, values))
+    (encounter,) = result.encounters
+    assert encounter.start_ns == 1_700_000_000 * 10**9
+    assert encounter.duration == pytest.approx(12.0)
+    assert {drop.reason: drop.count for drop in result.quality.dropped} == ({"stamp is not a number": 1} if missing else {})
+
+
+def test_nullable_integers_stay_exact(tmp_path):
+    stamps = pa.array([None if k == 60 else int(ns) for k, ns in enumerate(NS)])
+    path = table_with(tmp_path, stamps)
+    (encounter,) = read_log(path, LogConfig(columns="time=time:ns")).encounters
+    assert encounter.start_ns == int(NS[0])
+
+
+@pytest.mark.parametrize(
+    ("stamps", "said"),
+    [
+        (pa.array([True] * len(NS)), r"column 'time' \(time\): a bool is no time"),
+        (pa.array(NS).cast(pa.duration("ns")), r"column 'time' \(time\): a duration\[ns\] is no time"),
+        (pa.array([[1]] * len(NS)), r"column 'time' \(time\): a list<.*> is no time"),
+        (pa.array([b"1"] * len(NS)), r"column 'time' \(time\): a binary is no time"),
+        (pa.array([253402214400] * len(NS)).cast(pa.timestamp("s")), r"stamp is out of range: \d+, first at .*row 1"),
+        (pa.array([2**62] * len(NS)).cast(pa.timestamp("us")), r"stamp is out of range"),
+        (pa.array([-(2**63)] * len(NS)), r"stamp is out of range"),
+        (pa.array([2**64 - 1] * len(NS), type=pa.uint64()), r"stamp is out of range"),
+        (pa.array(["9999-12-31"] * len(NS)), r"stamp is out of range"),
+        (pa.array(["None"] * len(NS)), r"stamp is not a number"),
+        (pa.nulls(len(NS)), r"stamp is not a number"),
+    ],
+    ids=str,
+)
+def test_stamps_that_are_none_are_refused_by_name(tmp_path, stamps, said):
+    with pytest.raises(InputError, match=said):
+        read_log(table_with(tmp_path, stamps))
+
+
+def test_what_pandas_says_in_a_file_is_not_believed(tmp_path):
+    rows = pa.Table.from_pandas(crossing().set_index("t_s"))
+    for meta in (b"[]", b"{", b'{"columns": 3, "index_columns": ["no"]}', rows.schema.metadata[b"pandas"]):
+        parquet.write_table(rows.replace_schema_metadata({b"pandas": meta}), tmp_path / "log.parquet")
+        assert len(read_log(tmp_path / "log.parquet").encounters) == 1
+
+
+TEXTS = {
+    "a row with more fields": (lambda text: text.replace(",8.0\n", ",8.0,1\n", 1), "more fields|Expected 5 fields in line"),
+    "rows with more fields": (
+        lambda text: "\n".join(line + ",1" * (k > 0) for k, line in enumerate(text.split("\n"))),
+        "more fields",
+    ),
+    "no position": (lambda text: text.replace("x_m", "true", 1), "no column for position"),
+    "UTF-16": (lambda text: text.encode("utf-16"), "cannot be read as a table: .*codec"),
+    "a long name": (lambda text: "a" * 100_000 + text, "no column for time"),
+    "no rows": (lambda text: text.split("\n", 1)[0] + "\n", "has a header but no rows"),
+    "no text": (lambda text: "\n\n\n", "cannot be read as a table|no column"),
+    "an open quote": (lambda text: text.replace("a,", '"a,', 1), "cannot be read as a table: .*EOF inside string"),
+    "zeros": (lambda text: "\0" * 1000, "no rows|no column"),
+}
+
+
+@pytest.mark.parametrize(("change", "said"), TEXTS.values(), ids=TEXTS)
+def test_text_that_is_no_table(tmp_path, change, said):
+    path = tmp_path / "log.csv"
+    text = change(crossing().to_csv(index=False))
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(InputError, match=said) as error:
+        read_log(path)
+    assert "log.csv" in str(error.value) and len(str(error.value)) <= LONGEST
+
+
+def test_truth_values_are_no_positions(tmp_path):
+    with pytest.raises(InputError, match=r"column 'x_m' \(x\): true or false is no x"):
+        read_log(save(crossing().assign(x_m=True), tmp_path))
+
+
+def test_the_time_cannot_be_left_out(tmp_path):
+    with pytest.raises(InputError, match="no column for time"):
+        read_log(save(crossing(), tmp_path), LogConfig(columns="time=none"))
+
+
+@pytest.mark.parametrize("value", [1e300, -1e300, 1e308, 3e8])
+def test_positions_beyond_the_earth_are_dropped(tmp_path, value):
+    rows = crossing()
+    rows.loc[50, "x_m"] = value
+    (drop,) = read_log(save(rows, tmp_path)).quality.dropped
+    assert (drop.reason, drop.count) == ("position is off the globe", 1)
+
+
+def test_numbers_of_any_length_and_names_of_any_length(tmp_path):
+    rows = geographic(crossing()).astype(object)
+    rows.loc[50, "lat_deg"] = "1" * 400
+    rows["vehicle_id"] = rows["vehicle_id"] * 3000
+    (drop,) = read_log(save(rows, tmp_path)).quality.dropped
+    assert drop.count == 1
+
+
+def test_sizes_that_no_vehicle_has_are_not_taken(tmp_path):
+    (encounter,) = read_log(save(crossing().assign(length_m=1e308, width_m=2.5), tmp_path)).encounters
+    assert [(vehicle.length, vehicle.width) for vehicle in encounter.vehicles] == [(4.8, 2.5), (4.8, 2.5)]
+
+
+def test_what_is_no_file(tmp_path):
+    os.mkfifo(tmp_path / "log.csv")
+    for path, said in ((tmp_path / "log.csv", "neither a file nor a folder"), (tmp_path / ("x" * 300), "name too long")):
+        with pytest.raises(InputError, match=said):
+            read_log(path)
+    with pytest.raises(InputError, match="does not exist"):
+        read_log(Path("a\0b"))
