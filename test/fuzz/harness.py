@@ -190,7 +190,7 @@ def child(target: Target, seeds: Sequence[bytes], first: int, last: int, progres
             if found:
                 out.write(json.dumps([number, *found]) + "\n")
                 out.flush()
-                if found[0] == "Memory":  # the peak stays: a new child has its own
+                if peak() > most:  # it stays: a new child has its own
                     return
         progress[:8] = struct.pack("<q", last)
 
