@@ -22,6 +22,7 @@ once and tells its parent which number it is at; so a crash of native code or a 
 from collections.abc import Callable, Iterator, Sequence
 import contextlib
 from dataclasses import asdict, dataclass, field
+import faulthandler
 import importlib
 import json
 import mmap
@@ -175,6 +176,7 @@ def over_time(_signal: int, _frame: object) -> None:
 def child(target: Target, seeds: Sequence[bytes], first: int, last: int, progress: mmap.mmap, pipe: int) -> None:
     """Execute inputs `first` to before `last`; write the number of each before it runs, and failures to the pipe."""
     warnings.simplefilter("ignore")
+    faulthandler.disable()  # pytest's: the parent says what happened
     signal.signal(signal.SIGPROF, over_time)
     size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (size + HEADROOM, size + HEADROOM))
