@@ -20,6 +20,8 @@ import re
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
 
+SMALLEST, LARGEST = 0.01, 1000.0  # metres of a footprint
+
 
 def token(vehicle_id: str) -> str:
     """Return `vehicle_id` as a ROS name token: whatever is not a letter, digit or underscore becomes one underscore.
@@ -57,7 +59,7 @@ def vehicle_of(joint_name: str) -> Vehicle:
     """Return the vehicle of a joint name; one without a footprint gets the default size of a car.
 
     Raises:
-        InputError: the footprint is not two positive lengths.
+        InputError: the footprint is not two lengths of a vehicle.
     """
     name, colon, size = joint_name.partition(":")
     if not colon:
@@ -67,6 +69,8 @@ def vehicle_of(joint_name: str) -> Vehicle:
         length, width = (float(value) for value in match.groups()) if match else (0.0, 0.0)
     except ValueError:
         length = width = 0.0
-    if not (0.0 < length < float("inf") and 0.0 < width < float("inf")):
-        raise InputError(f"joint name {joint_name!r}: expected <id>:<length>x<width> in metres, e.g. car:4.8x1.9")
+    if not (SMALLEST <= length <= LARGEST and SMALLEST <= width <= LARGEST):
+        raise InputError(
+            f"joint name {joint_name!r}: expected <id>:<length>x<width>, {SMALLEST:g} to {LARGEST:g} m each, e.g. car:4.8x1.9"
+        )
     return Vehicle(name, length, width)

@@ -56,6 +56,10 @@ def decode_scenario(data: bytes, *, seed: int = 0, index: int = 0, what: str = "
     message = trajectory.decode(data, what)
     if len(message.time_ns) < 2 or message.time_ns[0] != 0 or (np.diff(message.time_ns) <= 0).any():
         raise InputError(f"{what}: time_from_start must increase from 0 over at least two points")
+    if message.time_ns[-1] > trajectory.LONGEST_NS:
+        raise InputError(
+            f"{what}: it lasts {message.time_ns[-1] * 1e-9:g} s; at most {trajectory.LONGEST_NS * 1e-9:g} s are read"
+        )
     scenario = Scenario(
         vehicles=message.vehicles,
         time=message.time_ns / NANOSECONDS,

@@ -29,6 +29,7 @@ from scenario_gen.errors import InputError
 __all__ = ["FRAME", "TYPE", "decode_tracks", "encode_tracks"]
 
 FRAME = "local_enu"
+SHORTEST_STEP_NS, LONGEST_STEP_NS = 1_000_000, 10_000_000_000
 
 
 def encode_tracks(encounter: Encounter) -> bytes:
@@ -57,6 +58,11 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
     steps = np.diff(message.time_ns)
     if len(steps) == 0 or message.time_ns[0] != 0 or steps[0] <= 0 or (steps != steps[0]).any():
         raise InputError(f"{name}: time_from_start must count from 0 in even steps; resample the tracks (10 Hz is usual)")
+    if not SHORTEST_STEP_NS <= steps[0] <= LONGEST_STEP_NS or message.time_ns[-1] > trajectory.LONGEST_NS:
+        raise InputError(
+            f"{name}: {len(steps)} steps of {steps[0] * 1e-9:g} s; steps of 0.001 to 10 s and at most "
+            f"{trajectory.LONGEST_NS * 1e-9:g} s in all are read"
+        )
     return Encounter(
         name=name,
         vehicles=message.vehicles,

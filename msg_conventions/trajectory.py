@@ -33,6 +33,9 @@ from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
 
 TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
+FARTHEST = 1e8  # m from the frame's origin: more than any geodetic grid has
+FASTEST = 1e4  # m/s: what drives is slower, and what follows from speeds can still be reckoned with
+LONGEST_NS = 7200 * NANOSECONDS  # of an encounter or a scenario
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +101,7 @@ def decode(data: bytes, what: str) -> Trajectory:
     """Return what the message says; velocities or accelerations that were left out are read as zero.
 
     Raises:
-        InputError: naming `what`, where the message is damaged, lacks poses, or holds a value that is not finite.
+        InputError: naming `what`, where the message is damaged, lacks poses, or holds a value that is not finite or no vehicle's.
     """
     reader = CdrReader(data, what)
     stamp_ns, frame_id = reader.header()
@@ -120,6 +123,13 @@ def decode(data: bytes, what: str) -> Trajectory:
     )
     if not all(np.isfinite(value).all() for value in (pose, velocity, acceleration)):
         raise InputError(f"{what}: the message holds a value that is not finite")
+    for name, values, most in (
+        ("position", pose[..., :2], FARTHEST),
+        ("speed", velocity, FASTEST),
+        ("quaternion", pose[..., 3:], 2.0),
+    ):
+        if (np.abs(values) > most).any():
+            raise InputError(f"{what}: a {name} is {np.abs(values).max():g}; at most {most:g} is read")
     return Trajectory(
         stamp_ns=stamp_ns,
         frame_id=frame_id,

@@ -52,8 +52,13 @@ def read_template(messages: Mapping[str, bytes]) -> Template:
     encounter = decode_tracks(messages["tracks"])
     segmentation = decode_changepoints(messages["changepoints"], encounter)
     _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"))
-    _, frame, asked, _ = decode_fit(messages["fit"])
+    _, frame, asked, poses = decode_fit(messages["fit"])
     anchors = anchor_stamps(encounter, segmentation.changepoints)
+    if poses.shape[:2] != (len(encounter.vehicles), len(anchors)):
+        raise InputError(
+            f"fit: {poses.shape[0]} vehicles at {poses.shape[1]} points, where tracks and changepoints ask for "
+            f"{len(encounter.vehicles)} at {len(anchors)}"
+        )
     routes = []
     for name in tokens(vehicle.id for vehicle in encounter.vehicles):
         topic = vehicle_topic(name, "route")

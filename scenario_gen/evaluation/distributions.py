@@ -22,12 +22,14 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
+from scenario_gen.errors import InputError
 from scenario_gen.evaluation.geometry import footprint_distance
 from scenario_gen.evaluation.motion import Motion
 
 SMOOTHING = 0.5
 """Seconds over which acceleration is averaged before it is differentiated to jerk."""
 
+MOST_COUNTS = 20_000_000  # bins of all samples together
 ROUNDING = 1e-6
 """Bins: a value this little below an edge belongs to the bin above, or rounding would move a cruise at 10 m/s."""
 
@@ -123,7 +125,11 @@ def wasserstein(a: Floats, b: Floats) -> float:
 
 
 def compare(quantity: Quantity, template: Floats, samples: Sequence[Floats], points: int = 513) -> Comparison:
-    """Compare the values of one quantity; bins are `quantity.bin_width` wide and aligned at zero."""
+    """Compare the values of one quantity; bins are `quantity.bin_width` wide and aligned at zero.
+
+    Raises:
+        InputError: the values lie so far apart that there would be too many bins.
+    """
     pooled = np.concatenate(list(samples))
     everything = np.concatenate([template, pooled])
     if template.size == 0 or pooled.size == 0:
@@ -133,6 +139,12 @@ def compare(quantity: Quantity, template: Floats, samples: Sequence[Floats], poi
     def bin_of(values: Floats) -> Ints:
         return np.asarray(np.floor(values / quantity.bin_width + ROUNDING), dtype=np.int64)
 
+    span = (everything.max() - everything.min()) / quantity.bin_width
+    if not span * (len(samples) + 1) < MOST_COUNTS:
+        raise InputError(
+            f"{quantity.label} from {everything.min():g} to {everything.max():g} {quantity.unit} in {len(samples)} scenarios: no "
+            "vehicles move so; check the units"
+        )
     first, last = (int(bin_of(np.array(bound))) for bound in (everything.min(), everything.max()))
 
     def counts(values: Floats) -> Floats:

@@ -21,6 +21,7 @@ import numpy as np
 
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.encounter import Encounter, Vehicle
+from scenario_gen.errors import InputError
 from scenario_gen.scenario import Scenario
 
 
@@ -52,8 +53,14 @@ def at_period(source: Encounter | Scenario, dt: float) -> Motion:
     """Bring an encounter or a scenario to the period dt [s] (a tail shorter than dt is left out).
 
     What is on that clock already passes through untouched; the rest is interpolated linearly.
+
+    Raises:
+        InputError: it is shorter than dt.
     """
     count = int(np.floor(source.time[-1] / dt + 1e-6)) + 1
+    if count < 2:
+        name = f"encounter {source.name!r}" if isinstance(source, Encounter) else f"scenario {source.index}"
+        raise InputError(f"{name} lasts {source.time[-1]:g} s, shorter than evaluation.period ({dt:g} s)")
     return _motion(source, np.minimum(np.arange(count) * dt, source.time[-1]), dt)
 
 

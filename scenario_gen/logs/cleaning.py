@@ -23,14 +23,13 @@ from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.errors import InputError
 from scenario_gen.geodesy import local_frame
-from scenario_gen.logs.budgets import check_clock, LATEST_NS
+from scenario_gen.logs.budgets import check_clock, FARTHEST, LATEST_NS
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import Observations, RawLog
 
 FASTEST = 70.0  # m/s: no road vehicle's measured speed is above it (an SPMD unit sends 163.8 for "unknown")
 JUMP_SLACK = 3.0  # m that a fix may lie beyond what the speeds allow: GPS noise
 JUMP_SPEED = 10.0  # m/s by which a measured speed may be wrong before a fix counts as a jump
-FARTHEST = 1e8  # m from the origin of any frame: a quarter of the way to the moon
 RELOCATED = 5  # so many fixes in a row that agree with each other are a new place, not jumps
 
 

@@ -25,14 +25,13 @@ import pandas as pd
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import InputError
 from scenario_gen.guard import guarded
-from scenario_gen.logs.budgets import check_size, check_vehicles
+from scenario_gen.logs.budgets import check_size, check_vehicles, LARGEST
 from scenario_gen.logs.columns import Column, find_columns
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import Observations, RawLog, Segment
 
 LONGEST = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
 LONGEST_NUMBER = 300  # characters
-LARGEST = 100.0  # m: what is longer is no vehicle
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:

@@ -28,14 +28,12 @@ from scenario_gen.errors import InputError
 from scenario_gen.guard import guarded
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.openings import find_openings
-from scenario_gen.roads.road import Road
+from scenario_gen.roads.road import COARSEST, FARTHEST, FINEST, Road
 
 _MODES = ("trinary", "scale", "raw")
 _FORMATS = ("PPM", "PNG", "BMP", "JPEG")  # by Pillow's names; PPM is PGM, PBM and PPM
 _FORMATS_SAID = "PGM, PPM, PBM, PNG, BMP or JPEG"
 _BLOCK = 1 << 20  # pixels worked on at a time, so that a large map takes little more memory than its cells
-_LARGEST_CELL = 10.0  # metres: nothing is seen of a vehicle in larger ones
-_FARTHEST = 1e8  # metres from the frame's origin: more than any geodetic grid has
 
 
 def read_map(path: Path, config: RoadConfig) -> Road:
@@ -48,7 +46,7 @@ def read_map(path: Path, config: RoadConfig) -> Road:
     content = read_yaml(path, f"map {path}")
     if not isinstance(content, dict):
         raise InputError(f"map {path}: expected keys image, resolution, origin, negate, occupied_thresh, free_thresh")
-    resolution = _number(path, content, "resolution", low=1e-6, high=_LARGEST_CELL)
+    resolution = _number(path, content, "resolution", low=FINEST, high=COARSEST)
     origin = _origin(path, content)
     mode = content.get("mode", "trinary")
     if mode not in _MODES:
@@ -89,8 +87,8 @@ def _origin(path: Path, content: dict[Any, Any]) -> Floats:
     numbers = isinstance(value, list) and all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
     if not isinstance(value, list) or len(value) not in (2, 3) or not numbers or not all(math.isfinite(v) for v in value):
         raise InputError(f"map {path}: key origin is {shown(value)}; a list of x, y and yaw is needed")
-    if max(abs(v) for v in value) > _FARTHEST:
-        raise InputError(f"map {path}: key origin is {shown(value)}; at most {_FARTHEST:g} m from the frame's origin are read")
+    if max(abs(v) for v in value) > FARTHEST:
+        raise InputError(f"map {path}: key origin is {shown(value)}; at most {FARTHEST:g} m from the frame's origin are read")
     if len(value) == 3 and value[2] != 0.0:
         raise InputError(f"map {path}: key origin has yaw {value[2]}; rotated maps are not supported, export it with yaw 0")
     return np.array(value[:2], dtype=np.float64)

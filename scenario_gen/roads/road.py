@@ -21,6 +21,9 @@ import numpy as np
 from scenario_gen.arrays import Bools, canonical_poses, Floats, frozen
 from scenario_gen.errors import InputError
 
+FINEST, COARSEST = 0.001, 10.0  # metres of a cell: nothing is seen of a vehicle in larger ones
+FARTHEST = 1e8  # metres from the frame's origin: more than any geodetic grid has
+
 
 @dataclass(frozen=True, eq=False)
 class Road:
@@ -54,5 +57,9 @@ class Road:
         object.__setattr__(self, "exits", canonical_poses(np.reshape(self.exits, (-1, 3))))
         if drivable.ndim != 2 or drivable.size == 0 or not drivable.any():
             raise InputError(f"road {self.name!r} has no drivable cell")
-        if not (np.isfinite(self.resolution) and self.resolution > 0.0):
-            raise InputError(f"road {self.name!r} has resolution {self.resolution}; it must be positive")
+        if not FINEST <= self.resolution <= COARSEST:
+            raise InputError(f"road {self.name!r} has resolution {self.resolution:g} m; {FINEST:g} to {COARSEST:g} m are read")
+        if self.origin.shape != (2,) or not (np.abs(self.origin) <= FARTHEST).all():
+            raise InputError(
+                f"road {self.name!r} has origin {self.origin}; at most {FARTHEST:g} m from the frame's origin are read"
+            )

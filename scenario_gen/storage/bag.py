@@ -29,7 +29,7 @@ from scenario_gen.documents import shown
 from scenario_gen.errors import InputError
 from scenario_gen.guard import guarded
 from scenario_gen.storage.config import Allowance, BagConfig
-from scenario_gen.storage.files import files_of
+from scenario_gen.storage.files import files_of, METADATA
 from scenario_gen.storage.mcap import McapFile, open_mcap
 from scenario_gen.storage.records import DamagedError
 from scenario_gen.storage.sqlite import open_sqlite, SqliteFile
@@ -147,7 +147,8 @@ def _of(topics: dict[int, tuple[str, str, str]], wanted: Callable[[str, str], bo
 
 
 def _remedy(file: Path) -> str:
-    return f"`scenario-gen reindex {file.parent}` saves what is whole"
+    bag = file.parent if (file.parent / METADATA).exists() else file
+    return f"`scenario-gen reindex {bag}` saves what is whole"
 
 
 @contextmanager

@@ -20,6 +20,7 @@ from scenario_gen.errors import InputError
 from scenario_gen.parameters import check, parameter
 
 MESSAGE_BYTES = 256  # what a message costs beside its own bytes
+FOUND_BYTES = 1024  # what finding a message in a chunk counts for: time, where a few bytes hold very many messages
 SHRINK = 100  # times that a file may grow by decompression before it is suspected; maps shrink most, 10 to 50 times
 
 

@@ -32,7 +32,7 @@ import zstandard
 
 from scenario_gen.errors import ScenarioGenError
 from scenario_gen.guard import guarded
-from scenario_gen.storage.config import Allowance, MESSAGE_BYTES
+from scenario_gen.storage.config import Allowance, FOUND_BYTES
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")
@@ -313,5 +313,5 @@ def read_contents(raw: bytes, offset: int, allowance: Allowance) -> Contents:
             at += length
     except DamagedError as error:
         found.damage = str(error)
-    allowance.unpack(MESSAGE_BYTES * len(found.stamps))
+    allowance.unpack(FOUND_BYTES * len(found.stamps))
     return found

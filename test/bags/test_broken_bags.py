@@ -14,17 +14,21 @@
 
 """Bags that once broke a reader, and bombs: an error that names the file, or what is whole of them; in little memory."""
 
+from dataclasses import replace
 import resource
 import shutil
 
 from bag_examples import hand_made_run
 from crash_files import crash_files, is_refused
 from mcap.writer import CompressionType, Writer
+import numpy as np
 import pytest
 
+from msg_conventions import trajectory
 from scenario_gen.bags import bag_topics, BagWriter, read_messages, reindex, write_run
 from scenario_gen.bags.evaluation import evaluate_bag
 from scenario_gen.bags.regenerate import regenerate_scenario
+from scenario_gen.bags.template import read_template
 from scenario_gen.bags.validation import UNUSABLE, validate_bag
 from scenario_gen.cli import main
 from scenario_gen.errors import InputError
@@ -188,3 +192,53 @@ def test_damaged_messages_are_named_or_found(tmp_path, topic, damage):
         is_refused(lambda: validate_bag(broken), topic)
     is_refused(lambda: evaluate_bag(broken))
     assert is_refused(lambda: regenerate_scenario(broken, 0))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda message: replace(message, position=message.position * 1e9), "position is"),
+        (lambda message: replace(message, speed=message.speed * 1e6), "speed is"),
+        (lambda message: replace(message, time_ns=message.time_ns * 10_000), "at most 7200 s|steps of 0.001 to 10 s"),
+        (lambda message: replace(message, vehicles=tuple(replace(v, length=1e9) for v in message.vehicles)), "0.01 to 1000 m"),
+    ],
+    ids=["position", "speed", "time", "length"],
+)
+@pytest.mark.parametrize("topic", ["/tracks", "/scenarios"])
+def test_what_no_vehicle_does_is_refused_before_it_takes_memory(tmp_path, topic, change, said):
+    bag = write_run(tmp_path / "bag", hand_made_run())
+
+    def changed_data(name, data):
+        return trajectory.encode(change(trajectory.decode(data, name))) if name == topic else data
+
+    broken = changed(bag, tmp_path / "broken", changed_data)
+    with pytest.raises(InputError, match=said):
+        evaluate_bag(broken)
+
+
+def test_figures_that_would_fill_the_memory_are_refused(tmp_path):
+    bag = write_run(tmp_path / "bag", hand_made_run())
+
+    def far_apart(name, data):
+        if name != "/scenarios":
+            return data
+        message = trajectory.decode(data, name)
+        return trajectory.encode(replace(message, position=message.position * np.array([[[1e6]], [[1.0]]])))
+
+    with pytest.raises(InputError, match=r"broken: gap from .* no vehicles move so"):
+        evaluate_bag(changed(bag, tmp_path / "broken", far_apart))
+
+
+def test_a_fit_of_other_vehicles_is_refused(tmp_path):
+    bag = write_run(tmp_path / "bag", hand_made_run())
+
+    def of_one(name, data):
+        if name != "/fit":
+            return data
+        fit = trajectory.decode(data, name)
+        parts = {key: getattr(fit, key)[:1] for key in ("vehicles", "position", "heading", "speed", "acceleration")}
+        return trajectory.encode(replace(fit, **parts))
+
+    messages = {m.topic[1:]: m.data for m in read_messages(changed(bag, tmp_path / "broken", of_one))}
+    with pytest.raises(InputError, match="fit: 1 vehicles at 4 points"):
+        read_template(messages)

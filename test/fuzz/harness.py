@@ -22,6 +22,7 @@ once and tells its parent which number it is at; so a crash of native code or a 
 from collections.abc import Callable, Iterator, Sequence
 import contextlib
 from dataclasses import asdict, dataclass, field
+import faulthandler
 import importlib
 import json
 import mmap
@@ -99,10 +100,16 @@ class OverTimeError(BaseException):
     """An execution took too long; no handler of `Exception` may swallow it."""
 
 
-def targets() -> dict[str, Target]:
-    """Return all targets by name; their modules find what the tests find."""
+def tests_on_path() -> None:
+    """Let modules of tests find each other as they do under pytest."""
     project = tomllib.loads((HERE.parents[1] / "pyproject.toml").read_text())
-    sys.path += [str(HERE.parents[1] / folder) for folder in project["tool"]["pytest"]["ini_options"]["pythonpath"]]
+    folders = [str(HERE.parents[1] / folder) for folder in project["tool"]["pytest"]["ini_options"]["pythonpath"]]
+    sys.path += [folder for folder in folders if folder not in sys.path]
+
+
+def targets() -> dict[str, Target]:
+    """Return all targets by name."""
+    tests_on_path()
     modules = [importlib.import_module(path.stem) for path in sorted(HERE.glob("targets_*.py"))]
     return {target.name: target for module in modules for target in module.TARGETS}
 
@@ -126,7 +133,7 @@ def damaged(target: Target, seeds: Sequence[bytes], number: int) -> bytes:
     return data
 
 
-def execute(target: Target, data: bytes, folder: Path) -> tuple[str, str] | None:
+def execute(target: Target, data: bytes, folder: Path, most: int = MEMORY) -> tuple[str, str] | None:
     """Run a target on one input in this process; return signature and message of what must not come out, or None."""
     folder.mkdir()
     signal.setitimer(signal.ITIMER_PROF, SECONDS)
@@ -143,8 +150,12 @@ def execute(target: Target, data: bytes, folder: Path) -> tuple[str, str] | None
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         shutil.rmtree(folder, ignore_errors=True)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    return ("Memory", f"{peak / 2**20:.0f} MiB at the peak") if peak > MEMORY else None
+    return ("Memory", f"{peak() / 2**20:.0f} MiB at the peak") if peak() > most else None
+
+
+def peak() -> int:
+    """Return the most memory that this process has held so far [bytes]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 def signature(error: BaseException) -> str:
@@ -165,21 +176,23 @@ def over_time(_signal: int, _frame: object) -> None:
 def child(target: Target, seeds: Sequence[bytes], first: int, last: int, progress: mmap.mmap, pipe: int) -> None:
     """Execute inputs `first` to before `last`; write the number of each before it runs, and failures to the pipe."""
     warnings.simplefilter("ignore")
+    faulthandler.disable()  # pytest's: the parent says what happened
     signal.signal(signal.SIGPROF, over_time)
     size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (size + HEADROOM, size + HEADROOM))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    most = max(MEMORY, peak() + MEMORY // 2)  # under pytest the parent may hold much already
     quiet = os.open(os.devnull, os.O_WRONLY)
     os.dup2(quiet, 1)
     os.dup2(quiet, 2)
     with tempfile.TemporaryDirectory() as scratch, os.fdopen(pipe, "w") as out:
         for number in range(first, last):
             progress[:8] = struct.pack("<q", number)
-            found = execute(target, damaged(target, seeds, number), Path(scratch) / "input")
+            found = execute(target, damaged(target, seeds, number), Path(scratch) / "input", most)
             if found:
                 out.write(json.dumps([number, *found]) + "\n")
                 out.flush()
-                if found[0] == "Memory":  # the peak stays: a new child has its own
+                if peak() > most:  # it stays: a new child has its own
                     return
         progress[:8] = struct.pack("<q", last)
 

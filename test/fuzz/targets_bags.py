@@ -15,6 +15,7 @@
 """The readers of bags, maps, parameters and JSON as targets."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache, partial
 import io
 import json
@@ -31,7 +32,10 @@ from PIL import Image
 from rosbags.rosbag2 import StoragePlugin
 from targets_logs import bags
 
+from msg_conventions import trajectory
+from msg_conventions.roads import decode_map, encode_map, MAP_TYPE
 from msg_conventions.topics import topic_entry
+from msg_conventions.trajectory import TYPE as TRAJECTORY_TYPE
 from scenario_gen.bags import bag_topics, BagWriter, read_messages, read_scenario_set, reindex, write_run
 from scenario_gen.bags.evaluation import bag_cases
 from scenario_gen.bags.metadata import qos_yaml
@@ -83,7 +87,7 @@ def messages(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
             (folder / "in.mcap").write_bytes(data)
             found = list(read_messages(folder / "in.mcap"))
             chosen = {rng.randrange(len(found)) for _ in range(rng.choice((1, 1, 2, 5)))}
-            how = rng.randrange(8)
+            how = rng.randrange(12)
             with BagWriter(folder / "out", compress=False) as bag:
                 for k, message in enumerate(found):
                     topic, kind, content, stamp = message.topic, message.type, message.data, message.stamp_ns
@@ -98,6 +102,8 @@ def messages(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
                             content = rng.choice(found).data
                         elif how == 4:
                             kind = rng.choice(found).type
+                        elif how > 7:
+                            content = meaning(rng, content, kind)
                         else:
                             content = rng.choice(BYTES)(rng, content, [message.data for message in found])
                     bag.add_topic(topic, kind)
@@ -105,6 +111,46 @@ def messages(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
             return (folder / "out" / "out_0.mcap").read_bytes()
     except (ScenarioGenError, ValueError, IndexError):
         return rng.choice(BYTES)(rng, data, seeds)
+
+
+def meaning(rng: random.Random, data: bytes, kind: str) -> bytes:
+    """Change what a message says and keep its form: places, speeds, times, sizes, numbers of vehicles; cells of a map."""
+    factor = rng.choice((0.0, -1.0, 1e-9, 1e-3, 0.5, 3.0, 1e3, 1e6, 1e9, 1e15, 1e100, 1e300))
+    if kind == MAP_TYPE:
+        _, road = decode_map(data)
+        height, width = rng.choice((road.drivable.shape, (1, road.drivable.size), (road.drivable.size, 1)))
+        changed = replace(
+            road,
+            drivable=road.drivable.reshape(height, width),
+            resolution=rng.choice((road.resolution, 1e-30, 1e-9, 1e-3, 10.0, 1e6, 1e30)),
+            origin=road.origin + rng.choice((0.0, 1e3, 1e9, 1e300)),
+        )
+        return encode_map(changed, 1)
+    if kind != TRAJECTORY_TYPE:
+        return data
+    found = trajectory.decode(data, "seed")
+    n, count = found.speed.shape
+    rows = [rng.randrange(n) for _ in range(rng.choice((1, n, n, 3, 20)))] if rng.random() < 0.2 else list(range(n))
+    kept = range(0, count, rng.choice((1, 1, 1, 2, 30)))
+    name = rng.choice(("position", "heading", "speed", "acceleration", "time_ns", "size", "shift"))
+    arrays = {key: getattr(found, key)[rows][:, kept] for key in ("position", "heading", "speed", "acceleration")}
+    time_ns = found.time_ns[kept]
+    vehicles = [
+        replace(found.vehicles[k], id=f"{found.vehicles[k].id}_{at}" if len(rows) > n else found.vehicles[k].id)
+        for at, k in enumerate(rows)
+    ]
+    if name in arrays:
+        one = rng.randrange(len(rows))
+        arrays[name][one] = arrays[name][one] * factor
+    elif name == "shift":
+        arrays["position"] = arrays["position"] + factor
+    elif name == "size":
+        size = rng.choice((1e-12, 1e-3, 1e3, 1e9, 1e300))
+        vehicles[0] = replace(vehicles[0], length=size) if rng.random() < 0.5 else replace(vehicles[0], width=size)
+    else:
+        step = rng.choice((1, 1000, 10**6, 10**9, 10**12, 10**16))
+        time_ns = np.arange(len(time_ns), dtype=np.int64) * step
+    return trajectory.encode(replace(found, vehicles=tuple(vehicles), time_ns=time_ns, **arrays))
 
 
 def framing(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:

@@ -17,9 +17,10 @@
 from collections.abc import Callable, Sequence
 import contextlib
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 import struct
+import tempfile
 
 from harness import Target
 from mutators import BYTES, columns, records, TEXT
@@ -32,7 +33,7 @@ from msg_conventions.tracks import encode_tracks
 from msg_conventions.tracks import TYPE as TRACKS
 from scenario_gen.errors import ScenarioGenError
 from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams
-from scenario_gen.logs.bag import ODOMETRY, STORES
+from scenario_gen.logs.bag import FIX, ODOMETRY, read_streams, read_tracks, STORES, Topic, TWIST, USED
 from scenario_gen.logs.files import COLUMNS
 from scenario_gen.logs.synthetic import bundled
 
@@ -145,6 +146,40 @@ def read_as(name: str, config: LogConfig = SHORT) -> Callable[[bytes, Path], Non
     return run
 
 
+@cache
+def recorded() -> dict[str, list[tuple[str, int, bytes]]]:
+    """Messages by type: (topic, stamp, CDR bytes)."""
+    found: dict[str, list[tuple[str, int, bytes]]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for k, data in enumerate(bags(StoragePlugin.MCAP, Path(folder))):
+            (Path(folder) / f"{k}.mcap").write_bytes(data)
+            with Reader(Path(folder) / f"{k}.mcap") as reader:
+                for connection, stamp, message in reader.messages():
+                    found.setdefault(connection.msgtype, []).append((connection.topic, stamp, bytes(message)))
+    return found
+
+
+def payloads(_folder: Path) -> list[bytes]:
+    """A number of a type, and CDR bytes of that type."""
+    return [bytes([k]) + message for k, kind in enumerate(USED) for _, _, message in recorded()[kind][:3]]
+
+
+def decode(data: bytes, _folder: Path) -> None:
+    """Read a log of sound messages, among which some are the input."""
+    kind = USED[data[0] % len(USED)] if data else USED[0]
+    topics: dict[tuple[str, str], Topic] = {}
+    for used in (ODOMETRY,) if kind == ODOMETRY else (TRACKS,) if kind == TRACKS else (FIX, TWIST):
+        for number, (name, stamp, message) in enumerate(recorded()[used]):
+            topic = topics.setdefault((used, name), Topic(name, used))
+            topic.stamps.append(stamp)
+            topic.data.append(data[1:] if used == kind and number % 7 == 0 else message)
+    if kind == TRACKS:
+        log = read_tracks(list(topics.values()), "log", "log.mcap", [])
+    else:
+        log = read_streams(list(topics.values()), "log", "log.mcap", SHORT)
+    encounters_of(log, SHORT)
+
+
 def put(data: bytes, _folder: Path) -> None:
     """Feed records (vehicle, kind, stamp, two values) to streams as they come, and read what they amount to."""
     streams = Streams(SHORT)
@@ -184,5 +219,6 @@ TARGETS = (
     Target("parquet", parquets, read_as("log.parquet"), PARQUET, ("parquet/*", "*.parquet"), "log.parquet"),
     Target("mcap_log", MCAP_BAGS, read_as("log.mcap"), BYTES, ("mcap_reader/*", "*.mcap"), "log.mcap"),
     Target("sqlite_log", SQLITE_BAGS, read_as("log.db3"), SQLITE, ("sqlite/*",), "log.db3"),
+    Target("payloads", payloads, decode, BYTES, named="log"),
     Target("streams", heard, put, BYTES),
 )

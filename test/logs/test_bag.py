@@ -22,6 +22,7 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from msg_conventions.tracks import encode_tracks
+from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.logs.bag import FIX, ODOMETRY, STORES, TWIST
@@ -166,6 +167,28 @@ def test_recorded_tracks_are_the_same_encounter_bit_for_bit(tmp_path, plain):
     ):
         with pytest.raises(InputError, match=words):
             read_log(tmp_path / "bag", config)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"position": np.full((2, 50, 2), 1e300)}, r"a position is 1e\+300 m"),
+        ({"speed": np.full((2, 50), 1e308)}, r"a speed is 1e\+308 m/s"),
+        ({"vehicles": (Vehicle("a", 1e308, 1.0), Vehicle("b"))}, r"a vehicle is 1e\+308 m"),
+        ({"dt_ns": 1}, "samples are 1e-09 s apart"),
+    ],
+)
+def test_tracks_of_no_road_are_refused(tmp_path, change, said):
+    plain = {
+        "position": np.zeros((2, 50, 2)),
+        "speed": np.ones((2, 50)),
+        "vehicles": (Vehicle("a"), Vehicle("b")),
+        "dt_ns": 10**8,
+    }
+    encounter = Encounter(name="e", start_ns=10**18, heading=np.zeros((2, 50)), **(plain | change))
+    bag = write(tmp_path / "bag", [Line("/tracks", TRACKS, 10**18, encode_tracks(encounter))])
+    with pytest.raises(InputError, match=rf"topic /tracks, message 1: {said}"):
+        read_log(bag)
 
 
 def test_several_tracks_are_several_encounters(tmp_path, plain):

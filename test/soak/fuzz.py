@@ -31,9 +31,8 @@ def run(state: Path) -> Iterator[Figure]:
     """Fuzz one target after the other; those that are done are not begun again. With atheris, each as long guided by coverage."""
     for name, target in targets().items():
         record = fuzz(target, state, EXECUTIONS, 60.0 * MINUTES)
-        found = [f"{failure.count} × {failure.signature}" for failure in record.failures.values()] + guided(
-            name, state / "guided"
-        )
+        found = [f"{failure.count} × {failure.signature}" for failure in record.failures.values()]
+        found += guided(name, state / "guided")
         yield Figure(
             promise=f"{name}: damaged inputs end in errors of ours",
             asked=f"{EXECUTIONS} or {MINUTES:g} min; each ≤ {SECONDS:g} s of CPU and ≤ {MEMORY >> 30} GiB",
