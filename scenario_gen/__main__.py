@@ -14,41 +14,19 @@
 
 """The executable `scenario-gen`. It sets the signals first, so that Ctrl-C and SIGTERM end it without a traceback at any time."""
 
-import os
 import signal
-import sys
 
-from scenario_gen.interrupts import interrupt, Interrupted
-
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
-
-def _leave(number: int, _frame: object) -> None:
-    """While the libraries load there is nothing to clean up, and some of them swallow exceptions."""
-    os.write(2, f"{Interrupted(number)}\n".encode())
-    os._exit(128 + number)
+from scenario_gen.interrupts import leave, SIGNALS
 
 
 def main() -> None:
     """Run the command line."""
-    heard = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]  # nohup, or a job in the background
-    for number in heard:
-        signal.signal(number, _leave)
+    for number in SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as for nohup, or a job in the background
+            signal.signal(number, leave)
     from scenario_gen.cli import main as run
 
-    code: int | str | None = 0
-    try:
-        for number in heard:
-            signal.signal(number, interrupt)
-        run()
-    except Interrupted as stopped:
-        print(stopped, file=sys.stderr)
-        code = stopped.exit_code
-    except SystemExit as end:
-        code = end.code
-    for number in heard:
-        signal.signal(number, _leave)  # while the interpreter ends
-    sys.exit(code)
+    run()
 
 
 if __name__ == "__main__":

@@ -14,40 +14,74 @@
 
 """Ctrl-C and SIGTERM, kept out of what must not be cut in two, such as a record that a bag is being given."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+import os
 import signal
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _held = False
-_pending = 0
+_pending: Callable[[], None] | None = None
+_endings: list[Callable[[], None]] = []
 
 
-class Interrupted(BaseException):
-    """A signal asks for the end; no Exception, so that no handler of errors swallows it."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__(f"stopped by {signal.Signals(number).name}")
-        self.exit_code = 128 + number  # as a shell says it
+def interrupt(_number: int, _frame: object) -> None:
+    """Signal handler of nodes: raise KeyboardInterrupt, at once or when `uninterrupted` work is done."""
+    _now_or_later(_raise)
 
 
-def interrupt(number: int, _frame: object) -> None:
-    """Signal handler: raise Interrupted, at once or when `uninterrupted` work is done."""
-    global _pending  # noqa: PLW0603 - a signal has no other place to be noted
-    if _held:
-        _pending = number
-    else:
-        raise Interrupted(number)
+def leave(number: int, _frame: object) -> None:
+    """Signal handler of commands: clean up and end the process, at once or when `uninterrupted` work is done.
+
+    Nothing is raised: an exception out of the blue is swallowed where Python calls back (when a module has been imported, say),
+    and compiled code that it meets may crash.
+    """
+    _now_or_later(partial(_leave, number))
+
+
+@contextmanager
+def ending(clean_up: Callable[[], None]) -> Iterator[None]:
+    """Let `leave` call `clean_up` while the work inside goes on."""
+    _endings.append(clean_up)
+    try:
+        yield
+    finally:
+        _endings.remove(clean_up)
 
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
     """Let the work inside be finished before a signal takes effect; not to be nested."""
-    global _held, _pending  # noqa: PLW0603
+    global _held  # noqa: PLW0603 - a signal has no other place to be noted
     _held = True
     try:
         yield
     finally:
         _held = False
-    if _pending:
-        number, _pending = _pending, 0
-        raise Interrupted(number)
+    if _pending is not None:
+        _pending()
+
+
+def _now_or_later(act: Callable[[], None]) -> None:
+    global _pending  # noqa: PLW0603
+    if _held:
+        _pending = act
+    else:
+        act()
+
+
+def _raise() -> None:
+    raise KeyboardInterrupt
+
+
+def _leave(number: int) -> None:
+    for other in SIGNALS:
+        signal.signal(other, signal.SIG_IGN)
+    for clean_up in reversed(_endings):
+        with suppress(Exception):
+            clean_up()
+    cursor = "\x1b[?25h" if os.isatty(2) else ""  # a progress bar hides it
+    with suppress(OSError):
+        os.write(2, f"{cursor}stopped by {signal.Signals(number).name}\n".encode())
+    os._exit(128 + number)  # as a shell says it

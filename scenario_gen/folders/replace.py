@@ -24,7 +24,7 @@ from scenario_gen.errors import InputError, of_system
 from scenario_gen.folders.claim import alone, Claim, claim, GUARD, PREFIX, settle
 from scenario_gen.folders.disk import exchange, is_gone, sync
 from scenario_gen.folders.marker import finish, Kind, objection
-from scenario_gen.interrupts import uninterrupted
+from scenario_gen.interrupts import ending, uninterrupted
 
 
 @contextmanager
@@ -50,27 +50,33 @@ def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> It
         missing = [folder for folder in place.parents if not folder.exists()]
     except (OSError, RuntimeError, ValueError) as error:  # too long, a loop of links, a null character
         raise _failed(target, error) from error
-    own: Claim | None = None
-    try:
-        with uninterrupted(), _system_errors(target, place.parent):
-            place.parent.mkdir(parents=True, exist_ok=True)
-            with alone(place.parent):
-                settle(place)
+    claims: list[Claim] = []
+
+    def clean_up() -> None:
+        while claims:
+            claims.pop().release()
+        for folder in missing:
+            with suppress(OSError):  # it is not empty: the result is there
+                folder.rmdir()
+
+    with ending(clean_up):
+        try:
+            with uninterrupted(), _system_errors(target, place.parent):
+                place.parent.mkdir(parents=True, exist_ok=True)
+                with alone(place.parent):
+                    settle(place)
+                    _check(target, place, kind)
+                    own = claim(place)
+                    claims.append(own)
+            with _system_errors(target, own.new):
+                yield own.new
+            with uninterrupted(), _system_errors(target, place.parent):
+                finish(own.new, kind)
                 _check(target, place, kind)
-                own = claim(place)
-        with _system_errors(target, own.new):
-            yield own.new
-        with uninterrupted(), _system_errors(target, place.parent):
-            finish(own.new, kind)
-            _check(target, place, kind)
-            _put(target, own, kind)
-    finally:
-        with uninterrupted():
-            if own is not None:
-                own.release()
-            for folder in missing:
-                with suppress(OSError):  # it is not empty: the result is there
-                    folder.rmdir()
+                _put(target, own, kind)
+        finally:
+            with uninterrupted():
+                clean_up()
 
 
 def _place(target: Path, inputs: Iterable[Path]) -> Path:

@@ -30,7 +30,7 @@ from rclpy.utilities import remove_ros_args
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.topics import LATCHED, Quality, topic_entry
 from scenario_gen.errors import of_system, presentable, ScenarioGenError
-from scenario_gen.interrupts import interrupt, Interrupted
+from scenario_gen.interrupts import interrupt
 from scenario_gen.nodes.answering import Answers
 from scenario_gen.nodes.compiling import compile_kernels
 from scenario_gen.nodes.message_classes import message_class
@@ -272,7 +272,7 @@ def run_nodes(make: Maker | Sequence[Maker], arguments: Sequence[str] | None = N
         for node in nodes:
             node.autostart()
         executor.spin()
-    except (Interrupted, KeyboardInterrupt, ExternalShutdownException):
+    except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except (ScenarioGenError, OSError) as error:
         code = _told(error)

@@ -42,6 +42,8 @@ def _become(node: str, arguments: list[str], log: str) -> None:
     """Turn the forked process into a node; never returns."""
     code = 1
     try:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda number, _: os._exit(128 + number))  # until the node sets its own
         os.setpgid(0, 0)  # the terminal's Ctrl-C reaches the suite, which ends its nodes in order
         descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
         os.dup2(descriptor, 2)
@@ -74,7 +76,13 @@ def _load(nodes: list[str]) -> None:
 
 def run(specification: list[dict[str, object]]) -> None:
     """Fork the nodes, report those that end, and end them all when asked."""
+    signals = (signal.SIGINT, signal.SIGTERM)
+    for number in signals:
+        signal.signal(number, lambda number, _: os._exit(128 + number))  # there is nobody to be ended yet
     _load([str(entry["node"]) for entry in specification])
+    asked: list[bool] = []
+    for number in signals:
+        signal.signal(number, lambda *_: asked.append(True))
     children: dict[int, str] = {}
     for entry in specification:
         pid = os.fork()
@@ -82,9 +90,6 @@ def run(specification: list[dict[str, object]]) -> None:
             _become(str(entry["node"]), [str(a) for a in entry["arguments"]], str(entry["log"]))  # type: ignore[attr-defined]
         children[pid] = str(entry["node"])
         say(event="started", node=entry["node"], pid=pid)
-    asked = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: asked.append(True))
     while not asked and children:
         readable, _, _ = select.select([0], [], [], 0.1)
         if readable and not os.read(0, 1):

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 import json
 import os
 from pathlib import Path
@@ -30,6 +31,7 @@ from typing import Any
 import yaml
 
 from scenario_gen.errors import InputError, RefusedError
+from scenario_gen.interrupts import ending
 from scenario_gen.nodes.domain import free_domain, this_host_only
 from scenario_gen.parameters import flatten
 from scenario_gen.pipeline import PipelineConfig
@@ -133,7 +135,7 @@ def run_suite(
         raise InputError(f"{bag} exists already; name another folder for the bag, or remove it")
     scratch = Path(tempfile.mkdtemp(prefix="scenario_gen_suite_"))
     try:
-        with free_domain() as domain:
+        with free_domain() as domain, ending(partial(shutil.rmtree, scratch, ignore_errors=True)):
             body = parameters(jobs, config, count, seed, scratch / bag.name)
             _run(jobs, body, scratch, domain, timeout, progress or (lambda _: None))
         bag.parent.mkdir(parents=True, exist_ok=True)
@@ -177,16 +179,22 @@ def _run(
         env=environment,
     )
     state = _State({job.namespace: set() for job in jobs})
-    try:
-        _follow(suite, state, scratch, timeout, progress)
-    finally:
-        if suite.stdin is not None:
-            suite.stdin.close()  # its end ends the suite, even where this process is killed
+    with ending(partial(_end, suite)):
         try:
-            suite.wait(30.0)
-        except subprocess.TimeoutExpired:
-            suite.kill()
-            suite.wait()
+            _follow(suite, state, scratch, timeout, progress)
+        finally:
+            _end(suite)
+
+
+def _end(suite: "subprocess.Popen[bytes]") -> None:
+    if suite.stdin is not None:
+        suite.stdin.close()  # its end ends the suite, even where this process is killed
+    suite.terminate()  # while it loads it does not look there
+    try:
+        suite.wait(30.0)
+    except subprocess.TimeoutExpired:
+        suite.kill()
+        suite.wait()
 
 
 def _follow(

@@ -18,6 +18,7 @@ from collections import Counter
 from dataclasses import replace
 import os
 from pathlib import Path
+import resource
 import subprocess
 import sys
 
@@ -209,6 +210,23 @@ def test_a_killed_recording_loses_its_last_chunk_only(tmp_path):
     saved = reindex(tmp_path / "bag", tmp_path / "saved").messages
     assert 950 <= saved < 1000  # a chunk of 2000 bytes holds about 50 such messages
     assert [m.stamp_ns for m in read_messages(tmp_path / "saved")] == list(range(saved))
+
+
+def test_a_bag_that_could_not_be_written_on_is_left_for_reindex(tmp_path):
+    """Files may be no longer than 100 kB here, as if the disk were full then; what is whole until then is saved."""
+    bag = BagWriter(tmp_path / "bag", compress=False, chunk_bytes=5000)
+    bag.add_topic("/t", "std_msgs/msg/String")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))
+    try:
+        with pytest.raises(OSError, match=r"bag_0\.mcap"):
+            for k in range(1000):
+                bag.write("/t", bytes(1000), k)
+        bag.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert not (tmp_path / "bag" / "metadata.yaml").exists()
+    assert 80 < reindex(tmp_path / "bag", tmp_path / "saved") < 100
 
 
 def test_a_truncated_or_missing_bag_is_an_error_that_names_the_file(run, tmp_path):

@@ -154,6 +154,46 @@ def test_a_killed_recorder_loses_its_last_chunk_only(start, client, tmp_path):
         assert str(k).encode() + b"\0" in raw[:40]
 
 
+def test_a_full_disk_ends_the_recording_and_says_so(start, client, tmp_path):
+    """The node lives on, as others in its process do; what is whole in the bag is saved elsewhere."""
+    from sensor_msgs.msg import CompressedImage
+
+    from msg_conventions.diagnostics import decode_diagnostics, Level
+
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=4m", "tmpfs", str(disk)]
+    made = subprocess.run(mount, capture_output=True, text=True, check=False)
+    if made.returncode:
+        pytest.skip(f"no file system can be mounted here: {made.stderr.strip()}")
+    try:
+        recorder = start("recorder", bag=disk / "bag", topics="/picture", compress=False)
+        picture = publisher(client, CompressedImage, "/picture")
+        client.heard["/diagnostics"] = []
+        client.hear("/diagnostics")
+
+        def errors():
+            statuses = [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
+            return [
+                status.message for status in statuses if status.name == "/recorder: recording" and status.level is Level.ERROR
+            ]
+
+        for k in range(120):  # 6 MB
+            picture.publish(CompressedImage(format=str(k), data=bytes(50_000)))
+            client.until(lambda due=k - 40: errors() or counted(client, "/picture") >= due, "the recorder to keep up")
+        client.until(errors, "an error of the recorder")
+        assert "No space left on device" in errors()[0] and "bag_0.mcap" in errors()[0]
+        assert recorder.poll() is None
+        ended(recorder)
+        saved = CliRunner().invoke(app, ["reindex", str(disk / "bag"), "--out", str(tmp_path / "saved")])
+        assert saved.exit_code == 0, saved.output
+        assert 40 <= len(list(read_messages(tmp_path / "saved"))) <= 80
+    finally:
+        recorder.kill()
+        recorder.wait()
+        subprocess.run(["umount", str(disk)], check=True)
+
+
 @pytest.mark.data
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_a_bag_of_genuine_rosbag2_is_played_and_recorded_again(start, client, data, tmp_path, storage):
