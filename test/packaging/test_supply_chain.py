@@ -16,14 +16,12 @@
 import json
 import re
 
-import pytest
-from source_files import ROOT
-
-pytest.importorskip("packaging", reason="packaging is not in this environment")
 from audit import CLEAN, judge, NOT_MADE, VULNERABLE
 from licences import COPYLEFT, installed, licence, locked, needed_at_run_time, PAGE
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
+import pytest
+from source_files import ROOT
 
 RUN_TIME = (ROOT / "requirements.in").read_text().partition("# to build and to test")[0]
 NEEDED = [Requirement(line) for line in RUN_TIME.splitlines() if line and not line.startswith("#")]
