@@ -37,7 +37,7 @@ from scenario_gen.evaluation import (
 from scenario_gen.fitting import Fit, FittingConfig
 from scenario_gen.logs import LogConfig
 from scenario_gen.planning import PlanningConfig, Route
-from scenario_gen.requests import Chain, Request, run_request
+from scenario_gen.requests import Chain, refuse_too_large, Request, run_request
 from scenario_gen.roads import build_road, Road, RoadConfig
 from scenario_gen.sampling import SamplingConfig
 from scenario_gen.scenario import ScenarioSet
@@ -87,9 +87,10 @@ def generate(
 
     Raises:
         InputError: the road cannot be read, or a vehicle of the request does not exist.
-        RefusedError: the template does not fit the road, there is no way, or what the request asks cannot be had; the
-            message says why, and what nearby can.
+        RefusedError: the encounter is too large, the template does not fit the road, there is no way, or what the request
+            asks cannot be had; the message says why, and what nearby can.
     """
+    refuse_too_large(encounter)
     request.ego_of(encounter)
     road = build_road(road_name, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)

@@ -20,9 +20,9 @@ from functools import cached_property
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats, frozen
+from scenario_gen.arrays import Floats, frozen, Ints
 
-DENSE = 1 << 18  # positions times edges that are looked at together: a table of them takes 2 MB
+TOGETHER = 64  # positions that are projected at once, on the edges that can be nearest to any of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,15 +85,16 @@ class Curve:
         size = exact.hypot(edge[:, 0], edge[:, 1])
         along = edge / size[:, None]
         found = [np.zeros((2, 0))]
-        rows = max(DENSE // len(size), 1)
-        for part in (xy[first : first + rows] for first in range(0, len(xy), rows)):
-            rel = part[:, None, :] - line[None, :-1, :]
-            t = np.clip(rel[..., 0] * along[:, 0] + rel[..., 1] * along[:, 1], 0.0, size)
-            gap = exact.hypot(rel[..., 0] - t * along[:, 0], rel[..., 1] - t * along[:, 1])
+        for part in (xy[first : first + TOGETHER] for first in range(0, len(xy), TOGETHER)):
+            near = _near(part, line, size)
+            way, length = along[near], size[near]
+            rel = part[:, None, :] - line[None, near, :]
+            t = np.clip(rel[..., 0] * way[:, 0] + rel[..., 1] * way[:, 1], 0.0, length)
+            gap = exact.hypot(rel[..., 0] - t * way[:, 0], rel[..., 1] - t * way[:, 1])
             best = np.argmin(gap, axis=1)
             row = np.arange(len(part))
-            side = along[best, 0] * rel[row, best, 1] - along[best, 1] * rel[row, best, 0]
-            found.append(np.array([at[best] + t[row, best], np.sign(side) * gap[row, best]]))
+            side = way[best, 0] * rel[row, best, 1] - way[best, 1] * rel[row, best, 0]
+            found.append(np.array([at[near][best] + t[row, best], np.sign(side) * gap[row, best]]))
         station, offset = np.concatenate(found, axis=1)
         return station, offset
 
@@ -107,6 +108,18 @@ class Curve:
         """The piece between two stations (continued straight where they lie beyond the ends), resampled."""
         count = max(int(np.ceil((end - start) / step)), 1)
         return Curve(self.at(np.linspace(start, end, count + 1)))
+
+
+def _near(xy: Floats, line: Floats, size: Floats) -> Ints:
+    """Ascending indices of the edges of `line` (M + 1, 2), `size` long, that can be the nearest to one of the positions (P, 2).
+
+    A circle about the positions: the nearest edge to any of them is no farther from its centre than the nearest vertex and the
+    circle's diameter, and an edge is no nearer than its first vertex less its size. What is not finite keeps every edge.
+    """
+    centre = xy.mean(axis=0)
+    radius = exact.hypot(*(xy - centre).T).max()
+    away = exact.hypot(line[:, 0] - centre[0], line[:, 1] - centre[1])
+    return np.flatnonzero(~(away[:-1] - size > away.min() + 2.0 * radius + 1e-6))
 
 
 def crossings(first: Curve, second: Curve, min_angle: float = 0.35) -> Floats:
