@@ -14,6 +14,8 @@
 
 """The errors that a person sees; each message names the place (file, row, topic, parameter) and what to do."""
 
+import sys
+
 LONGEST = 500  # characters of a message about an input: what is quoted from a broken file may be of any length
 
 
@@ -39,8 +41,8 @@ def presentable(text: str) -> str:
     if len(text) > LONGEST:  # at first roughly, for a quoted field may hold megabytes
         text = text[:LONGEST] + text[-LONGEST:]
     text = printable(text)
-    half = (LONGEST - 3) // 2
-    return text if len(text) <= LONGEST else f"{text[:half]} … {text[-half:]}"
+    half = LONGEST // 2
+    return text if len(text) <= LONGEST else f"{text[: half - 3]} … {text[-half:]}"
 
 
 class RefusedError(ScenarioGenError):
@@ -57,3 +59,10 @@ def of_system(error: OSError, name: object = None, advice: str = "") -> InputErr
 def printable(text: str) -> str:
     """Return the text with what would steer a terminal (control characters, bidi marks) written as in Python source."""
     return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+
+
+def tell(error: ScenarioGenError | OSError) -> int:
+    """Say on standard error what is wrong; return the exit code."""
+    own = of_system(error) if isinstance(error, OSError) else error
+    print(f"error: {presentable(str(own))}", file=sys.stderr)
+    return own.exit_code

@@ -27,7 +27,7 @@ import pytest
 from rich.table import Table
 
 from scenario_gen import cli
-from scenario_gen.errors import shown
+from scenario_gen.errors import presentable
 from scenario_gen.folders import MARKER
 from scenario_gen.folders.claim import PREFIX
 from scenario_gen.logs.synthetic import bundled
@@ -177,7 +177,7 @@ def test_a_terminal_shows_cells_and_lines_as_they_are(capsys):
 
 
 def test_an_error_is_at_most_500_characters_with_both_ends():
-    text = shown("begins" + "x" * 2000 + "ends")
+    text = presentable("begins" + "x" * 2000 + "ends")
     assert len(text) == 500 and text.startswith("begins") and text.endswith("ends") and "…" in text
 
 

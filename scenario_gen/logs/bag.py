@@ -31,7 +31,7 @@ from scenario_gen import exact
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.guard import guarded
-from scenario_gen.logs.budgets import check_recorded, check_size, check_vehicles
+from scenario_gen.logs.budgets import check_size, check_vehicles
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import RawLog, Rows, Segment
 from scenario_gen.storage import BagConfig, open_bag
@@ -212,7 +212,6 @@ def read_tracks(topics: list[Topic], name: str, label: str, others: list[str]) -
         for number, data in enumerate(dict.fromkeys(topic.data)):
             where = f"{label}, topic {topic.name}, message {number + 1}"
             found = decode_tracks(data, where)
-            check_recorded(found, where)
             values = {key: getattr(found, key) for key in found.__dataclass_fields__}
             encounters.append(Encounter(**(values | {"name": name if whole == 1 else f"{name}-{len(encounters) + 1}"})))
     if others:

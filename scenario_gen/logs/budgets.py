@@ -22,7 +22,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import Observations, RawLog
@@ -31,8 +30,6 @@ LATEST_NS = 2**62  # years 1823 to 2116: so the difference of any two stamps fit
 SLOWEST = 5.0  # s between fixes: a slower source says nothing of how a vehicle drives, or its unit of time is another one
 FARTHEST = 1e8  # m from the origin of any frame: a quarter of the way to the moon
 LARGEST = 100.0  # m: what is longer is no vehicle
-SUPERSONIC = 1000.0  # m/s: no recording and no simulation of road vehicles has that
-SAMPLED_NS = (10**6, 10**10)  # periods of recorded tracks
 UNITS = {"milliseconds": ("ms", 1e-3), "microseconds": ("us", 1e-6), "nanoseconds": ("ns", 1e-9)}
 USUAL = (0.005, 2.0)  # s between fixes of usual sources
 
@@ -71,26 +68,6 @@ def check_vehicles(where: str, count: int, config: LogConfig) -> None:
         raise InputError(
             f"{where}: {count} vehicles, at most {config.vehicle_limit} are read; check the vehicle column (parameter columns), "
             "or raise the parameter vehicle_limit"
-        )
-
-
-def check_recorded(encounter: Encounter, where: str) -> None:
-    """Refuse a recorded encounter that is of no road, so that no stage meets numbers whose squares are none.
-
-    Raises:
-        InputError: a place, size, speed or period is beyond any road vehicle's.
-    """
-    size = max(max(vehicle.length, vehicle.width) for vehicle in encounter.vehicles)
-    for what, value, most, unit in (
-        ("a position is", float(np.abs(encounter.position).max()), FARTHEST, "m from the origin"),
-        ("a speed is", float(encounter.speed.max()), SUPERSONIC, "m/s"),
-        ("a vehicle is", size, LARGEST, "m long or wide"),
-    ):
-        if value > most:
-            raise InputError(f"{where}: {what} {value:g} {unit}, at most {most:g} is taken; check the tracks' units and frame")
-    if not SAMPLED_NS[0] <= encounter.dt_ns <= SAMPLED_NS[1]:
-        raise InputError(
-            f"{where}: samples are {encounter.dt:g} s apart, 0.001 to 10 s are taken; resample the tracks (10 Hz is usual)"
         )
 
 

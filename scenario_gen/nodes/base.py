@@ -29,7 +29,7 @@ from rclpy.utilities import remove_ros_args
 
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.topics import LATCHED, Quality, topic_entry
-from scenario_gen.errors import of_system, presentable, ScenarioGenError
+from scenario_gen.errors import ScenarioGenError, tell
 from scenario_gen.interrupts import interrupt
 from scenario_gen.nodes.answering import Answers
 from scenario_gen.nodes.compiling import compile_kernels
@@ -243,13 +243,6 @@ def namespaces(arguments: Sequence[str]) -> list[str | None]:
     return [name or None for name in rest[1::2]] or [None]
 
 
-def _told(error: ScenarioGenError | OSError) -> int:
-    """Say on standard error what is wrong; return the exit code."""
-    own = of_system(error) if isinstance(error, OSError) else error
-    print(f"error: {presentable(str(own))}", file=sys.stderr)
-    return own.exit_code
-
-
 Maker = Callable[[str | None], Any]
 
 
@@ -275,7 +268,7 @@ def run_nodes(make: Maker | Sequence[Maker], arguments: Sequence[str] | None = N
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except (ScenarioGenError, OSError) as error:
-        code = _told(error)
+        code = tell(error)
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)  # a second Ctrl-C does not disturb the clean end
@@ -285,7 +278,7 @@ def run_nodes(make: Maker | Sequence[Maker], arguments: Sequence[str] | None = N
             try:
                 node.destroy_node()
             except (ScenarioGenError, OSError) as error:  # a bag that cannot be closed, say
-                code = _told(error)
+                code = tell(error)
         executor.shutdown(timeout_sec=1.0)
         rclpy.try_shutdown()
     return code

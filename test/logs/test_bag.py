@@ -172,10 +172,10 @@ def test_recorded_tracks_are_the_same_encounter_bit_for_bit(tmp_path, plain):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"position": np.full((2, 50, 2), 1e300)}, r"a position is 1e\+300 m"),
-        ({"speed": np.full((2, 50), 1e308)}, r"a speed is 1e\+308 m/s"),
-        ({"vehicles": (Vehicle("a", 1e308, 1.0), Vehicle("b"))}, r"a vehicle is 1e\+308 m"),
-        ({"dt_ns": 1}, "samples are 1e-09 s apart"),
+        ({"position": np.full((2, 50, 2), 1e300)}, r"topic /tracks, message 1: a position is 1e\+300; at most 1e\+08"),
+        ({"speed": np.full((2, 50), 1e308)}, r"topic /tracks, message 1: a speed is 1e\+308; at most 10000"),
+        ({"vehicles": (Vehicle("a", 1e308, 1.0), Vehicle("b"))}, r"joint name .*0.01 to 1000 m each"),
+        ({"dt_ns": 1}, "topic /tracks, message 1: 49 steps of 1e-09 s"),
     ],
 )
 def test_tracks_of_no_road_are_refused(tmp_path, change, said):
@@ -187,7 +187,7 @@ def test_tracks_of_no_road_are_refused(tmp_path, change, said):
     }
     encounter = Encounter(name="e", start_ns=10**18, heading=np.zeros((2, 50)), **(plain | change))
     bag = write(tmp_path / "bag", [Line("/tracks", TRACKS, 10**18, encode_tracks(encounter))])
-    with pytest.raises(InputError, match=rf"topic /tracks, message 1: {said}"):
+    with pytest.raises(InputError, match=said):
         read_log(bag)
 
 

@@ -17,6 +17,7 @@
 from hypothesis import strategies as st
 import numpy as np
 
+from msg_conventions.paths import chord_length
 from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.planning.route import Route
 from scenario_gen.scenario import Scenario
@@ -73,8 +74,7 @@ def route(seed: int) -> Route:
     """Five anchors: drives, dwells twice in a row, drives."""
     rng = generator(seed)
     points = np.column_stack([np.cumsum(rng.uniform(0.1, 0.5, 30)), rng.normal(0.0, 0.1, 30), headings(rng, 1, 30)[0]])
-    length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
-    return Route(points=points, anchor=np.array([0, 12, 12, 12, 29]), length=length)
+    return Route(points=points, anchor=np.array([0, 12, 12, 12, 29]), length=chord_length(points))
 
 
 seeds = st.integers(0, 2**32 - 1)
