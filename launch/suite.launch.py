@@ -18,98 +18,45 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, GroupAction
-from launch.conditions import IfCondition, UnlessCondition
-from launch.substitutions import LaunchConfiguration, PythonExpression
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
+
+from scenario_gen.nodes.launching import descriptions, read_arguments
 
 SHARE = Path(get_package_share_directory("scenario_gen"))
-
-ARGUMENTS = {
-    "log": ("", "log to read: a file, a bag or a folder of files"),
-    "encounter": ("0", "which encounter of the log, from 0"),
-    "road": ("t_intersection", "straight, t_intersection, four_way, corridor, or a map_server YAML file"),
-    "count": ("50", "scenarios to generate"),
-    "seed": ("0", "seed of every stage"),
-    "namespace": ("", "namespace of all nodes"),
-    "params": (str(SHARE / "config" / "suite.yaml"), "parameter file"),
-    "bag": ("", "folder to record to; empty records nothing"),
-    "composed": ("false", "all nodes in one process, for small machines"),
-    "stream": ("false", "play the log as fixes and speeds of each vehicle, with /clock, instead of as tracks"),
-    "rate": ("1.0", "how many times as fast as it was recorded the stream is"),
-    "use_sim_time": ("false", "the nodes follow /clock"),
-    "rviz": ("false", "open RViz"),
-}
+NODES = ("recorder", "road_server", "segmenter", "planner", "gp_sampler", "evaluator", "log_player")  # who listens comes first
 
 
-def argument(name, kind):
-    return ParameterValue(LaunchConfiguration(name), value_type=kind)
-
-
-def settings(**parameters):
-    return [LaunchConfiguration("params"), parameters | {"use_sim_time": argument("use_sim_time", bool)}]
-
-
-def node(name, condition=None, **parameters):
-    return Node(
-        package="scenario_gen",
-        executable=name,
-        name=name,
-        namespace=LaunchConfiguration("namespace"),
-        parameters=settings(**parameters),
-        output="screen",
-        condition=condition,
-    )
+def suite(context):
+    """Return the processes; whatever is wrong with an argument is said before there is one."""
+    launch = read_arguments({name: LaunchConfiguration(name).perform(context) for name in descriptions()})
+    arguments = launch.arguments
+    common = {
+        "package": "scenario_gen",
+        "namespace": arguments.namespace,
+        "parameters": launch.parameter_files(SHARE / "config" / "suite.yaml"),
+        "ros_arguments": ["--log-level", arguments.log_level],
+        "output": "screen",
+        "respawn_delay": 2.0,
+    }
+    if arguments.composed:  # without a name, for it would be that of every node in the process
+        started = [Node(executable="suite", respawn=arguments.respawn, **common)]
+    else:
+        started = [Node(executable=name, name=name, respawn=arguments.respawn, **common) for name in NODES[1:]]
+        if launch.records:  # a bag is begun once
+            started.insert(0, Node(executable=NODES[0], name=NODES[0], **common))
+    if arguments.rviz:
+        # tracks lie in local_enu: shown on the map's origin, so that RViz can show both
+        frames = ["--frame-id", "map", "--child-frame-id", "local_enu"]
+        display = ["-d", str(SHARE / "config" / "suite.rviz")]
+        started += [
+            Node(package="tf2_ros", executable="static_transform_publisher", arguments=frames),
+            Node(package="rviz2", executable="rviz2", arguments=display, namespace=arguments.namespace),
+        ]
+    return started
 
 
 def generate_launch_description():
-    road = {"road_name": argument("road", str), "wait_for_tracks": True}
-    seed = {"seed": argument("seed", int)}
-    count = {"count": argument("count", int)}
-    log = {
-        "log_path": argument("log", str),
-        "encounter": argument("encounter", int),
-        "stream": argument("stream", bool),
-        "rate": argument("rate", float),
-    }
-    bag = {"bag": argument("bag", str)}
-    apart = [
-        node("recorder", IfCondition(PythonExpression(["'", LaunchConfiguration("bag"), "' != ''"])), **bag),
-        node("road_server", **road),
-        node("segmenter", **seed),
-        node("planner", **seed),
-        node("gp_sampler", **seed, **count),
-        node("evaluator"),
-        node("log_player", **log),
-    ]
-    # without a name, for it would be that of every node in the process; what a parameter is called says whose it is
-    together = Node(
-        package="scenario_gen",
-        executable="suite",
-        namespace=LaunchConfiguration("namespace"),
-        parameters=settings(**road, **seed, **count, **log, **bag),
-        output="screen",
-        condition=IfCondition(LaunchConfiguration("composed")),
-    )
-    return LaunchDescription(
-        [
-            *(DeclareLaunchArgument(name, default_value=value, description=text) for name, (value, text) in ARGUMENTS.items()),
-            GroupAction(apart, condition=UnlessCondition(LaunchConfiguration("composed"))),
-            together,
-            # tracks lie in local_enu: shown on the map's origin, so that RViz can show both
-            Node(
-                package="tf2_ros",
-                executable="static_transform_publisher",
-                arguments=["--frame-id", "map", "--child-frame-id", "local_enu"],
-                condition=IfCondition(LaunchConfiguration("rviz")),
-            ),
-            Node(
-                package="rviz2",
-                executable="rviz2",
-                arguments=["-d", str(SHARE / "config" / "suite.rviz")],
-                namespace=LaunchConfiguration("namespace"),
-                condition=IfCondition(LaunchConfiguration("rviz")),
-            ),
-        ]
-    )
+    declared = [DeclareLaunchArgument(name, default_value="", description=text) for name, text in descriptions().items()]
+    return LaunchDescription([*declared, OpaqueFunction(function=suite)])

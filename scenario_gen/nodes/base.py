@@ -247,7 +247,7 @@ Maker = Callable[[str | None], Any]
 
 
 def run_nodes(make: Maker | Sequence[Maker], arguments: Sequence[str] | None = None) -> int:
-    """Spin one node (or one of each) per `--namespace` until Ctrl-C, SIGTERM or shutdown; return the exit code."""
+    """Spin one node (or one of each) per `--namespace` until Ctrl-C, SIGTERM, shutdown, or all are done; return the exit code."""
     arguments = sys.argv if arguments is None else arguments
     where = namespaces(arguments)
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -264,7 +264,9 @@ def run_nodes(make: Maker | Sequence[Maker], arguments: Sequence[str] | None = N
                 executor.add_node(nodes[-1])
         for node in nodes:
             node.autostart()
-        executor.spin()
+        while rclpy.ok() and not all(getattr(node, "done", False) for node in nodes):
+            executor.spin_once()
+        code = max(getattr(node, "exit_code", 0) for node in nodes)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except (ScenarioGenError, OSError) as error:

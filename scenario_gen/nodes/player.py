@@ -16,11 +16,13 @@
 
 Each topic is offered with the quality of service it was recorded with, or as `qos_overrides./topic.publisher.reliability` and the
 like say. With an offset, what latched topics had said before it is published first. With `clock`, the bag's time is published on
-/clock, so that nodes with `use_sim_time` follow it.
+/clock, so that nodes with `use_sim_time` follow it, in place of the bag's own /clock. When all is played and heard the player
+ends, unless it is to `loop`, or to `stay` for who comes late to latched topics.
 """
 
 from collections import deque
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 import re
@@ -29,6 +31,8 @@ import threading
 from time import monotonic
 from typing import Any
 
+from rclpy.duration import Duration
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -46,6 +50,7 @@ from scenario_gen.parameters import check, parameter
 from scenario_gen.storage import BagConfig
 
 STREAMED = BagConfig(most_bytes=2**62)  # a message is published and forgotten, so a bag may be of any size
+PATIENCE = 5.0  # seconds in which listeners have to take the last messages
 TICK = 0.01  # seconds between two clock messages
 KINDS = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
 
@@ -59,6 +64,7 @@ class Config:
     rate: float = parameter(1.0, "how many times as fast as it was recorded", low=0.01, high=1000.0)
     start_offset: float = parameter(0.0, "begin so far into the bag", unit="s", low=0.0)
     loop: bool = parameter(False, "begin again at the end")
+    stay: bool = parameter(False, "stay when all is played, so that latched topics are heard later, too")
     paused: bool = parameter(False, "wait for ~/resume before the first message")
     clock: bool = parameter(False, "publish /clock")
 
@@ -73,6 +79,8 @@ class Player(Node):  # type: ignore[misc]
         super().__init__("player", namespace=namespace)
         self.parameters = ConfigParameters(self, Config())
         self.parameters.log()
+        self.done = False
+        self.exit_code = 0
         self._running = threading.Event()
         self._ended = threading.Event()
         self._offered: dict[str, tuple[Any, bool, int]] = {}
@@ -91,7 +99,7 @@ class Player(Node):  # type: ignore[misc]
             raise InputError("parameter bag is empty; name the bag to play")
         for topic in bag_topics(Path(config.bag), STREAMED):
             name = topic.name if topic.name.startswith("/") else f"/{topic.name}"
-            if not re.fullmatch(config.topics, name):
+            if not re.fullmatch(config.topics, name) or (config.clock and name == "/clock"):
                 continue
             try:
                 kind, quality = message_class(topic.type), qos(topic.quality)
@@ -114,6 +122,21 @@ class Player(Node):  # type: ignore[misc]
             self.get_logger().info(f"{config.bag}: played")
         except ScenarioGenError as error:
             self.get_logger().error(str(error))
+            self.exit_code = error.exit_code
+        if not config.stay and not self._ended.is_set():
+            self._leave()
+
+    def _leave(self) -> None:
+        """Let `run_nodes` end the node, once who listens has everything."""
+        deadline = monotonic() + PATIENCE
+        with suppress(InvalidHandle):  # the node is being ended already
+            for publisher, _, _ in self._offered.values():
+                while not publisher.wait_for_all_acked(Duration()) and monotonic() < deadline:
+                    self._ended.wait(TICK)
+        self.executor.create_task(self._finish)  # to wake the executor alone would not make it look
+
+    def _finish(self) -> None:
+        self.done = True
 
     def _play_once(self, config: Config) -> None:
         first: int | None = None

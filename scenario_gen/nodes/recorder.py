@@ -45,10 +45,16 @@ from scenario_gen.nodes.offered import offered
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.parameters import check, parameter
 
-DEFAULT_TOPICS = (
-    r".*(/map|/road/(entries|exits)|/tracks|/changepoints(/live)?|/posterior|/fit|/vehicle_\w+/(route|footprint|fix|speed)"
-    r"|/scenarios|/scenarios/info|/markers|/report|/diagnostics)"
+OF_ALL = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, whatever the namespace
+OF_A_SUITE = (
+    r"map|road/(entries|exits)|tracks|changepoints(/live)?|posterior|fit|vehicle_\w+/(route|footprint|fix|speed)"
+    r"|ego/(start|goal|track)|scenarios(/info)?|markers|report"
 )
+
+
+def default_topics(namespace: str) -> str:
+    """Return the regular expression of the topics of the suites in a namespace, and of what they share with all."""
+    return rf"{re.escape(namespace.rstrip('/'))}(/.*)?/({OF_A_SUITE}|{OF_ALL})|/({OF_ALL})"
 
 
 @dataclass(frozen=True)
@@ -56,7 +62,10 @@ class Config:
     """The recorder's parameters."""
 
     bag: str = parameter("", "folder of the bag to begin at once; empty waits for ~/start and names it by the time")
-    topics: str = parameter(DEFAULT_TOPICS, "regular expression of the full names of the topics to record")
+    topics: str = parameter(
+        "",
+        "regular expression of the full names of the topics to record; empty: those of the node's namespace, /clock and /tf",
+    )
     compress: bool = parameter(True, "compress chunks with zstd")
     split_bytes: int = parameter(0, "begin a new file after so many bytes of messages; 0 never", unit="B", low=0)
     split_seconds: float = parameter(0.0, "begin a new file after so long; 0 never", unit="s", low=0.0)
@@ -132,7 +141,7 @@ class Recorder(Node):  # type: ignore[misc]
         """Subscribe to topics that have come up since."""
         if self._bag is None:
             return
-        wanted = re.compile(self.parameters.config.topics)
+        wanted = re.compile(self.parameters.config.topics or default_topics(self.get_namespace()))
         for topic, kinds in self.get_topic_names_and_types():
             if topic not in self._listening and topic not in self._refused and wanted.fullmatch(topic):
                 self._listen(topic, kinds[0])

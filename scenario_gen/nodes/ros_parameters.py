@@ -12,10 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""ROS parameters from the configuration dataclasses: same names, types, ranges and meanings as on the command line."""
+"""ROS parameters from the configuration dataclasses: same names, types, ranges and meanings as on the command line.
+
+The tools of ROS guess a value's type from its text, each by rules of its own: `-p ego:=21202` is an integer, and `param load`
+makes a text of the 1e-06 that `param dump` wrote. The declaration says what was meant, so values are brought to its type.
+"""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import Field
+import re
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
@@ -27,17 +33,18 @@ from scenario_gen.parameters import flatten, updated
 
 Config = TypeVar("Config")
 INT64 = 2**63 - 1
+STATES = ("starts", "goals")  # `1: 10.5 -1.75` would be a mapping to `param load`, so it is kept as `1:10.5 -1.75`
 
 
 def descriptor(entry: "Field[Any]", *, read_only: bool = False) -> ParameterDescriptor:
-    """Return the descriptor of one declared parameter; a real number may also be written without a point."""
+    """Return the descriptor of one declared parameter; what is no real number or text may become one (see `meant`)."""
     meta = entry.metadata
     text = meta["meaning"] + (f" [{meta['unit']}]" if meta["unit"] else "")
     result = ParameterDescriptor(description=text, read_only=read_only)
     if meta["choices"]:
         result.additional_constraints = "one of " + ", ".join(meta["choices"])
+    result.dynamic_typing = isinstance(entry.default, float | str)
     if isinstance(entry.default, float):
-        result.dynamic_typing = True
         if (meta["low"], meta["high"]) != (None, None):
             low, high = (float(end if end is not None else sign * 1e300) for end, sign in ((meta["low"], -1), (meta["high"], 1)))
             result.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
@@ -47,6 +54,16 @@ def descriptor(entry: "Field[Any]", *, read_only: bool = False) -> ParameterDesc
     return result
 
 
+def meant(entry: "Field[Any]", value: Any) -> Any:
+    """Return a value as the type that `entry` declares, if it can be meant so, else as it is."""
+    if isinstance(entry.default, str) and isinstance(value, int | float) and not isinstance(value, bool):
+        return str(value)
+    if isinstance(entry.default, float) and isinstance(value, int | str) and not isinstance(value, bool):
+        with suppress(ValueError):
+            return float(value)
+    return value
+
+
 def with_values(config: Config, parameters: Sequence[Parameter]) -> Config:
     """Return `config` with those of the parameters that belong to it.
 
@@ -54,7 +71,7 @@ def with_values(config: Config, parameters: Sequence[Parameter]) -> Config:
         InputError: a value has the wrong type or is out of range.
     """
     known = flatten(config)
-    return updated(config, {p.name: p.value for p in parameters if p.name in known})
+    return updated(config, {p.name: meant(known[p.name][0], p.value) for p in parameters if p.name in known})
 
 
 def values_of_call(config: Config, messages: Sequence[Any]) -> Config:
@@ -80,14 +97,42 @@ class ConfigParameters:
         """
         self.config = config
         self._node = node
+        self._declared = {name: entry for name, (entry, _) in flatten(config).items()}
         for name, (entry, value) in flatten(config).items():
             try:
                 node.declare_parameter(name, value, descriptor(entry))
             except Exception as error:
                 raise InputError(f"{node.get_fully_qualified_name()}: parameter {name}: {error}") from error
-        self.config = with_values(config, [node.get_parameter(name) for name in flatten(config)])
+        given = [node.get_parameter(name) for name in self._declared]
+        self.config = with_values(config, given)
+        node.set_parameters([kept for old in given if (kept := self._kept(old)) is not old])
+        self.config = with_values(config, [node.get_parameter(name) for name in self._declared])
+        node.add_pre_set_parameters_callback(self._keep)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._take)
+
+    def _keep(self, parameters: list[Parameter]) -> list[Parameter]:
+        """Return what is to be set: values of the declared types, and nothing that is read-only and in effect already."""
+        changes = [self._kept(parameter) for parameter in parameters if not self._repeats(parameter)]
+        # `param load` sets what was dumped one by one, read-only ones too, and rclpy refuses to set nothing
+        return changes or [self._node.get_parameter(next(iter(self._declared)))]
+
+    def _kept(self, parameter: Parameter) -> Parameter:
+        """Return the parameter as it is kept; itself, if nothing is to be changed."""
+        name, old = parameter.name, parameter.value
+        if name not in self._declared:
+            return parameter
+        new = meant(self._declared[name], old)
+        if name in STATES and isinstance(new, str):
+            new = re.sub(r":\s+", ":", new)
+        return parameter if type(new) is type(old) and new == old else Parameter(name, value=new)
+
+    def _repeats(self, parameter: Parameter) -> bool:
+        """Say whether a read-only parameter is given the value that it has."""
+        node = self._node
+        if not node.has_parameter(parameter.name) or not node.describe_parameter(parameter.name).read_only:
+            return False
+        return bool(node.get_parameter(parameter.name).value == parameter.value)
 
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
         try:

@@ -56,8 +56,9 @@ def test_a_played_back_bag_gives_the_same_bytes(demo, tmp_path, domain, client):
         recorded.setdefault(message.topic, []).append(message.data)
     sim_time = ["-p", "use_sim_time:=true"]
     topics = "/case_./(tracks|map|road/entries|road/exits)"
+    played = {"bag": demo, "topics": topics, "rate": 1000.0, "clock": "true", "stay": "true"}
     nodes = {
-        "player": ["-p", f"bag:={demo}", "-p", f"topics:={topics}", "-p", "rate:=1000.0", "-p", "clock:=true"],
+        "player": [word for name, value in played.items() for word in ("-p", f"{name}:={value}")],
         "segmenter": [*sim_time, "-p", "seed:=7"],
         "planner": [*sim_time, "-p", "seed:=7"],
         "gp_sampler": [*sim_time, "-p", "count:=3", "-p", "seed:=7"],

@@ -14,11 +14,8 @@
 
 """The parts of the nodes that need no other process."""
 
-import importlib
 from pathlib import Path
-import sys
 import threading
-from unittest import mock
 
 import pytest
 from rclpy.parameter import Parameter
@@ -148,50 +145,3 @@ def test_nodes_are_thin():
         assert lines(path) <= 270, path
     for name in ("segmenter", "planner", "gp_sampler", "log_player", "road_server", "evaluator"):
         assert lines(ROOT / "scenario_gen" / "nodes" / f"{name}.py") <= 150, name
-
-
-def test_the_launch_file_names_nodes_and_parameters_that_exist():
-    """The launch package is not among the wheels, so stand-ins say what the file would start."""
-    started = _launched()
-    assert [name for name, _ in started] == [*SUITE_OF_LAUNCH, "suite", "static_transform_publisher", "rviz2"]
-    for name, given in started[:-2]:
-        known = {key for node in (SUITE_OF_LAUNCH if name == "suite" else (name,)) for key in flatten(_config_of(node))}
-        assert set(given) - {"use_sim_time"} <= known, name
-    whole = {key for _, given in started[:-3] for key in given}
-    assert set(started[-3][1]) == whole, "in one process the nodes are told the same"
-
-
-SUITE_OF_LAUNCH = ("recorder", "road_server", "segmenter", "planner", "gp_sampler", "evaluator", "log_player")
-
-
-def _config_of(node: str):
-    module = importlib.import_module(f"scenario_gen.nodes.{node}")
-    return module.Config()
-
-
-def _launched() -> list[tuple[str, dict[str, object]]]:
-    """Executable and parameters of every node that the launch file describes."""
-    nodes = []
-
-    class Anything:
-        """Takes whatever it is given."""
-
-        def __init__(self, *args, **kwargs):
-            pass
-
-    class Node(Anything):
-        """Remembers what it is to start."""
-
-        def __init__(self, *, executable, parameters=({}, {}), **_):
-            nodes.append((executable, parameters[1]))
-
-    names = ("launch", "launch.actions", "launch.conditions", "launch.substitutions", "launch_ros.parameter_descriptions")
-    stand_ins = {name: mock.MagicMock(**{"__spec__": None}) for name in (*names, "launch_ros")}
-    stand_ins["launch_ros.actions"] = mock.MagicMock(Node=Node)
-    source = (ROOT / "launch" / "suite.launch.py").read_text()
-    share = {"get_package_share_directory": lambda _: str(ROOT)}
-    with mock.patch.dict(sys.modules, stand_ins | {"ament_index_python.packages": mock.MagicMock(**share)}):
-        scope = {}
-        exec(compile(source, "suite.launch.py", "exec"), scope)
-        scope["generate_launch_description"]()
-    return nodes

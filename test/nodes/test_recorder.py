@@ -14,6 +14,7 @@
 
 """The recorder and the player as processes: types of no concern to the suite, a kill, and bags of genuine rosbag2."""
 
+from collections import Counter
 import os
 from pathlib import Path
 import signal
@@ -23,7 +24,7 @@ import sys
 from mcap.reader import make_reader
 import pytest
 from rosbags.rosbag2 import Reader
-from suite_processes import Client
+from suite_processes import Client, RESOURCES
 from typer.testing import CliRunner
 import yaml
 
@@ -111,15 +112,15 @@ def test_any_type_is_recorded_as_it_was_sent(start, client, tmp_path):
     assert all(c.metadata["topic_type_hash"].startswith("RIHS01_") for c in summary.channels.values())
 
 
-def counted(client: Client, topic: str) -> int:
-    """How many messages of a topic the recorder says are in the bag."""
+def counted(client: Client, topic: str, node: str = "/recorder") -> int:
+    """How many messages of a topic a recorder says are in its bag."""
     from msg_conventions.diagnostics import decode_diagnostics
 
     if "/diagnostics" not in client.heard:
         client.heard["/diagnostics"] = []
         client.hear("/diagnostics")
-    said = [status.values for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
-    return max((int(values[topic]) for values in said if topic in values), default=0)
+    said = [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
+    return max((int(s.values[topic]) for s in said if s.name == f"{node}: recorded" and topic in s.values), default=0)
 
 
 def test_a_killed_recorder_loses_its_last_chunk_only(start, client, tmp_path):
@@ -233,3 +234,74 @@ def test_the_player_takes_other_names_and_other_qualities_of_service(start, clie
     offers = [info.qos_profile for info in client.node.get_publishers_info_by_topic("/here/other")]
     changed = (ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.TRANSIENT_LOCAL)
     assert changed in {(found.reliability, found.durability) for found in offers}
+
+
+def test_a_recorder_keeps_to_its_namespace(start, client, tmp_path):
+    """By default it records the suite's topics there, ego/* too, and what is of the whole domain; at the root those of all."""
+    from geometry_msgs.msg import TransformStamped  # in place of tf2_msgs, which is not among the wheels; the name decides
+    from nav_msgs.msg import Odometry
+    from rosgraph_msgs.msg import Clock
+    from std_msgs.msg import String
+
+    kinds = {"/a/ego/start": Odometry, "/a/deep/ego/goal": Odometry, "/b/ego/start": Odometry, "/ab/ego/start": Odometry}
+    kinds |= {"/clock": Clock, "/tf": TransformStamped, "/tf_static": TransformStamped, "/a/other": String, "/other": String}
+    recorders = {
+        "/": start("recorder", bag=tmp_path / "root", compress=False),
+        "/a": start("recorder", "-r", "__ns:=/a", bag=tmp_path / "own", compress=False),
+    }
+    heard = {topic: len(recorders) for topic in ("/a/ego/start", "/a/deep/ego/goal", "/clock", "/tf", "/tf_static")}
+    heard |= {"/b/ego/start": 1, "/ab/ego/start": 1}
+    made = {topic: client.node.create_publisher(kind, topic, QUEUE) for topic, kind in kinds.items()}
+    for topic, count in heard.items():
+        client.until(lambda out=made[topic], n=count: out.get_subscription_count() == n, f"{count} subscribers of {topic}")
+    for topic, out in made.items():
+        out.publish(kinds[topic]())
+    wanted = {"/": set(heard), "/a": set(heard) - {"/b/ego/start", "/ab/ego/start"}}
+    for space, topics in wanted.items():
+        node = f"{space.rstrip('/')}/recorder"
+        client.until(lambda n=node, t=topics: all(counted(client, one, n) == 1 for one in t), f"{len(topics)} messages of {node}")
+    for process in recorders.values():
+        ended(process)
+    bags = {"/": tmp_path / "root", "/a": tmp_path / "own"}
+    assert {space: {m.topic for m in read_messages(bag)} - {"/diagnostics"} for space, bag in bags.items()} == wanted
+
+
+def test_the_player_ends_when_all_is_played_and_heard(start, client):
+    from std_srvs.srv import Trigger
+
+    from msg_conventions.topics import topic_entry
+
+    bag = RESOURCES / "synthetic_c"
+    played = [m for m in read_messages(bag) if topic_entry(m.topic)[0] == "sensor_msgs/msg/NavSatFix"]
+    topics = sorted({f"/{m.topic.lstrip('/')}" for m in played})
+    process = start("player", bag=bag, paused=True, rate=1000.0, clock=True)
+    client.hear(*topics)
+    for topic in topics:
+        client.until(lambda name=topic: client.node.count_publishers(name) == 1, f"a publisher of {topic}")
+    client.until(lambda: client.node.count_publishers("/clock") == 1, "one publisher of /clock")
+    assert client.call(Trigger, "/player/resume", Trigger.Request()).success
+    output, _ = process.communicate(timeout=180.0)
+    assert process.returncode == 0 and "played" in output and "Traceback" not in output, output
+    assert {topic: len(client.heard[topic]) for topic in topics} == Counter(f"/{m.topic.lstrip('/')}" for m in played)
+
+
+def test_the_player_stays_if_it_is_told_to(start, client):
+    bag = RESOURCES / "synthetic_c"
+    process = start("player", bag=bag, rate=1000.0, stay=True)
+    assert process.stdout is not None
+    while "played" not in (line := process.stdout.readline()):
+        assert line, "it ended"
+    client.until(lambda: ("player", "/") in client.node.get_node_names_and_namespaces(), "the player in the graph")
+    assert process.poll() is None
+    ended(process)
+
+
+def test_a_player_whose_bag_breaks_off_says_so_by_its_exit_code(start, tmp_path):
+    source = next((RESOURCES / "synthetic_c").glob("*.mcap"))
+    bag = tmp_path / "broken.mcap"
+    data = bytearray(source.read_bytes())
+    data[len(data) // 2 : len(data) // 2 + 64] = bytes(64)
+    bag.write_bytes(data)
+    process = start("player", bag=bag, rate=1000.0)
+    output, _ = process.communicate(timeout=180.0)
+    assert process.returncode == 2 and "Traceback" not in output, output

@@ -1,0 +1,124 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""ROS parameters as the tools of ROS give them: numbers for texts, whole numbers for real ones, what they dumped."""
+
+import os
+import subprocess
+import sys
+
+from hypothesis import given, strategies
+import pytest
+from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_value_to_python
+from suite_processes import Client, RESOURCES
+import yaml
+
+from scenario_gen.errors import InputError
+from scenario_gen.nodes.ros_parameters import meant, with_values
+from scenario_gen.nodes.sample_request import Config
+from scenario_gen.parameters import flatten
+
+DECLARED = {name: entry for name, (entry, _) in flatten(Config()).items()}
+RESERVED = "start_type_description_service"  # read-only, of every rclpy node
+
+
+@given(strategies.integers(0, 2**63 - 1))
+def test_a_number_is_taken_for_an_id(number):
+    assert with_values(Config(), [Parameter("ego", value=number)]).ego == str(number)
+
+
+@given(strategies.floats(allow_nan=False, allow_infinity=False))
+def test_a_real_number_is_taken_as_any_tool_writes_it(number):
+    entry = DECLARED["limits.time_resolution"]
+    assert meant(entry, str(number)) == number
+    assert meant(entry, yaml.safe_load(yaml.safe_dump(number))) == number
+    assert type(meant(entry, int(number))) is float
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("ego", True), ("limits.max_speed", "fast"), ("limits.max_speed", True), ("count", "5"), ("count", 5.0)]
+)
+def test_what_can_only_be_a_mistake_is_refused(name, value):
+    with pytest.raises(InputError, match=name.rpartition(".")[2]):
+        with_values(Config(), [Parameter(name, value=value)])
+
+
+def dumped(client: Client, node: str) -> dict[str, object]:
+    """What `ros2 param dump` asks for: every parameter of a node and its value."""
+    from rcl_interfaces.srv import GetParameters, ListParameters
+
+    names = client.call(ListParameters, f"{node}/list_parameters", ListParameters.Request()).result.names
+    values = client.call(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=names)).values
+    return dict(zip(names, map(parameter_value_to_python, values), strict=True))
+
+
+def loaded(client: Client, node: str, path) -> dict[str, str]:
+    """What `ros2 param load` does with a file; return what was refused and why."""
+    from rcl_interfaces.srv import SetParameters
+
+    messages = list(parameter_dict_from_yaml_file(str(path)).values())
+    results = client.call(SetParameters, f"{node}/set_parameters", SetParameters.Request(parameters=messages)).results
+    return {message.name: result.reason for message, result in zip(messages, results, strict=True) if not result.successful}
+
+
+@pytest.mark.dds
+def test_every_node_loads_what_was_dumped_of_it(domain, client, tmp_path):
+    """And each parameter has the type that is declared, whatever was given."""
+    values = {
+        "ego": "21202",
+        "log.vehicles": "21202",
+        "starts": "'21202: 10.5 -1.75 0.0 8.0; 2: 3 4 1.5'",
+        "limits.max_speed": "40",
+        "limits.time_resolution": "1.0e-06",
+        "log.origin": "48.1,11.5",
+        "autostart": "false",
+    }
+    words = [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "scenario_gen.nodes.start", "suite", "--namespace", "/a", "--ros-args", *words],
+        env=os.environ | {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(tmp_path)},
+    )
+    player = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "scenario_gen.nodes.start", "player", "--ros-args"),
+            *("-r", "__ns:=/a", "-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "paused:=true"),
+        ],
+        env=os.environ | {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(tmp_path)},
+    )
+    try:
+        for name in ("gp_sampler", "log_player", "road_server", "segmenter", "planner", "evaluator", "recorder", "player"):
+            node = f"/a/{name}"
+            before = dumped(client, node)
+            assert RESERVED in before
+            file = tmp_path / f"{name}.yaml"
+            file.write_text(yaml.dump({node: {"ros__parameters": before}}))
+            assert loaded(client, node, file) == {}, name
+            after = dumped(client, node)
+            assert {key: (type(value), value) for key, value in after.items()} == {
+                key: (type(value), value) for key, value in before.items()
+            }
+            if name == "gp_sampler":
+                assert before["ego"] == "21202" and before["starts"] == "21202:10.5 -1.75 0.0 8.0; 2:3 4 1.5"
+                assert type(before["limits.max_speed"]) is float and before["limits.time_resolution"] == 1e-6
+                file.write_text(yaml.dump({node: {"ros__parameters": {RESERVED: False, "ego": 7, "limits": {"max_speed": 30}}}}))
+                assert set(loaded(client, node, file)) == {RESERVED}, "what is read-only is not changed"
+                changed = dumped(client, node)
+                assert (changed["ego"], changed["limits.max_speed"], changed[RESERVED]) == ("7", 30.0, True)
+                assert type(changed["limits.max_speed"]) is float
+            if name == "log_player":
+                assert before["log.vehicles"] == "21202"
+    finally:
+        for one in (process, player):
+            one.terminate()
+        assert [one.wait(60.0) for one in (process, player)] == [0, 0]
