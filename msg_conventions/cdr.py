@@ -141,3 +141,10 @@ class CdrReader:
     def header(self) -> tuple[int, str]:
         """Read std_msgs/Header: stamp in nanoseconds and frame."""
         return self.stamp(), self.string()
+
+    def framed_header(self) -> tuple[int, str]:
+        """Read the std_msgs/Header of a message with positions: its frame may not be empty."""
+        stamp_ns, frame_id = self.header()
+        if not frame_id:
+            raise InputError(f"{self._what}: header.frame_id is empty; name the frame that the positions are in")
+        return stamp_ns, frame_id

@@ -27,7 +27,7 @@ import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter, NANOSECONDS
 from msg_conventions.names import joint_names, vehicle_of
-from msg_conventions.yaw import quaternion, yaw
+from msg_conventions.yaw import check_quaternions, quaternion, yaw
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
@@ -104,9 +104,11 @@ def decode(data: bytes, what: str) -> Trajectory:
         InputError: naming `what`, where the message is damaged, lacks poses, or holds a value that is not finite or no vehicle's.
     """
     reader = CdrReader(data, what)
-    stamp_ns, frame_id = reader.header()
+    stamp_ns, frame_id = reader.framed_header()
     vehicles = tuple(vehicle_of(reader.string()) for _ in range(reader.count()))
     n, count = len(vehicles), reader.count(20)
+    if not n:
+        raise InputError(f"{what}: joint_names is empty; at least one vehicle is needed")
     time_ns: list[int] = []
     blocks: tuple[list[Floats], ...] = ([], [], [])
     for k in range(count):
@@ -130,6 +132,7 @@ def decode(data: bytes, what: str) -> Trajectory:
     ):
         if (np.abs(values) > most).any():
             raise InputError(f"{what}: a {name} is {np.abs(values).max():g}; at most {most:g} is read")
+    check_quaternions(pose[..., 3:], what)
     return Trajectory(
         stamp_ns=stamp_ns,
         frame_id=frame_id,

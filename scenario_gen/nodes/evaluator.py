@@ -32,6 +32,7 @@ from msg_conventions.diagnostics import (
 )
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
+from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import CheckCounts, evaluate, EvaluationConfig, WITH
 from scenario_gen.nodes.base import run_nodes, StageNode
@@ -46,6 +47,7 @@ class Config:
 
     seed: int = parameter(0, "seed of the bootstrap", low=0)
     keep: int = parameter(10_000, "scenarios kept until their request is closed; older ones are forgotten", low=1)
+    wait: int = parameter(100, "closed requests that wait for scenarios on their way; older ones are given up", low=1)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
 
     def __post_init__(self) -> None:
@@ -64,7 +66,7 @@ class Evaluator(StageNode):
         self._newest: dict[str, bytes] = {}
         self._scenarios: dict[str, bytes] = {}  # by SHA-256
         self._open: dict[str, dict[str, Mapping[str, str]]] = {}  # request -> index -> entry of `scenarios/info`
-        self._closed: list[Status] = []
+        self._closed: dict[str, Status] = {}  # by request: what its account says, while scenarios of it are still to come
 
     def received(self, topic: str, data: bytes) -> None:
         """Keep what comes, and evaluate a request when all of it is there."""
@@ -78,20 +80,38 @@ class Evaluator(StageNode):
                     continue
                 request = text_in(status.values, "request", f"{topic}, {status.name}")
                 if "published" in status.values:
-                    self._closed.append(status)
+                    self._closed[request] = status
                 else:
                     entry = {key: text_in(status.values, key, f"{topic}, {status.name}") for key in ("index", "seed", "sha256")}
                     take_entry(self._open.setdefault(request, {}), entry)
+            self._give_up()
         else:
             self._newest[topic] = data
-        for status in list(self._closed):
-            entries = tuple(self._open.get(status.values["request"], {}).values())
-            if {"tracks", "changepoints"} <= set(self._newest) and all(v["sha256"] in self._scenarios for v in entries):
-                self._closed.remove(status)
-                self._open.pop(status.values["request"], None)
+        if not {"tracks", "changepoints"} <= set(self._newest):
+            return
+        for request, status in list(self._closed.items()):
+            entries = tuple(self._open.get(request, {}).values())
+            if all(v["sha256"] in self._scenarios for v in entries):
+                self._closed.pop(request)
+                self._open.pop(request, None)
                 self._submit(dict(self._newest), [(self._scenarios[v["sha256"]], v) for v in entries], status)
                 for values in entries:  # two may have the same bytes
                     self._scenarios.pop(values["sha256"], None)
+
+    def _give_up(self) -> None:
+        """Forget the oldest requests while more of them wait, or more scenarios are told of, than are kept."""
+        while len(self._closed) > self.config.wait:
+            self._forget(next(iter(self._closed)))
+        while self._open and sum(map(len, self._open.values())) > self.config.keep:
+            self._forget(next(iter(self._open)))
+
+    def _forget(self, request: str) -> None:
+        """Give up a request."""
+        entries = self._open.pop(request, {})
+        missing = sum(v["sha256"] not in self._scenarios for v in entries.values())
+        words = f"request {request} is not evaluated: {missing} of its {len(entries)} scenarios are not there; see keep and wait"
+        if self._closed.pop(request, None) is not None or entries:
+            self.status(Level.WARN, words, f"request {request}")
 
     def _submit(self, messages: Mapping[str, bytes], scenarios: Told, status: Status) -> None:
         name = f"request {status.values['request']}"
@@ -115,6 +135,7 @@ class Evaluator(StageNode):
             config=self.config.evaluation,
             seed=self.config.seed,
         )
+        stop_if_cancelled()
         statuses = []
         for row in evaluation.rows:
             figures = {key: repr(entry.value) for key, entry in row.values.items() if math.isfinite(entry.value)}
