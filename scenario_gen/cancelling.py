@@ -18,12 +18,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from scenario_gen.errors import RefusedError
+from scenario_gen.errors import ScenarioGenError
 
 _asked: ContextVar[Callable[[], bool]] = ContextVar("cancelled", default=lambda: False)
 
 
-class CancelledError(RefusedError):
+class CancelledError(ScenarioGenError):
     """Nobody waits for the result any more."""
 
 
