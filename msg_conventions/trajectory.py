@@ -35,6 +35,7 @@ from scenario_gen.errors import InputError
 TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
 FARTHEST = 1e8  # m from the frame's origin: more than any geodetic grid has
 FASTEST = 1e4  # m/s: what drives is slower, and what follows from speeds can still be reckoned with
+MANY = 10_000  # vehicles: beyond, a message is not laid out as one table
 LONGEST_NS = 7200 * NANOSECONDS  # of an encounter or a scenario
 
 
@@ -109,20 +110,7 @@ def decode(data: bytes, what: str) -> Trajectory:
     n, count = len(vehicles), reader.count(20)
     if not n:
         raise InputError(f"{what}: joint_names is empty; at least one vehicle is needed")
-    time_ns: list[int] = []
-    blocks: tuple[list[Floats], ...] = ([], [], [])
-    for k in range(count):
-        for block, width in zip(blocks, (7, 6, 6), strict=True):
-            length = reader.count()
-            if length != n and (length or width == 7):
-                raise InputError(f"{what}: point {k} has {length} entries for {n} joint names")
-            block.append(reader.floats(length * width).reshape(length, width) if length else np.zeros((n, width)))
-        time_ns.append(reader.stamp())
-    shape = (count, n, -1)
-    pose, velocity, acceleration = (
-        np.array(block).reshape(shape) if count else np.zeros((0, n, width))
-        for block, width in zip(blocks, (7, 6, 6), strict=True)
-    )
+    time_ns, pose, velocity, acceleration = _alike(reader, n, count) or _one_by_one(reader, what, n, count)
     if not all(np.isfinite(value).all() for value in (pose, velocity, acceleration)):
         raise InputError(f"{what}: the message holds a value that is not finite")
     for name, values, most in (
@@ -137,9 +125,49 @@ def decode(data: bytes, what: str) -> Trajectory:
         stamp_ns=stamp_ns,
         frame_id=frame_id,
         vehicles=vehicles,
-        time_ns=np.array(time_ns, dtype=np.int64),
+        time_ns=time_ns,
         position=pose[..., :2].swapaxes(0, 1),
         heading=yaw(pose[..., 3:]).T,
         speed=velocity[..., 0].T,
         acceleration=acceleration[..., 0].T,
     )
+
+
+Points = tuple[Ints, Floats, Floats, Floats]  # times (T,) [ns], poses (T, N, 7), velocities and accelerations (T, N, 6)
+
+
+def _alike(reader: CdrReader, n: int, count: int) -> Points | None:
+    """The points all at once, where each has all that it can have; None, and nothing read, where they have not."""
+    place = reader.place
+    points = reader.aligned(_point_type(n), count) if n <= MANY else None
+    if points is None:
+        return None
+    names = ("transforms", "velocities", "accelerations")
+    if not all((points["n_" + name] == n).all() for name in names):
+        reader.place = place
+        return None
+    pose, velocity, acceleration = (np.ascontiguousarray(points[name]) for name in names)
+    return points["sec"].astype(np.int64) * NANOSECONDS + points["nanosec"], pose, velocity, acceleration
+
+
+def _one_by_one(reader: CdrReader, what: str, n: int, count: int) -> Points:
+    """The points one after the other; velocities or accelerations that were left out are zero.
+
+    Raises:
+        InputError: naming `what`, where the message is damaged or lacks poses.
+    """
+    time_ns: list[int] = []
+    blocks: tuple[list[Floats], ...] = ([], [], [])
+    for k in range(count):
+        for block, width in zip(blocks, (7, 6, 6), strict=True):
+            length = reader.count()
+            if length != n and (length or width == 7):
+                raise InputError(f"{what}: point {k} has {length} entries for {n} joint names")
+            block.append(reader.floats(length * width).reshape(length, width) if length else np.zeros((n, width)))
+        time_ns.append(reader.stamp())
+    shape = (count, n, -1)
+    pose, velocity, acceleration = (
+        np.array(block).reshape(shape) if count else np.zeros((0, n, width))
+        for block, width in zip(blocks, (7, 6, 6), strict=True)
+    )
+    return np.array(time_ns, dtype=np.int64), pose, velocity, acceleration

@@ -23,6 +23,7 @@ from msg_conventions.paths import decode_path, encode_path
 from msg_conventions.roads import decode_map, decode_poses, encode_map, encode_poses
 from msg_conventions.tracks import decode_tracks
 from msg_conventions.trajectory import Trajectory
+from scenario_gen.arrays import canonical_heading
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
 from scenario_gen.roads import build_road
@@ -75,3 +76,22 @@ def test_empty_frames_and_quaternions_of_zeros(kind):
         decode(data.replace(UNTURNED, bytes(32)))
     with pytest.raises(InputError, match=rf"{kind}: header\.frame_id is empty; name the frame"):
         decode(_messages("")[kind][1])
+
+
+@pytest.mark.parametrize("frame", ["a", "ab", "abc", "abcd", "abcde", "abcdefgh"])
+def test_points_that_are_not_alike_are_read_one_by_one_to_the_same_values(frame, monkeypatch):
+    data = trajectory.encode(_moving(frame))
+    at_once = trajectory.decode(data, "tracks")
+    monkeypatch.setattr(trajectory, "MANY", 0)
+    one_by_one = trajectory.decode(data, "tracks")
+    for name in ("time_ns", "position", "heading", "speed", "acceleration"):
+        assert getattr(at_once, name).tobytes() == getattr(one_by_one, name).tobytes()
+    for name in ("time_ns", "position", "speed", "acceleration"):
+        assert getattr(at_once, name).tobytes() == getattr(_moving(frame), name).tobytes()
+
+
+def _moving(frame: str) -> Trajectory:
+    random = np.random.Generator(np.random.PCG64(3))
+    values = (canonical_heading(random.uniform(-3.0, 3.0, (3, 5))), *random.uniform(0.0, 20.0, (2, 3, 5)))
+    named = tuple(Vehicle(name) for name in ("a", "bc", "def"))
+    return Trajectory(7, frame, named, np.arange(5) * 1_500_000_000, random.uniform(-9.0, 9.0, (3, 5, 2)), *values)
