@@ -14,6 +14,7 @@
 
 """evaluator: `tracks`, `changepoints` and the `scenarios` of a request in; its figures out as `report`."""
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 import math
@@ -67,6 +68,7 @@ class Evaluator(StageNode):
         self._scenarios: dict[str, bytes] = {}  # by SHA-256
         self._open: dict[str, dict[str, Mapping[str, str]]] = {}  # request -> index -> entry of `scenarios/info`
         self._closed: dict[str, Status] = {}  # by request: what its account says, while scenarios of it are still to come
+        self._cut: deque[str] = deque(maxlen=1000)  # requests given up before they were closed
 
     def received(self, topic: str, data: bytes) -> None:
         """Keep what comes, and evaluate a request when all of it is there."""
@@ -78,12 +80,7 @@ class Evaluator(StageNode):
             for status in decode_diagnostics(data)[1]:
                 if not {"published", "sha256"} & set(status.values):
                     continue
-                request = text_in(status.values, "request", f"{topic}, {status.name}")
-                if "published" in status.values:
-                    self._closed[request] = status
-                else:
-                    entry = {key: text_in(status.values, key, f"{topic}, {status.name}") for key in ("index", "seed", "sha256")}
-                    take_entry(self._open.setdefault(request, {}), entry)
+                self._take_told(status, f"{topic}, {status.name}")
             self._give_up()
         else:
             self._newest[topic] = data
@@ -98,6 +95,20 @@ class Evaluator(StageNode):
                 for values in entries:  # two may have the same bytes
                     self._scenarios.pop(values["sha256"], None)
 
+    def _take_told(self, status: Status, place: str) -> None:
+        """Keep an entry of a request, or its closing."""
+        request = text_in(status.values, "request", place)
+        if "published" in status.values:
+            count_in(status.values, "published", place)
+            self._closed[request] = status
+            if request in self._cut:
+                self._forget(request)
+            return
+        entry = {key: text_in(status.values, key, place) for key in ("index", "seed", "sha256")}
+        if entry["index"] == "0" and request in self._cut:  # begun anew
+            self._cut.remove(request)
+        take_entry(self._open.setdefault(request, {}), entry)
+
     def _give_up(self) -> None:
         """Forget the oldest requests while more of them wait, or more scenarios are told of, than are kept."""
         while len(self._closed) > self.config.wait:
@@ -106,12 +117,14 @@ class Evaluator(StageNode):
             self._forget(next(iter(self._open)))
 
     def _forget(self, request: str) -> None:
-        """Give up a request."""
-        entries = self._open.pop(request, {})
-        missing = sum(v["sha256"] not in self._scenarios for v in entries.values())
-        words = f"request {request} is not evaluated: {missing} of its {len(entries)} scenarios are not there; see keep and wait"
-        if self._closed.pop(request, None) is not None or entries:
-            self.status(Level.WARN, words, f"request {request}")
+        """Give up a request, and say how many of its scenarios have not come or are not kept any more."""
+        entries, closing = self._open.pop(request, {}), self._closed.pop(request, None)
+        untold = int(closing.values["published"]) - len(entries) if closing else 0
+        missing = max(untold, 0) + sum(v["sha256"] not in self._scenarios for v in entries.values())
+        if closing is None and request not in self._cut:  # more of it is to come
+            self._cut.append(request)
+        words = f"request {request} is not evaluated: {missing} of its scenarios did not come; see keep and wait"
+        self.status(Level.WARN, words, f"request {request}")
 
     def _submit(self, messages: Mapping[str, bytes], scenarios: Told, status: Status) -> None:
         name = f"request {status.values['request']}"

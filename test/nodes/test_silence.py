@@ -145,7 +145,10 @@ def test_the_evaluator_gives_up_requests_whose_scenarios_never_come_and_says_so(
             entry = {"request": "endless", "index": str(k), "seed": "0", "sha256": f"{many + k:064x}"}
             node.received("scenarios/info", encode_diagnostics([Status("scenario", Level.OK, "", entry)], 0))
         assert sum(map(len, node._open.values())) <= node.config.keep
-        client.until(lambda: "request 0 is not evaluated: 1 of its 1 scenarios are not there" in _said(client), "the warning")
+        closing = {"request": "endless", "published": str(node.config.keep + 10), "requested": "1"}
+        node.received("scenarios/info", encode_diagnostics([Status("request", Level.OK, "", closing)], 0))
+        assert "endless" not in node._closed | node._open, "part of a request is not evaluated as all of it"
+        client.until(lambda: "request 0 is not evaluated: 1 of its scenarios did not come" in _said(client), "the warning")
     finally:
         node.destroy_node()
 
