@@ -81,7 +81,7 @@ class CdrWriter:
 
 
 class CdrReader:
-    """Reads what CdrWriter (or rclpy, or rosbags) wrote.
+    """Reads what CdrWriter (or rclpy, or rosbags) wrote; `place` is the byte after the last one read.
 
     Raises:
         InputError: from every method, naming `what`, where the data ends too early or is not little-endian CDR.
@@ -91,14 +91,14 @@ class CdrReader:
         if len(data) < 4 or bytes(data[:2]) != HEADER[:2]:
             raise InputError(f"{what}: not a little-endian CDR message ({len(data)} bytes)")
         self._data = memoryview(data)[4:]
-        self._offset = 0
+        self.place = 0
         self._what = what
 
     def _take(self, size: int, alignment: int) -> memoryview:
-        start = self._offset + -self._offset % alignment
+        start = self.place + -self.place % alignment
         if size < 0 or start + size > len(self._data):
             raise InputError(f"{self._what}: the message ends at byte {len(self._data)}, {start + size} are needed")
-        self._offset = start + size
+        self.place = start + size
         return self._data[start : start + size]
 
     def one(self, code: str) -> Any:
@@ -108,7 +108,7 @@ class CdrReader:
 
     def count(self, size: int = 1) -> int:
         """Read the length of a sequence whose items take at least `size` bytes each."""
-        count, left = int(self.one("I")), len(self._data) - self._offset
+        count, left = int(self.one("I")), len(self._data) - self.place
         if count * size > left:
             raise InputError(f"{self._what}: {count} items are announced where {left} bytes are left")
         return count
@@ -138,6 +138,27 @@ class CdrReader:
         """Read a Time or Duration in nanoseconds."""
         return int(self.one("i")) * NANOSECONDS + int(self.one("I"))
 
+    def aligned(self, dtype: npt.DTypeLike, count: int) -> npt.NDArray[Any] | None:
+        """Read `count` structures that each end at a multiple of 8 bytes; None, and nothing read, if less is left.
+
+        The type begins with 4 bytes and a padding to 8, which the first structure does without where it begins amid 8.
+        """
+        kind, start = np.dtype(dtype), self.place + -self.place % 4
+        amid = start % 8 == 4
+        end = start + kind.itemsize * count - 4 * amid
+        if not count or end > len(self._data):
+            return None
+        self.place = end
+        body = self._data[start:end]
+        return np.frombuffer(b"".join((body[:4], bytes(4), body[4:])) if amid else body, dtype=kind)
+
     def header(self) -> tuple[int, str]:
         """Read std_msgs/Header: stamp in nanoseconds and frame."""
         return self.stamp(), self.string()
+
+    def framed_header(self) -> tuple[int, str]:
+        """Read the std_msgs/Header of a message with positions: its frame may not be empty."""
+        stamp_ns, frame_id = self.header()
+        if not frame_id:
+            raise InputError(f"{self._what}: header.frame_id is empty; name the frame that the positions are in")
+        return stamp_ns, frame_id

@@ -51,7 +51,7 @@ def decode_state(data: bytes, what: str = "state") -> tuple[int, str, str, Float
         InputError: the message is damaged, or a value is not finite.
     """
     reader = CdrReader(data, what)
-    stamp_ns, frame_id = reader.header()
+    stamp_ns, frame_id = reader.framed_header()
     child = reader.string()
     row = reader.floats(7 + _COVARIANCE)
     speed = float(reader.floats(6 + _COVARIANCE)[0])

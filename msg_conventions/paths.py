@@ -87,7 +87,7 @@ def decode_path(data: bytes, what: str = "path") -> tuple[int, str, Floats, Ints
         InputError: the message is damaged, or a pose is in another frame than the path.
     """
     reader = CdrReader(data, what)
-    stamp_ns, frame_id = reader.header()
+    stamp_ns, frame_id = reader.framed_header()
     count = reader.count(68)
     rows, stamps = np.zeros((count, 7)), np.zeros(count, dtype=np.int64)
     for k in range(count):

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
-from msg_conventions.yaw import half_angle, yaw
+from msg_conventions.yaw import check_quaternions, half_angle, yaw
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 
@@ -54,6 +54,7 @@ def poses_of(rows: Floats, what: str) -> Floats:
     """
     if not np.isfinite(rows).all():
         raise InputError(f"{what}: a pose holds a value that is not finite")
+    check_quaternions(rows[:, 3:], what)
     return np.column_stack([rows[:, :2], yaw(rows[:, 3:])])
 
 
@@ -79,7 +80,7 @@ def decode_poses(data: bytes, what: str = "poses") -> tuple[int, str, Floats]:
         InputError: the message is damaged.
     """
     reader = CdrReader(data, what)
-    stamp_ns, frame_id = reader.header()
+    stamp_ns, frame_id = reader.framed_header()
     count = reader.count(56)
     return stamp_ns, frame_id, poses_of(reader.floats(7 * count).reshape(count, 7), what)
 
@@ -93,11 +94,12 @@ def decode_map(data: bytes, entries: bytes | None = None, exits: bytes | None = 
     from scenario_gen.roads.road import Road
 
     reader = CdrReader(data, name)
-    stamp_ns, frame_id = reader.header()
+    stamp_ns, frame_id = reader.framed_header()
     reader.stamp()
     resolution, width, height = float(reader.one("f")), reader.number(), reader.number()
     origin = reader.floats(7)
     cells = reader.array(np.int8, reader.count(), 1)
+    check_quaternions(origin[3:], f"{name}: info.origin")
     if width * height != len(cells):
         raise InputError(f"{name}: {width} x {height} cells are announced, {len(cells)} are there")
     if not np.isfinite(origin).all() or abs(float(yaw(origin[3:]))) > 1e-9:

@@ -55,8 +55,10 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
         InputError: the message is damaged, its times are not evenly spaced from 0, or it is no encounter (one vehicle, …).
     """
     message = trajectory.decode(data, name)
+    if len(message.time_ns) < 2:
+        raise InputError(f"{name}: {len(message.time_ns)} sample(s); at least 2 are needed to say how anybody drives")
     steps = np.diff(message.time_ns)
-    if len(steps) == 0 or message.time_ns[0] != 0 or steps[0] <= 0 or (steps != steps[0]).any():
+    if message.time_ns[0] != 0 or steps[0] <= 0 or (steps != steps[0]).any():
         raise InputError(f"{name}: time_from_start must count from 0 in even steps; resample the tracks (10 Hz is usual)")
     if not SHORTEST_STEP_NS <= steps[0] <= LONGEST_STEP_NS or message.time_ns[-1] > trajectory.LONGEST_NS:
         raise InputError(

@@ -27,7 +27,7 @@ import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter, NANOSECONDS
 from msg_conventions.names import joint_names, vehicle_of
-from msg_conventions.yaw import quaternion, yaw
+from msg_conventions.yaw import check_quaternions, quaternion, yaw
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
@@ -35,6 +35,7 @@ from scenario_gen.errors import InputError
 TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
 FARTHEST = 1e8  # m from the frame's origin: more than any geodetic grid has
 FASTEST = 1e4  # m/s: what drives is slower, and what follows from speeds can still be reckoned with
+MANY = 10_000  # vehicles: beyond, a message is not laid out as one table
 LONGEST_NS = 7200 * NANOSECONDS  # of an encounter or a scenario
 
 
@@ -104,9 +105,57 @@ def decode(data: bytes, what: str) -> Trajectory:
         InputError: naming `what`, where the message is damaged, lacks poses, or holds a value that is not finite or no vehicle's.
     """
     reader = CdrReader(data, what)
-    stamp_ns, frame_id = reader.header()
+    stamp_ns, frame_id = reader.framed_header()
     vehicles = tuple(vehicle_of(reader.string()) for _ in range(reader.count()))
     n, count = len(vehicles), reader.count(20)
+    if not n:
+        raise InputError(f"{what}: joint_names is empty; at least one vehicle is needed")
+    time_ns, pose, velocity, acceleration = _alike(reader, n, count) or _one_by_one(reader, what, n, count)
+    if not all(np.isfinite(value).all() for value in (pose, velocity, acceleration)):
+        raise InputError(f"{what}: the message holds a value that is not finite")
+    for name, values, most in (
+        ("position", pose[..., :2], FARTHEST),
+        ("speed", velocity, FASTEST),
+        ("quaternion", pose[..., 3:], 2.0),
+    ):
+        if (np.abs(values) > most).any():
+            raise InputError(f"{what}: a {name} is {np.abs(values).max():g}; at most {most:g} is read")
+    check_quaternions(pose[..., 3:], what)
+    return Trajectory(
+        stamp_ns=stamp_ns,
+        frame_id=frame_id,
+        vehicles=vehicles,
+        time_ns=time_ns,
+        position=pose[..., :2].swapaxes(0, 1),
+        heading=yaw(pose[..., 3:]).T,
+        speed=velocity[..., 0].T,
+        acceleration=acceleration[..., 0].T,
+    )
+
+
+Points = tuple[Ints, Floats, Floats, Floats]  # times (T,) [ns], poses (T, N, 7), velocities and accelerations (T, N, 6)
+
+
+def _alike(reader: CdrReader, n: int, count: int) -> Points | None:
+    """The points all at once, where each has all that it can have; None, and nothing read, where they have not."""
+    place = reader.place
+    points = reader.aligned(_point_type(n), count) if n <= MANY else None
+    if points is None:
+        return None
+    names = ("transforms", "velocities", "accelerations")
+    if not all((points["n_" + name] == n).all() for name in names):
+        reader.place = place
+        return None
+    pose, velocity, acceleration = (np.ascontiguousarray(points[name]) for name in names)
+    return points["sec"].astype(np.int64) * NANOSECONDS + points["nanosec"], pose, velocity, acceleration
+
+
+def _one_by_one(reader: CdrReader, what: str, n: int, count: int) -> Points:
+    """The points one after the other; velocities or accelerations that were left out are zero.
+
+    Raises:
+        InputError: naming `what`, where the message is damaged or lacks poses.
+    """
     time_ns: list[int] = []
     blocks: tuple[list[Floats], ...] = ([], [], [])
     for k in range(count):
@@ -121,22 +170,4 @@ def decode(data: bytes, what: str) -> Trajectory:
         np.array(block).reshape(shape) if count else np.zeros((0, n, width))
         for block, width in zip(blocks, (7, 6, 6), strict=True)
     )
-    if not all(np.isfinite(value).all() for value in (pose, velocity, acceleration)):
-        raise InputError(f"{what}: the message holds a value that is not finite")
-    for name, values, most in (
-        ("position", pose[..., :2], FARTHEST),
-        ("speed", velocity, FASTEST),
-        ("quaternion", pose[..., 3:], 2.0),
-    ):
-        if (np.abs(values) > most).any():
-            raise InputError(f"{what}: a {name} is {np.abs(values).max():g}; at most {most:g} is read")
-    return Trajectory(
-        stamp_ns=stamp_ns,
-        frame_id=frame_id,
-        vehicles=vehicles,
-        time_ns=np.array(time_ns, dtype=np.int64),
-        position=pose[..., :2].swapaxes(0, 1),
-        heading=yaw(pose[..., 3:]).T,
-        speed=velocity[..., 0].T,
-        acceleration=acceleration[..., 0].T,
-    )
+    return np.array(time_ns, dtype=np.int64), pose, velocity, acceleration

@@ -18,8 +18,10 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
+from scenario_gen.errors import InputError
 
 TWO_PI = 2.0 * np.pi
+SHORTEST = 0.5  # of a quaternion, which should have length 1
 
 
 def half_angle(heading: Floats) -> tuple[Floats, Floats]:
@@ -38,6 +40,21 @@ def quaternion(heading: Floats) -> Floats:
     result = np.zeros((*np.shape(heading), 4))
     result[..., 2], result[..., 3] = half_angle(heading)
     return result
+
+
+def check_quaternions(quaternions: Floats, what: str) -> None:
+    """Refuse quaternions (..., 4) that are no rotation; lengths near 1 are left to rounding.
+
+    Raises:
+        InputError: naming `what`, one is shorter than a half: all zeros, as a rule, for nobody set it.
+    """
+    squared = np.square(quaternions).sum(axis=-1)
+    if (squared < SHORTEST * SHORTEST).any():
+        row = int(np.argmin(squared.reshape(-1)))
+        x, y, z, w = quaternions.reshape(-1, 4)[row]
+        raise InputError(
+            f"{what}: quaternion {row} is ({x:g}, {y:g}, {z:g}, {w:g}), which is no rotation; (0, 0, 0, 1) means a heading of 0"
+        )
 
 
 def yaw(quaternions: Floats) -> Floats:

@@ -26,10 +26,10 @@ PACKAGE = ROOT / "scenario_gen"
 
 # The data flow, first to last; modules of one tuple may import each other.
 ORDER = (
-    ("errors", "guard", "documents", "arrays", "interrupts", "folders", "kernels", "parameters"),
+    ("errors", "guard", "documents", "arrays", "cancelling", "interrupts", "folders", "kernels", "parameters"),
     ("exact",),
     ("geodesy", "storage"),
-    ("encounter", "scenario", "interaction"),
+    ("encounter", "scenario", "interaction", "size"),
     ("logs",),
     ("segmentation",),
     ("roads",),

@@ -26,6 +26,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
+from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.fitting.placement import farthest_repair, kept_apart, Placement, room
@@ -69,6 +70,7 @@ def place_by_search(tracks: tuple[Track, ...], road: Road, config: FittingConfig
             continue
         found = sorted(_coarse(discs, road, need, scale), key=_order)[:_KEPT]
         for motion in sorted((_refined(discs, road, need, motion) for motion in found), key=_order):
+            stop_if_cancelled()
             try:
                 placement, share, farthest = _tried(tracks, centre, motion, road, config)
             except RefusedError as error:

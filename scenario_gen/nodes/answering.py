@@ -31,6 +31,7 @@ from rclpy.node import Node
 
 AGAIN = 0.1  # seconds between two attempts, of which each takes 100 ms
 PATIENCE = 60.0  # seconds after which a caller is given up
+MOST = 1000  # answers kept; then the oldest caller is given up
 
 Send = Callable[[Any, Any], None]  # of a response and the header of its request
 
@@ -48,6 +49,9 @@ class Answers:
 
     def _send(self, send: Send, response: Any, header: Any) -> None:
         if not heard(partial(send, response, header)):
+            if len(self._kept) >= MOST:
+                self._kept.popleft()
+                self._node.get_logger().warning(f"{MOST} callers are not found; the oldest one's answer is dropped")
             self._kept.append((monotonic() + PATIENCE, partial(send, response, header)))
             self._timer.reset()
 

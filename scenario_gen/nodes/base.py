@@ -15,6 +15,7 @@
 """What all nodes with a stage have in common: lifecycle, parameters, raw topics, a worker, diagnostics, a clean end."""
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 import signal
 import sys
 import traceback
@@ -24,8 +25,7 @@ import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.utilities import remove_ros_args
+from rclpy.qos import QoSProfile
 
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.topics import LATCHED, Quality, topic_entry
@@ -33,20 +33,12 @@ from scenario_gen.errors import ScenarioGenError, tell
 from scenario_gen.interrupts import interrupt
 from scenario_gen.nodes.answering import Answers
 from scenario_gen.nodes.compiling import compile_kernels
+from scenario_gen.nodes.inputs import take_tracks
 from scenario_gen.nodes.message_classes import message_class
-from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.ros_parameters import ConfigParameters
+from scenario_gen.nodes.usage import asks_for_help, help_of, namespaces
+from scenario_gen.nodes.voice import qos, Voice
 from scenario_gen.nodes.worker import Job, Worker
-
-
-def qos(quality: Quality) -> QoSProfile:
-    """Return the profile of a topic."""
-    return QoSProfile(
-        depth=quality.depth,
-        reliability=ReliabilityPolicy.RELIABLE if quality.reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if quality.transient_local else DurabilityPolicy.VOLATILE,
-    )
-
 
 REQUESTS = QoSProfile(depth=1000)  # ROS's own 10 would drop the oldest of many requests that come at once
 
@@ -65,7 +57,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     def __init__(self, name: str, config: Any, namespace: str | None = None) -> None:
         self._together = ReentrantCallbackGroup()
         super().__init__(name, namespace=namespace)
-        self._raw_publishers: dict[str, Any] = {}
+        self.voice = Voice(self)
         self._inputs: dict[str, Any] = {}
         self._heard: dict[str, tuple[bytes, Any]] = {}
         self._worker: Worker | None = None
@@ -120,14 +112,8 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             self._heard.pop(topic, None)
 
     def send(self, topic: str, data: bytes) -> None:
-        """Publish the CDR bytes of a topic of the suite."""
-        self._announce(topic)
-        publish(self, self._raw_publishers[topic], data)
-
-    def _announce(self, topic: str) -> None:
-        if topic not in self._raw_publishers:
-            kind, quality = topic_entry(topic)
-            self._raw_publishers[topic] = self.create_publisher(message_class(kind), topic, qos(quality))
+        """Publish the CDR bytes of a topic of the suite, if the node is active."""
+        self.voice.send(topic, data)
 
     def serve(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
         """Offer a service; whatever goes wrong in it, the caller gets an answer and the node lives on."""
@@ -155,14 +141,14 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         self.send("/diagnostics", encode_diagnostics(statuses, stamp_ns))
 
     def status(self, level: Level, message: str, subject: str = "status", stamp_ns: int = 0, **values: str) -> None:
-        """Publish one status on /diagnostics and log it."""
+        """Publish one status on /diagnostics and log it; a job that was left behind ends here, before it is logged."""
+        self.report(Status(f"{self.get_fully_qualified_name()}: {subject}", level, message, values), stamp_ns=stamp_ns)
         if level is Level.OK:  # a call of its own for each severity: rclpy refuses to change it between calls from one line
             self.get_logger().info(message)
         elif level is Level.WARN:
             self.get_logger().warning(message)
         else:
             self.get_logger().error(message)
-        self.report(Status(f"{self.get_fully_qualified_name()}: {subject}", level, message, values), stamp_ns=stamp_ns)
 
     # --- lifecycle --------------------------------------------------------------------------------------------
 
@@ -172,12 +158,13 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             count, seconds = compile_kernels(self.STAGES)
             self.get_logger().info(f"{count} kernels ready after {seconds:.1f} s")
         for topic in ("/diagnostics", *self.OUTPUTS):
-            self._announce(topic)
+            self.voice.announce(topic)
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Subscribe to the inputs."""
-        self._worker = Worker(self.failed)
+        self._worker = Worker(self.failed, self.get_name())
+        self.voice.begin()
         for topic in self.INPUTS:
             self.listen(topic)
         self.started()
@@ -190,8 +177,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Withdraw what was published."""
-        for topic in list(self._raw_publishers):
-            self.destroy_publisher(self._raw_publishers.pop(topic))
+        self.voice.withdraw()
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -200,6 +186,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         return super().on_shutdown(state)
 
     def _stop(self) -> None:
+        self.voice.silence()
         for topic in list(self._inputs):
             self.ignore(topic)
         if self._worker is not None:
@@ -221,6 +208,8 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     def _receive(self, topic: str, data: bytes) -> None:
         """Take an input in; whatever is wrong with it, the node lives on."""
         try:
+            if topic == "tracks":
+                take_tracks(data)
             self.received(topic, data)
         except Exception as error:
             self.failed(topic, error)
@@ -235,20 +224,15 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         self.status(Level.ERROR, str(error) if isinstance(error, ScenarioGenError) else f"{kind}: {error}", name, error=kind)
 
 
-def namespaces(arguments: Sequence[str]) -> list[str | None]:
-    """Return the values of `--namespace` (one node for each, all in this process); [None] if there is none."""
-    rest = remove_ros_args(list(arguments))[1:]
-    if any(word != "--namespace" for word in rest[::2]) or len(rest) % 2:
-        raise SystemExit(f"usage: {arguments[0]} [--namespace NAME]... [--ros-args ...]")
-    return [name or None for name in rest[1::2]] or [None]
-
-
 Maker = Callable[[str | None], Any]
 
 
 def run_nodes(make: Maker | Sequence[Maker], arguments: Sequence[str] | None = None) -> int:
     """Spin one node (or one of each) per `--namespace` until Ctrl-C, SIGTERM, shutdown, or all are done; return the exit code."""
     arguments = sys.argv if arguments is None else arguments
+    if asks_for_help(arguments):
+        print(help_of(Path(arguments[0]).name, (make,) if callable(make) else make))
+        return 0
     where = namespaces(arguments)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, interrupt)  # rclpy calls it after its own handler
@@ -272,15 +256,22 @@ def run_nodes(make: Maker | Sequence[Maker], arguments: Sequence[str] | None = N
     except (ScenarioGenError, OSError) as error:
         code = tell(error)
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)  # a second Ctrl-C does not disturb the clean end
-        for node in nodes:
-            getattr(node, "cancel", list)()  # all at once, so that none is waited for before another is told
-        for node in nodes:
-            try:
-                node.destroy_node()
-            except (ScenarioGenError, OSError) as error:  # a bag that cannot be closed, say
-                code = tell(error)
-        executor.shutdown(timeout_sec=1.0)
-        rclpy.try_shutdown()
+        code = max(code, _end(nodes, executor))
+    return code
+
+
+def _end(nodes: Sequence[Any], executor: SingleThreadedExecutor) -> int:
+    """Destroy the nodes, whatever one of them says to it; return the exit code."""
+    code = 0
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)  # a second Ctrl-C does not disturb the clean end
+    for node in nodes:
+        getattr(node, "cancel", list)()  # all at once, so that none is waited for before another is told
+    for node in nodes:
+        try:
+            node.destroy_node()
+        except (ScenarioGenError, OSError) as error:  # a bag that cannot be closed, say
+            code = tell(error)
+    executor.shutdown(timeout_sec=1.0)
+    rclpy.try_shutdown()
     return code

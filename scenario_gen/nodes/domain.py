@@ -35,22 +35,46 @@ def _quiet(domain: int) -> bool:
     return False
 
 
+def _lock_file(path: Path) -> int:
+    """Open a lock file, whoever made it.
+
+    Reading suffices for a lock: another user's file in a sticky folder may be read, but neither written nor opened to be made.
+
+    Raises:
+        OSError: it may not be read, or not be made.
+    """
+    try:
+        return os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+    except FileNotFoundError:
+        return os.open(path, os.O_RDONLY | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o644)
+
+
+def _locked(lock: int) -> bool:
+    """Take the lock; False if another run holds it."""
+    with suppress(OSError):
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return True
+    return False
+
+
 @contextmanager
 def free_domain() -> Iterator[int]:
     """Hold a domain id: no participant is in it, and no other run of ours takes it meanwhile.
 
     Raises:
-        RefusedError: none is free.
+        RefusedError: none is free, or may be locked.
     """
     for domain in reversed(DOMAINS):
-        with (Path(tempfile.gettempdir()) / f"scenario_gen_domain_{domain}.lock").open("a") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                continue  # another run of ours holds it
-            if _quiet(domain):
+        try:
+            lock = _lock_file(Path(tempfile.gettempdir()) / f"scenario_gen_domain_{domain}.lock")
+        except OSError:
+            continue  # another user's, who lets nobody read it
+        try:
+            if _locked(lock) and _quiet(domain):
                 yield domain
                 return
+        finally:
+            os.close(lock)
     raise RefusedError(f"no free ROS domain among {DOMAINS.start} to {DOMAINS.stop - 1}; end other ROS processes")
 
 

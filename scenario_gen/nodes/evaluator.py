@@ -14,6 +14,7 @@
 
 """evaluator: `tracks`, `changepoints` and the `scenarios` of a request in; its figures out as `report`."""
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 import math
@@ -32,6 +33,7 @@ from msg_conventions.diagnostics import (
 )
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
+from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import CheckCounts, evaluate, EvaluationConfig, WITH
 from scenario_gen.nodes.base import run_nodes, StageNode
@@ -46,6 +48,7 @@ class Config:
 
     seed: int = parameter(0, "seed of the bootstrap", low=0)
     keep: int = parameter(10_000, "scenarios kept until their request is closed; older ones are forgotten", low=1)
+    wait: int = parameter(100, "closed requests that wait for scenarios on their way; older ones are given up", low=1)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
 
     def __post_init__(self) -> None:
@@ -64,7 +67,8 @@ class Evaluator(StageNode):
         self._newest: dict[str, bytes] = {}
         self._scenarios: dict[str, bytes] = {}  # by SHA-256
         self._open: dict[str, dict[str, Mapping[str, str]]] = {}  # request -> index -> entry of `scenarios/info`
-        self._closed: list[Status] = []
+        self._closed: dict[str, Status] = {}  # by request: what its account says, while scenarios of it are still to come
+        self._cut: deque[str] = deque(maxlen=1000)  # requests given up before they were closed
 
     def received(self, topic: str, data: bytes) -> None:
         """Keep what comes, and evaluate a request when all of it is there."""
@@ -76,22 +80,51 @@ class Evaluator(StageNode):
             for status in decode_diagnostics(data)[1]:
                 if not {"published", "sha256"} & set(status.values):
                     continue
-                request = text_in(status.values, "request", f"{topic}, {status.name}")
-                if "published" in status.values:
-                    self._closed.append(status)
-                else:
-                    entry = {key: text_in(status.values, key, f"{topic}, {status.name}") for key in ("index", "seed", "sha256")}
-                    take_entry(self._open.setdefault(request, {}), entry)
+                self._take_told(status, f"{topic}, {status.name}")
+            self._give_up()
         else:
             self._newest[topic] = data
-        for status in list(self._closed):
-            entries = tuple(self._open.get(status.values["request"], {}).values())
-            if {"tracks", "changepoints"} <= set(self._newest) and all(v["sha256"] in self._scenarios for v in entries):
-                self._closed.remove(status)
-                self._open.pop(status.values["request"], None)
+        if not {"tracks", "changepoints"} <= set(self._newest):
+            return
+        for request, status in list(self._closed.items()):
+            entries = tuple(self._open.get(request, {}).values())
+            if all(v["sha256"] in self._scenarios for v in entries):
+                self._closed.pop(request)
+                self._open.pop(request, None)
                 self._submit(dict(self._newest), [(self._scenarios[v["sha256"]], v) for v in entries], status)
                 for values in entries:  # two may have the same bytes
                     self._scenarios.pop(values["sha256"], None)
+
+    def _take_told(self, status: Status, place: str) -> None:
+        """Keep an entry of a request, or its closing."""
+        request = text_in(status.values, "request", place)
+        if "published" in status.values:
+            count_in(status.values, "published", place)
+            self._closed[request] = status
+            if request in self._cut:
+                self._forget(request)
+            return
+        entry = {key: text_in(status.values, key, place) for key in ("index", "seed", "sha256")}
+        if entry["index"] == "0" and request in self._cut:  # begun anew
+            self._cut.remove(request)
+        take_entry(self._open.setdefault(request, {}), entry)
+
+    def _give_up(self) -> None:
+        """Forget the oldest requests while more of them wait, or more scenarios are told of, than are kept."""
+        while len(self._closed) > self.config.wait:
+            self._forget(next(iter(self._closed)))
+        while self._open and sum(map(len, self._open.values())) > self.config.keep:
+            self._forget(next(iter(self._open)))
+
+    def _forget(self, request: str) -> None:
+        """Give up a request, and say how many of its scenarios have not come or are not kept any more."""
+        entries, closing = self._open.pop(request, {}), self._closed.pop(request, None)
+        untold = int(closing.values["published"]) - len(entries) if closing else 0
+        missing = max(untold, 0) + sum(v["sha256"] not in self._scenarios for v in entries.values())
+        if closing is None and request not in self._cut:  # more of it is to come
+            self._cut.append(request)
+        words = f"request {request} is not evaluated: {missing} of its scenarios did not come; see keep and wait"
+        self.status(Level.WARN, words, f"request {request}")
 
     def _submit(self, messages: Mapping[str, bytes], scenarios: Told, status: Status) -> None:
         name = f"request {status.values['request']}"
@@ -115,6 +148,7 @@ class Evaluator(StageNode):
             config=self.config.evaluation,
             seed=self.config.seed,
         )
+        stop_if_cancelled()
         statuses = []
         for row in evaluation.rows:
             figures = {key: repr(entry.value) for key, entry in row.values.items() if math.isfinite(entry.value)}

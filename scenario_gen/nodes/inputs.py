@@ -17,11 +17,34 @@
 from collections.abc import Iterable
 
 from msg_conventions.cdr import CdrReader
+from msg_conventions.tracks import decode_tracks
+from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
+from scenario_gen.size import MOST_SAMPLES, refuse_too_large
+
+MOST_BYTES = 200 * MOST_SAMPLES  # of tracks: a sample of a vehicle takes 176 at most, and an instant 36
 
 
 def stamp_of(data: bytes, topic: str) -> int:
     """Return the header stamp [ns] of a CDR message that begins with a header."""
     return CdrReader(data, topic).stamp()
+
+
+def take_tracks(data: bytes) -> Encounter:
+    """Return the encounter of a `tracks` message that a node can work on; what is too large is refused before it is read.
+
+    Raises:
+        InputError: it is too large, damaged, or no encounter.
+        RefusedError: it is too large, or its vehicles are not where they can be.
+    """
+    if len(data) > MOST_BYTES:
+        raise InputError(
+            f"tracks: the message has {len(data)} bytes, at most {MOST_BYTES} are read; cut the encounter, or resample it "
+            "(10 Hz is usual)"
+        )
+    encounter = decode_tracks(data)
+    refuse_too_large(encounter)
+    return encounter
 
 
 class Inputs:

@@ -30,6 +30,7 @@ from scenario_gen.logs import LogConfig, Sample, Streams
 from scenario_gen.logs.raw import RawLog
 from scenario_gen.nodes.offered import offered
 from scenario_gen.parameters import check, parameter
+from scenario_gen.size import MOST_VEHICLES
 
 LOOK = 0.2  # seconds between two looks for new streams, and for silence
 TYPES = {"fix": FIX_TYPE, "speed": TWIST_TYPE}
@@ -87,6 +88,8 @@ class LiveStreams:
                 if not publishers:
                     continue
                 self._topics[topic] = (name, kind)
+                if name not in list(dict.fromkeys(vehicle for vehicle, _ in self._topics.values()))[:MOST_VEHICLES]:
+                    raise InputError(f"{topic} is left out: {MOST_VEHICLES} others are heard; name those wanted in log.vehicles")
                 if publishers[0].topic_type != kind_type:
                     raise InputError(f"{topic} is a {publishers[0].topic_type}; {kind_type} is needed, so it is left out")
                 self._node.listen(topic, offered(topic, [publisher.qos_profile for publisher in publishers])[0])

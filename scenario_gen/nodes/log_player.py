@@ -32,6 +32,7 @@ from msg_conventions.names import tokens
 from msg_conventions.streams import encode_fix, encode_speed, geodetic
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import encode_tracks
+from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
@@ -78,6 +79,7 @@ class LogPlayer(StageNode):
                 f"parameter encounter is {config.encounter}; {config.log_path} holds {len(result.encounters)}, counted from 0"
             )
         encounter = result.encounters[config.encounter]
+        stop_if_cancelled()
         if not config.stream:
             self.send("tracks", encode_tracks(encounter))
         n, samples = encounter.speed.shape
@@ -93,7 +95,7 @@ class LogPlayer(StageNode):
         clock = self.create_publisher(Clock, "/clock", 10)
         topics = [vehicle_topic(name, kind) for name in names for kind in ("fix", "speed")]
         for topic in topics:
-            self._announce(topic)
+            self.voice.announce(topic)
         while min(map(self.count_subscribers, topics)) < config.wait_matching_subscriptions and not cancelled():
             time.sleep(0.05)
         started = time.monotonic() + HEAD_START
@@ -103,7 +105,7 @@ class LogPlayer(StageNode):
             if cancelled() or not self.context.ok():
                 break
             stamp = encounter.start_ns + k * encounter.dt_ns
-            clock.publish(CdrWriter().stamp(stamp).finish())
+            self.voice.publish(clock, CdrWriter().stamp(stamp).finish())
             for i, name in enumerate(names):
                 self.send(
                     vehicle_topic(name, "fix"),

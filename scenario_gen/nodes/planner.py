@@ -36,6 +36,7 @@ from msg_conventions.paths import encode_path, encode_route
 from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
+from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting import fit_template, FittingConfig
 from scenario_gen.nodes.base import REQUESTS, run_nodes, StageNode
@@ -93,6 +94,7 @@ class Planner(StageNode):
         _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"))
         fit = fit_template(encounter, segmentation, road, config.fitting)
         routes = plan_routes(road, fit, config.planning, config.seed)
+        stop_if_cancelled()
         anchors = anchor_stamps(encounter, segmentation.changepoints)
         for name, route in zip(tokens(vehicle.id for vehicle in encounter.vehicles), routes, strict=True):
             self.send(vehicle_topic(name, "route"), encode_route(route, anchors, road.frame_id))

@@ -42,10 +42,11 @@ from std_srvs.srv import Trigger
 from msg_conventions.cdr import CdrWriter
 from scenario_gen.bags import bag_topics, BagMessage, read_messages
 from scenario_gen.errors import InputError, ScenarioGenError
-from scenario_gen.nodes.base import qos, run_nodes
+from scenario_gen.nodes.base import run_nodes
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.ros_parameters import ConfigParameters
+from scenario_gen.nodes.voice import qos
 from scenario_gen.parameters import check, parameter
 from scenario_gen.storage import BagConfig
 

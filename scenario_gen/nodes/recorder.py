@@ -39,10 +39,11 @@ from scenario_gen.bags import BagWriter, Split
 from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.errors import InputError, of_system
 from scenario_gen.interrupts import uninterrupted
-from scenario_gen.nodes.base import qos, run_nodes
+from scenario_gen.nodes.base import run_nodes
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.offered import offered
 from scenario_gen.nodes.ros_parameters import ConfigParameters
+from scenario_gen.nodes.voice import qos
 from scenario_gen.parameters import check, parameter
 
 OF_ALL = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, whatever the namespace

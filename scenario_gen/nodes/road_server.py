@@ -33,6 +33,7 @@ from rclpy.task import Future
 from msg_conventions.diagnostics import Level
 from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.tracks import decode_tracks
+from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.nodes.base import REQUESTS, run_nodes, StageNode
 from scenario_gen.parameters import check, parameter
@@ -89,22 +90,24 @@ class RoadServer(StageNode):
     def started(self) -> None:
         """Publish the plain road until tracks come."""
         if not self.config.wait_for_tracks and self.config.road_name != "corridor":
-            self.work("road", lambda _cancelled: self._publish(*self._build(self._name)))
+            self.work("road", lambda cancelled: None if cancelled() else self._publish(*self._build(self._name)))
 
     def received(self, topic: str, data: bytes) -> None:
         """Size the road to the newest encounter."""
         self._tracks = data
-        self.work("road", lambda _cancelled: self._publish(*self._build(self._name)))
+        self.work("road", lambda cancelled: None if cancelled() else self._publish(*self._build(self._name)))
 
     def _build(self, name: str) -> tuple[Road, int]:
         encounter = decode_tracks(self._tracks) if self._tracks else None
         return build_road(name, encounter, self.config.road), encounter.start_ns if encounter else 0
 
     def _publish(self, road: Road, stamp_ns: int) -> None:
-        self._grid = encode_map(road, stamp_ns)
+        grid = encode_map(road, stamp_ns)
+        stop_if_cancelled()
         self.send("road/entries", encode_poses(road.entries, road.frame_id, stamp_ns))
         self.send("road/exits", encode_poses(road.exits, road.frame_id, stamp_ns))
-        self.send("map", self._grid)
+        self.send("map", grid)
+        self._grid = grid
         height, width = road.drivable.shape
         message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, {len(road.entries)} entries"
         self.status(Level.OK, message, "road", stamp_ns)

@@ -29,6 +29,7 @@ from msg_conventions.changepoints import encode_changepoints, encode_live_change
 from msg_conventions.diagnostics import Level
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from scenario_gen.bags.run import segmentation_status
+from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.logs import encounters_of, LogConfig, Sample
 from scenario_gen.logs.raw import RawLog
 from scenario_gen.nodes.base import run_nodes, StageNode
@@ -89,6 +90,7 @@ class Segmenter(StageNode):
     def _segment(self, data: bytes) -> None:
         encounter = decode_tracks(data)
         segmentation = segment(encounter, self.config.segmentation, self.config.seed)
+        stop_if_cancelled()
         self.send("changepoints", encode_changepoints(encounter, segmentation))
         self.send("posterior", encode_posterior(encounter, segmentation))
         status = segmentation_status(segmentation, self.get_fully_qualified_name())

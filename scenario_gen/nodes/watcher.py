@@ -20,9 +20,10 @@ from rclpy.node import Node
 
 from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.topics import topic_entry
-from scenario_gen.nodes.base import qos, run_nodes
+from scenario_gen.nodes.base import run_nodes
 from scenario_gen.nodes.forked import say
 from scenario_gen.nodes.message_classes import message_class
+from scenario_gen.nodes.voice import qos
 
 MILESTONES = ("tracks", "map", "changepoints", "fit")
 

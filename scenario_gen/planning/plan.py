@@ -22,6 +22,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
+from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.result import Fit, FittedVehicle
@@ -124,6 +125,7 @@ def _route(task: _Task) -> Route:
     targets = Targets(anchors[weights > 0.0, :2], weights[weights > 0.0])
     curve: Curve | None = None
     for direct_allowed in (True, False):
+        stop_if_cancelled()
         guess = _joined([_leg(task, a, b, direct_allowed) for a, b in itertools.pairwise(waypoints)])
         curve = smooth(task.road, task.vehicle, anchors[0], anchors[-1], targets, guess, task.config)
         if curve.curvature <= task.config.max_curvature and not len(curve.off_road):

@@ -18,6 +18,6 @@ from scenario_gen.requests.chain import Chain
 from scenario_gen.requests.nearest import ImpossibleError, Suggestion
 from scenario_gen.requests.request import Request
 from scenario_gen.requests.run import Outcome, run_request
-from scenario_gen.requests.size import refuse_too_large
+from scenario_gen.size import refuse_too_large
 
 __all__ = ["Chain", "ImpossibleError", "Outcome", "Request", "Suggestion", "refuse_too_large", "run_request"]

@@ -23,7 +23,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
-from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.road import Road
 
 _VERGE = 2.0  # metres of kerb drawn beside a road
@@ -65,6 +65,7 @@ def draw(name: str, layout: Layout, config: RoadConfig) -> Road:
     )  # kerbs on cell edges
     high = np.array([reach["east"], reach.get("north", verge)])
     cells = np.ceil((high - low) / cell - 1e-6).astype(np.int64)
+    refuse_too_many_cells(name, int(cells[0]), int(cells[1]), config)
     x = low[0] + (np.arange(cells[0]) + 0.5) * cell
     y = low[1] + (np.arange(cells[1]) + 0.5) * cell
     drivable = np.repeat(np.abs(y)[:, None] < half, len(x), axis=1)

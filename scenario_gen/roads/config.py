@@ -16,6 +16,7 @@
 
 from dataclasses import dataclass
 
+from scenario_gen.errors import RefusedError
 from scenario_gen.parameters import check, parameter
 
 
@@ -34,8 +35,23 @@ class RoadConfig:
     )
     corridor_run_out: float = parameter(6.0, "how far a corridor goes on beyond a path's ends", unit="m", low=1.0, high=50.0)
     paper: bool = parameter(False, "straight and t_intersection as in the paper: a grid of 1000 x 1000 cells, lengths in cells")
-    max_cells: int = parameter(25_000_000, "most cells (pixels) of a map that is read", low=1, high=80_000_000)
+    max_cells: int = parameter(
+        25_000_000, "most cells of a road that is drawn, or pixels of a map that is read", low=1, high=80_000_000
+    )
     image_outside_folder: bool = parameter(False, "read also a map's image that lies outside the folder of its YAML file")
 
     def __post_init__(self) -> None:
         check(self)
+
+
+def refuse_too_many_cells(name: str, width: int, height: int, config: RoadConfig) -> None:
+    """Refuse to draw a road that would fill the memory.
+
+    Raises:
+        RefusedError: it has more than `max_cells` cells.
+    """
+    if width * height > config.max_cells:
+        raise RefusedError(
+            f"road {name} would have {width} x {height} cells, more than road.max_cells ({config.max_cells}); cut the encounter, "
+            "or set road.resolution or road.max_cells"
+        )

@@ -19,7 +19,7 @@ from PIL import Image, ImageDraw
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
-from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.road import Road
 from scenario_gen.roads.tracks import Track
 
@@ -48,6 +48,7 @@ def draw_corridor(tracks: tuple[Track, ...], config: RoadConfig) -> Road:
     everything = np.concatenate([corners.reshape(-1, 2) for corners in outlines])
     low = np.floor(everything.min(axis=0) - _BORDER)
     size = np.ceil((everything.max(axis=0) + _BORDER - low) / config.resolution).astype(int)
+    refuse_too_many_cells("corridor", int(size[0]), int(size[1]), config)
     image = Image.new("1", (int(size[0]), int(size[1])))
     brush = ImageDraw.Draw(image)
     for corners in outlines:

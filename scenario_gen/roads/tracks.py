@@ -28,6 +28,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen, wrap_angle
+from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.roads.curve import Curve
 
@@ -111,6 +112,7 @@ def _clean(encounter: Encounter, i: int) -> Track:
         return Track(encounter.vehicles[i], curve, frozen(np.zeros(len(speed))), speed, True, deviation)
     best: tuple[float, Curve, Floats, float] | None = None
     for wavelength in _WAVELENGTHS:
+        stop_if_cancelled()
         grid, smooth = smoothing_spline(claimed, position, wavelength)
         curve = Curve.through(smooth)
         progress = np.interp(claimed, grid, curve.station)

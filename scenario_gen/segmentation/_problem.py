@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
+from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.segmentation._chain import run_chain, TRACE
 from scenario_gen.segmentation._emission import joint_prior
 from scenario_gen.segmentation._merge import merge_states
@@ -127,6 +128,7 @@ class Problem:
 
     def run(self, config: "SamplerConfig", prior: Prior, labels: Ints, burn: int, keep: int, seed: int) -> tuple[Ints, Floats]:
         """Run a chain from `labels` for `burn` + `keep` sweeps; returns kept labels (keep, T') and their trace (keep, 5)."""
+        stop_if_cancelled()
         samples = np.empty((keep, len(self.v)), np.int64)
         trace = np.empty((burn + keep, len(TRACE)))
         emissions = np.empty((config.states, self.dimensions, self.v.shape[1]))

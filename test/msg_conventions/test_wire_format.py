@@ -110,6 +110,7 @@ def test_messages_without_velocities_are_read():
     from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
     message = MultiDOFJointTrajectory(joint_names=["a", "b"])
+    message.header.frame_id = "local_enu"
     for k in range(3):
         point = MultiDOFJointTrajectoryPoint(transforms=[Transform(), Transform()])
         point.transforms[1].translation.x = float(k)

@@ -15,12 +15,14 @@
 """Processes that meet on this host only: which domain, and over which devices."""
 
 from contextlib import suppress
+import fcntl
 import os
 from pathlib import Path
+import tempfile
 
 import pytest
 
-from scenario_gen.nodes.domain import free_domain, this_host_only
+from scenario_gen.nodes.domain import DOMAINS, free_domain, this_host_only
 
 
 def test_two_runs_get_two_domains():
@@ -28,6 +30,26 @@ def test_two_runs_get_two_domains():
         assert one != two
     with free_domain() as again:
         assert again == one
+
+
+def test_locks_of_other_users_are_honoured_and_never_in_the_way(monkeypatch):
+    """Those that may be read are; those that may not are passed over."""
+    own = os.geteuid()
+    with tempfile.TemporaryDirectory() as name, (Path(name) / f"scenario_gen_domain_{DOMAINS[-1]}.lock").open("w") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        Path(name).chmod(0o1777)
+        files = {domain: Path(name) / f"scenario_gen_domain_{domain}.lock" for domain in DOMAINS}
+        for domain, file in files.items():
+            file.touch()
+            file.chmod(0o444 if domain > 80 else 0o000)
+        monkeypatch.setattr(tempfile, "tempdir", name)
+        if own == 0:  # whom no file mode stops
+            os.seteuid(65534)
+        try:
+            with free_domain() as one, free_domain() as two:
+                assert one != two and {one, two} <= set(range(81, DOMAINS[-1]))
+        finally:
+            os.seteuid(own)
 
 
 def test_other_middleware_is_kept_on_this_host_by_ros_itself():

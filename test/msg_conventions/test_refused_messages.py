@@ -1,0 +1,97 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Messages that say nothing usable are refused by the name of what is wrong."""
+
+import numpy as np
+import pytest
+
+from msg_conventions import trajectory
+from msg_conventions.odometry import decode_state, encode_state
+from msg_conventions.paths import decode_path, encode_path
+from msg_conventions.roads import decode_map, decode_poses, encode_map, encode_poses
+from msg_conventions.tracks import decode_tracks
+from msg_conventions.trajectory import Trajectory
+from scenario_gen.arrays import canonical_heading
+from scenario_gen.encounter import Vehicle
+from scenario_gen.errors import InputError
+from scenario_gen.roads import build_road
+
+UNTURNED = np.array([0.0, 0.0, 0.0, 1.0]).tobytes()
+
+
+def _tracks(vehicles: int, samples: int, frame: str = "local_enu") -> bytes:
+    flat = np.zeros((vehicles, samples))
+    named = tuple(Vehicle(str(k)) for k in range(vehicles))
+    time = np.arange(samples) * 100_000_000
+    return trajectory.encode(Trajectory(7, frame, named, time, np.zeros((vehicles, samples, 2)), flat, flat, flat))
+
+
+@pytest.mark.parametrize(
+    ("vehicles", "samples", "words"),
+    [
+        (0, 0, r"tracks: joint_names is empty; at least one vehicle is needed"),
+        (0, 5, r"tracks: joint_names is empty"),
+        (2, 0, r"tracks: 0 sample\(s\); at least 2 are needed"),
+        (2, 1, r"tracks: 1 sample\(s\); at least 2 are needed"),
+        (1, 5, r"1 vehicle\(s\) and 5 sample\(s\); at least 2 of each"),
+    ],
+)
+def test_tracks_of_nobody_or_of_an_instant(vehicles, samples, words):
+    with pytest.raises(InputError, match=words):
+        decode_tracks(_tracks(vehicles, samples))
+
+
+def _messages(frame: str) -> dict[str, tuple[object, bytes]]:
+    """A decoder and a message of each kind with poses; every heading is 0."""
+    pose = np.zeros((2, 3))
+    road = build_road("straight", None)
+    object.__setattr__(road, "frame_id", frame)
+    return {
+        "tracks": (decode_tracks, _tracks(2, 3, frame)),
+        "poses": (decode_poses, encode_poses(pose, frame, 7)),
+        "path": (decode_path, encode_path(pose, np.array([7, 8]), frame, 7)),
+        "state": (decode_state, encode_state(np.zeros(4), "vehicle_a", frame, 7)),
+        "map": (decode_map, encode_map(road, 7)),
+    }
+
+
+@pytest.mark.parametrize("kind", ["tracks", "poses", "path", "state", "map"])
+def test_empty_frames_and_quaternions_of_zeros(kind):
+    decode, data = _messages("map")[kind]
+    decode(data)
+    assert UNTURNED in data
+    with pytest.raises(InputError, match=rf"{kind}.*: quaternion 0 is \(0, 0, 0, 0\), which is no rotation"):
+        decode(data.replace(UNTURNED, bytes(32)))
+    with pytest.raises(InputError, match=rf"{kind}: header\.frame_id is empty; name the frame"):
+        decode(_messages("")[kind][1])
+
+
+@pytest.mark.parametrize("frame", ["a", "ab", "abc", "abcd", "abcde", "abcdefgh"])
+def test_points_that_are_not_alike_are_read_one_by_one_to_the_same_values(frame, monkeypatch):
+    data = trajectory.encode(_moving(frame))
+    at_once = trajectory.decode(data, "tracks")
+    monkeypatch.setattr(trajectory, "MANY", 0)
+    one_by_one = trajectory.decode(data, "tracks")
+    for name in ("time_ns", "position", "heading", "speed", "acceleration"):
+        assert getattr(at_once, name).tobytes() == getattr(one_by_one, name).tobytes()
+    for name in ("time_ns", "position", "speed", "acceleration"):
+        assert getattr(at_once, name).tobytes() == getattr(_moving(frame), name).tobytes()
+
+
+def _moving(frame: str) -> Trajectory:
+    random = np.random.Generator(np.random.PCG64(3))
+    values = (canonical_heading(random.uniform(-3.0, 3.0, (3, 5))), *random.uniform(0.0, 20.0, (2, 3, 5)))
+    named = tuple(Vehicle(name) for name in ("a", "bc", "def"))
+    return Trajectory(7, frame, named, np.arange(5) * 1_500_000_000, random.uniform(-9.0, 9.0, (3, 5, 2)), *values)

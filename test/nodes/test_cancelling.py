@@ -1,0 +1,64 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Long work ends where it stands when nobody waits for it any more, and is the same when somebody does."""
+
+import threading
+
+import pytest
+
+from scenario_gen.cancelling import cancellable, CancelledError, stop_if_cancelled
+from scenario_gen.errors import ScenarioGenError
+from scenario_gen.fitting import fit_template
+from scenario_gen.logs import read_log
+from scenario_gen.nodes.worker import Worker
+from scenario_gen.planning import plan_routes
+from scenario_gen.roads import build_road
+from scenario_gen.segmentation import segment
+
+CASE = "scenario_gen/resources/synthetic_c"
+
+
+def test_every_stage_of_a_node_can_be_cancelled(request):
+    (encounter,) = read_log(request.config.rootpath / CASE).encounters
+    segmentation, road = segment(encounter), build_road("straight", encounter)
+    fit = fit_template(encounter, segmentation, road)
+    for work in (
+        lambda: segment(encounter),
+        lambda: build_road("straight", encounter),
+        lambda: fit_template(encounter, segmentation, road),
+        lambda: plan_routes(road, fit),
+    ):
+        with cancellable(lambda: True), pytest.raises(CancelledError):
+            work()
+    stop_if_cancelled()  # outside, nothing is
+
+
+def test_a_newer_job_ends_the_running_one_of_its_name_and_nobody_is_told():
+    failures, done, started = [], [], threading.Event()
+    worker = Worker(lambda name, error: failures.append((name, error)))
+
+    def endless(_):
+        started.set()
+        while True:
+            stop_if_cancelled()
+
+    worker.submit("tracks", endless)
+    assert started.wait(60.0)
+    finished = threading.Event()
+    worker.submit("tracks", lambda cancelled: (done.append(cancelled()), finished.set()))
+    assert finished.wait(60.0)
+    worker.close(60.0)
+    assert done == [False] and failures == []
+    assert issubclass(CancelledError, ScenarioGenError)
