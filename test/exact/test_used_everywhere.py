@@ -54,6 +54,7 @@ COUNTS = {  # sum() of whole numbers
     "scenario_gen/evaluation/summary.py",
     "scenario_gen/logs/budgets.py",
     "scenario_gen/logs/parquet.py",
+    "scenario_gen/nodes/evaluator.py",
     "scenario_gen/storage/bag.py",
 }
 EXEMPT = {
