@@ -202,7 +202,13 @@ def test_whatever_the_system_says_is_one_message(run, monkeypatch, error, words)
 
 def started(tmp_path, *words, **options):
     command = [sys.executable, "-m", "scenario_gen", *map(str, words)]
-    return subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, cwd=tmp_path, preexec_fn=hears_ctrl_c, **pipes, **options)  # noqa: PLW1509 - one thread
+
+
+def hears_ctrl_c():
+    """Take SIGINT as in a terminal: where a shell runs the tests in the background, it has them ignore it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
