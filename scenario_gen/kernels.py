@@ -90,10 +90,15 @@ def kernel(*argument_types: Any, inline: bool = False) -> Callable[[Function], F
         dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
         _watch(dispatcher, function)
         if not inline:
-            _registry.append((dispatcher, argument_types))
+            register(dispatcher, argument_types)
         return cast("Function", dispatcher)
 
     return decorate
+
+
+def register(compiled: Any, argument_types: Any) -> None:
+    """Have `compile_all` call `compiled.compile(argument_types)`."""
+    _registry.append((compiled, argument_types))
 
 
 def compile_all() -> tuple[int, float]:

@@ -27,12 +27,12 @@ import math
 from typing import Any, cast, overload, Protocol
 
 from llvmlite import ir
-import numba
 from numba import types
 from numba.extending import intrinsic
 import numpy as np
 
 from scenario_gen.arrays import Floats
+from scenario_gen.exact.elementwise import elementwise
 from scenario_gen.kernels import F, kernel
 
 Scalar = Callable[..., float]
@@ -221,10 +221,6 @@ TAIL_BOTTOM = (
 )
 
 
-def _ufunc(arguments: int) -> Callable[[Scalar], Scalar]:
-    return cast("Callable[[Scalar], Scalar]", numba.vectorize([F(*(F,) * arguments)], cache=True))
-
-
 @intrinsic  # type: ignore[untyped-decorator,unused-ignore]
 def _bits(_context: Any, _x: Any) -> Any:
     """The bits of a float64 as an int64."""
@@ -246,7 +242,7 @@ def _polynomial(x: float, coefficients: tuple[float, ...]) -> float:
     return value
 
 
-@_ufunc(1)
+@elementwise
 def _exp(x: float) -> float:
     y = min(max(x, -746.0), 710.0)
     shifted = y * 1.4426950408889634 + ROUNDS
@@ -263,7 +259,7 @@ def _exp(x: float) -> float:
     return x if np.isnan(x) else value
 
 
-@_ufunc(1)
+@elementwise
 def _log(x: float) -> float:
     small = x < 2.2250738585072014e-308
     b = _bits(x * 1.8014398509481984e16 if small else x)  # 2**54
@@ -314,7 +310,7 @@ def _cosine(x: float, low: float) -> float:
     return w + (((1.0 - w) - half) + (z * r - x * low))
 
 
-@_ufunc(1)
+@elementwise
 def _sin(x: float) -> float:
     high, low, n = _reduced(x)
     s, c = _sine(high, low), _cosine(high, low)
@@ -322,7 +318,7 @@ def _sin(x: float) -> float:
     return -value if n & 2 else value
 
 
-@_ufunc(1)
+@elementwise
 def _cos(x: float) -> float:
     high, low, n = _reduced(x)
     s, c = _sine(high, low), _cosine(high, low)
@@ -330,7 +326,7 @@ def _cos(x: float) -> float:
     return -value if (n + 1) & 2 else value
 
 
-@_ufunc(1)
+@elementwise
 def _tan(x: float) -> float:
     high, low, n = _reduced(x)
     s, c = _sine(high, low), _cosine(high, low)
@@ -355,12 +351,12 @@ def _arctan_of(x: float) -> float:
     return -value if x < 0.0 else value
 
 
-@_ufunc(1)
+@elementwise
 def _arctan(x: float) -> float:
     return _arctan_of(x)
 
 
-@_ufunc(2)
+@elementwise
 def _arctan2(y: float, x: float) -> float:
     if np.isnan(x) or np.isnan(y):
         return x + y
@@ -379,7 +375,7 @@ def _arctan2(y: float, x: float) -> float:
     return -value if down else value
 
 
-@_ufunc(1)
+@elementwise
 def _tanh(x: float) -> float:
     if abs(x) < 0.1:  # where the difference below would lose digits
         return x * _polynomial(x * x, TANH)
@@ -387,12 +383,12 @@ def _tanh(x: float) -> float:
     return -value if x < 0.0 else value
 
 
-@_ufunc(2)
+@elementwise
 def _hypot(x: float, y: float) -> float:
     return math.sqrt(x * x + y * y)
 
 
-@_ufunc(1)
+@elementwise
 def _lgamma(x: float) -> float:
     if not x > 0.0:
         return np.nan
@@ -403,7 +399,7 @@ def _lgamma(x: float) -> float:
     return (a - 0.5) * _log(a) - a + 0.91893853320467274178 + _polynomial(1.0 / (a * a), STIRLING) / a - _log(product)
 
 
-@_ufunc(1)
+@elementwise
 def _ndtr(x: float) -> float:
     if np.isnan(x):
         return x
@@ -420,7 +416,7 @@ def _ndtr(x: float) -> float:
     return tail if x < 0.0 else 1.0 - tail
 
 
-@_ufunc(1)
+@elementwise
 def _ndtri(p: float) -> float:
     q = p - 0.5
     if abs(q) <= 0.425:

@@ -127,7 +127,9 @@ def _part(curve: Floats, j: int, h: float, x: float) -> float:
 def _displace(node: Floats, h: float, deviation: Floats, curve: Floats, arc: Floats) -> None:
     """Clamped cubic splines through the displaced nodes (Thomas algorithm on the tangents), and their arc lengths."""
     samples, g = deviation.shape
-    cos, sin, ratio = exact.cos(node[:, 2]), exact.sin(node[:, 2]), np.empty(g)
+    cos, sin, ratio = np.empty(g), np.empty(g), np.empty(g)
+    for j in range(g):
+        cos[j], sin[j] = exact.cos(node[j, 2]), exact.sin(node[j, 2])
     for j in range(1, g - 1):
         ratio[j] = 1.0 / (4.0 - (ratio[j - 1] if j > 1 else 0.0))
     for s in range(samples):
