@@ -14,14 +14,14 @@
 
 """Compiled kernels: one decorator, explicit types, compiled once and cached on disk.
 
-Every kernel names its argument types, so nothing is ever compiled by surprise in the middle of a call.
-`compile_all` compiles (or loads from the cache) every kernel of the project; `make` runs it at installation and a
-node while it configures. Inputs are declared read-only (`F1`, `F2`, …): numba accepts writable arrays for them too,
-while the arrays of our frozen dataclasses would not match a writable declaration. Outputs are `OUT1`, `OUT2`, ….
+Every kernel names its argument types and has one compiled form, which is made (or loaded from the cache) at its first call.
+`compile_all` does so for every kernel of the project; `make` runs it at installation and a node while it configures.
+Inputs are `F1`, `I2`, …, read-only to the kernel; outputs are `OUT1`, `OUTI2`, ….
 """
 
 from collections.abc import Callable
 import importlib
+import operator
 from pathlib import Path
 import pkgutil
 from time import perf_counter
@@ -30,6 +30,9 @@ from typing import Any, cast, TypeVar
 
 import numba
 from numba import types
+from numba.core.registry import CPUDispatcher
+from numba.np.numpy_support import as_dtype
+import numpy as np
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -78,6 +81,64 @@ def _watch(dispatcher: Any, function: Callable[..., Any]) -> None:
         cache._source_stamp = _source_stamp(function, set())
 
 
+def _input(name: str, declared: types.Array) -> Callable[[Any], Any]:
+    """Return what makes an array argument the declared one; it is copied if it is not contiguous."""
+    dtype, ndim = as_dtype(declared.dtype), declared.ndim
+
+    def take(value: Any) -> Any:
+        array = np.ascontiguousarray(value)
+        if array.dtype is not dtype and array.dtype != dtype:
+            array = array.astype(dtype, casting="safe")
+        if array.ndim != ndim:
+            raise TypeError(f"{name}: an array of {array.ndim} dimensions was given, {ndim} are declared")
+        return array
+
+    return take
+
+
+def _output(name: str, declared: types.Array) -> Callable[[Any], Any]:
+    """Return what passes an output on; a copy of one would be lost."""
+    dtype, ndim = as_dtype(declared.dtype), declared.ndim
+
+    def take(array: Any) -> Any:
+        if array.dtype != dtype or array.ndim != ndim or not (array.flags.c_contiguous and array.flags.writeable):
+            raise TypeError(f"{name}: an output must be a writable, contiguous array of {ndim} dimensions of {dtype}")
+        return array
+
+    return take
+
+
+def _argument(name: str, declared: Any) -> Callable[[Any], Any]:
+    if isinstance(declared, types.Array):
+        return _output(name, declared) if declared.mutable else _input(name, declared)
+    return operator.index if declared == I else bool if declared == B else float
+
+
+class Kernel(CPUDispatcher):  # type: ignore[misc]
+    """A function with one compiled form, to Python and to the kernels that call it.
+
+    numba's own dispatcher compiles another form for every mixture of read-only and writable arrays that it is given.
+    """
+
+    def __init__(self, function: Callable[..., Any], declared: tuple[Any, ...]) -> None:
+        super().__init__(function, targetoptions={"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": None})
+        self._declared = declared
+        self._arguments = tuple(_argument(function.__name__, each) for each in declared)
+        self._compiled: Callable[..., Any] | None = None
+        self.enable_caching()
+
+    def compile(self, _types: Any = None) -> Any:
+        """Make or load the declared form, whatever is asked for; calls from other kernels come here, too."""
+        entry = super().compile(self._declared)
+        self._compiled = entry
+        return entry
+
+    def __call__(self, *values: Any) -> Any:
+        """Call the compiled form."""
+        compiled = self._compiled or self.compile()
+        return compiled(*[take(value) for take, value in zip(self._arguments, values, strict=True)])
+
+
 def kernel(*argument_types: Any, inline: bool = False) -> Callable[[Function], Function]:
     """Compile a function with numba: cached, without the GIL, IEEE arithmetic (no fastmath: same bytes everywhere).
 
@@ -87,10 +148,12 @@ def kernel(*argument_types: Any, inline: bool = False) -> Callable[[Function], F
     """
 
     def decorate(function: Function) -> Function:
-        dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-        _watch(dispatcher, function)
-        if not inline:
+        if inline:
+            dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+        else:
+            dispatcher = Kernel(function, argument_types)
             register(dispatcher, argument_types)
+        _watch(dispatcher, function)
         return cast("Function", dispatcher)
 
     return decorate

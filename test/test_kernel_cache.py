@@ -12,11 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Kernels are compiled again when a kernel that they call, in another file, has changed."""
+"""A kernel has one compiled form, which is made again when a kernel that it calls, in another file, has changed."""
 
 from pathlib import Path
 import subprocess
 import sys
+
+import numpy as np
+import pytest
+
+from scenario_gen.kernels import F, F2, I, kernel, OUT1
 
 HELPER = """
 from scenario_gen.kernels import kernel
@@ -57,3 +62,48 @@ def test_a_cached_kernel_follows_the_kernels_it_calls(tmp_path):
     assert list(tmp_path.rglob("*.nbi")), "nothing was cached, so nothing is tested"
     (tmp_path / "helper.py").write_text(HELPER.format(value="0.25"))
     assert result(tmp_path) == 0.5
+
+
+@kernel(F2, F, I, OUT1)
+def add_rows(table: np.ndarray, factor: float, first: int, out: np.ndarray) -> None:
+    """Put factor times the sum of the rows from `first` on into `out`."""
+    out[:] = 0.0
+    for k in range(first, table.shape[0]):
+        out += factor * table[k]
+
+
+@kernel(F2, OUT1)
+def add_all_rows(table: np.ndarray, out: np.ndarray) -> None:
+    """Call a kernel with what is writable where read-only is declared."""
+    copy = table.copy()
+    add_rows(copy, 1.0, 0, out)
+
+
+def test_all_that_is_given_meets_one_compiled_form():
+    table, out = np.arange(6.0).reshape(3, 2), np.empty(2)
+    locked = table.copy()
+    locked.flags.writeable = False
+    for given in (table, locked, np.asfortranarray(table), table[:, ::-1][:, ::-1], table.astype(np.int32), table.tolist()):
+        add_rows(given, 2, np.int64(1), out)
+        np.testing.assert_array_equal(out, [12.0, 16.0])
+    add_all_rows(table, out)
+    np.testing.assert_array_equal(out, [6.0, 9.0])
+    assert len(add_rows.signatures) == len(add_all_rows.signatures) == 1
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        (np.zeros((2, 2)), 1.0, 0, np.zeros(4)[::2]),
+        (np.zeros((2, 2)), 1.0, 0, np.zeros(2, dtype=int)),
+        (np.zeros(2), 1.0, 0, np.zeros(2)),
+        (np.zeros((2, 2), dtype=complex), 1.0, 0, np.zeros(2)),
+        (np.zeros((2, 2)), 1.0, 0.5, np.zeros(2)),
+        (np.zeros((2, 2)), "a", 0, np.zeros(2)),
+        (np.zeros((2, 2)), 1.0, 0),
+    ],
+    ids=["a view as output", "an output of integers", "a dimension less", "complex", "half an index", "a word", "too few"],
+)
+def test_what_a_kernel_cannot_take_is_refused(given):
+    with pytest.raises((TypeError, ValueError)):
+        add_rows(*given)
