@@ -137,7 +137,7 @@ def test_long_work_says_how_far_it_is_lets_others_be_served_and_can_be_cancelled
     running = _generate(client, wait=False, count=20_000)
     waiting = _generate(client, wait=False, count=2, seed=3)
     name = "/gp_sampler: progress"
-    client.until(lambda: any(s.name == name and "of 20000" in s.message for s in _said(client)), "progress")
+    client.until(lambda: any(s.name == name and s.values.get("requested") == "20000" for s in _said(client)), "progress")
     assert client.call(ListParameters, "/gp_sampler/list_parameters", ListParameters.Request()).result.names
     assert client.call(GetMap, "/road_server/get_map", GetMap.Request()).map.data
     client.call(GetPlan, "/planner/get_plan", GetPlan.Request())
