@@ -36,7 +36,7 @@ from scenario_gen.nodes.health import Health
 from scenario_gen.nodes.inputs import take_tracks
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.ros_parameters import ConfigParameters
-from scenario_gen.nodes.usage import asks_for_help, help_of, namespaces
+from scenario_gen.nodes.usage import asks_for_help, help_of, namespaces, show
 from scenario_gen.nodes.voice import qos, Voice
 from scenario_gen.nodes.worker import Job, Worker
 
@@ -236,7 +236,7 @@ def run_nodes(make: Maker | Sequence[Maker], arguments: Sequence[str] | None = N
     """Spin one node (or one of each) per `--namespace` until Ctrl-C, SIGTERM, shutdown, or all are done; return the exit code."""
     arguments = sys.argv if arguments is None else arguments
     if asks_for_help(arguments):
-        print(help_of(Path(arguments[0]).name, (make,) if callable(make) else make))
+        show(help_of(Path(arguments[0]).name, (make,) if callable(make) else make))
         return 0
     where = namespaces(arguments)
     for number in (signal.SIGINT, signal.SIGTERM):
