@@ -126,6 +126,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
                 return callback(request, response)
             except Exception as error:
                 self.failed(name, error)
+                self.health.settle(name)
                 return response
 
         self.create_service(kind, name, guarded, qos_profile=REQUESTS)

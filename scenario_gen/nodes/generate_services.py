@@ -56,7 +56,7 @@ class GenerateServices:
             config, messages = self._config_of(asked)
             opened.wanted = config.count
         except ScenarioGenError as error:
-            self._requests.end(opened, Level.ERROR, str(error))
+            self._requests.end(opened, Level.ERROR, str(error), error=type(error).__name__)
             response.result.reason = f"request {opened.name}: {error}"
             return response
 

@@ -25,7 +25,6 @@ from msg_conventions.diagnostics import Level
 from msg_conventions.names import tokens
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.errors import ScenarioGenError
 from scenario_gen.nodes.base import run_nodes, StageNode
 from scenario_gen.nodes.generate_services import GenerateServices
 from scenario_gen.nodes.inputs import Inputs, stamp_of
@@ -103,7 +102,7 @@ class GpSampler(StageNode):
         self, messages: Mapping[str, bytes], request: OpenRequest, config: Config, cancelled: Callable[[], bool]
     ) -> Answer | None:
         """Sample, check and publish; the request's account closes `scenarios/info`. None if it was cancelled."""
-        level, words = Level.WARN, "cancelled"
+        level, words, more = Level.WARN, "cancelled", dict[str, str]()
         try:
             if cancelled():
                 return None
@@ -116,11 +115,12 @@ class GpSampler(StageNode):
                 self.send(topic, data)
             level, words = answer.closing.level, answer.closing.message
             return answer
-        except ScenarioGenError as error:
-            level, words = (level, words) if cancelled() else (Level.ERROR, str(error))
+        except Exception as error:
+            if not cancelled():
+                level, words, more = Level.ERROR, str(error), {"error": type(error).__name__}
             raise
         finally:
-            self._requests.end(request, level, words)
+            self._requests.end(request, level, words, **more)
 
 
 def main() -> None:

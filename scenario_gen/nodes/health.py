@@ -71,6 +71,7 @@ class Health:
         self._state: Status | None = None  # of nodes that have any
         self._news: dict[str, list[str]] = {}  # what was found since the last message, by name
         self._left, self._refilled = AT_ONCE, monotonic()
+        self._due = False  # the regular message is being made
         quality = qos(topic_entry("/diagnostics")[1])
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", quality)
         node.create_timer(PERIOD, self._again, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -80,6 +81,7 @@ class Health:
         with self._one_at_a_time:
             self._listening = to_work
             self._kept.clear()
+            self._news.clear()
 
     def state(self, message: str, **values: str) -> None:
         """Say in which state the node is; values that only tell how far something is wait for the next second."""
@@ -170,14 +172,16 @@ class Health:
     def _now(self) -> None:
         if monotonic() - self._refilled >= PERIOD:
             self._left, self._refilled = AT_ONCE, monotonic()
-        if self._left > 0:
+        if self._left > 0 and not self._due:
             self._left -= 1
             self._publish()
 
     def _again(self) -> None:
         """End what is over and was shown long enough; say all."""
+        self._due = True
         self._before()
         with self._one_at_a_time:
+            self._due = False
             now = monotonic()
             for name, kept in self._kept.items():
                 if kept.over and now - kept.since >= HOLD:
@@ -189,7 +193,7 @@ class Health:
         """Publish all; findings of one name that no message has said yet are said beside the newest."""
         statuses = [self._state] if self._state else []
         for name, kept in self._kept.items():
-            also = {f"also.{k}": message for k, message in enumerate(self._news.get(name, ())[:-1])}
+            also = {f"also.{k}": message for k, message in enumerate(self._news.get(name, [])[: -1 if kept.bad else None])}
             statuses.append(bounded(replace(kept.status, values={**kept.status.values, **also})) if also else kept.status)
         self._news.clear()
         publish(self._node, self._publisher, encode_diagnostics(statuses, self._node.get_clock().now().nanoseconds))

@@ -130,6 +130,8 @@ class LiveStreams:
         """Hand over what is buffered; return whether there was anything."""
         log = self._streams.take("live")
         if log is not None:
+            for topic in self._topics:
+                self._node.health.settle(topic)  # whatever was wrong with its messages, no more of them are to come
             self._ended(log, self._streams.config)
         return log is not None
 

@@ -93,11 +93,11 @@ class OpenRequests:
         request.said = (0, request.began)
         self.tell()
 
-    def end(self, request: OpenRequest, level: Level, message: str) -> None:
-        """It is done, cancelled or refused."""
+    def end(self, request: OpenRequest, level: Level, message: str, **more: str) -> None:
+        """It is done, cancelled or refused; `more` is said on /diagnostics beside how far it came."""
         with self._one_at_a_time:
             self._open.pop(request.name, None)
-        self._node.status(level, f"request {request.name}: {message}", "generate", request.stamp_ns, **request.values())
+        self._node.status(level, f"request {request.name}: {message}", "generate", request.stamp_ns, **request.values(), **more)
         self._node.health.settle("generate")
         self.tell()
 
@@ -126,7 +126,7 @@ class OpenRequests:
         words = f"{running.accepted} of {running.wanted} scenarios from {running.candidates} candidates"
         message = f"request {running.name}: {words}, {running.seconds():.0f} s"
         tenths, now = 10 * running.accepted // max(running.wanted, 1), monotonic()
-        farther = now - running.said[1] >= 1.0 and tenths > running.said[0]
+        farther = now - running.said[1] >= 1.0 and running.said[0] < tenths < 10
         log = farther or now - running.said[1] >= SILENCE
         if log:
             running.said = (tenths, now)

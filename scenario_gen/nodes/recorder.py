@@ -100,9 +100,8 @@ class Recorder(Node):  # type: ignore[misc]
         self.create_service(Trigger, "~/start", self._start_service)
         self.create_service(Trigger, "~/stop", self._stop_service)
         self.create_timer(0.1, self._look_around)
-        self.health = Health(self)
+        self.health = Health(self, self._tell_counts)
         self._say(Level.OK, "nothing is being recorded")
-        self.create_timer(0.5, self._tell_counts)
 
     def autostart(self) -> None:
         """Begin the bag that the parameter names."""

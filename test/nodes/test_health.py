@@ -71,7 +71,12 @@ def reporter(domain: int, client: Client) -> Iterator[Reporter]:
 
 
 def test_all_is_said_every_second_stamped_now(reporter: Reporter):
-    before = time.time_ns()
+    from diagnostic_msgs.msg import DiagnosticArray
+    from rclpy.qos import QoSPresetProfiles
+
+    before, aggregated = time.time_ns(), []
+    quality = QoSPresetProfiles.SYSTEM_DEFAULT.value  # diagnostic_aggregator's
+    reporter.client.node.create_subscription(DiagnosticArray, "/diagnostics", aggregated.append, quality)
     reporter.health.say(Level.OK, "a road", "road", {"cells": "7"}, 5_000_000_006, log=False)
     reporter.health.say(Level.WARN, "moved", "fit of 1", {}, log=False)
     reporter.until(lambda: {"road", "fit of 1"} <= set(reporter.newest()), "both at once")
@@ -83,6 +88,8 @@ def test_all_is_said_every_second_stamped_now(reporter: Reporter):
         assert template_of(statuses["road"], stamp) == 5_000_000_006
         assert template_of(statuses["fit of 1"], stamp) == stamp
         assert {status.name.partition(":")[0] for status in statuses.values()} == {NODE}
+    reporter.until(lambda: aggregated, "what an aggregator hears")
+    assert all(message.header.stamp.sec > 0 for message in aggregated), "it warns of messages without a stamp"
 
 
 def test_what_is_over_goes_back_to_ok_when_it_was_seen(reporter: Reporter):
