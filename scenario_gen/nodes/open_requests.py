@@ -27,7 +27,7 @@ from scenario_gen.errors import InputError
 
 SHOWN = 20  # waiting requests that are named
 SILENCE = 10.0  # seconds after which a line on the terminal says how far a request is, though it is hardly farther
-NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]{0,63}")
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
 
 
 @dataclass
