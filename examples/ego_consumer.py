@@ -157,7 +157,7 @@ class EgoConsumer(Node):
         yaw = [2.0 * math.atan2(pose.orientation.z, pose.orientation.w) for pose in poses]
         plan = np.array([(pose.position.x, pose.position.y, angle) for pose, angle in zip(poses, yaw, strict=True)])
         if len(plan) < 2:
-            self._tell(message, number, DiagnosticStatus.ERROR, "there is no plan; /diagnostics says why", {})
+            self._tell(message, number, DiagnosticStatus.ERROR, "there is no plan; planner/explain says why", {})
             return
         crashes, least = self.driver.drive(plan, traffic.sizes[at], traffic)
         level = DiagnosticStatus.ERROR if crashes else DiagnosticStatus.OK

@@ -14,13 +14,13 @@
 
 """Reports ⇄ diagnostic_msgs/DiagnosticArray: key-values with full node names, one status per subject.
 
-Used for `scenarios/info` (one per scenario, then one per request) and `/diagnostics`. `header.stamp` is the template's.
-QoS: reliable, transient_local; `scenarios/info` depth 1000, the others 10.
+Used for `scenarios/info` (one per scenario, then one per request), `report` and `/diagnostics`. `header.stamp` is the template's,
+but on /diagnostics the time of the message: there what is said of a template bears its stamp as the value `template_stamp`.
 """
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from itertools import islice
 import json
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from scenario_gen.fitting.result import Fit
 
 TYPE = "diagnostic_msgs/msg/DiagnosticArray"
+TEMPLATE = "template_stamp"
 
 
 class Level(IntEnum):
@@ -90,6 +91,23 @@ def decode_diagnostics(data: bytes, what: str = "diagnostics") -> tuple[int, tup
             values[key] = reader.string()
         statuses.append(Status(name, Level(min(level, Level.STALE)), message, values))
     return stamp_ns, tuple(statuses)
+
+
+def written(stamp_ns: int) -> str:
+    """Return a stamp as seconds and nine digits behind the point."""
+    return f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
+
+
+def of_template(status: Status, stamp_ns: int) -> Status:
+    """Return a status that says as the value `template_stamp` which template it is about."""
+    return replace(status, values={**status.values, TEMPLATE: written(stamp_ns)})
+
+
+def template_of(status: Status, stamp_ns: int) -> int:
+    """Return the stamp [ns] of the template that a status is about; `stamp_ns`, its message's, where it does not say."""
+    seconds, point, rest = status.values.get(TEMPLATE, "").partition(".")
+    told = point and len(rest) == 9 and (seconds + rest).isascii() and (seconds + rest).isdecimal() and len(seconds) < 20
+    return int(seconds + rest) if told else stamp_ns
 
 
 def states_text(scenario: Scenario, at: int) -> str:

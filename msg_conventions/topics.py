@@ -58,7 +58,8 @@ TOPICS: dict[str, tuple[str, Quality]] = {
     "scenarios/info": (diagnostics.TYPE, MANY),
     "markers": (pictures.MARKERS_TYPE, LATCHED),
     "report": (diagnostics.TYPE, LATCHED),
-    "diagnostics": (diagnostics.TYPE, Quality(depth=100)),
+    "diagnostics": (diagnostics.TYPE, Quality(depth=100)),  # of a bag written in process: one message, which is latched
+    "/diagnostics": (diagnostics.TYPE, Quality(depth=100, transient_local=False)),  # all is said again every second
 }
 
 

@@ -355,7 +355,7 @@ def run_all(
             for road in roads:
                 task = bar.add_task(printable(f"{template.name} on {Path(road).stem}"), total=count)
 
-                def advance(done: int, total: int, task: TaskID = task) -> None:
+                def advance(done: int, total: int, _candidates: int, task: TaskID = task) -> None:
                     bar.update(task, completed=done, total=total)
 
                 try:

@@ -45,7 +45,7 @@ from scenario_gen.segmentation import segment, Segmentation, SegmentationConfig
 from scenario_gen.storage import BagConfig
 from scenario_gen.validity import Limits
 
-Progress = Callable[[int, int], None]
+Progress = Callable[[int, int, int], None]
 
 
 @dataclass(frozen=True)

@@ -134,7 +134,7 @@ def write_regenerated(made: Regenerated, folder: Path, inputs: Sequence[Path] = 
     """
     with AtomicBag(folder, REGENERATED, inputs) as bag:
         for message in made.messages:
-            bag.add_topic(message.topic, message.type, qos_yaml(topic_entry(message.topic)[1]))
+            bag.add_topic(message.topic, message.type, qos_yaml(topic_entry(message.topic.lstrip("/"))[1]))
             bag.write(message.topic, message.data, message.stamp_ns)
     return folder
 

@@ -26,7 +26,7 @@ import numpy as np
 
 from msg_conventions.cdr import CdrReader
 from msg_conventions.changepoints import decode_changepoints, decode_posterior
-from msg_conventions.diagnostics import decode_diagnostics
+from msg_conventions.diagnostics import decode_diagnostics, TEMPLATE, template_of
 from msg_conventions.fits import anchor_stamps, decode_fit
 from msg_conventions.names import tokens
 from msg_conventions.paths import decode_route
@@ -47,7 +47,7 @@ REFUSED = "refused."
 
 
 def told_values(messages: Sequence[bytes], stamp_ns: int, nodes: str = "/") -> dict[str, Values]:
-    """Return the key-values of diagnostics that bear the stamp, by subject ("/planner: fit" is "fit"); the last word counts.
+    """Return the key-values of diagnostics about one template, by subject ("/planner: fit" is "fit"); the last word counts.
 
     Args:
         messages: of /diagnostics or `scenarios/info`.
@@ -60,8 +60,10 @@ def told_values(messages: Sequence[bytes], stamp_ns: int, nodes: str = "/") -> d
             stamp, statuses = decode_diagnostics(data)
         except InputError:
             continue
-        if stamp == stamp_ns:
-            found |= {s.name.partition(": ")[2]: s.values for s in statuses if s.name.startswith(nodes)}
+        for status in statuses:
+            if template_of(status, stamp) == stamp_ns and status.name.startswith(nodes):
+                values = {key: value for key, value in status.values.items() if key != TEMPLATE}
+                found[status.name.partition(": ")[2]] = values
     return found
 
 

@@ -18,7 +18,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 import signal
 import sys
-import traceback
 from typing import Any
 
 import rclpy
@@ -27,16 +26,17 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.qos import QoSProfile
 
-from msg_conventions.diagnostics import encode_diagnostics, Level, Status
+from msg_conventions.diagnostics import Level, Status
 from msg_conventions.topics import LATCHED, Quality, topic_entry
 from scenario_gen.errors import ScenarioGenError, tell
 from scenario_gen.interrupts import interrupt
 from scenario_gen.nodes.answering import Answers
 from scenario_gen.nodes.compiling import compile_kernels
+from scenario_gen.nodes.health import Health
 from scenario_gen.nodes.inputs import take_tracks
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.ros_parameters import ConfigParameters
-from scenario_gen.nodes.usage import asks_for_help, help_of, namespaces
+from scenario_gen.nodes.usage import asks_for_help, help_of, namespaces, show
 from scenario_gen.nodes.voice import qos, Voice
 from scenario_gen.nodes.worker import Job, Worker
 
@@ -58,6 +58,8 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         self._together = ReentrantCallbackGroup()
         super().__init__(name, namespace=namespace)
         self.voice = Voice(self)
+        self.health = Health(self, self.ticked, listening=False)
+        self.health.state("unconfigured")
         self._inputs: dict[str, Any] = {}
         self._heard: dict[str, tuple[bytes, Any]] = {}
         self._worker: Worker | None = None
@@ -110,6 +112,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         if topic in self._inputs:
             self.destroy_subscription(self._inputs.pop(topic))
             self._heard.pop(topic, None)
+            self.health.settle(topic)
 
     def send(self, topic: str, data: bytes) -> None:
         """Publish the CDR bytes of a topic of the suite, if the node is active."""
@@ -123,6 +126,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
                 return callback(request, response)
             except Exception as error:
                 self.failed(name, error)
+                self.health.settle(name)
                 return response
 
         self.create_service(kind, name, guarded, qos_profile=REQUESTS)
@@ -132,39 +136,46 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         if self._worker is not None:
             self._worker.submit(name, job)
 
-    def cancel(self) -> list[str]:
-        """Cancel all jobs; return their names."""
-        return self._worker.cancel() if self._worker is not None else []
+    def cancel(self, only: str | None = None) -> list[str]:
+        """Cancel all jobs, or those of one name; return their names."""
+        return self._worker.cancel(only) if self._worker is not None else []
 
     def report(self, *statuses: Status, stamp_ns: int = 0) -> None:
-        """Publish statuses on /diagnostics."""
-        self.send("/diagnostics", encode_diagnostics(statuses, stamp_ns))
+        """Say statuses on /diagnostics, until others about the same are said."""
+        self.health.report(*statuses, stamp_ns=stamp_ns)
 
     def status(self, level: Level, message: str, subject: str = "status", stamp_ns: int = 0, **values: str) -> None:
-        """Publish one status on /diagnostics and log it; a job that was left behind ends here, before it is logged."""
-        self.report(Status(f"{self.get_fully_qualified_name()}: {subject}", level, message, values), stamp_ns=stamp_ns)
-        if level is Level.OK:  # a call of its own for each severity: rclpy refuses to change it between calls from one line
-            self.get_logger().info(message)
-        elif level is Level.WARN:
-            self.get_logger().warning(message)
-        else:
-            self.get_logger().error(message)
+        """Say one status on /diagnostics and log it; a job that was left behind ends here, before it is logged."""
+        self.health.say(level, message, subject, values, stamp_ns)
+
+    def failed(self, name: str, error: BaseException) -> None:
+        """Say on /diagnostics that something went wrong; the node lives on."""
+        self.health.failed(name, error)
+
+    def ticked(self) -> None:
+        """Bring up to date, each second, what /diagnostics says of the work that goes on."""
+        if self._worker is not None:
+            self.health.state("active", **self._worker.account())
 
     # --- lifecycle --------------------------------------------------------------------------------------------
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Compile the kernels, or load them from the cache, and announce the outputs."""
         if self.STAGES:
+            self.health.state("configuring: kernels are loaded, or compiled")
             count, seconds = compile_kernels(self.STAGES)
             self.get_logger().info(f"{count} kernels ready after {seconds:.1f} s")
-        for topic in ("/diagnostics", *self.OUTPUTS):
+        for topic in self.OUTPUTS:
             self.voice.announce(topic)
+        self.health.state("inactive")
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Subscribe to the inputs."""
-        self._worker = Worker(self.failed, self.get_name())
+        self._worker = Worker(self.failed, self.get_name(), self.health.settle)
         self.voice.begin()
+        self.health.listen(to_work=True)
+        self.health.state("active")
         for topic in self.INPUTS:
             self.listen(topic)
         self.started()
@@ -178,6 +189,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Withdraw what was published."""
         self.voice.withdraw()
+        self.health.state("unconfigured")
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -187,12 +199,14 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     def _stop(self) -> None:
         self.voice.silence()
+        self.health.listen(to_work=False)
         for topic in list(self._inputs):
             self.ignore(topic)
         if self._worker is not None:
             self._worker.close()
             self._worker = None
             self.stopped()
+            self.health.state("inactive")
 
     def destroy_node(self) -> None:
         """End the work, then the node."""
@@ -211,17 +225,9 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             if topic == "tracks":
                 take_tracks(data)
             self.received(topic, data)
+            self.health.settle(topic)
         except Exception as error:
             self.failed(topic, error)
-
-    def failed(self, name: str, error: BaseException) -> None:
-        """Say on /diagnostics that something went wrong; the node lives on."""
-        if not self.context.ok():
-            return
-        if not isinstance(error, ScenarioGenError):
-            self.get_logger().error("".join(traceback.format_exception(error)))
-        kind = type(error).__name__
-        self.status(Level.ERROR, str(error) if isinstance(error, ScenarioGenError) else f"{kind}: {error}", name, error=kind)
 
 
 Maker = Callable[[str | None], Any]
@@ -231,7 +237,7 @@ def run_nodes(make: Maker | Sequence[Maker], arguments: Sequence[str] | None = N
     """Spin one node (or one of each) per `--namespace` until Ctrl-C, SIGTERM, shutdown, or all are done; return the exit code."""
     arguments = sys.argv if arguments is None else arguments
     if asks_for_help(arguments):
-        print(help_of(Path(arguments[0]).name, (make,) if callable(make) else make))
+        show(help_of(Path(arguments[0]).name, (make,) if callable(make) else make))
         return 0
     where = namespaces(arguments)
     for number in (signal.SIGINT, signal.SIGTERM):

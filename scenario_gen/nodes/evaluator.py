@@ -124,7 +124,7 @@ class Evaluator(StageNode):
         if closing is None and request not in self._cut:  # more of it is to come
             self._cut.append(request)
         words = f"request {request} is not evaluated: {missing} of its scenarios did not come; see keep and wait"
-        self.status(Level.WARN, words, f"request {request}")
+        self.status(Level.WARN, words, "requests", request=request)
 
     def _submit(self, messages: Mapping[str, bytes], scenarios: Told, status: Status) -> None:
         name = f"request {status.values['request']}"
@@ -155,6 +155,7 @@ class Evaluator(StageNode):
             values = {"request": status.values["request"], "samples": str(row.samples), **figures}
             statuses.append(Status(f"{self.get_fully_qualified_name()}: {row.name}", Level.OK, "; ".join(row.notes), values))
         self.send("report", encode_diagnostics(statuses, encounter.start_ns))
+        self.health.settle("requests")
         self.get_logger().info(f"request {status.values['request']} evaluated: {len(decoded)} scenarios")
 
 

@@ -14,26 +14,21 @@
 
 """gp_sampler: road, tracks, changepoints, fit and routes of one template in; checked `scenarios` and their `scenarios/info` out.
 
-It generates when the inputs are complete, and on `~/generate`, whose parameters are the node's own, valid for that call only.
+It generates when the inputs are complete, and on `~/generate`, whose parameters are the node's own, valid for that call only, and
+`request`, the caller's name for it. /diagnostics says how far it is; `~/cancel_request` ends one, `~/cancel` all.
 """
 
 from collections.abc import Callable, Mapping
-from functools import partial
-from itertools import count
 import sys
-
-from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.task import Future
-from std_srvs.srv import Trigger
 
 from msg_conventions.diagnostics import Level
 from msg_conventions.names import tokens
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.errors import RefusedError, ScenarioGenError
-from scenario_gen.nodes.base import REQUESTS, run_nodes, StageNode
+from scenario_gen.nodes.base import run_nodes, StageNode
+from scenario_gen.nodes.generate_services import GenerateServices
 from scenario_gen.nodes.inputs import Inputs, stamp_of
-from scenario_gen.nodes.ros_parameters import values_of_call
+from scenario_gen.nodes.open_requests import OpenRequest, OpenRequests
 from scenario_gen.nodes.sample_messages import sample_messages
 from scenario_gen.nodes.sample_request import Answer, answer_request, Config
 
@@ -52,13 +47,17 @@ class GpSampler(StageNode):
         paired = ("tracks", "changepoints", "fit", *(("map",) if self.config.pair_map else ()))
         self._seen = Inputs(paired, () if self.config.pair_map else ("map",))
         self._routes: set[str] = set()
-        self._requests = map(str, count(1))
-        self.create_service(SetParametersAtomically, "~/generate", self._generate_for_caller, qos_profile=REQUESTS)
-        self.serve(Trigger, "~/cancel", self._cancel)
+        self._requests = OpenRequests(self, self.cancel)
+        GenerateServices(self, self._requests)
 
     def stopped(self) -> None:
         """Forget the inputs: being latched, they come again."""
         self._seen.clear()
+
+    def ticked(self) -> None:
+        """Say how far the request at work is."""
+        super().ticked()
+        self._requests.tell()
 
     def received(self, topic: str, data: bytes) -> None:
         """Generate when everything is there."""
@@ -66,16 +65,16 @@ class GpSampler(StageNode):
         if topic == "tracks":
             self._follow(data)
         config = self.config
-        if config.generate_on_input and (topic not in ENDS or config.moves) and not self._missing(config):
-            messages = self._messages()
-            self.work("inputs", lambda cancelled: self._generate(messages, next(self._requests), config, cancelled))
+        if config.generate_on_input and (topic not in ENDS or config.moves) and not self.missing(config):
+            messages = self.messages()
+            self.work("inputs", lambda cancelled: self._generate_on_input(messages, config, cancelled))
 
-    def _missing(self, config: Config) -> list[str]:
+    def missing(self, config: Config) -> list[str]:
         """The topics that a request still waits for."""
         ends = ENDS if config.moves and config.pair_map else ()
-        return self._seen.missing() or [topic for topic in ends if topic not in self._messages()]
+        return self._seen.missing() or [topic for topic in ends if topic not in self.messages()]
 
-    def _messages(self) -> dict[str, bytes]:
+    def messages(self) -> dict[str, bytes]:
         """The template's messages; entries and exits only if they are those of its road."""
         messages = self._seen.complete() or {}
         for topic in ENDS:
@@ -95,68 +94,33 @@ class GpSampler(StageNode):
         for topic in sorted(wanted):
             self.listen(topic)
 
-    def _generate(
-        self, messages: Mapping[str, bytes], request: str, config: Config, cancelled: Callable[[], bool]
+    def _generate_on_input(self, messages: Mapping[str, bytes], config: Config, cancelled: Callable[[], bool]) -> None:
+        if not cancelled():
+            self.generate(messages, self._requests.add(job="inputs", wanted=config.count), config, cancelled)
+
+    def generate(
+        self, messages: Mapping[str, bytes], request: OpenRequest, config: Config, cancelled: Callable[[], bool]
     ) -> Answer | None:
         """Sample, check and publish; the request's account closes `scenarios/info`. None if it was cancelled."""
-        if cancelled():
-            return None
-        node = self.get_fully_qualified_name()
-        answer = answer_request(messages, config, request, node, partial(self._progress, request), cancelled)
-        stamp = answer.template.encounter.start_ns
-        if cancelled():
-            self.status(Level.WARN, f"request {request} was cancelled", f"request {request}", stamp)
-            return None
-        for topic, data in sample_messages(answer.template.encounter, answer.asked, answer.result, answer.closing, node):
-            self.send(topic, data)
-        self.status(answer.closing.level, answer.closing.message, f"request {request}", stamp)
-        return answer
-
-    def _progress(self, request: str, done: int, total: int, stamp_ns: int) -> None:
-        if done == total or done % max(1, total // 10) == 0:
-            self.status(Level.OK, f"request {request}: {done} of {total}", "progress", stamp_ns)
-
-    async def _generate_for_caller(
-        self, request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
-    ) -> SetParametersAtomically.Response:
-        """Generate with the caller's parameters; the answer comes when the set is done."""
-        name, answer, executor = next(self._requests), Future(), self.executor
+        level, words, more = Level.WARN, "cancelled", dict[str, str]()
         try:
-            config, messages = self._config_of(request)
-        except ScenarioGenError as error:
-            response.result.reason = f"request {name}: {error}"
-            return response
-
-        def job(cancelled: Callable[[], bool]) -> None:
-            try:
-                made = self._generate(messages, name, config, cancelled)
-                message = made.closing.message if made else "cancelled"
-                answer.set_result((bool(made and made.result.scenarios), message))
-            except ScenarioGenError as error:
-                answer.set_result((False, str(error)))
-            except Exception as error:
-                answer.set_result((False, f"{type(error).__name__}: {error}"))
-                raise
-            finally:
-                executor.wake()
-
-        self.work(f"request {name}", job)
-        response.result.successful, reason = await answer
-        response.result.reason = f"request {name}: {reason}"
-        return response
-
-    def _config_of(self, request: SetParametersAtomically.Request) -> tuple[Config, Mapping[str, bytes]]:
-        if not self.active:
-            raise RefusedError("the node is not active; activate it first")
-        config: Config = values_of_call(self.config, request.parameters)
-        if missing := self._missing(config):
-            raise RefusedError(f"nothing to generate from yet: waiting for {', '.join(missing)}")
-        return config, self._messages()
-
-    def _cancel(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        names = self.cancel()
-        response.success, response.message = bool(names), f"cancelled: {', '.join(names)}" if names else "nothing is running"
-        return response
+            if cancelled():
+                return None
+            self._requests.begin(request)
+            node = self.get_fully_qualified_name()
+            answer = answer_request(messages, config, request.name, node, request.progress, cancelled)
+            if cancelled():
+                return None
+            for topic, data in sample_messages(answer.template.encounter, answer.asked, answer.result, answer.closing, node):
+                self.send(topic, data)
+            level, words = answer.closing.level, answer.closing.message
+            return answer
+        except Exception as error:
+            if not cancelled():
+                level, words, more = Level.ERROR, str(error), {"error": type(error).__name__}
+            raise
+        finally:
+            self._requests.end(request, level, words, **more)
 
 
 def main() -> None:

@@ -68,10 +68,16 @@ class LiveStreams:
         self._streams = Streams(log, config.late)
         self._heard = monotonic()
         self._topics: dict[str, tuple[str, str]] = {}  # full name -> vehicle, kind
+        self._left_out: set[str] = set()  # of them
         self._timer = node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _look(self) -> None:
-        """Find new streams; notice silence."""
+        """Find new streams, forget those that were left out and are gone; notice silence."""
+        for topic in [topic for topic in self._left_out if not self._node.get_publishers_info_by_topic(topic)]:
+            self._left_out.discard(topic)
+            self._topics.pop(topic)
+            if not self._left_out:
+                self._node.health.settle("streams")
         try:
             self._subscribe()
         except InputError as error:
@@ -88,10 +94,12 @@ class LiveStreams:
                 if not publishers:
                     continue
                 self._topics[topic] = (name, kind)
+                self._left_out.add(topic)
                 if name not in list(dict.fromkeys(vehicle for vehicle, _ in self._topics.values()))[:MOST_VEHICLES]:
                     raise InputError(f"{topic} is left out: {MOST_VEHICLES} others are heard; name those wanted in log.vehicles")
                 if publishers[0].topic_type != kind_type:
                     raise InputError(f"{topic} is a {publishers[0].topic_type}; {kind_type} is needed, so it is left out")
+                self._left_out.discard(topic)
                 self._node.listen(topic, offered(topic, [publisher.qos_profile for publisher in publishers])[0])
 
     def _vehicles(self) -> list[str]:
@@ -122,6 +130,8 @@ class LiveStreams:
         """Hand over what is buffered; return whether there was anything."""
         log = self._streams.take("live")
         if log is not None:
+            for topic in self._topics:
+                self._node.health.settle(topic)  # whatever was wrong with its messages, no more of them are to come
             self._ended(log, self._streams.config)
         return log is not None
 

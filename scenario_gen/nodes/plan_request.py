@@ -14,11 +14,14 @@
 
 """nav_msgs/GetPlan as the planner serves it: a checked request in, a free path for a disc out."""
 
+from collections import deque
 import math
+import threading
 from typing import Any
 
 import numpy as np
 
+from msg_conventions.diagnostics import written
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
@@ -26,6 +29,28 @@ from scenario_gen.planning.config import PlanningConfig
 from scenario_gen.planning.plan import make_planner
 from scenario_gen.planning.planner import plan_patiently, Query
 from scenario_gen.roads import Road
+
+TOLD = 20  # answers that are explained
+
+
+class Reasons:
+    """Why the newest plans are empty: nav_msgs/GetPlan has no place for it. The request's stamp tells whose answer it is."""
+
+    def __init__(self) -> None:
+        self._newest: deque[tuple[int, str]] = deque(maxlen=TOLD)
+        self._one_at_a_time = threading.Lock()
+
+    def add(self, stamp_ns: int, reason: str) -> None:
+        """Note an answer: why there is no path, or "" if there is one."""
+        with self._one_at_a_time:
+            self._newest.appendleft((stamp_ns, reason))
+
+    def told(self) -> tuple[bool, str]:
+        """Return whether the newest answer is a path, and a line for each, newest first: its request's stamp and the reason."""
+        with self._one_at_a_time:
+            newest = list(self._newest)
+        lines = [f"{written(stamp)}: {reason or 'a path was found'}" for stamp, reason in newest]
+        return bool(newest) and not newest[0][1], "\n".join(lines) or "no plan has been asked for"
 
 
 def query_of(request: Any, frame_id: str, radius: float) -> Query:

@@ -14,7 +14,7 @@
 
 """planner: `map`, `tracks` and `changepoints` of one template in; `fit` and a `vehicle_<id>/route` each out.
 
-`~/get_plan` (nav_msgs/GetPlan) plans on the newest map for anyone; a plan that cannot be is empty, and /diagnostics says why.
+`~/get_plan` (nav_msgs/GetPlan) plans on the newest map for anyone; a plan that cannot be is empty, and `~/explain` says why.
 """
 
 from collections.abc import Callable
@@ -27,9 +27,10 @@ import numpy as np
 from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 from rclpy.time import Time
+from std_srvs.srv import Trigger
 
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.diagnostics import fit_statuses
+from msg_conventions.diagnostics import fit_statuses, Level, written
 from msg_conventions.fits import anchor_stamps, encode_fit
 from msg_conventions.names import tokens
 from msg_conventions.paths import encode_path, encode_route
@@ -37,11 +38,11 @@ from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.cancelling import stop_if_cancelled
-from scenario_gen.errors import RefusedError
+from scenario_gen.errors import RefusedError, ScenarioGenError
 from scenario_gen.fitting import fit_template, FittingConfig
 from scenario_gen.nodes.base import REQUESTS, run_nodes, StageNode
 from scenario_gen.nodes.inputs import Inputs
-from scenario_gen.nodes.plan_request import plan_poses, query_of
+from scenario_gen.nodes.plan_request import plan_poses, query_of, Reasons
 from scenario_gen.parameters import check, parameter
 from scenario_gen.planning import plan_routes, PlanningConfig
 
@@ -72,6 +73,8 @@ class Planner(StageNode):
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("planner", Config(), namespace)
         self.create_service(GetPlan, "~/get_plan", self._get_plan, qos_profile=REQUESTS)
+        self.serve(Trigger, "~/explain", self._explain)
+        self._reasons = Reasons()
         paired = self.config.pair_map
         self._asked = 0
         self._inputs_seen = Inputs(("tracks", "changepoints", *(ROAD if paired else ())), () if paired else ("map",))
@@ -110,23 +113,36 @@ class Planner(StageNode):
         name = f"get_plan {self._asked}"
 
         def job(cancelled: Callable[[], bool]) -> None:
-            plan = b""
+            plan, reason = b"", "cancelled"
             try:
                 if grid is None or cancelled():
                     raise RefusedError("there is no map yet" if grid is None else "cancelled")
                 _, road = decode_map(grid)
                 query = query_of(request, road.frame_id, self.config.radius)
                 poses = plan_poses(road, query, self.config.planning, self.config.seed)
-                plan = encode_path(poses, np.full(len(poses), stamp), road.frame_id, stamp)
+                plan, reason = encode_path(poses, np.full(len(poses), stamp), road.frame_id, stamp), ""
+            except ScenarioGenError as error:
+                reason = str(error)
+                self.status(Level.ERROR, reason, "get_plan", error=type(error).__name__, job=name, request_stamp=written(stamp))
+            except Exception as error:
+                reason = f"{type(error).__name__}: {error}"
+                raise
             finally:
+                self._reasons.add(stamp, reason)
                 answer.set_result(plan)
                 executor.wake()
 
         response.plan.header.stamp = request.start.header.stamp
-        if self.active:
+        if not self.active:
+            self._reasons.add(stamp, "the node is not active; activate it first")
+        else:
             self.work(name, job)
             if plan := await answer:
                 response.plan = deserialize_message(plan, Path)
+        return response
+
+    def _explain(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success, response.message = self._reasons.told()
         return response
 
 

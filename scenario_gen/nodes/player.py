@@ -40,9 +40,11 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from msg_conventions.cdr import CdrWriter
+from msg_conventions.diagnostics import Level
 from scenario_gen.bags import bag_topics, BagMessage, read_messages
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.nodes.base import run_nodes
+from scenario_gen.nodes.health import Health
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.ros_parameters import ConfigParameters
@@ -80,6 +82,8 @@ class Player(Node):  # type: ignore[misc]
         super().__init__("player", namespace=namespace)
         self.parameters = ConfigParameters(self, Config())
         self.parameters.log()
+        self.health = Health(self, self._tell_progress)
+        self._at: float | None = None  # seconds of the bag that have been played, while it is
         self.done = False
         self.exit_code = 0
         self._running = threading.Event()
@@ -107,7 +111,7 @@ class Player(Node):  # type: ignore[misc]
                 publisher = self.create_publisher(kind, name, quality, qos_overriding_options=QoSOverridingOptions(KINDS))
                 self._offered[topic.name] = (publisher, topic.quality.transient_local, topic.quality.depth)
             except InputError as error:
-                self.get_logger().error(f"{name} is not played: {error}")
+                self.health.say(Level.ERROR, f"{name} is not played: {error}", "topics", {"error": "InputError"})
         if not self._offered:
             raise InputError(f"{config.bag}: none of its topics can be played; see the messages above and the parameter topics")
         if not config.paused:
@@ -115,14 +119,17 @@ class Player(Node):  # type: ignore[misc]
         threading.Thread(target=self._play, args=(config,), daemon=True).start()
 
     def _play(self, config: Config) -> None:
+        self._at = config.start_offset
         try:
             while not self._ended.is_set():
                 self._play_once(config)
                 if not config.loop:
                     break
-            self.get_logger().info(f"{config.bag}: played")
+            self._at = None
+            self.health.say(Level.OK, f"{config.bag}: played", "playing", {})
         except ScenarioGenError as error:
-            self.get_logger().error(str(error))
+            self._at = None
+            self.health.say(Level.ERROR, str(error), "playing", {"error": type(error).__name__})
             self.exit_code = error.exit_code
         if not config.stay and not self._ended.is_set():
             self._leave()
@@ -168,6 +175,7 @@ class Player(Node):  # type: ignore[misc]
     def _wait_until(self, due: float, elapsed: float, config: Config, first_ns: int) -> float:
         """Let the bag's time run, at `rate` and unless paused, from `elapsed` to `due` [s]; return where it stands."""
         while elapsed < due and not self._ended.is_set():
+            self._at = elapsed
             self._running.wait(TICK)
             started = monotonic()
             if self._running.is_set():
@@ -176,6 +184,12 @@ class Player(Node):  # type: ignore[misc]
             self._tell_time(first_ns + round((min(elapsed, due) - config.start_offset) * 1e9))
         self._running.wait()
         return max(elapsed, due) if elapsed < due + 1.0 else due
+
+    def _tell_progress(self) -> None:
+        """Say how far into the bag it is, each second."""
+        if (at := self._at) is not None:
+            words = f"{self.parameters.config.bag}: {at:.1f} s played" + ("" if self._running.is_set() else ", paused")
+            self.health.say(Level.OK, words, "playing", {"seconds": f"{at:.1f}"}, log=False)
 
     def _tell_time(self, stamp_ns: int) -> None:
         if self._clock_publisher is not None:

@@ -28,18 +28,17 @@ import re
 import sys
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.time import Time
 from std_srvs.srv import Trigger
 
-from msg_conventions.diagnostics import encode_diagnostics, Level, Status
-from msg_conventions.topics import topic_entry
+from msg_conventions.diagnostics import Level
 from scenario_gen.bags import BagWriter, Split
 from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.errors import InputError, of_system
 from scenario_gen.interrupts import uninterrupted
 from scenario_gen.nodes.base import run_nodes
+from scenario_gen.nodes.health import Health
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.offered import offered
 from scenario_gen.nodes.ros_parameters import ConfigParameters
@@ -101,8 +100,8 @@ class Recorder(Node):  # type: ignore[misc]
         self.create_service(Trigger, "~/start", self._start_service)
         self.create_service(Trigger, "~/stop", self._stop_service)
         self.create_timer(0.1, self._look_around)
-        self._counts = self.create_publisher(DiagnosticArray, "/diagnostics", qos(topic_entry("/diagnostics")[1]))
-        self.create_timer(0.5, self._tell_counts)
+        self.health = Health(self, self._tell_counts)
+        self._say(Level.OK, "nothing is being recorded")
 
     def autostart(self) -> None:
         """Begin the bag that the parameter names."""
@@ -113,7 +112,9 @@ class Recorder(Node):  # type: ignore[misc]
         config = self.parameters.config
         with _disk_errors():
             self._bag = BagWriter(folder, compress=config.compress, split=Split(config.split_bytes, config.split_seconds))
-        self.get_logger().info(f"recording to {folder}")
+        self._say(Level.OK, f"recording to {folder}")
+        self._refused.clear()
+        self.health.settle("topics")
         self._look_around()
 
     def stop(self) -> str:
@@ -129,7 +130,11 @@ class Recorder(Node):  # type: ignore[misc]
             return ""
         with _disk_errors():
             bag.close()
+        self._say(Level.OK, f"{bag.folder} is closed")
         return str(bag.folder)
+
+    def _say(self, level: Level, words: str, subject: str = "recording", **values: str) -> None:
+        self.health.say(level, words, subject, values)
 
     def destroy_node(self) -> None:
         """Close the bag, then the node."""
@@ -151,8 +156,7 @@ class Recorder(Node):  # type: ignore[misc]
         """Say on /diagnostics how many messages of each topic are in the bag."""
         if self._bag is not None:
             counts = {topic.name: str(topic.count) for topic in self._bag.info.topics}
-            status = Status(f"{self.get_fully_qualified_name()}: recorded", Level.OK, str(self._bag.folder), counts)
-            self._counts.publish(encode_diagnostics([status], self.get_clock().now().nanoseconds))
+            self.health.say(Level.OK, str(self._bag.folder), "recorded", counts, log=False)
 
     def _listen(self, topic: str, kind: str) -> None:
         publishers = self.get_publishers_info_by_topic(topic)
@@ -164,7 +168,7 @@ class Recorder(Node):  # type: ignore[misc]
             self._bag.add_topic(topic, kind, qos_yaml(recorded), str(publishers[0].topic_type_hash))
         except InputError as error:
             self._refused.add(topic)
-            self.get_logger().error(f"{topic} is not recorded: {error}")
+            self._say(Level.ERROR, f"{topic} is not recorded: {error}", "topics", error="InputError")
             return
         self._listening[topic] = self.create_subscription(
             message, topic, lambda data: self._write(topic, data), qos(quality), raw=True
@@ -182,9 +186,7 @@ class Recorder(Node):  # type: ignore[misc]
     def _give_up(self, error: InputError) -> None:
         """Say what is wrong and record no more; the node, and others in its process, live on."""
         self.stop()  # nothing more is written to such a bag
-        self.get_logger().error(str(error))
-        told = Status(f"{self.get_fully_qualified_name()}: recording", Level.ERROR, str(error), {"error": "InputError"})
-        self._counts.publish(encode_diagnostics([told], self.get_clock().now().nanoseconds))
+        self._say(Level.ERROR, str(error), error="InputError")
 
     def _start_service(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         now = self.get_clock().now().nanoseconds

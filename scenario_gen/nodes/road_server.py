@@ -133,7 +133,7 @@ class RoadServer(StageNode):
                 missing = not Path(request.map_url.removeprefix("file://")).exists()
                 result = codes.RESULT_MAP_DOES_NOT_EXIST if missing else codes.RESULT_INVALID_MAP_METADATA
                 words = f"load_map {request.map_url!r}: {reason}"
-                self.status(Level.ERROR, words, "load_map", error=type(reason).__name__)
+                self.status(Level.ERROR, words, "load_map", error=type(reason).__name__)  # which is over when the job is done
             finally:
                 answer.set_result((result, self._grid))
                 executor.wake()

@@ -72,7 +72,7 @@ def answer_request(
         config: the values of this request.
         request: its id.
         node: the node's full name.
-        progress: called with scenarios done and wanted, and the template's stamp [ns].
+        progress: called with the scenarios and candidates so far, and the template's stamp [ns].
         cancelled: whether to stop early.
 
     Raises:
@@ -91,8 +91,8 @@ def answer_request(
         config.limits,
     )
 
-    def advance(done: int, total: int) -> None:
-        progress(done, total, template.encounter.start_ns)
+    def advance(done: int, _total: int, candidates: int) -> None:
+        progress(done, candidates, template.encounter.start_ns)
 
     asked = template.asked
     if config.moves:

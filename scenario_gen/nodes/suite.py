@@ -25,6 +25,7 @@ import sys
 from typing import Any
 
 from scenario_gen.nodes.base import run_nodes
+from scenario_gen.nodes.usage import asks_for_help, show
 
 CLASSES = {
     "recorder": "Recorder",
@@ -61,4 +62,6 @@ def maker(name: str) -> Callable[[str | None], Any]:
 def main() -> None:
     """Run the nodes."""
     names, arguments = chosen(sys.argv)
+    if asks_for_help(arguments):
+        show(f"{(__doc__ or '').strip()}\n")
     sys.exit(run_nodes([maker(name) for name in names], arguments))

@@ -15,6 +15,7 @@
 """What an executable says of itself when it is asked for help, or is called as it cannot be."""
 
 from collections.abc import Sequence
+import os
 import sys
 from typing import Any
 
@@ -37,6 +38,14 @@ def help_of(name: str, makers: Sequence[Any]) -> str:
             choices = f"; one of {', '.join(meta['choices'])}" if meta["choices"] else ""
             lines.append(f"  {parameter} := {_written(value)}{unit}\n      {meta['meaning']}{choices}")
     return "\n".join(lines)
+
+
+def show(text: str) -> None:
+    """Print a text that somebody may read in part only: `--help | head`."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python complains when it ends
 
 
 def _written(value: object) -> str:

@@ -33,6 +33,7 @@ class Watcher(Node):  # type: ignore[misc]
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("watcher", namespace=namespace, enable_rosout=False, start_parameter_services=False)
+        self._said: dict[str, str] = {}  # by name: /diagnostics says all again every second
         if namespace is None:
             self._listen("/diagnostics", self._diagnostics)
             return
@@ -55,11 +56,14 @@ class Watcher(Node):  # type: ignore[misc]
 
     def _diagnostics(self, data: bytes) -> None:
         for status in decode_diagnostics(data)[1]:
+            if self._said.get(status.name) == status.message and "recorded" not in status.name:
+                continue
+            self._said[status.name] = status.message
             if "recorded" in status.name:
                 say(event="recorded", counts={topic: int(count) for topic, count in status.values.items()})
             elif status.level >= Level.ERROR:
                 say(event="error", name=status.name, text=status.message, kind=status.values.get("error", ""))
-            elif "progress" in status.name:
+            elif "progress" in status.name and "request" in status.values:
                 say(event="progress", name=status.name, text=status.message)
 
 

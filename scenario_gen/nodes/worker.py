@@ -18,6 +18,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from contextlib import suppress
 import threading
+from time import monotonic
 
 from scenario_gen.cancelling import cancellable, CancelledError
 from scenario_gen.errors import RefusedError
@@ -41,15 +42,21 @@ def stop_if_left_behind() -> None:
 class Worker:
     """Runs jobs one after the other; each gets a function that says whether it has been cancelled.
 
-    A job that is cancelled before its turn still runs, so that it can answer whoever waits for it: it looks first. So does one
-    that comes when too many wait, at once. A job that takes long asks `stop_if_cancelled` now and then.
+    A job that is cancelled before its turn still runs, at once, so that it can answer whoever waits for it: it looks first. So
+    does one that comes when too many wait. A job that takes long asks `stop_if_cancelled` now and then.
     """
 
-    def __init__(self, failed: Callable[[str, BaseException], None], owner: str = "node") -> None:
-        """Start the thread, named after its `owner`; `failed` is called with a job's name and what it raised."""
-        self._failed = failed
+    def __init__(
+        self,
+        failed: Callable[[str, BaseException], None],
+        owner: str = "node",
+        done: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        """Start the thread, named after its `owner`; `failed` gets a job's name and what it raised, `done` another's name."""
+        self._failed, self._done = failed, done
         self._waiting: OrderedDict[str, tuple[Job, threading.Event]] = OrderedDict()
         self._running: tuple[str, threading.Event] | None = None
+        self._began = 0.0
         self._changed = threading.Condition()
         self.closed = False
         self._thread = threading.Thread(target=self._run, daemon=True, name=f"worker of {owner}")
@@ -69,14 +76,30 @@ class Worker:
             self._failed(name, RefusedError(f"{MOST_WAITING} jobs wait already; ask again when some are done"))
             self._do(name, job, lambda: True)
 
-    def cancel(self) -> list[str]:
-        """Cancel the running job and the waiting ones; return their names, the running one first."""
+    def cancel(self, only: str | None = None) -> list[str]:
+        """Cancel the running job and the waiting ones, or those of one name; return their names, the running one first.
+
+        Those that wait answer at once, on this thread, and not only when it would be their turn.
+        """
         with self._changed:
-            running = [self._running] if self._running else []
-            every = running + [(name, cancelled) for name, (_, cancelled) in self._waiting.items()]
-            for _, cancelled in every:
+            running = [self._running] if self._running and only in (None, self._running[0]) else []
+            for _, cancelled in running:
                 cancelled.set()
-        return [name for name, _ in every]
+            waiting = [(name, self._waiting.pop(name)[0]) for name in list(self._waiting) if only in (None, name)]
+        for name, job in waiting:
+            self._do(name, job, lambda: True)
+        return [name for name, _ in running] + [name for name, _ in waiting]
+
+    def account(self) -> dict[str, str]:
+        """Return what runs, for how many seconds, and how many jobs wait; nothing if none does."""
+        with self._changed:
+            if self._running is None:
+                return {}
+            return {
+                "job": self._running[0],
+                "seconds": f"{monotonic() - self._began:.0f}",
+                "waiting": str(len(self._waiting)),
+            }
 
     def close(self, timeout: float = 0.5) -> None:
         """Cancel everything and end the thread; a job that does not listen is left behind after `timeout` seconds.
@@ -98,7 +121,7 @@ class Worker:
                 if not self._waiting:
                     return
                 name, (job, cancelled) = self._waiting.popitem(last=False)
-                self._running = (name, cancelled)
+                self._running, self._began = (name, cancelled), monotonic()
             self._do(name, job, cancelled.is_set)
 
     def _do(self, name: str, job: Job, cancelled: Callable[[], bool]) -> None:
@@ -106,6 +129,8 @@ class Worker:
             try:
                 with cancellable(cancelled):
                     job(cancelled)
+                if not cancelled():
+                    self._done(name)
             except CancelledError:
                 raise
             except Exception as error:

@@ -31,7 +31,7 @@ from scenario_gen.scenario import BoundaryStates, Scenario, ScenarioSet
 from scenario_gen.segmentation import Segmentation
 from scenario_gen.validity import Checker, Limits
 
-Progress = Callable[[int, int], None]
+Progress = Callable[[int, int, int], None]  # of scenarios so far, scenarios wanted, candidates so far
 Cancelled = Callable[[], bool]
 
 

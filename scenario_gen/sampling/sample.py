@@ -124,7 +124,7 @@ def sample_scenarios(
     seed: int = 0,
     waits: tuple[Wait, ...],
     ego: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> ScenarioSet:
     """Draw candidates until `count` are valid or the budget is spent.
@@ -141,7 +141,7 @@ def sample_scenarios(
         seed: of all randomness; with a scenario's index it gives that scenario again.
         waits: when a vehicle stands, on the template's clock.
         ego: index of the vehicle that is left out of every scenario; its template track is given instead.
-        progress: called with (valid so far, count).
+        progress: called with (valid so far, count, candidates so far).
         cancelled: asked now and then; if True, the set so far is returned.
 
     Returns:
@@ -188,7 +188,7 @@ class _Loop:
         sampler: Sampler,
         check: Check,
         count: int,
-        progress: Callable[[int, int], None] | None,
+        progress: Callable[[int, int, int], None] | None,
         cancelled: Callable[[], bool] | None,
     ) -> None:
         self.sampler, self.check, self.count = sampler, check, count
@@ -248,7 +248,7 @@ class _Loop:
                 else:
                     self.refused[verdict.violations[0].cause if verdict else Cause.TIME_LAW] += 1
             if self.progress:
-                self.progress(len(self.index), self.count)
+                self.progress(len(self.index), self.count, self.candidates + seen)
         self.candidates += seen
         return seen, good
 

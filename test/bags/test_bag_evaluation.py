@@ -25,7 +25,7 @@ import numpy as np
 from PIL import Image
 import pytest
 
-from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics
+from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, of_template
 from msg_conventions.topics import topic_entry
 from scenario_gen.bags import read_messages, Run, write_run
 from scenario_gen.bags.evaluation import bag_cases, evaluate_bag
@@ -175,7 +175,9 @@ def test_what_nodes_say_on_one_topic_is_told_apart_by_their_namespaces(tmp_path)
                     replace(s, name=namespace + s.name, values=s.values if note is None else dict.fromkeys(s.values, note))
                     for s in statuses
                 ]
-                copy.write(topic, encode_diagnostics(said, stamp), message.stamp_ns)
+                for later in (1, 2):  # every second, with the time of the message
+                    now = stamp + later * 10**9
+                    copy.write(topic, encode_diagnostics([of_template(s, stamp) for s in said], now), now)
     (case,) = bag_cases(tmp_path / "recorded", QUICK)
     assert case.fit is not None and case.fit.notes == run.fit.notes
     assert case.segmentation.descriptions == run.segmentation.descriptions

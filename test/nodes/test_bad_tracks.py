@@ -86,9 +86,16 @@ def test_bad_tracks_are_named_by_every_node_and_the_next_good_ones_are_served(tm
         client.wait("/report", 2)
         assert decode_fit(client.heard["/fit"][-1])[0] == later.start_ns
         assert {node: _peak(pid) for node, pid in made.pids.items() if _peak(pid) >= GIBIBYTE} == {}
+        client.until(lambda: _levels(client) == dict.fromkeys(NODES, Level.OK), "the end of what was wrong with the tracks")
     finally:
         codes = made.end()
     assert codes == dict.fromkeys(NODES, 0)
+
+
+def _levels(client) -> dict[str, Level]:
+    """What each node said last of its tracks."""
+    statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
+    return {s.name[1:].removesuffix(": tracks"): s.level for s in statuses if s.name.endswith(": tracks")}
 
 
 def _named(client, node: str, words: str) -> bool:

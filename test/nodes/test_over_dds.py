@@ -144,8 +144,9 @@ def test_maps_are_served_and_bad_ones_refused(suite, client):
     )
 
 
-def test_anyone_may_ask_for_a_plan(suite, client):
+def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
     from nav_msgs.srv import GetPlan
+    from std_srvs.srv import Trigger
 
     client.hear("/diagnostics", "/fit")
     asked = decode_fit(client.wait("/fit")[0])[2]
@@ -158,12 +159,16 @@ def test_anyone_may_ask_for_a_plan(suite, client):
     assert plan.header.stamp.sec == 123
     assert plan.poses[0].pose.position.x == request.start.pose.position.x
     assert plan.poses[-1].pose.position.y == request.goal.pose.position.y
-    for field, value, reason in (
-        ("tolerance", -1.0, "tolerance"),
-        ("frame", "elsewhere", "elsewhere"),
-        ("x", math.nan, "finite"),
+    assert client.call(Trigger, "/planner/explain", Trigger.Request()).message.startswith("123.000000000: a path was found")
+    for stamp, (field, value, reason) in enumerate(
+        (
+            ("tolerance", -1.0, "tolerance"),
+            ("frame", "elsewhere", "elsewhere"),
+            ("x", math.nan, "finite"),
+        )
     ):
         bad = GetPlan.Request(start=request.start, goal=request.goal)
+        bad.start.header.stamp.sec = stamp
         if field == "tolerance":
             bad.tolerance = value
         elif field == "frame":
@@ -180,6 +185,9 @@ def test_anyone_may_ask_for_a_plan(suite, client):
             ),
             f"{reason} on /diagnostics",
         )
+        told = client.call(Trigger, "/planner/explain", Trigger.Request())
+        (own, *_) = [line for line in told.message.splitlines() if line.startswith(f"{stamp}.000000000: ")]
+        assert reason in own and not told.success
 
 
 def test_a_damaged_message_is_said_and_survived(suite, client):

@@ -27,7 +27,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.nodes.worker import MOST_WAITING, Worker
 
 pytestmark = pytest.mark.dds
-OUTPUTS = ("/changepoints", "/posterior", "/diagnostics", "/rosout")
+OUTPUTS = ("/changepoints", "/posterior", "/rosout")
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def test_what_is_done_too_late_is_not_published(ros, client: Client, monkeypatch
     monkeypatch.setattr(segmenter, "segment", gate)
     node = segmenter.Segmenter()
     topics = [topic for topic in OUTPUTS if topic != "/rosout"]
-    client.hear(*topics)
+    client.hear(*topics, "/diagnostics")
     try:
         node.trigger_configure()
         node.trigger_activate()
@@ -95,6 +95,11 @@ def test_what_is_done_too_late_is_not_published(ros, client: Client, monkeypatch
         node.destroy_node()
     if cleaned:
         assert not any(client.heard[topic] for topic in topics)
+    last = "unconfigured" if cleaned else "inactive"
+    client.until(lambda: _said(client).endswith(last), f"the state {last}")
+    assert "too late" not in _said(client)
+    names = {s.name for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]}
+    assert names == {"/segmenter: state"}, "of its work a node says nothing when it is not active"
 
 
 def test_a_node_that_is_active_again_says_nothing_of_what_was_left_behind(ros, client: Client, monkeypatch):
@@ -141,6 +146,7 @@ def test_the_evaluator_gives_up_requests_whose_scenarios_never_come_and_says_so(
             closing = {"request": str(k), "published": "1", "requested": "1"}
             node.received("scenarios/info", encode_diagnostics([Status("request", Level.OK, "", closing)], 0))
         assert len(node._closed) == len(node._open) == wait
+        node.health._again()  # a second has gone by
         for k in range(node.config.keep + 10):  # of one request that is never closed
             entry = {"request": "endless", "index": str(k), "seed": "0", "sha256": f"{many + k:064x}"}
             node.received("scenarios/info", encode_diagnostics([Status("scenario", Level.OK, "", entry)], 0))
@@ -155,7 +161,8 @@ def test_the_evaluator_gives_up_requests_whose_scenarios_never_come_and_says_so(
 
 
 def _said(client: Client) -> str:
-    return "\n".join(s.message for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1])
+    statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
+    return "\n".join(words for s in statuses for words in (*(v for k, v in s.values.items() if k.startswith("also.")), s.message))
 
 
 def test_of_too_many_jobs_the_newest_is_answered_at_once():

@@ -129,7 +129,8 @@ def test_a_map_is_served_while_another_is_loaded(suite, domain, client):
 
 def test_long_work_says_how_far_it_is_lets_others_be_served_and_can_be_cancelled(suite, client):
     from nav_msgs.srv import GetMap, GetPlan
-    from rcl_interfaces.srv import ListParameters
+    from rcl_interfaces.srv import ListParameters, SetParametersAtomically
+    from rclpy.parameter import Parameter
     from std_srvs.srv import Trigger
 
     client.hear("/diagnostics")
@@ -137,11 +138,18 @@ def test_long_work_says_how_far_it_is_lets_others_be_served_and_can_be_cancelled
     running = _generate(client, wait=False, count=20_000)
     waiting = _generate(client, wait=False, count=2, seed=3)
     name = "/gp_sampler: progress"
-    client.until(lambda: any(s.name == name and "of 20000" in s.message for s in _said(client)), "progress")
+    client.until(lambda: any(s.name == name and s.values.get("requested") == "20000" for s in _said(client)), "progress")
     assert client.call(ListParameters, "/gp_sampler/list_parameters", ListParameters.Request()).result.names
     assert client.call(GetMap, "/road_server/get_map", GetMap.Request()).map.data
     client.call(GetPlan, "/planner/get_plan", GetPlan.Request())
     assert not running.done(), "the others were to be served while it ran"
+    third = _generate(client, wait=False, count=20_000, request="third")
+    one = SetParametersAtomically.Request(parameters=[Parameter("request", value="third").to_parameter_msg()])
+    client.until(lambda: client.call(SetParametersAtomically, "/gp_sampler/cancel_request", one).result.successful, "its end")
+    client.until(third.done, "the answer of one that waited, though others did not end")
+    assert third.result().result.reason == "request third: cancelled" and not running.done()
+    refused = client.call(SetParametersAtomically, "/gp_sampler/cancel_request", one).result
+    assert not refused.successful and "no request 'third' is open; open: " in refused.reason
     cancelled = set()
 
     def ended() -> bool:  # the second request may come after the first call

@@ -276,7 +276,7 @@ def test_progress_and_cancellation():
         *head, all_valid, count=500, waits=waits, progress=lambda *a: seen.append(a), cancelled=lambda: len(seen) > 2
     )
     assert 0 < len(found.scenarios) < 500
-    assert seen[-1] == (len(found.scenarios), 500)
+    assert seen[-1] == (len(found.scenarios), 500, found.candidates)
     assert "cancelled" in found.adaptations
 
 
