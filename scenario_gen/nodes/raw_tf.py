@@ -14,10 +14,10 @@
 
 """tf2_msgs/msg/TFMessage where tf2_msgs is not installed: it is not among the Jazzy wheels.
 
-Raw bytes are published and heard without any function of a type; what rcl and Fast DDS ask for is the type's name, its hash and its
-description. They are put together here, of what the wheels have: the description is that of geometry_msgs/msg/TransformStamped
-with one structure more. So the topic is of the same type, with the same hash, as that of every other node, and `ros2 topic info`
-says so. Messages of this class cannot be made or read: only raw publishers and subscriptions work.
+Raw bytes are published and heard without any function of a type; what rcl and Fast DDS ask for is the type's name, its hash and
+its description. They are put together here, of what the wheels have: geometry_msgs/msg/TransformStamped with one structure more.
+So the topic is of the same type, with the same hash, as that of every other node. The structures are those of Jazzy's headers.
+Messages of this class cannot be made or read: only raw publishers and subscriptions work.
 """
 
 import ctypes
@@ -90,7 +90,7 @@ class _Hash(ctypes.Structure):
 
 
 class _Callbacks(ctypes.Structure):
-    """`message_type_support_callbacks_t` of Fast DDS; the functions are another type's, and only the greatest size is asked for."""
+    """`message_type_support_callbacks_t` of Fast DDS; the functions are another type's: only the greatest size is asked for."""
 
     _fields_ = (("namespace", ctypes.c_char_p), ("name", ctypes.c_char_p), ("functions", _Pointer * 5))
 
@@ -134,7 +134,14 @@ _Get = ctypes.CFUNCTYPE(_Pointer, _Pointer)
 class _Support(ctypes.Structure):
     """`rosidl_message_type_support_t`."""
 
-    _fields_ = (("identifier", ctypes.c_char_p), ("data", _Pointer), ("find", _Pointer), *((f"get_{k}", _Pointer) for k in range(3)))
+    _fields_ = (
+        ("identifier", ctypes.c_char_p),
+        ("data", _Pointer),
+        ("find", _Pointer),
+        ("hash", _Pointer),
+        ("description", _Pointer),
+        ("sources", _Pointer),
+    )
 
 
 def _text(text: str) -> _Text:
@@ -156,7 +163,7 @@ def _donor() -> _Support:
 
 
 def _description(donor: _Support, kept: list[Any]) -> _Description:
-    part = _Description.from_address(_Get(donor.get_1)(ctypes.addressof(donor)))
+    part = _Description.from_address(_Get(donor.description)(ctypes.addressof(donor)))
     others = list((_Own * part.referenced.size).from_address(part.referenced.data))
     referenced = sorted([*others, part.own], key=lambda own: bytes(own.type_name.data))
     field = _Field(_text("transforms"), SEQUENCE, 0, 0, _text(PART), _text(""))
@@ -165,10 +172,14 @@ def _description(donor: _Support, kept: list[Any]) -> _Description:
 
 
 def _sources(donor: _Support, kept: list[Any]) -> _Sequence:
-    parts = _Sequence.from_address(_Get(donor.get_2)(ctypes.addressof(donor)))
+    parts = _Sequence.from_address(_Get(donor.sources)(ctypes.addressof(donor)))
     others = list((_Source * parts.size).from_address(parts.data))
     text = definition(KIND)[0].partition("=" * 8)[0]
     return _sequence(_Source, [_Source(_text(KIND), _text("msg"), _text(text)), *others], kept)
+
+
+def _getter(told: ctypes.Structure) -> Any:
+    return _Get(lambda _: ctypes.addressof(told))
 
 
 @cache
@@ -182,13 +193,15 @@ def raw_tf_message() -> type:
         raise InputError(f"message type {KIND} is not installed, and {rmw} asks for it; source the workspace that has tf2_msgs")
     donor = _donor()
     for_fast, for_introspection = (_Find(donor.find)(ctypes.addressof(donor), name) for name in (FAST, INTROSPECTION))
-    callbacks = _Callbacks(b"tf2_msgs::msg", b"TFMessage", _Callbacks.from_address(_Support.from_address(for_fast).data).functions)
+    callbacks = _Callbacks(
+        b"tf2_msgs::msg", b"TFMessage", _Callbacks.from_address(_Support.from_address(for_fast).data).functions
+    )
     member = _Member(b"transforms", MESSAGE, members=for_introspection, is_array=True)
     members = _Members(b"tf2_msgs__msg", b"TFMessage", 1, ctypes.sizeof(_Sequence), members=ctypes.pointer(member))
     kept: list[Any] = [callbacks, member, members]  # all that C points to; it lives as long as the process
     digest = _Hash(1, (ctypes.c_uint8 * 32)(*bytes.fromhex(definition(KIND)[1].removeprefix("RIHS01_"))))
     told = (digest, _description(donor, kept), _sources(donor, kept))
-    getters = [_Get(lambda _, address=ctypes.addressof(one): address) for one in told]
+    getters = [_getter(one) for one in told]
     addresses = [ctypes.cast(getter, _Pointer).value for getter in getters]
     supports: dict[bytes, _Support] = {}
     find = _Find(lambda _, name: ctypes.addressof(supports[name]) if name in supports else None)
