@@ -1,0 +1,84 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The launch file as `ros2 launch` runs it: real launch, real processes; the suite comes up, generates, records and ends cleanly.
+
+It runs where a Jazzy is sourced and this package is built (`colcon test` after `colcon build`); elsewhere
+test/nodes/test_launching.py runs the launch file with stand-ins.
+"""
+
+import os
+from pathlib import Path
+import tempfile
+import unittest
+
+import pytest
+from skips import NO_LAUNCH
+
+pytest.importorskip("launch_testing", reason=NO_LAUNCH)
+pytest.importorskip("launch_ros", reason=NO_LAUNCH)
+
+from ament_index_python.packages import get_package_share_directory, PackageNotFoundError
+from launch import LaunchDescription
+from launch.actions import IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+import launch_testing
+from launch_testing.actions import ReadyToTest
+from launch_testing.asserts import assertExitCodes
+
+from scenario_gen.bags import bag_topics
+
+try:
+    SHARE = Path(get_package_share_directory("scenario_gen"))
+except PackageNotFoundError:
+    pytest.skip(NO_LAUNCH, allow_module_level=True)
+
+SCENARIOS, SPACE = 3, "/launched"
+FOLDER = Path(tempfile.mkdtemp(prefix="scenario_gen_launch_"))
+LOG = Path(__file__).resolve().parents[2] / "scenario_gen" / "resources" / "synthetic_c"
+
+
+@pytest.mark.launch_test
+def generate_test_description():
+    arguments = {"log": LOG, "road": "straight", "count": SCENARIOS, "seed": 7, "namespace": SPACE, "bag": FOLDER / "bag"}
+    suite = IncludeLaunchDescription(
+        PythonLaunchDescriptionSource(str(SHARE / "launch" / "suite.launch.py")),
+        launch_arguments=[(name, str(value)) for name, value in arguments.items()],
+    )
+    return LaunchDescription([suite, ReadyToTest()])
+
+
+class TestTheSuite(unittest.TestCase):
+    def test_it_generates_what_it_is_asked_for(self):
+        from suite_processes import Client
+
+        client = Client(int(os.environ.get("ROS_DOMAIN_ID", "0")))
+        try:
+            topics = [f"{SPACE}/{name}" for name in ("map", "tracks", "fit", "report")]
+            client.hear(*topics, f"{SPACE}/scenarios")
+            client.wait(f"{SPACE}/scenarios", SCENARIOS)
+            for topic in topics:
+                client.wait(topic)
+        finally:
+            client.close()
+
+
+@launch_testing.post_shutdown_test()
+class TestTheEnd(unittest.TestCase):
+    def test_every_node_ends_with_0(self, proc_info):
+        assertExitCodes(proc_info, allowable_exit_codes=[0])
+
+    def test_the_bag_is_whole(self):
+        counts = {topic.name: topic.count for topic in bag_topics(FOLDER / "bag")}
+        self.assertEqual(counts[f"{SPACE}/scenarios"], SCENARIOS)
