@@ -26,22 +26,20 @@ import unittest
 import pytest
 from skips import NO_LAUNCH
 
-pytest.importorskip("launch_testing", reason=NO_LAUNCH)
-pytest.importorskip("launch_ros", reason=NO_LAUNCH)
-
-from ament_index_python.packages import get_package_share_directory, PackageNotFoundError
-from launch import LaunchDescription
-from launch.actions import IncludeLaunchDescription
-from launch.launch_description_sources import PythonLaunchDescriptionSource
-import launch_testing
-from launch_testing.actions import ReadyToTest
-from launch_testing.asserts import assertExitCodes
-
 from scenario_gen.bags import bag_topics
 
+launch_testing = pytest.importorskip("launch_testing", reason=NO_LAUNCH)
+actions = pytest.importorskip("launch.actions", reason=NO_LAUNCH)
+asserts = pytest.importorskip("launch_testing.asserts", reason=NO_LAUNCH)
+LaunchDescription = pytest.importorskip("launch", reason=NO_LAUNCH).LaunchDescription
+ReadyToTest = pytest.importorskip("launch_testing.actions", reason=NO_LAUNCH).ReadyToTest
+sources = pytest.importorskip("launch.launch_description_sources", reason=NO_LAUNCH)
+pytest.importorskip("launch_ros", reason=NO_LAUNCH)
+index = pytest.importorskip("ament_index_python.packages", reason=NO_LAUNCH)
+
 try:
-    SHARE = Path(get_package_share_directory("scenario_gen"))
-except PackageNotFoundError:
+    SHARE = Path(index.get_package_share_directory("scenario_gen"))
+except index.PackageNotFoundError:
     pytest.skip(NO_LAUNCH, allow_module_level=True)
 
 SCENARIOS, SPACE = 3, "/launched"
@@ -52,8 +50,8 @@ LOG = Path(__file__).resolve().parents[2] / "scenario_gen" / "resources" / "synt
 @pytest.mark.launch_test
 def generate_test_description():
     arguments = {"log": LOG, "road": "straight", "count": SCENARIOS, "seed": 7, "namespace": SPACE, "bag": FOLDER / "bag"}
-    suite = IncludeLaunchDescription(
-        PythonLaunchDescriptionSource(str(SHARE / "launch" / "suite.launch.py")),
+    suite = actions.IncludeLaunchDescription(
+        sources.PythonLaunchDescriptionSource(str(SHARE / "launch" / "suite.launch.py")),
         launch_arguments=[(name, str(value)) for name, value in arguments.items()],
     )
     return LaunchDescription([suite, ReadyToTest()])
@@ -77,7 +75,7 @@ class TestTheSuite(unittest.TestCase):
 @launch_testing.post_shutdown_test()
 class TestTheEnd(unittest.TestCase):
     def test_every_node_ends_with_0(self, proc_info):
-        assertExitCodes(proc_info, allowable_exit_codes=[0])
+        asserts.assertExitCodes(proc_info, allowable_exit_codes=[0])
 
     def test_the_bag_is_whole(self):
         counts = {topic.name: topic.count for topic in bag_topics(FOLDER / "bag")}
