@@ -58,6 +58,8 @@ def generate_test_description():
 
 
 class TestTheSuite(unittest.TestCase):
+    """While it runs."""
+
     def test_it_generates_what_it_is_asked_for(self):
         from suite_processes import Client
 
@@ -74,6 +76,8 @@ class TestTheSuite(unittest.TestCase):
 
 @launch_testing.post_shutdown_test()
 class TestTheEnd(unittest.TestCase):
+    """When all have ended."""
+
     def test_every_node_ends_with_0(self, proc_info):
         asserts.assertExitCodes(proc_info, allowable_exit_codes=[0])
 
