@@ -3,6 +3,14 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
+# A sourced Jazzy keeps its own rclpy: then no ROS wheel is installed, and the environment sees the system's packages.
+# What lies in a virtual environment that is active is no Jazzy, but wheels that an earlier `make` put there.
+SOURCED := $(if $(AMENT_PREFIX_PATH),$(shell $(PYTHON) -c 'import os, rclpy, sys; \
+	wheel = sys.prefix != sys.base_prefix and rclpy.__file__.startswith(sys.prefix + os.sep); \
+	paths = [path for path in os.environ["AMENT_PREFIX_PATH"].split(":") if path]; \
+	print("yes" if not wheel and any(rclpy.__file__.startswith(path + os.sep) for path in paths) else "")' 2>/dev/null))
+LOCKED := -r requirements.lock $(if $(SOURCED),,-r requirements-ros.lock)
+
 .PHONY: demo test soak bench audit licences install tools clean
 
 demo: $(READY)
@@ -25,7 +33,7 @@ bench: $(READY)
 
 # Known vulnerabilities of all that is locked. It fails, too, where it could not look everything up.
 audit: .venv-audit/.ready
-	.venv-audit/bin/python test/packaging/audit.py requirements.lock requirements-bench.lock requirements-audit.lock
+	.venv-audit/bin/python test/packaging/audit.py requirements.lock requirements-ros.lock requirements-bench.lock requirements-audit.lock
 
 .venv-audit/.ready: requirements-audit.lock
 	$(PYTHON) -m venv .venv-audit
@@ -38,10 +46,10 @@ licences: $(READY)
 install: $(READY)
 
 # The environment: locked packages, the project itself, and its kernels compiled once.
-$(READY): requirements.lock setup.py
+$(READY): requirements.lock requirements-ros.lock setup.py
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(not (3, 11) <= v <= (3, 13) and f"Python {v[0]}.{v[1]} found; 3.11, 3.12 or 3.13 is needed: make PYTHON=python3.12")'
-	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(PYTHON) -m venv $(if $(SOURCED),--system-site-packages) .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes $(LOCKED)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	$(BIN)/python -m scenario_gen.kernels
 	@touch $(READY)

@@ -21,9 +21,14 @@ from setuptools import find_packages, setup
 NAME = "scenario_gen"
 NODES = ("segmenter", "planner", "gp_sampler", "road_server", "log_player", "evaluator", "recorder", "player", "suite")
 
-# requirements.in names what is needed at run time first; ROS itself comes from a Jazzy installation, or from wheels as an extra.
-LISTED = Path("requirements.in").read_text(encoding="utf-8").partition("# to build and to test")[0].splitlines()
-NEEDED = [line for line in LISTED if line and not line.startswith("#")]
+# What is needed at run time is named first. ROS itself comes from a Jazzy installation, or from wheels as an extra.
+
+
+def needed(name: str) -> list[str]:
+    """Return what a list of requirements asks for at run time."""
+    listed = Path(name).read_text(encoding="utf-8").partition("# to build and to test")[0].splitlines()
+    return [line for line in listed if line and not line.startswith("#")]
+
 
 setup(
     name=NAME,
@@ -42,8 +47,8 @@ setup(
         (f"share/{NAME}/launch", [str(path) for path in sorted(Path("launch").glob("*.launch.py"))]),
         (f"share/{NAME}/examples", [str(path) for path in sorted(Path("examples").glob("*.*"))]),
     ],
-    install_requires=[line for line in NEEDED if not line.startswith("ros-jazzy")],
-    extras_require={"ros": [line for line in NEEDED if line.startswith("ros-jazzy")], "test": ["pytest"]},
+    install_requires=needed("requirements.in"),
+    extras_require={"ros": needed("requirements-ros.in"), "test": ["pytest"]},
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -17,7 +17,7 @@
 from dataclasses import dataclass
 import re
 
-from msg_conventions import diagnostics, odometry, paths, pictures, roads, trajectory
+from msg_conventions import diagnostics, frames, odometry, paths, pictures, roads, trajectory
 
 CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
 FIX_TYPE = "sensor_msgs/msg/NavSatFix"
@@ -60,6 +60,8 @@ TOPICS: dict[str, tuple[str, Quality]] = {
     "report": (diagnostics.TYPE, LATCHED),
     "diagnostics": (diagnostics.TYPE, Quality(depth=100)),  # of a bag written in process: one message, which is latched
     "/diagnostics": (diagnostics.TYPE, Quality(depth=100, transient_local=False)),  # all is said again every second
+    "tf": (frames.TYPE, Quality(depth=100, transient_local=False)),
+    "tf_static": (frames.TYPE, LATCHED),
 }
 
 

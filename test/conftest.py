@@ -12,12 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Shared fixtures: where the recorded data is, and a rule that CI may not skip."""
+"""Shared fixtures: where the recorded data is, and a rule that CI may not skip, with one exception."""
 
 import os
 from pathlib import Path
 
 import pytest
+from skips import NO_LAUNCH
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 
@@ -39,11 +40,21 @@ def crashes() -> Path:
     return folder
 
 
+def _not_in_ci(report: pytest.TestReport | pytest.CollectReport) -> None:
+    """In CI what is skipped has failed."""
+    reason = report.longrepr[-1] if isinstance(report.longrepr, tuple) else report.longrepr
+    if report.skipped and os.environ.get("CI") and not hasattr(report, "wasxfail") and NO_LAUNCH not in str(reason):
+        report.outcome = "failed"
+        report.longrepr = f"skipped in CI: {reason}"
+
+
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]):
-    """In CI a skipped test is a failed one."""
     outcome = yield
-    report = outcome.get_result()
-    if report.skipped and os.environ.get("CI") and not hasattr(report, "wasxfail"):
-        report.outcome = "failed"
-        report.longrepr = f"skipped in CI: {report.longrepr[-1] if isinstance(report.longrepr, tuple) else report.longrepr}"
+    _not_in_ci(outcome.get_result())
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_make_collect_report(collector: pytest.Collector):
+    outcome = yield
+    _not_in_ci(outcome.get_result())

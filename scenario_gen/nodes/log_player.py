@@ -85,6 +85,8 @@ class LogPlayer(StageNode):
         n, samples = encounter.speed.shape
         message = f"{encounter.name}: {n} vehicles, {samples} samples over {encounter.duration:.1f} s"
         notes = {f"note.{k}": note for k, note in enumerate(result.quality.notes)}
+        if encounter.origin is not None:
+            notes["origin"] = "{!r},{!r}".format(*encounter.origin)
         self.status(Level.OK, message, "encounter", encounter.start_ns, **notes)
         if config.stream:
             self._stream(encounter, config, cancelled)

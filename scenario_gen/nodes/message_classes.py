@@ -30,4 +30,8 @@ def message_class(kind: str) -> Any:
     try:
         return getattr(importlib.import_module(f"{package}.msg"), name)
     except (ImportError, AttributeError, ValueError):
+        if kind == "tf2_msgs/msg/TFMessage":
+            from scenario_gen.nodes.raw_tf import raw_tf_message
+
+            return raw_tf_message()
         raise InputError(f"message type {kind} is not installed; source the workspace that has {package or 'it'}") from None

@@ -16,14 +16,17 @@
 
 Each topic is offered with the quality of service it was recorded with, or as `qos_overrides./topic.publisher.reliability` and the
 like say. With an offset, what latched topics had said before it is published first. With `clock`, the bag's time is published on
-/clock, so that nodes with `use_sim_time` follow it, in place of the bag's own /clock. When all is played and heard the player
-ends, unless it is to `loop`, or to `stay` for who comes late to latched topics.
+/clock, so that nodes with `use_sim_time` follow it, in place of the bag's own /clock. A motion of the bag, its tracks or one of
+its scenarios, is told sample by sample as the frames of its vehicles (frames.py). When all is played and heard the player ends,
+unless it is to `loop`, or to `stay` for who comes late to latched topics.
 """
 
 from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from heapq import merge
+from operator import attrgetter
 from pathlib import Path
 import re
 import sys
@@ -45,6 +48,7 @@ from scenario_gen.bags import bag_topics, BagMessage, read_messages
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.nodes.base import run_nodes
 from scenario_gen.nodes.health import Health
+from scenario_gen.nodes.frames import find_motion, Frames, Instant
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.ros_parameters import ConfigParameters
@@ -70,6 +74,10 @@ class Config:
     stay: bool = parameter(False, "stay when all is played, so that latched topics are heard later, too")
     paused: bool = parameter(False, "wait for ~/resume before the first message")
     clock: bool = parameter(False, "publish /clock")
+    frames: str = parameter(
+        "tracks", "topic whose motion is told on /tf, as vehicle_<id>: `tracks`, `scenarios`, or its full name; empty: none"
+    )
+    scenario: int = parameter(0, "which message of that topic, from 0", low=0)
 
     def __post_init__(self) -> None:
         check(self)
@@ -89,6 +97,7 @@ class Player(Node):  # type: ignore[misc]
         self._running = threading.Event()
         self._ended = threading.Event()
         self._offered: dict[str, tuple[Any, bool, int]] = {}
+        self._frames: Frames | None = None
         self._clock_publisher = self.create_publisher(Clock, "/clock", 10) if self.parameters.config.clock else None
         self.create_service(Trigger, "~/pause", lambda _, response: self._set_running(response, running=False))
         self.create_service(Trigger, "~/resume", lambda _, response: self._set_running(response, running=True))
@@ -114,9 +123,29 @@ class Player(Node):  # type: ignore[misc]
                 self.health.say(Level.ERROR, f"{name} is not played: {error}", "topics", {"error": "InputError"})
         if not self._offered:
             raise InputError(f"{config.bag}: none of its topics can be played; see the messages above and the parameter topics")
+        self._frames = self._frames_of(config)
         if not config.paused:
             self._running.set()
         threading.Thread(target=self._play, args=(config,), daemon=True).start()
+
+    def _frames_of(self, config: Config) -> Frames | None:
+        """What is told on /tf: nothing if the bag has a /tf of its own, or /tf is not among the topics to play.
+
+        Raises:
+            InputError: one topic was chosen, and it has no such motion.
+        """
+        if not config.frames or not re.fullmatch(config.topics, "/tf") or {"/tf", "tf"} & set(self._offered):
+            return None
+        try:
+            motion = find_motion(Path(config.bag), config.frames, config.scenario, STREAMED)
+            if motion is None and config.frames != Config.frames:
+                raise InputError(f"{config.bag} has no motion on {config.frames}; see the parameter frames")
+            return Frames(self, motion) if motion else None
+        except InputError as error:
+            if config.frames != Config.frames:
+                raise
+            self.get_logger().warning(f"no frames are told on /tf: {error}")
+            return None
 
     def _play(self, config: Config) -> None:
         self._at = config.start_offset
@@ -138,7 +167,7 @@ class Player(Node):  # type: ignore[misc]
         """Let `run_nodes` end the node, once who listens has everything."""
         deadline = monotonic() + PATIENCE
         with suppress(InvalidHandle):  # the node is being ended already
-            for publisher, _, _ in self._offered.values():
+            for publisher in (*(one for one, _, _ in self._offered.values()), *(self._frames.publishers if self._frames else ())):
                 while not publisher.wait_for_all_acked(Duration()) and monotonic() < deadline:
                     self._ended.wait(TICK)
         self.executor.create_task(self._finish)  # to wake the executor alone would not make it look
@@ -154,17 +183,22 @@ class Player(Node):  # type: ignore[misc]
             elapsed = self._wait_until((message.stamp_ns - first) * 1e-9 + config.start_offset, elapsed, config, first)
             if self._ended.is_set():
                 return
-            publish(self, self._offered[message.topic][0], message.data)
+            if isinstance(message, BagMessage):
+                publish(self, self._offered[message.topic][0], message.data)
+            elif self._frames is not None:
+                self._frames.tell(message, message.stamp_ns if config.clock else self.get_clock().now().nanoseconds)
 
-    def _from_offset(self, config: Config) -> Iterator[BagMessage]:
+    def _from_offset(self, config: Config) -> Iterator[BagMessage | Instant]:
         """Yield the messages from the offset on; before the first, publish what latched topics hold by then."""
         latched: dict[str, deque[bytes]] = {}
         begin: int | None = None
-        for message in read_messages(Path(config.bag), lambda topic: topic in self._offered, STREAMED):
+        recorded = read_messages(Path(config.bag), lambda topic: topic in self._offered, STREAMED)
+        moved: Iterator[BagMessage | Instant] = self._frames.instants() if self._frames is not None else iter(())
+        for message in merge(recorded, moved, key=attrgetter("stamp_ns")):
             begin = message.stamp_ns if begin is None else begin
             if message.stamp_ns - begin < config.start_offset * 1e9:
-                _, transient_local, depth = self._offered[message.topic]
-                if transient_local:
+                if isinstance(message, BagMessage) and self._offered[message.topic][1]:
+                    depth = self._offered[message.topic][2]
                     latched.setdefault(message.topic, deque(maxlen=depth)).append(message.data)
                 continue
             for topic in list(latched):

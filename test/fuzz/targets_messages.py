@@ -36,6 +36,8 @@ from msg_conventions.diagnostics import decode_diagnostics, read_request
 from msg_conventions.diagnostics import TYPE as DIAGNOSTICS_TYPE
 from msg_conventions.ego import ego_messages
 from msg_conventions.fits import decode_fit
+from msg_conventions.frames import decode_frames, encode_frames
+from msg_conventions.frames import TYPE as TF_TYPE
 from msg_conventions.odometry import decode_state
 from msg_conventions.odometry import TYPE as ODOMETRY_TYPE
 from msg_conventions.paths import decode_path, decode_route, encode_route
@@ -137,6 +139,12 @@ TARGETS = (
     decoder("message_odometry", ODOMETRY_TYPE, lambda: ego("ego/start") + ego("ego/goal"), decode_state),
     decoder("message_fit", TRAJECTORY_TYPE, lambda: of_run("fit"), decode_fit),
     decoder("message_fix", FIX_TYPE, lambda: [encode_fix(48.1, 11.2, 5, "vehicle_1")], decode_fix),
+    decoder(
+        "message_frames",
+        TF_TYPE,
+        lambda: [encode_frames(np.array([[1.0, 2.0, 0.5]] * k), [f"vehicle_{n}" for n in range(k)], "map", 5) for k in (1, 3)],
+        decode_frames,
+    ),
     decoder("message_speed", TWIST_TYPE, lambda: [encode_speed(8.5, 5, "vehicle_1")], decode_speed),
     decoder(
         "message_footprint",

@@ -71,6 +71,18 @@ def test_a_late_joiner_gets_everything(suite, client):
         late.close()
 
 
+def test_the_origin_of_the_tracks_frame_is_said(suite, client):
+    client.hear("/diagnostics")
+
+    def origins():
+        said = [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
+        return {status.values["origin"] for status in said if status.name == "/log_player: encounter"}
+
+    client.until(origins, "the log player's word on its encounter")
+    (encounter,) = read_log(LOG).encounters
+    assert origins() == {"{!r},{!r}".format(*encounter.origin)}
+
+
 def test_in_process_gives_the_same_bytes(suite, client):
     client.hear("/scenarios")
     heard = client.wait("/scenarios", 4)

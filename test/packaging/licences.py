@@ -23,7 +23,8 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[2]
-LOCK, PAGE = ROOT / "requirements.lock", ROOT / "docs" / "licences.md"
+LOCKS = (ROOT / "requirements.lock", ROOT / "requirements-ros.lock")
+PAGE = ROOT / "docs" / "licences.md"
 TOLD = {  # what metadata does not say, or says only on Windows; looked up in the projects themselves
     "colorama": "BSD-3-Clause",
     "coloredlogs": "MIT",
@@ -53,10 +54,10 @@ COPYLEFT = re.compile(r"\bA?GPL")
 INTRO = """# Licences
 
 The project itself is under Apache-2.0. It ships no other's code but one: the HTML pages that it writes contain plotly.js (MIT).
-What it needs is installed from wheels; this table lists every package of `requirements.lock` with the licence that its metadata
-states (`make licences` writes it; a test holds it against the lock). *Run time* is what `setup.py` asks for, the extra `ros`
-included, and all that follows from it; the rest builds and tests. Under the GPL are two linters and one file of docutils, which
-no user needs; nothing is under the AGPL.
+What it needs is installed from wheels; this table lists every package of `requirements.lock` and of `requirements-ros.lock` with
+the licence that its metadata states (`make licences` writes it; a test holds it against the locks). *Run time* is what `setup.py`
+asks for, the extra `ros` included, and all that follows from it; the rest builds and tests. Under the GPL are two linters and one
+file of docutils, which no user needs; nothing is under the AGPL.
 
 Not in the table: the peers of `requirements-bench.lock` and the tools of `requirements-audit.lock`, which are installed by
 `make bench` and `make audit` alone and with which nothing is built or shipped.
@@ -67,9 +68,10 @@ Not in the table: the peers of `requirements-bench.lock` and the tools of `requi
 
 
 def locked() -> dict[str, str]:
-    """Return {name: version} of the lock; versions that differ by Python version are joined."""
+    """Return {name: version} of the locks; versions that differ by Python version are joined."""
     found: dict[str, list[str]] = {}
-    for name, version in re.findall(r"^([\w.\-]+)==([^\s;\\]+)", LOCK.read_text(encoding="utf-8"), re.MULTILINE):
+    text = "".join(lock.read_text(encoding="utf-8") for lock in LOCKS)
+    for name, version in re.findall(r"^([\w.\-]+)==([^\s;\\]+)", text, re.MULTILINE):
         found.setdefault(canonicalize_name(name), []).append(version)
     return {name: ", ".join(versions) for name, versions in sorted(found.items())}
 
@@ -101,10 +103,16 @@ def _of_manifests(found: Distribution) -> Iterator[str]:
         yield "Apache-2.0"
 
 
+def run_time() -> list[Requirement]:
+    """Return what setup.py asks for, the extra `ros` included."""
+    listed = [(ROOT / name).read_text(encoding="utf-8") for name in ("requirements.in", "requirements-ros.in")]
+    lines = [line for text in listed for line in text.partition("# to build and to test")[0].splitlines()]
+    return [Requirement(line) for line in lines if line and not line.startswith("#")]
+
+
 def needed_at_run_time(known: Mapping[str, Distribution]) -> set[str]:
     """Return the names of all that the requirements of setup.py lead to on this platform, the extra `ros` included."""
-    listed = (ROOT / "requirements.in").read_text(encoding="utf-8").partition("# to build and to test")[0]
-    open_ = [Requirement(line) for line in listed.splitlines() if line and not line.startswith("#")]
+    open_ = run_time()
     found: set[str] = set()
     seen: set[tuple[str, str]] = set()
     while open_:
@@ -125,10 +133,10 @@ def needed_at_run_time(known: Mapping[str, Distribution]) -> set[str]:
 def page() -> str:
     """Return the text of docs/licences.md."""
     known = installed()
-    run_time = needed_at_run_time(known)
+    needed = needed_at_run_time(known)
     rows = []
     for name, version in locked().items():
-        stated, need = licence(name, known.get(name)) or "unknown", "run time" if name in run_time else "to test"
+        stated, need = licence(name, known.get(name)) or "unknown", "run time" if name in needed else "to test"
         rows.append(f"| {name} | {version} | {stated} | {need} |")
     return INTRO + "\n".join(rows) + "\n"
 

@@ -22,6 +22,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ET
 
+from licences import run_time
 import pytest
 from source_files import ROOT
 
@@ -44,6 +45,51 @@ def test_every_ros_package_that_is_imported_is_declared():
     for path in [*(ROOT / "scenario_gen").rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")]:
         imported |= set(re.findall(r"^\s*from (\w+)\.(?:msg|srv) import", path.read_text(), re.MULTILINE))
     assert imported <= declared, imported - declared
+
+
+KEYS = {  # rosdep's, of what requirements.in names; looked up in rosdistro for Ubuntu 24.04 (docs/dependencies.md)
+    "numpy": "python3-numpy",
+    "scipy": "python3-scipy",
+    "numba": "python3-numba",
+    "rosbags": "python3-rosbags-pip",
+    "pandas": "python3-pandas",
+    "shapely": "python3-shapely",
+    "pillow": "python3-pil",
+    "pyyaml": "python3-yaml",
+    "jinja2": "python3-jinja2",
+    "typer": "python3-typer",
+    "jsonschema": "python3-jsonschema",
+    "rich": "python3-rich",
+}
+
+
+def test_package_xml_and_requirements_in_name_the_same_packages():
+    """Each by its rosdep key or, where it has none, by its name in the comment on pip; and none that is not needed."""
+    text = (ROOT / "package.xml").read_text()
+    needed = {wanted.name for wanted in run_time() if not wanted.name.startswith("ros-")}
+    by_pip = set(re.search(r"By pip, for they have no rosdep key: ([^.]*)\.", text)[1].split(", "))
+    keys = {entry.text for entry in ET.fromstring(text).findall("exec_depend") if entry.text.startswith("python3-")}
+    assert by_pip | set(KEYS) == needed and not by_pip & set(KEYS)
+    assert keys == set(KEYS.values())
+    dependencies = (ROOT / "docs" / "dependencies.md").read_text()
+    assert all(f"`{key}`" in dependencies for key in keys)
+
+
+@pytest.mark.parametrize("sourced", [False, True])
+def test_make_leaves_a_sourced_jazzy_its_rclpy(tmp_path, sourced):
+    package = tmp_path / "lib" / "rclpy"
+    package.mkdir(parents=True)
+    (package / "__init__.py").touch()
+    environment = {name: value for name, value in os.environ.items() if name not in ("AMENT_PREFIX_PATH", "MAKEFLAGS")}
+    if sourced:
+        environment |= {"AMENT_PREFIX_PATH": f"/none:{tmp_path}", "PYTHONPATH": str(package.parent)}
+    else:  # wheels in an active virtual environment are no Jazzy
+        environment |= {"AMENT_PREFIX_PATH": sys.prefix}
+    command = ["make", "--dry-run", "--always-make", "install", f"PYTHON={sys.executable}"]
+    said = subprocess.run(command, cwd=ROOT, env=environment, check=True, capture_output=True, text=True).stdout
+    assert "-r requirements.lock" in said
+    assert ("-r requirements-ros.lock" in said) is not sourced
+    assert ("--system-site-packages" in said) is sourced
 
 
 def test_every_executable_exists(tmp_path):
@@ -92,10 +138,14 @@ def test_colcon_builds_what_ros2_run_needs(colcon):
     prefix = base / "install" / "scenario_gen"
     names = "segmenter planner gp_sampler road_server log_player evaluator recorder player suite scenario-gen"
     nodes = set(names.split())
-    assert nodes <= {path.name for path in (prefix / "lib" / "scenario_gen").iterdir()}
+    executables = list((prefix / "lib" / "scenario_gen").iterdir())
+    assert nodes <= {path.name for path in executables}
+    for path in executables:  # `ros2 run` takes what can be executed; the packages are those of the Python that ran colcon
+        assert os.access(path, os.X_OK) and path.read_text().startswith(f"#!{sys.executable}\n"), path
     assert (prefix / "share" / "ament_index" / "resource_index" / "packages" / "scenario_gen").is_file()
-    for file in ("package.xml", "config/default.yaml", "launch/suite.launch.py"):
-        assert (prefix / "share" / "scenario_gen" / file).is_file()
+    share = prefix / "share" / "scenario_gen"
+    shared = [*ROOT.glob("config/*.*"), *ROOT.glob("launch/*.py"), *ROOT.glob("examples/*.*"), ROOT / "package.xml"]
+    assert {str(path.relative_to(ROOT)) for path in shared} <= {str(p.relative_to(share)) for p in share.rglob("*")}
     (packages,) = prefix.glob("lib/python3*/site-packages")
     assert (packages / "scenario_gen" / "resources" / "synthetic_a").is_dir()
     assert (packages / "scenario_gen" / "nodes" / "loopback.xml").is_file()

@@ -27,6 +27,7 @@ TYPES = {
     "Map": "nav_msgs/msg/OccupancyGrid",
     "PoseArray": "geometry_msgs/msg/PoseArray",
     "PointCloud2": "sensor_msgs/msg/PointCloud2",
+    "Polygon": "geometry_msgs/msg/PolygonStamped",
     "Path": "nav_msgs/msg/Path",
     "MarkerArray": "visualization_msgs/msg/MarkerArray",
 }
@@ -35,7 +36,7 @@ TYPES = {
 def test_rviz_shows_topics_of_the_suite_with_their_types_and_quality():
     manager = yaml.safe_load((CONFIG / "suite.rviz").read_text())["Visualization Manager"]
     shown = {d["Topic"]["Value"]: d for d in manager["Displays"] if "Topic" in d}
-    assert {"map", "posterior", "vehicle_1/route", "markers"} <= set(shown)
+    assert {"map", "posterior", "vehicle_1/route", "vehicle_1/footprint", "markers"} <= set(shown)
     for name, display in shown.items():
         assert not name.startswith("/"), "absolute names do not work in a namespace"
         kind, quality = topic_entry(name)

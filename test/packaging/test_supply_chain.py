@@ -17,18 +17,15 @@ import json
 import re
 
 from audit import CLEAN, judge, NOT_MADE, VULNERABLE
-from licences import COPYLEFT, installed, licence, locked, needed_at_run_time, PAGE
-from packaging.requirements import Requirement
+from licences import COPYLEFT, installed, licence, locked, needed_at_run_time, PAGE, run_time
 from packaging.utils import canonicalize_name
 import pytest
 from source_files import ROOT
 
-RUN_TIME = (ROOT / "requirements.in").read_text().partition("# to build and to test")[0]
-NEEDED = [Requirement(line) for line in RUN_TIME.splitlines() if line and not line.startswith("#")]
-LOCKS = ("requirements.lock", "requirements-bench.lock", "requirements-audit.lock")
+LOCKS = ("requirements.lock", "requirements-ros.lock", "requirements-bench.lock", "requirements-audit.lock")
 
 
-@pytest.mark.parametrize("wanted", NEEDED, ids=str)
+@pytest.mark.parametrize("wanted", run_time(), ids=str)
 def test_what_is_needed_at_run_time_has_a_lower_bound_that_the_lock_meets(wanted):
     assert [one.operator for one in wanted.specifier] == [">="]
     versions = locked()[canonicalize_name(wanted.name)].split(", ")
@@ -38,7 +35,15 @@ def test_what_is_needed_at_run_time_has_a_lower_bound_that_the_lock_meets(wanted
 def test_setup_py_asks_for_the_same():
     setup = (ROOT / "setup.py").read_text()
     assert 'python_requires=">=3.11,<3.14"' in setup
-    assert 'Path("requirements.in")' in setup
+    assert 'needed("requirements.in")' in setup and 'needed("requirements-ros.in")' in setup
+
+
+def test_what_a_sourced_jazzy_has_itself_is_locked_apart():
+    """`make` installs requirements-ros.lock only where no Jazzy is sourced, and both in one call: no package stands in both."""
+    pins = [set(re.findall(r"^(\S+)==", (ROOT / name).read_text(), re.MULTILINE)) for name in LOCKS[:2]]
+    assert not pins[0] & pins[1]
+    assert not [name for name in pins[0] if name.startswith("ros-")]
+    assert "ros-rclpy" in pins[1] and "numpy" in pins[0]
 
 
 @pytest.mark.parametrize("name", LOCKS)

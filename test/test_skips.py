@@ -1,0 +1,41 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""In CI a skipped test has failed, but for the one named exception: what needs `launch`."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+CASES = {
+    "test_exception.py": "import pytest\nfrom skips import NO_LAUNCH\npytest.importorskip('no_launch', reason=NO_LAUNCH)\n",
+    "test_one.py": "import pytest\ndef test_it():\n    pytest.skip('no disk')\n",
+    "test_module.py": "import pytest\npytest.skip('no reason', allow_module_level=True)\n",
+}
+
+
+@pytest.mark.parametrize(("ci", "said"), [(True, "1 failed, 1 skipped, 1 error"), (False, "3 skipped")])
+def test_only_what_needs_launch_may_be_skipped_in_ci(tmp_path, ci, said):
+    own = {name: Path(__file__).with_name(name).read_text() for name in ("conftest.py", "skips.py")}
+    for name, text in (own | CASES).items():
+        (tmp_path / name).write_text(text)
+    environment = {name: value for name, value in os.environ.items() if name not in ("CI", "PYTEST_ADDOPTS")}
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--continue-on-collection-errors", str(tmp_path)]
+    environment |= {"CI": "true"} if ci else {}
+    run = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert said in run.stdout, run.stdout + run.stderr
+    assert bool(run.returncode) is ci
