@@ -47,8 +47,8 @@ from msg_conventions.diagnostics import Level
 from scenario_gen.bags import bag_topics, BagMessage, read_messages
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.nodes.base import run_nodes
-from scenario_gen.nodes.health import Health
 from scenario_gen.nodes.frames import find_motion, Frames, Instant
+from scenario_gen.nodes.health import Health
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.ros_parameters import ConfigParameters
