@@ -163,7 +163,8 @@ def told_fit(
     if any(len(vehicle.anchors) != len(stamps) or len(vehicle.moved) != len(stamps) for vehicle in fitted):
         return None, ()
     index = np.array([0, *segmentation.changepoints, len(encounter.time) - 1])
-    return Fit(encounter.vehicles, fitted, index, asked, tuple(told.get("fit", {}).values())), routes
+    notes = tuple(text for key, text in told.get("fit", {}).items() if key.startswith("note."))
+    return Fit(encounter.vehicles, fitted, index, asked, notes), routes
 
 
 def _fitted(poses: Floats, values: Values) -> FittedVehicle:

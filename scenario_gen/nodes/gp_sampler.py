@@ -32,24 +32,25 @@ from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import RefusedError, ScenarioGenError
 from scenario_gen.nodes.base import REQUESTS, run_nodes, StageNode
-from scenario_gen.nodes.inputs import Inputs, stamp_of
+from scenario_gen.nodes.inputs import Inputs
 from scenario_gen.nodes.ros_parameters import values_of_call
 from scenario_gen.nodes.sample_messages import sample_messages
 from scenario_gen.nodes.sample_request import Answer, answer_request, Config
 
 ENDS = ("road/entries", "road/exits")  # of use only where start or end states are asked for
+Asked = Callable[[], bool]  # whether a job was cancelled
 
 
 class GpSampler(StageNode):
     """Samples valid scenarios around the planned routes."""
 
-    INPUTS = ("map", *ENDS, "tracks", "changepoints", "fit")
+    INPUTS = ("map", *ENDS, "tracks", "changepoints", "fit", "fit/info")
     STAGES = ("interaction", "roads", "fitting", "planning", "sampling", "validity")
     OUTPUTS = ("scenarios", "scenarios/info", "markers")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("gp_sampler", Config(), namespace)
-        paired = ("tracks", "changepoints", "fit", *(("map",) if self.config.pair_map else ()))
+        paired = ("tracks", "changepoints", "fit", "fit/info", *(("map",) if self.config.pair_map else ()))
         self._seen = Inputs(paired, () if self.config.pair_map else ("map",))
         self._routes: set[str] = set()
         self._requests = map(str, count(1))
@@ -76,13 +77,9 @@ class GpSampler(StageNode):
         return self._seen.missing() or [topic for topic in ends if topic not in self._messages()]
 
     def _messages(self) -> dict[str, bytes]:
-        """The template's messages; entries and exits only if they are those of its road."""
+        """The template's messages; entries and exits only if the fit was made with them."""
         messages = self._seen.complete() or {}
-        for topic in ENDS:
-            own = topic in messages and self.config.pair_map
-            if not own or stamp_of(messages[topic], topic) != stamp_of(messages["map"], "map"):
-                messages.pop(topic, None)
-        return messages
+        return {t: data for t, data in messages.items() if t not in ENDS or self._seen.named("fit/info", t)}
 
     def _follow(self, tracks: bytes) -> None:
         """Listen to the routes of the vehicles in the tracks, and no longer to those of others."""
@@ -95,22 +92,25 @@ class GpSampler(StageNode):
         for topic in sorted(wanted):
             self.listen(topic)
 
-    def _generate(
-        self, messages: Mapping[str, bytes], request: str, config: Config, cancelled: Callable[[], bool]
-    ) -> Answer | None:
-        """Sample, check and publish; the request's account closes `scenarios/info`. None if it was cancelled."""
-        if cancelled():
+    def _generate(self, messages: Mapping[str, bytes], request: str, config: Config, cancelled: Asked) -> Answer | None:
+        """Sample, check and publish; the request's account closes `scenarios/info`. None if it was given up."""
+        over = partial(self._over, messages, cancelled)
+        if over():
             return None
         node = self.get_fully_qualified_name()
-        answer = answer_request(messages, config, request, node, partial(self._progress, request), cancelled)
-        stamp = answer.template.encounter.start_ns
-        if cancelled():
-            self.status(Level.WARN, f"request {request} was cancelled", f"request {request}", stamp)
-            return None
-        for topic, data in sample_messages(answer.template.encounter, answer.asked, answer.result, answer.closing, node):
+        answer = answer_request(messages, config, request, node, partial(self._progress, request), lambda: bool(over()))
+        encounter = answer.template.encounter
+        for topic, data in sample_messages(encounter, answer.asked, answer.result, answer.closing, node):
+            if why := over():  # also amid a set: nothing of an old map is said beside the new one
+                self.status(Level.WARN, f"request {request} was {why}", f"request {request}", encounter.start_ns)
+                return None
             self.send(topic, data)
-        self.status(answer.closing.level, answer.closing.message, f"request {request}", stamp)
+        self.status(answer.closing.level, answer.closing.message, f"request {request}", encounter.start_ns)
         return answer
+
+    def _over(self, messages: Mapping[str, bytes], cancelled: Asked) -> str:
+        """Say why a request is to be given up; nothing if it is not."""
+        return "given up: its inputs were replaced" if self._seen.replaced(messages) else "cancelled" if cancelled() else ""
 
     def _progress(self, request: str, done: int, total: int, stamp_ns: int) -> None:
         if done == total or done % max(1, total // 10) == 0:
@@ -127,11 +127,11 @@ class GpSampler(StageNode):
             response.result.reason = f"request {name}: {error}"
             return response
 
-        def job(cancelled: Callable[[], bool]) -> None:
+        def job(cancelled: Asked) -> None:
             try:
                 made = self._generate(messages, name, config, cancelled)
-                message = made.closing.message if made else "cancelled"
-                answer.set_result((bool(made and made.result.scenarios), message))
+                why = made.closing.message if made else self._over(messages, lambda: True)
+                answer.set_result((bool(made and made.result.scenarios), why))
             except ScenarioGenError as error:
                 answer.set_result((False, str(error)))
             except Exception as error:

@@ -50,7 +50,7 @@ def run() -> Run:
 
 def test_every_message_decodes_in_every_reader(run, tmp_path):
     folder = write_run(tmp_path / "bag", [replace(run, namespace="/a"), run])
-    expected = 2 * (8 + 4 + 3 * 5 + 1)
+    expected = 2 * (10 + 4 + 3 * 5 + 1)
     counts = Counter()
     with AnyReader([folder], default_typestore=get_typestore(Stores.EMPTY)) as reader:
         for connection, _, data in reader.messages():
