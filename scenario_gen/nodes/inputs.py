@@ -14,11 +14,15 @@
 
 """Latched inputs that belong together: complete once all bear the same stamp and `road/info` and `fit/info` agree."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
+from msg_conventions import trajectory
 from msg_conventions.belonging import decode_belonging, hash_of, INFOS
 from msg_conventions.cdr import CdrReader
+from msg_conventions.fits import decode_fit
+from msg_conventions.paths import decode_path
+from msg_conventions.roads import decode_map, decode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
@@ -47,6 +51,28 @@ def take_tracks(data: bytes) -> Encounter:
     encounter = decode_tracks(data)
     refuse_too_large(encounter)
     return encounter
+
+
+DECODERS: dict[str, Callable[[bytes, str], object]] = {
+    "tracks": lambda data, _: take_tracks(data),
+    "map": lambda data, what: decode_map(data, name=what),
+    "road/entries": decode_poses,
+    "road/exits": decode_poses,
+    "changepoints": trajectory.decode,
+    "fit": decode_fit,
+    "route": decode_path,
+    **dict.fromkeys(INFOS, decode_belonging),
+}
+
+
+def refuse_damaged(topic: str, data: bytes) -> None:
+    """Read a latched input as it arrives, so that what is damaged is named and does not take the place of what was there.
+
+    Raises:
+        InputError, RefusedError: it is damaged, or too large.
+    """
+    if decode := DECODERS.get("route" if topic.endswith("/route") else topic):
+        decode(data, topic)
 
 
 @dataclass(frozen=True)
