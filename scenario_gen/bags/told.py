@@ -24,6 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
+from msg_conventions.belonging import MAP_HASH, TEMPLATE_HASH
 from msg_conventions.cdr import CdrReader
 from msg_conventions.changepoints import decode_changepoints, decode_posterior
 from msg_conventions.diagnostics import decode_diagnostics
@@ -43,6 +44,7 @@ from scenario_gen.storage import BagConfig
 
 Values = Mapping[str, str]
 OUTCOME = ("request", "requested", "published", "candidates")
+IDENTITY = (MAP_HASH, TEMPLATE_HASH)
 REFUSED = "refused."
 
 
@@ -106,7 +108,7 @@ def told_provenance(bag: Path, config: BagConfig = DEFAULT) -> dict[str, str]:
     for message in read_messages(bag, lambda topic: f"/{topic}".endswith("/scenarios/info"), config):
         for account in told_requests([message.data]):
             for key, value in account.items():
-                if key not in OUTCOME and not key.startswith((REFUSED, "adaptation.", "ego")):
+                if key not in (*OUTCOME, *IDENTITY) and not key.startswith((REFUSED, "adaptation.", "ego")):
                     found.setdefault(key, []).append(value)
     return {key: " | ".join(dict.fromkeys(values)) for key, values in found.items()}
 

@@ -38,7 +38,7 @@ from suite_processes import Client, Processes, RESOURCES
 
 from msg_conventions.cdr import CdrReader
 from msg_conventions.diagnostics import decode_diagnostics, Level
-from msg_conventions.streams import encode_fix, encode_speed
+from msg_conventions.streams import decode_fix, decode_speed, encode_fix, encode_speed
 from msg_conventions.topics import topic_entry
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.errors import ScenarioGenError
@@ -48,6 +48,7 @@ from scenario_gen.nodes.inputs import refuse_damaged
 
 MESSAGES = int(os.environ.get("SCENARIO_GEN_SOAK_MESSAGES", "10000"))
 MINUTES = float(os.environ.get("SCENARIO_GEN_SOAK_MINUTES", "30"))
+HEAD = 160  # bytes
 CLIENTS, WARM_UP, GROWTH = 8, 0.2, 0.05  # a share of the time; of the memory then
 GIBIBYTE, IDLE = 1 << 20, 1.0  # kB; s in which a machine with nothing else to do names what it refuses
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -58,6 +59,7 @@ NODES = {
     "gp_sampler": ["-p", "count:=1"],
     "evaluator": [],
 }
+STREAMS: dict[str, Callable[[bytes, str], object]] = {"fix": decode_fix, "speed": decode_speed}
 ROAD = ("planner", "gp_sampler")
 LISTENERS = {
     "tracks": tuple(NODES),
@@ -87,18 +89,24 @@ def hostile(rng: random.Random, kind: str, seeds: list[bytes]) -> bytes:
     """A damaged message that is still of its type: what any publisher of ROS could send."""
     while True:
         data = rng.choice(seeds)
+        size = rng.choice((HEAD, len(data)))  # what a message says of itself stands at its beginning
+        head, rest = data[:size], data[size:]
         for _ in range(rng.choice((1, 1, 2, 4))):
-            data = rng.choice(BYTES)(rng, data, seeds)
+            head = rng.choice(BYTES)(rng, head, seeds)
         try:
-            return bytes(STORE.serialize_cdr(STORE.deserialize_cdr(data, kind), kind))
+            return bytes(STORE.serialize_cdr(STORE.deserialize_cdr(head + rest, kind), kind))
         except Exception:  # whatever a decoder says of bytes that are not of the type
             continue
 
 
 def is_refused(topic: str, data: bytes) -> bool:
-    """Say whether a node refuses a message as it arrives; those of streams, scenarios and accounts it judges later."""
+    """Say whether a node refuses a message as it arrives; scenarios and accounts it judges later, together."""
+    stream = STREAMS.get(topic.rpartition("/")[2])
     try:
-        refuse_damaged(topic, data)
+        if stream:
+            stream(data, topic)
+        else:
+            refuse_damaged(topic, data)
     except ScenarioGenError:
         return True
     return False
@@ -133,7 +141,7 @@ class Suite:
         """The nodes that have said an error of the topic since so many messages of /diagnostics."""
         statuses = [s for data in self.client.heard["/diagnostics"][after:] for s in decode_diagnostics(data)[1]]
         named = {s.name for s in statuses if s.level is Level.ERROR}
-        return {node for node in LISTENERS[topic] if f"/{node}: {topic}" in named}
+        return {node for node in LISTENERS[topic] if {f"/{node}: {topic}", f"/{node}: /{topic}"} & named}
 
     def end(self) -> dict[str, int]:
         """End the nodes; return their exit codes."""
