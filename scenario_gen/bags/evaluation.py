@@ -23,7 +23,7 @@ from msg_conventions.belonging import MAP_HASH
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.bags.accounts import accounts_of, is_ambiguous, map_of, unknown_scenarios
+from scenario_gen.bags.belonging import accounts_of, is_ambiguous, map_of, unknown_scenarios
 from scenario_gen.bags.contents import read_namespaces
 from scenario_gen.bags.reader import DEFAULT, within
 from scenario_gen.bags.told import request_sentence, told_fit, told_numbers, told_requests, told_segmentation, told_values

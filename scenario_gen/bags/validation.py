@@ -36,7 +36,7 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.arrays import Floats
-from scenario_gen.bags.accounts import Account, accounts_of, is_ambiguous, map_of, newest, tracks_of, unknown_scenarios
+from scenario_gen.bags.belonging import Account, accounts_of, is_ambiguous, map_of, newest, tracks_of, unknown_scenarios
 from scenario_gen.bags.contents import Contents, read_namespaces
 from scenario_gen.bags.reader import DEFAULT, within
 from scenario_gen.errors import InputError
