@@ -60,11 +60,14 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
     steps = np.diff(message.time_ns)
     if message.time_ns[0] != 0:
         raise InputError(f"{name}: the first sample is at {message.time_ns[0] * 1e-9:g} s; time_from_start must count from 0")
-    if steps[0] <= 0 or (steps != steps[0]).any():
-        at = int(np.argmax(steps != steps[0])) if steps[0] > 0 else 0
+    if (steps <= 0).any():
+        at = int(np.argmax(steps <= 0))
+        raise InputError(f"{name}: sample {at + 1} is not later than sample {at}; time_from_start must count in even steps")
+    if (steps != steps[0]).any():
+        at = int(np.argmax(steps != steps[0]))
         raise InputError(
-            f"{name}: sample {at + 1} comes {steps[at] * 1e-9:g} s after the one before; time_from_start must have even steps, "
-            f"as from sample 0 to 1 ({steps[0] * 1e-9:g} s); resample the tracks (10 Hz is usual)"
+            f"{name}: sample {at + 1} comes {steps[at] * 1e-9:g} s after the one before, sample 1 {steps[0] * 1e-9:g} s; "
+            "time_from_start must count in even steps; resample the tracks (10 Hz is usual)"
         )
     if not SHORTEST_STEP_NS <= steps[0] <= LONGEST_STEP_NS or message.time_ns[-1] > trajectory.LONGEST_NS:
         raise InputError(
