@@ -41,7 +41,10 @@ def hash_of(topic: str, data: bytes) -> str:
 
 
 def _timeless(grid: bytes) -> bytes:
-    """Return the bytes of a map without stamp, load time, and what follows its cells; of a damaged one, whatever is there."""
+    """Return the bytes of a map without stamp, load time, and what follows its cells; of a damaged one, whatever is there.
+
+    DDS fills small messages up to a multiple of 4 bytes. All other messages that are named by a hash end at one.
+    """
     load_time = 16 + int.from_bytes(grid[12:16], "little")  # behind the frame, at a multiple of 4
     load_time += -load_time % 4
     origin = load_time + 20  # behind resolution, width and height, at a multiple of 8 from the encapsulation on

@@ -19,7 +19,7 @@ import threading
 import pytest
 from suite_processes import Processes, RESOURCES
 
-from msg_conventions.belonging import identity, INFOS
+from msg_conventions.belonging import decode_belonging, identity, INFOS
 from msg_conventions.diagnostics import decode_diagnostics
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags import read_messages
@@ -52,8 +52,8 @@ def test_the_suite_records_several_jobs_in_their_namespaces(demo):
         assert [m.data for m in read_messages(demo) if m.topic == f"{job.namespace}/scenarios"] == expected
         written = list(run_messages(as_run(case, 7, job.namespace)))
         for topic in INFOS:
-            (data,) = [data for name, data, _ in written if name == topic]
-            assert [m.data for m in read_messages(demo) if m.topic == f"{job.namespace}/{topic}"] == [data]
+            own = [decode_belonging(data, topic) for name, data, _ in written if name == topic]
+            assert [decode_belonging(m.data, topic) for m in read_messages(demo) if m.topic == f"{job.namespace}/{topic}"] == own
         messages = {topic: data for topic, data, _ in written}
         infos = [m.data for m in read_messages(demo) if m.topic == f"{job.namespace}/scenarios/info"]
         assert all(identity(messages).items() <= decode_diagnostics(data)[1][0].values.items() for data in infos)

@@ -49,7 +49,7 @@ from scenario_gen.nodes.inputs import refuse_damaged
 MESSAGES = int(os.environ.get("SCENARIO_GEN_SOAK_MESSAGES", "10000"))
 MINUTES = float(os.environ.get("SCENARIO_GEN_SOAK_MINUTES", "30"))
 HEAD = 160  # bytes
-CLIENTS, WARM_UP, GROWTH = 8, 0.2, 0.05  # a share of the time; of the memory then
+CLIENTS, WARM_UP, GROWTH = 8, 1 / 3, 0.05  # a share of the time; of the memory then
 GIBIBYTE, IDLE = 1 << 20, 1.0  # kB; s in which a machine with nothing else to do names what it refuses
 STORE = get_typestore(Stores.ROS2_JAZZY)
 NODES = {
