@@ -79,7 +79,7 @@ LISTENERS = {
 
 
 def memory(pid: int, key: str) -> int:
-    """VmRSS or VmHWM [kB] of a process; 0 if it is gone."""
+    """Return VmRSS or VmHWM [kB] of a process; 0 if it is gone."""
     path = Path("/proc") / str(pid) / "status"
     lines = path.read_text().splitlines() if path.exists() else ()
     return next((int(line.split()[1]) for line in lines if line.startswith(key)), 0)
