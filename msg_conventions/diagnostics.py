@@ -235,8 +235,8 @@ def read_request(status: Status, scenarios: tuple[Scenario, ...] = ()) -> Scenar
         raise InputError(f"{what} ({error})") from None
 
 
-def fit_statuses(fit: "Fit", node: str) -> tuple[Status, ...]:
-    """Return what the fitting decided: one status per vehicle, one for the notes."""
+def fit_statuses(fit: "Fit", node: str, more: Mapping[str, str] | None = None) -> tuple[Status, ...]:
+    """Return what the fitting decided: one status per vehicle, one for the notes; each with what `more` says of it."""
     per_vehicle = tuple(
         Status(
             f"{node}: fit of {vehicle.id}",
@@ -247,9 +247,10 @@ def fit_statuses(fit: "Fit", node: str) -> tuple[Status, ...]:
                 "scale": repr(fitted.scale),
                 "moved_m": json.dumps(fitted.moved.tolist()),
                 "stands": json.dumps([bool(value) for value in fitted.stands]),
+                **(more or {}),
             },
         )
         for vehicle, fitted in zip(fit.vehicles, fit.fitted, strict=True)
     )
     notes = {f"note.{k}": note for k, note in enumerate(fit.notes)}
-    return (*per_vehicle, Status(f"{node}: fit", Level.OK, "template fitted to the road", notes))
+    return (*per_vehicle, Status(f"{node}: fit", Level.OK, "template fitted to the road", notes | dict(more or {})))

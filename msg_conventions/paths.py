@@ -129,8 +129,11 @@ def decode_route(data: bytes, anchors_ns: Sequence[int], what: str = "route") ->
     stamp_ns, frame_id, poses, stamps = decode_path(data, what)
     if stamp_ns != anchors_ns[0]:
         raise InputError(f"{what}: stamp {stamp_ns} ns is not that of the template ({anchors_ns[0]} ns)")
-    if len(poses) == 0 or (np.diff(stamps) < 0).any():
-        raise InputError(f"{what}: no poses, or their stamps decrease")
+    if len(poses) == 0:
+        raise InputError(f"{what}: the path holds no poses")
+    if (np.diff(stamps) < 0).any():
+        bad = int(np.argmax(np.diff(stamps) < 0))
+        raise InputError(f"{what}: pose {bad + 1} bears an earlier stamp than pose {bad}; planned times must not decrease")
     moved = np.concatenate([[True], (np.diff(poses, axis=0) != 0.0).any(axis=1)])
     at = np.searchsorted(stamps, anchors_ns)
     missing = (at >= len(stamps)) | (stamps[np.minimum(at, len(stamps) - 1)] != anchors_ns)

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.trajectory import FARTHEST
 from msg_conventions.yaw import check_quaternions, half_angle, yaw
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
@@ -54,6 +55,8 @@ def poses_of(rows: Floats, what: str) -> Floats:
     """
     if not np.isfinite(rows).all():
         raise InputError(f"{what}: a pose holds a value that is not finite")
+    if (np.abs(rows[:, :3]) > FARTHEST).any():
+        raise InputError(f"{what}: a position is {np.abs(rows[:, :3]).max():g}; at most {FARTHEST:g} is read")
     check_quaternions(rows[:, 3:], what)
     return np.column_stack([rows[:, :2], yaw(rows[:, 3:])])
 
@@ -104,6 +107,8 @@ def decode_map(data: bytes, entries: bytes | None = None, exits: bytes | None = 
         raise InputError(f"{name}: {width} x {height} cells are announced, {len(cells)} are there")
     if not np.isfinite(origin).all() or abs(float(yaw(origin[3:]))) > 1e-9:
         raise InputError(f"{name}: info.origin must be finite and not rotated")
+    if (np.abs(origin[:3]) > FARTHEST).any():
+        raise InputError(f"{name}: info.origin is {np.abs(origin[:3]).max():g} m away; at most {FARTHEST:g} is read")
     ends: list[Floats] = []
     for what, poses in (("road/entries", entries), ("road/exits", exits)):
         if poses is None:

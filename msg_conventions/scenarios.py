@@ -54,8 +54,13 @@ def decode_scenario(data: bytes, *, seed: int = 0, index: int = 0, what: str = "
         InputError: the message is damaged or its times do not increase from 0.
     """
     message = trajectory.decode(data, what)
-    if len(message.time_ns) < 2 or message.time_ns[0] != 0 or (np.diff(message.time_ns) <= 0).any():
-        raise InputError(f"{what}: time_from_start must increase from 0 over at least two points")
+    if len(message.time_ns) < 2:
+        raise InputError(f"{what}: {len(message.time_ns)} point(s); at least 2 are needed")
+    if message.time_ns[0] != 0 or (np.diff(message.time_ns) <= 0).any():
+        begin = (
+            f"it begins at {message.time_ns[0] * 1e-9:g} s" if message.time_ns[0] else "a point is not later than the one before"
+        )
+        raise InputError(f"{what}: {begin}; time_from_start must increase from 0")
     if message.time_ns[-1] > trajectory.LONGEST_NS:
         raise InputError(
             f"{what}: it lasts {message.time_ns[-1] * 1e-9:g} s; at most {trajectory.LONGEST_NS * 1e-9:g} s are read"

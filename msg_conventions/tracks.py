@@ -58,8 +58,17 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
     if len(message.time_ns) < 2:
         raise InputError(f"{name}: {len(message.time_ns)} sample(s); at least 2 are needed to say how anybody drives")
     steps = np.diff(message.time_ns)
-    if message.time_ns[0] != 0 or steps[0] <= 0 or (steps != steps[0]).any():
-        raise InputError(f"{name}: time_from_start must count from 0 in even steps; resample the tracks (10 Hz is usual)")
+    if message.time_ns[0] != 0:
+        raise InputError(f"{name}: the first sample is at {message.time_ns[0] * 1e-9:g} s; time_from_start must count from 0")
+    if (steps <= 0).any():
+        at = int(np.argmax(steps <= 0))
+        raise InputError(f"{name}: sample {at + 1} is not later than sample {at}; time_from_start must count in even steps")
+    if (steps != steps[0]).any():
+        at = int(np.argmax(steps != steps[0]))
+        raise InputError(
+            f"{name}: sample {at + 1} comes {steps[at] * 1e-9:g} s after the one before, sample 1 {steps[0] * 1e-9:g} s; "
+            "time_from_start must count in even steps; resample the tracks (10 Hz is usual)"
+        )
     if not SHORTEST_STEP_NS <= steps[0] <= LONGEST_STEP_NS or message.time_ns[-1] > trajectory.LONGEST_NS:
         raise InputError(
             f"{name}: {len(steps)} steps of {steps[0] * 1e-9:g} s; steps of 0.001 to 10 s and at most "

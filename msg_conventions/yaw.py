@@ -21,7 +21,7 @@ from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 
 TWO_PI = 2.0 * np.pi
-SHORTEST = 0.5  # of a quaternion, which should have length 1
+SHORTEST, LARGEST = 0.5, 2.0  # length, and part, of a quaternion, which should have length 1
 
 
 def half_angle(heading: Floats) -> tuple[Floats, Floats]:
@@ -46,11 +46,12 @@ def check_quaternions(quaternions: Floats, what: str) -> None:
     """Refuse quaternions (..., 4) that are no rotation; lengths near 1 are left to rounding.
 
     Raises:
-        InputError: naming `what`, one is shorter than a half: all zeros, as a rule, for nobody set it.
+        InputError: naming `what`, one is shorter than a half (all zeros, as a rule, for nobody set it), or far too long.
     """
-    squared = np.square(quaternions).sum(axis=-1)
-    if (squared < SHORTEST * SHORTEST).any():
-        row = int(np.argmin(squared.reshape(-1)))
+    squared = np.square(np.clip(quaternions, -2.0 * LARGEST, 2.0 * LARGEST)).sum(axis=-1)
+    wrong = (squared < SHORTEST * SHORTEST) | (np.abs(quaternions) > LARGEST).any(axis=-1)
+    if wrong.any():
+        row = int(np.argmax(wrong.reshape(-1)))
         x, y, z, w = quaternions.reshape(-1, 4)[row]
         raise InputError(
             f"{what}: quaternion {row} is ({x:g}, {y:g}, {z:g}, {w:g}), which is no rotation; (0, 0, 0, 1) means a heading of 0"

@@ -280,6 +280,10 @@ def validate(
             table.add_row(cause, str(entry.count), str(entry.scenario), entry.message)
         if one.found:
             console.print(table)
+        if one.unaccounted:
+            console.print(
+                f"  {one.unaccounted} unaccounted: scenarios/info does not tell of them (lost with the end of a recording?)"
+            )
         for sentence, count in one.left_out.items():
             console.print(f"  not applicable to {count}: {sentence}")
     if any(one.invalid for one in found):

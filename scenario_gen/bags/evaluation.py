@@ -16,11 +16,14 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
+from msg_conventions.belonging import MAP_HASH
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
+from scenario_gen.bags.belonging import accounts_of, is_ambiguous, map_of, unknown_scenarios
 from scenario_gen.bags.contents import read_namespaces
 from scenario_gen.bags.reader import DEFAULT, within
 from scenario_gen.bags.told import request_sentence, told_fit, told_numbers, told_requests, told_segmentation, told_values
@@ -82,16 +85,21 @@ def _case(
     road_name = next((values["road"] for values in accounts if "road" in values), f"{namespace}/map")
     road = decode_map(topics["map"][-1], name=road_name)[1] if topics["map"] else None
     scenarios = _scenarios(topics, f"{namespace}/{SCENARIOS}")
+    given = accounts_of(topics[INFO], INFO, lenient=True)
+    of_scenario = {account["sha256"]: account for account in given}
+    several = is_ambiguous(topics["map"], given)
     conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
     waits = find_waits(encounter) if segmentation.changepoints.size else ()
     names = tuple(vehicle.id for vehicle in encounter.vehicles)
-    reference = Reference(road, None, names, conflicts, waits)
     checkers: dict[tuple[str, ...], Checker] = {}
     verdicts = []
-    for scenario in scenarios:  # an ego may have been left out
-        ids = tuple(vehicle.id for vehicle in scenario.vehicles)
+    for scenario, data in zip(scenarios, topics[SCENARIOS], strict=True):  # an ego may have been left out, the map been another
+        account = of_scenario.get(digest(data), {})
+        ids = (account.get(MAP_HASH, ""), *(vehicle.id for vehicle in scenario.vehicles))
         if ids not in checkers:
-            checkers[ids] = reference.checker(scenario, limits)
+            grid = map_of(account, topics["map"], encounter.start_ns, f"{namespace}/map")
+            there = road if not several else decode_map(grid, name=road_name)[1] if grid and ids[0] else None
+            checkers[ids] = Reference(there, None, names, conflicts, waits).checker(scenario, limits)
         verdicts += checkers[ids].check([scenario])
     counts = CheckCounts.of_verdicts(verdicts)
     evaluation = evaluate(
@@ -103,6 +111,12 @@ def _case(
         config=config,
         seed=seed,
     )
+    lost = sum(account is None for account in unknown_scenarios(topics[SCENARIOS], given).values()) if given else 0
+    if lost:
+        why = f"{INFO} does not tell of them (lost with the end of a recording?)"
+        note = f"{lost} of {len(scenarios)} scenarios are unaccounted: {why}"
+        rows = (replace(row, notes=(*row.notes, note)) if row.name == SCENARIOS else row for row in evaluation.rows)
+        evaluation = replace(evaluation, rows=tuple(rows))
     ego = decode_scenario(topics["ego/track"][-1], what=f"{namespace}/ego/track")[1] if topics["ego/track"] else None
     if ego is not None and ego.vehicles[0].id in evaluation.vehicles:
         ego = None  # of another request than these scenarios

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from msg_conventions.belonging import decode_belonging, hash_of, MAP_HASH, TEMPLATE_HASH
 from msg_conventions.cdr import CdrReader
 from msg_conventions.diagnostics import count_in, decode_diagnostics, encode_diagnostics, Status, text_in
 from msg_conventions.names import tokens
@@ -234,7 +235,9 @@ def _find(bag: Path, index: int, namespace: str | None, request: str | None, con
 def _belonging(
     bag: Path, where: str, entry: Status, info: BagMessage, account: Status, config: BagConfig
 ) -> Iterator[BagMessage]:
-    """What bears the scenario's stamp in its namespace: the newest of each topic, then the scenario and the two accounts.
+    """What bears the scenario's stamp in its namespace, then the scenario and the two accounts.
+
+    Of each topic that is the newest, or, where `fit/info` says what belongs to the scenario's map and template, that one.
 
     Raises:
         InputError: the scenario itself is not in the bag.
@@ -242,8 +245,15 @@ def _belonging(
     stamp = CdrReader(info.data, info.topic).stamp()
     newest: dict[str, BagMessage] = {}
     scenario = None
+    together: dict[str, str] = {}
+    for message in read_messages(bag, lambda topic: topic == f"{where}/fit/info", config):
+        told = decode_belonging(message.data, message.topic)
+        if all(told.get(topic) == entry.values.get(key) for topic, key in (("map", MAP_HASH), ("tracks", TEMPLATE_HASH))):
+            together = told
     for message in read_messages(bag, lambda topic: topic.startswith(f"{where}/"), config):
         topic = message.topic.removeprefix(f"{where}/")
+        if topic in together and hash_of(topic, message.data) != together[topic]:
+            continue
         if topic == "scenarios" and digest(message.data) == entry.values["sha256"]:
             scenario = message
         if _is_kept(topic) and (topic == "map" or CdrReader(message.data, message.topic).stamp() == stamp):

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from msg_conventions.belonging import encode_belonging, identity
 from msg_conventions.changepoints import encode_changepoints, encode_posterior
 from msg_conventions.diagnostics import (
     asked_values,
@@ -81,35 +82,40 @@ class Run:
 def run_messages(run: Run) -> Iterator[tuple[str, bytes, int]]:
     """Yield topic (without namespace), CDR bytes and log stamp [ns] of every message of the run, in order of the stamps."""
     encounter, road, stamp = run.encounter, run.road, run.encounter.start_ns
-    yield "tracks", encode_tracks(encounter), stamp
-    yield "map", encode_map(road, stamp), stamp
-    yield "road/entries", encode_poses(road.entries, road.frame_id, stamp), stamp
-    yield "road/exits", encode_poses(road.exits, road.frame_id, stamp), stamp
-    yield "changepoints", encode_changepoints(encounter, run.segmentation), stamp
-    yield "posterior", encode_posterior(encounter, run.segmentation), stamp
-    yield "fit", encode_fit(encounter, run.fit, road.frame_id), stamp
+    template = {
+        "tracks": encode_tracks(encounter),
+        "map": encode_map(road, stamp),
+        "road/entries": encode_poses(road.entries, road.frame_id, stamp),
+        "road/exits": encode_poses(road.exits, road.frame_id, stamp),
+    }
+    hashes, belonging = identity(template), {"road/info": encode_belonging("road", template, stamp)}
+    template["changepoints"] = encode_changepoints(encounter, run.segmentation)
+    template["fit"] = encode_fit(encounter, run.fit, road.frame_id)
     anchors = anchor_stamps(encounter, run.segmentation.changepoints)
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
-    for name, vehicle, route in zip(names, encounter.vehicles, run.routes, strict=True):
-        yield vehicle_topic(name, "route"), encode_route(route, anchors, road.frame_id), stamp
+    for name, route in zip(names, run.routes, strict=True):
+        template[vehicle_topic(name, "route")] = encode_route(route, anchors, road.frame_id)
+    belonging["fit/info"] = encode_belonging("fit", template, stamp)
+    for topic, data in (*template.items(), *belonging.items()):
+        yield topic, data, stamp
+    yield "posterior", encode_posterior(encounter, run.segmentation), stamp
+    for name, vehicle in zip(names, encounter.vehicles, strict=True):
         yield vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}"), stamp
-    yield (
-        "diagnostics",
-        encode_diagnostics((segmentation_status(run.segmentation), *fit_statuses(run.fit, "/planner")), stamp),
-        stamp,
-    )
+    statuses = (segmentation_status(run.segmentation), *fit_statuses(run.fit, "/planner", hashes))
+    yield "diagnostics", encode_diagnostics(statuses, stamp), stamp
     for topic, data in () if run.result.ego is None else ego_messages(run.result.ego, stamp):
         yield topic, data, stamp
     ego = ego_values(run.result.ego)
     for k, scenario in enumerate(run.result.scenarios):
         logged = stamp + k * SCENARIO_STEP_NS
         data = encode_scenario(scenario, stamp)
-        more = {"template": encounter.name, "road": road.name, **ego, **asked_values(run.fit.asked, encounter.vehicles, scenario)}
+        asked = asked_values(run.fit.asked, encounter.vehicles, scenario)
+        more = {"template": encounter.name, "road": road.name, **hashes, **ego, **asked}
         status = scenario_status(scenario, data, run.request, "/gp_sampler", **more)
         yield "scenarios", data, logged
         yield "scenarios/info", encode_diagnostics([status], stamp), logged
         yield "markers", scenario_markers(scenario, stamp), logged
-    closing = request_status(run.result, run.request, "/gp_sampler", run.seed, run.provenance)
+    closing = request_status(run.result, run.request, "/gp_sampler", run.seed, {**run.provenance, **hashes})
     yield "scenarios/info", encode_diagnostics([closing], stamp), stamp + len(run.result.scenarios) * SCENARIO_STEP_NS
 
 

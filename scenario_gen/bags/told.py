@@ -24,6 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
+from msg_conventions.belonging import MAP_HASH, TEMPLATE_HASH
 from msg_conventions.cdr import CdrReader
 from msg_conventions.changepoints import decode_changepoints, decode_posterior
 from msg_conventions.diagnostics import decode_diagnostics, TEMPLATE, template_of
@@ -43,6 +44,7 @@ from scenario_gen.storage import BagConfig
 
 Values = Mapping[str, str]
 OUTCOME = ("request", "requested", "published", "candidates")
+IDENTITY = (MAP_HASH, TEMPLATE_HASH)
 REFUSED = "refused."
 
 
@@ -108,7 +110,7 @@ def told_provenance(bag: Path, config: BagConfig = DEFAULT) -> dict[str, str]:
     for message in read_messages(bag, lambda topic: f"/{topic}".endswith("/scenarios/info"), config):
         for account in told_requests([message.data]):
             for key, value in account.items():
-                if key not in OUTCOME and not key.startswith((REFUSED, "adaptation.", "ego")):
+                if key not in (*OUTCOME, *IDENTITY) and not key.startswith((REFUSED, "adaptation.", "ego")):
                     found.setdefault(key, []).append(value)
     return {key: " | ".join(dict.fromkeys(values)) for key, values in found.items()}
 
@@ -165,7 +167,8 @@ def told_fit(
     if any(len(vehicle.anchors) != len(stamps) or len(vehicle.moved) != len(stamps) for vehicle in fitted):
         return None, ()
     index = np.array([0, *segmentation.changepoints, len(encounter.time) - 1])
-    return Fit(encounter.vehicles, fitted, index, asked, tuple(told.get("fit", {}).values())), routes
+    notes = tuple(text for key, text in told.get("fit", {}).items() if key.startswith("note."))
+    return Fit(encounter.vehicles, fitted, index, asked, notes), routes
 
 
 def _fitted(poses: Floats, values: Values) -> FittedVehicle:

@@ -15,9 +15,10 @@
 """Is every scenario of a bag valid? For any bag of the conventions, ours or not.
 
 A scenario is checked against what bears its stamp in its own namespace: the states asked of it (its own in `scenarios/info`,
-else `fit`), the conflicts and waits of its template (`tracks`; waits if there are `changepoints`), and the road (`map`; the
-newest one where none bears the stamp). What is not there is not checked, and said. Vehicles are matched by id, so one may be
-left out for an ego. Where there are accounts on `scenarios/info`, each scenario's SHA-256 must be among them.
+else `fit`), the conflicts and waits of its template (`tracks`; waits if there are `changepoints`), and the road: the `map` that
+its account on `scenarios/info` names by hash, else the newest one of the stamp, or of all. What is not there is not checked,
+and said. Vehicles are matched by id, so one may be left out for an ego. Where there are accounts, a scenario is not to stand
+in the place of another that was published; one without any account is counted, and checked as far as that goes.
 """
 
 from collections.abc import Collection, Sequence
@@ -27,7 +28,7 @@ from pathlib import Path
 import numpy as np
 
 from msg_conventions import trajectory
-from msg_conventions.cdr import CdrReader
+from msg_conventions.belonging import MAP_HASH, TEMPLATE_HASH
 from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.diagnostics import decode_diagnostics, states_of
 from msg_conventions.names import tokens
@@ -35,6 +36,7 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.arrays import Floats
+from scenario_gen.bags.belonging import Account, accounts_of, is_ambiguous, map_of, newest, tracks_of, unknown_scenarios
 from scenario_gen.bags.contents import Contents, read_namespaces
 from scenario_gen.bags.reader import DEFAULT, within
 from scenario_gen.errors import InputError
@@ -61,11 +63,15 @@ class Found:
 
 @dataclass
 class Validation:
-    """What was found in one namespace: `found` by cause; `left_out` says what could not be checked, and of how many scenarios."""
+    """What was found in one namespace: `found` by cause; `left_out` says what could not be checked, and of how many scenarios.
+
+    `unaccounted` scenarios have no account on `scenarios/info`, though others have; they are valid if nothing else is wrong.
+    """
 
     namespace: str
     scenarios: int = 0
     invalid: int = 0
+    unaccounted: int = 0
     found: dict[str, Found] = field(default_factory=dict)
     left_out: dict[str, int] = field(default_factory=dict)
 
@@ -136,22 +142,31 @@ def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = D
 
 def _validate(namespace: str, topics: Contents, limits: Limits | None) -> Validation:
     result = Validation(namespace)
-    asked = asked_by_digest([(f"{namespace}/{INFO}", data) for data in topics[INFO]])
-    accounts = _accounts(namespace, topics[INFO])
-    unaccounted = () if accounts else (f"sha256: there is no account on {INFO}",)
-    references: dict[int, Reference] = {}
-    checkers: dict[tuple[int, tuple[str, ...], bytes], Checker] = {}
+    info = f"{namespace}/{INFO}"
+    accounts = accounts_of(topics[INFO], info)
+    own = {account["sha256"]: account for account in accounts}
+    asked = asked_by_digest([(info, data) for data in topics[INFO]])
+    unknown = unknown_scenarios(topics["scenarios"], accounts) if accounts else {}
+    silent = () if accounts else (f"sha256: there is no account on {INFO}",)
+    references: dict[tuple[object, ...], Reference] = {}
+    checkers: dict[tuple[object, ...], Checker] = {}
     for index, data in enumerate(topics["scenarios"]):
-        altered = [(ALTERED, _altered(data, index, accounts))] if accounts and digest(data) not in accounts else []
+        altered, account = [], unknown.get(index)
+        if account is not None:
+            altered = [(ALTERED, _altered(data, index, account))]
+        elif index in unknown:
+            result.unaccounted += 1
         try:
             stamp, scenario = decode_scenario(data, index=index, what=f"{namespace}/scenarios, message {index}")
-            if stamp not in references:
-                references[stamp] = _reference(namespace, topics, stamp)
-            own = asked.get(digest(data))
-            states = b"" if own is None else own.start.tobytes() + own.end.tobytes()
-            key = (stamp, tuple(vehicle.id for vehicle in scenario.vehicles), states)
+            account, states = own.get(digest(data), account), asked.get(digest(data))
+            is_lost = index in unknown and account is None
+            place = (stamp, is_lost, *((account or {}).get(key) for key in (TEMPLATE_HASH, MAP_HASH)))
+            if place not in references:
+                references[place] = _reference(namespace, topics, stamp, account, is_lost)
+            of_these = b"" if states is None else states.start.tobytes() + states.end.tobytes()
+            key = (place, tuple(vehicle.id for vehicle in scenario.vehicles), of_these)
             if key not in checkers:
-                checkers[key] = references[stamp].checker(scenario, limits, own)
+                checkers[key] = references[place].checker(scenario, limits, states)
         except _ReferenceError as error:
             raise InputError(str(error)) from error
         except InputError as error:
@@ -163,60 +178,50 @@ def _validate(namespace: str, topics: Contents, limits: Limits | None) -> Valida
             result.add(index, [*altered, (UNUSABLE, str(error))], ())
             continue
         violations = [(violation.cause.value, violation.message) for violation in verdict.violations]
-        result.add(index, [*altered, *violations], (*unaccounted, *checkers[key].not_applicable))
+        result.add(index, [*altered, *violations], (*silent, *checkers[key].not_applicable))
     return result
 
 
-def _accounts(namespace: str, messages: Sequence[bytes]) -> dict[str, str]:
-    """Return what `scenarios/info` accounts for: by SHA-256, the request and index of a scenario; in the order of the bag.
-
-    Raises:
-        InputError: a message of it is damaged.
-    """
-    what = f"{namespace}/{INFO}"
-    entries = [status.values for data in messages for status in decode_diagnostics(data, what)[1]]
-    known = [values for values in entries if "sha256" in values]
-    return {v["sha256"]: f"index {v.get('index', '?')} of request {v.get('request', '?')}" for v in known}
+def _name(account: Account) -> str:
+    return f"index {account.get('index', '?')} of request {account.get('request', '?')}"
 
 
-def _altered(data: bytes, index: int, accounts: dict[str, str]) -> str:
-    """Return the sentence for a message whose SHA-256 is not accounted for; the account in its place says what it was."""
-    place = list(accounts.items())[index : index + 1]
-    published = "".join(f"; {name} was published as {known[:12]}…" for known, name in place)
-    return f"message {index} has SHA-256 {digest(data)[:12]}…, which {INFO} does not know{published}"
+def _altered(data: bytes, index: int, account: Account) -> str:
+    """Return the sentence for a message that stands where another one was published."""
+    published = f"{_name(account)} was published as {account['sha256'][:12]}…"
+    return f"message {index} has SHA-256 {digest(data)[:12]}…, which {INFO} does not know; {published}"
 
 
 class _ReferenceError(Exception):
     """What the scenarios are to be held against cannot be read itself."""
 
 
-def _reference(namespace: str, topics: Contents, stamp: int) -> Reference:
-    """Return what bears the stamp.
+def _reference(namespace: str, topics: Contents, stamp: int, account: Account | None, is_lost: bool) -> Reference:
+    """Return what a scenario of the stamp and account is held against; if its account is lost, only what is beyond doubt.
 
     Raises:
         _ReferenceError: a message of it is damaged.
     """
     try:
-        newest = {topic: _of_stamp(topics[topic], stamp, f"{namespace}/{topic}") for topic in REFERENCES}
-        grid = newest["map"] or (topics["map"][-1] if topics["map"] else None)
+        found = {topic: newest(topics[topic], stamp, f"{namespace}/{topic}") for topic in REFERENCES}
+        tracks = tracks_of(account, topics["tracks"], stamp, f"{namespace}/tracks")
+        grid = map_of(account, topics["map"], stamp, f"{namespace}/map")
+        if is_lost and is_ambiguous(topics["map"], accounts_of(topics[INFO], f"{namespace}/{INFO}")):
+            grid = None
         road = decode_map(grid, name=f"{namespace}/map")[1] if grid else None
         asked, template, conflicts, waits = None, None, [], None
-        if newest["fit"]:
-            asked = _asked(newest["fit"], f"{namespace}/fit")
-        if newest["tracks"]:
-            encounter = decode_tracks(newest["tracks"], f"{namespace}/tracks")
+        if found["fit"] and not is_lost:
+            asked = _asked(found["fit"], f"{namespace}/fit")
+        if tracks:
+            encounter = decode_tracks(tracks, f"{namespace}/tracks")
             template = tokens(vehicle.id for vehicle in encounter.vehicles)
             conflicts = list(find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading))
-            if newest["changepoints"]:  # without changepoints there is no dwell to hold: its waits are not asked for
-                segmentation = decode_changepoints(newest["changepoints"], encounter, f"{namespace}/changepoints")
+            if found["changepoints"]:  # without changepoints there is no dwell to hold: its waits are not asked for
+                segmentation = decode_changepoints(found["changepoints"], encounter, f"{namespace}/changepoints")
                 waits = find_waits(encounter) if segmentation.changepoints.size else ()
     except InputError as error:
         raise _ReferenceError(str(error)) from error
     return Reference(road, asked, template, tuple(conflicts), waits)
-
-
-def _of_stamp(messages: Sequence[bytes], stamp: int, what: str) -> bytes | None:
-    return next((data for data in reversed(messages) if CdrReader(data, what).stamp() == stamp), None)
 
 
 def _asked(data: bytes, what: str) -> dict[str, tuple[Floats, Floats]]:

@@ -33,7 +33,7 @@ from scenario_gen.interrupts import interrupt
 from scenario_gen.nodes.answering import Answers
 from scenario_gen.nodes.compiling import compile_kernels
 from scenario_gen.nodes.health import Health
-from scenario_gen.nodes.inputs import take_tracks
+from scenario_gen.nodes.inputs import refuse_damaged
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.usage import asks_for_help, help_of, namespaces, show
@@ -222,8 +222,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     def _receive(self, topic: str, data: bytes) -> None:
         """Take an input in; whatever is wrong with it, the node lives on."""
         try:
-            if topic == "tracks":
-                take_tracks(data)
+            refuse_damaged(topic, data)
             self.received(topic, data)
             self.health.settle(topic)
         except Exception as error:

@@ -63,7 +63,7 @@ class GenerateServices:
         def job(cancelled: Callable[[], bool]) -> None:
             try:
                 made = node.generate(messages, opened, config, cancelled)
-                message = made.closing.message if made else "cancelled"
+                message = made.closing.message if made else node.over(messages, lambda: True)
                 answer.set_result((bool(made and made.result.scenarios), message))
             except ScenarioGenError as error:
                 answer.set_result((False, str(error)))

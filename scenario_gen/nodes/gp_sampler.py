@@ -19,6 +19,7 @@ It generates when the inputs are complete, and on `~/generate`, whose parameters
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 import sys
 
 from msg_conventions.diagnostics import Level
@@ -27,24 +28,25 @@ from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.nodes.base import run_nodes, StageNode
 from scenario_gen.nodes.generate_services import GenerateServices
-from scenario_gen.nodes.inputs import Inputs, stamp_of
+from scenario_gen.nodes.inputs import Inputs
 from scenario_gen.nodes.open_requests import OpenRequest, OpenRequests
 from scenario_gen.nodes.sample_messages import sample_messages
 from scenario_gen.nodes.sample_request import Answer, answer_request, Config
 
 ENDS = ("road/entries", "road/exits")  # of use only where start or end states are asked for
+Asked = Callable[[], bool]  # whether a job was cancelled
 
 
 class GpSampler(StageNode):
     """Samples valid scenarios around the planned routes."""
 
-    INPUTS = ("map", *ENDS, "tracks", "changepoints", "fit")
+    INPUTS = ("map", *ENDS, "tracks", "changepoints", "fit", "fit/info")
     STAGES = ("interaction", "roads", "fitting", "planning", "sampling", "validity")
     OUTPUTS = ("scenarios", "scenarios/info", "markers")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("gp_sampler", Config(), namespace)
-        paired = ("tracks", "changepoints", "fit", *(("map",) if self.config.pair_map else ()))
+        paired = ("tracks", "changepoints", "fit", "fit/info", *(("map",) if self.config.pair_map else ()))
         self._seen = Inputs(paired, () if self.config.pair_map else ("map",))
         self._routes: set[str] = set()
         self._requests = OpenRequests(self, self.cancel)
@@ -75,13 +77,9 @@ class GpSampler(StageNode):
         return self._seen.missing() or [topic for topic in ends if topic not in self.messages()]
 
     def messages(self) -> dict[str, bytes]:
-        """The template's messages; entries and exits only if they are those of its road."""
+        """The template's messages; entries and exits only if the fit was made with them."""
         messages = self._seen.complete() or {}
-        for topic in ENDS:
-            own = topic in messages and self.config.pair_map
-            if not own or stamp_of(messages[topic], topic) != stamp_of(messages["map"], "map"):
-                messages.pop(topic, None)
-        return messages
+        return {t: data for t, data in messages.items() if t not in ENDS or self._seen.named("fit/info", t)}
 
     def _follow(self, tracks: bytes) -> None:
         """Listen to the routes of the vehicles in the tracks, and no longer to those of others."""
@@ -94,33 +92,36 @@ class GpSampler(StageNode):
         for topic in sorted(wanted):
             self.listen(topic)
 
-    def _generate_on_input(self, messages: Mapping[str, bytes], config: Config, cancelled: Callable[[], bool]) -> None:
+    def _generate_on_input(self, messages: Mapping[str, bytes], config: Config, cancelled: Asked) -> None:
         if not cancelled():
             self.generate(messages, self._requests.add(job="inputs", wanted=config.count), config, cancelled)
 
-    def generate(
-        self, messages: Mapping[str, bytes], request: OpenRequest, config: Config, cancelled: Callable[[], bool]
-    ) -> Answer | None:
-        """Sample, check and publish; the request's account closes `scenarios/info`. None if it was cancelled."""
-        level, words, more = Level.WARN, "cancelled", dict[str, str]()
+    def over(self, messages: Mapping[str, bytes], cancelled: Asked) -> str:
+        """Say why a request is to be given up; nothing if it is not."""
+        return "given up: its inputs were replaced" if self._seen.replaced(messages) else "cancelled" if cancelled() else ""
+
+    def generate(self, messages: Mapping[str, bytes], request: OpenRequest, config: Config, cancelled: Asked) -> Answer | None:
+        """Sample, check and publish; the request's account closes `scenarios/info`. None if it was given up."""
+        over = partial(self.over, messages, cancelled)
+        level, words, more = Level.WARN, "", dict[str, str]()
         try:
-            if cancelled():
+            if over():
                 return None
             self._requests.begin(request)
             node = self.get_fully_qualified_name()
-            answer = answer_request(messages, config, request.name, node, request.progress, cancelled)
-            if cancelled():
-                return None
+            answer = answer_request(messages, config, request.name, node, request.progress, lambda: bool(over()))
             for topic, data in sample_messages(answer.template.encounter, answer.asked, answer.result, answer.closing, node):
+                if over():  # also amid a set: nothing of an old map is said beside the new one
+                    return None
                 self.send(topic, data)
             level, words = answer.closing.level, answer.closing.message
             return answer
         except Exception as error:
-            if not cancelled():
+            if not over():
                 level, words, more = Level.ERROR, str(error), {"error": type(error).__name__}
             raise
         finally:
-            self._requests.end(request, level, words, **more)
+            self._requests.end(request, level, words or over() or "cancelled", **more)
 
 
 def main() -> None:

@@ -12,11 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Latched inputs that belong together: complete once all bear the same stamp."""
+"""Latched inputs that belong together: complete once all bear the same stamp and `road/info` and `fit/info` agree."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 
+from msg_conventions import trajectory
+from msg_conventions.belonging import decode_belonging, hash_of, INFOS
 from msg_conventions.cdr import CdrReader
+from msg_conventions.fits import decode_fit
+from msg_conventions.paths import decode_path
+from msg_conventions.roads import decode_map, decode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
@@ -47,6 +53,38 @@ def take_tracks(data: bytes) -> Encounter:
     return encounter
 
 
+DECODERS: dict[str, Callable[[bytes, str], object]] = {
+    "tracks": lambda data, _: take_tracks(data),
+    "map": lambda data, what: decode_map(data, name=what),
+    "road/entries": decode_poses,
+    "road/exits": decode_poses,
+    "changepoints": trajectory.decode,
+    "fit": decode_fit,
+    "route": decode_path,
+    **dict.fromkeys(INFOS, decode_belonging),
+}
+
+
+def refuse_damaged(topic: str, data: bytes) -> None:
+    """Read a latched input as it arrives, so that what is damaged is named and does not take the place of what was there.
+
+    Raises:
+        InputError, RefusedError: it is damaged, or too large.
+    """
+    if decode := DECODERS.get("route" if topic.endswith("/route") else topic):
+        decode(data, topic)
+
+
+@dataclass(frozen=True)
+class _Message:
+    """A message with its stamp and hash; if it is an info, the hashes of those that belong together, by topic."""
+
+    data: bytes
+    stamp: int
+    hash: str
+    together: Mapping[str, str]
+
+
 class Inputs:
     """The newest message of each topic.
 
@@ -58,7 +96,7 @@ class Inputs:
     def __init__(self, paired: Iterable[str], unpaired: Iterable[str] = ()) -> None:
         self._paired = set(paired)
         self._unpaired = set(unpaired)
-        self._newest: dict[str, bytes] = {}
+        self._newest: dict[str, _Message] = {}
 
     def expect(self, topics: Iterable[str]) -> None:
         """Add topics to the paired ones, e.g. the routes of the vehicles of the tracks."""
@@ -75,20 +113,42 @@ class Inputs:
         self._newest.clear()
 
     def put(self, topic: str, data: bytes) -> None:
-        """Take a message in."""
-        self._newest[topic] = data
+        """Take a message in.
+
+        Raises:
+            InputError: it is damaged; what was there stays.
+        """
+        together = decode_belonging(data, topic) if topic in INFOS else {}
+        self._newest[topic] = _Message(data, stamp_of(data, topic), hash_of(topic, data), together)
 
     def get(self, topic: str) -> bytes | None:
         """Return the newest message of a topic."""
-        return self._newest.get(topic)
+        message = self._newest.get(topic)
+        return message.data if message else None
+
+    def named(self, info: str, topic: str) -> bool:
+        """Say whether an info names a message of the topic as one that belongs to the others."""
+        return info in self._newest and topic in self._newest[info].together
+
+    def replaced(self, messages: Mapping[str, bytes]) -> bool:
+        """Say whether one of these messages is no longer the newest of its topic."""
+        return any(self.get(topic) != data for topic, data in messages.items())
 
     def missing(self) -> list[str]:
-        """Return the topics from which nothing came yet, or nothing of the newest template's stamp."""
+        """Return the topics from which nothing came yet, or nothing that belongs to the newest template and road."""
         silent = [topic for topic in sorted(self._paired | self._unpaired) if topic not in self._newest]
-        stamps = {topic: stamp_of(self._newest[topic], topic) for topic in self._paired if topic in self._newest}
+        held = dict(self._newest)
+        stamps = {topic: held[topic].stamp for topic in self._paired if topic in held}
         newest = stamps.get("tracks", max(stamps.values(), default=0))
-        return silent + sorted(topic for topic, stamp in stamps.items() if stamp != newest)
+        old = sorted(topic for topic, stamp in stamps.items() if stamp != newest)
+        others = [
+            f"{info} of this {topic}"
+            for info in INFOS
+            for topic, told in (held[info].together.items() if info in held else ())
+            if topic in held and held[topic].hash != told
+        ]
+        return silent + old + others
 
     def complete(self) -> dict[str, bytes] | None:
-        """Return all messages if none is missing and the paired ones bear one stamp."""
-        return None if self.missing() else dict(self._newest)
+        """Return all messages if none is missing and all belong together."""
+        return None if self.missing() else {topic: message.data for topic, message in self._newest.items()}

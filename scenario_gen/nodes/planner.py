@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""planner: `map`, `tracks` and `changepoints` of one template in; `fit` and a `vehicle_<id>/route` each out.
+"""planner: `map`, `tracks` and `changepoints` of one template in; `fit`, a `vehicle_<id>/route` each, and `fit/info` out.
 
 `~/get_plan` (nav_msgs/GetPlan) plans on the newest map for anyone; a plan that cannot be is empty, and `~/explain` says why.
 """
@@ -29,6 +29,7 @@ from rclpy.task import Future
 from rclpy.time import Time
 from std_srvs.srv import Trigger
 
+from msg_conventions.belonging import encode_belonging, identity
 from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.diagnostics import fit_statuses, Level, written
 from msg_conventions.fits import anchor_stamps, encode_fit
@@ -66,9 +67,9 @@ class Config:
 class Planner(StageNode):
     """Fits each template to the road and plans every vehicle's route between its changepoints."""
 
-    INPUTS = (*ROAD, "tracks", "changepoints")
+    INPUTS = (*ROAD, "road/info", "tracks", "changepoints")
     STAGES = ("interaction", "roads", "fitting", "planning")
-    OUTPUTS = ("fit",)
+    OUTPUTS = ("fit", "fit/info")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("planner", Config(), namespace)
@@ -85,10 +86,11 @@ class Planner(StageNode):
 
     def received(self, topic: str, data: bytes) -> None:
         """Plan when road, tracks and changepoints are those of one template."""
+        if topic == "road/info" and not self.config.pair_map:
+            return  # a map server of the user's own does not say what belongs to its map
         self._inputs_seen.put(topic, data)
-        messages = self._inputs_seen.complete()
-        if messages is not None:
-            self.work("plan", lambda cancelled: None if cancelled() else self._plan(messages))
+        messages = self._inputs_seen.complete()  # if not all is there, the work on what was there is cancelled all the same
+        self.work("plan", lambda cancelled: None if cancelled() or messages is None else self._plan(messages))
 
     def _plan(self, messages: dict[str, bytes]) -> None:
         config = self.config
@@ -99,11 +101,17 @@ class Planner(StageNode):
         routes = plan_routes(road, fit, config.planning, config.seed)
         stop_if_cancelled()
         anchors = anchor_stamps(encounter, segmentation.changepoints)
-        for name, route in zip(tokens(vehicle.id for vehicle in encounter.vehicles), routes, strict=True):
-            self.send(vehicle_topic(name, "route"), encode_route(route, anchors, road.frame_id))
-        self.send("fit", encode_fit(encounter, fit, road.frame_id))
+        made = {
+            vehicle_topic(name, "route"): encode_route(route, anchors, road.frame_id)
+            for name, route in zip(tokens(vehicle.id for vehicle in encounter.vehicles), routes, strict=True)
+        }
+        made["fit"] = encode_fit(encounter, fit, road.frame_id)
+        made["fit/info"] = encode_belonging("fit", messages | made, encounter.start_ns)
+        for topic, data in made.items():
+            self.send(topic, data)
         self.get_logger().info(f"planned {len(routes)} routes through {len(anchors)} anchors")
-        self.report(*fit_statuses(fit, self.get_fully_qualified_name()), stamp_ns=encounter.start_ns)
+        statuses = fit_statuses(fit, self.get_fully_qualified_name(), identity(messages))
+        self.report(*statuses, stamp_ns=encounter.start_ns)
 
     async def _get_plan(self, request: GetPlan.Request, response: GetPlan.Response) -> GetPlan.Response:
         """Plan for a caller, off the executor's thread."""

@@ -47,7 +47,7 @@ from scenario_gen.parameters import check, parameter
 
 OF_ALL = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, whatever the namespace
 OF_A_SUITE = (
-    r"map|road/(entries|exits)|tracks|changepoints(/live)?|posterior|fit|vehicle_\w+/(route|footprint|fix|speed)"
+    r"map|road/(entries|exits|info)|tracks|changepoints(/live)?|posterior|fit(/info)?|vehicle_\w+/(route|footprint|fix|speed)"
     r"|ego/(start|goal|track)|scenarios(/info)?|markers|report"
 )
 

@@ -30,12 +30,14 @@ from nav_msgs.srv import GetMap, LoadMap
 from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 
+from msg_conventions.belonging import encode_belonging, identity
 from msg_conventions.diagnostics import Level
 from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.nodes.base import REQUESTS, run_nodes, StageNode
+from scenario_gen.nodes.inputs import stamp_of
 from scenario_gen.parameters import check, parameter
 from scenario_gen.roads import build_road, Road, RoadConfig
 
@@ -76,7 +78,7 @@ class RoadServer(StageNode):
 
     INPUTS = ("tracks",)
     STAGES = ("roads",)
-    OUTPUTS = ("map", "road/entries", "road/exits")
+    OUTPUTS = ("map", "road/entries", "road/exits", "road/info")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("road_server", Config(), namespace)
@@ -97,20 +99,27 @@ class RoadServer(StageNode):
         self._tracks = data
         self.work("road", lambda cancelled: None if cancelled() else self._publish(*self._build(self._name)))
 
-    def _build(self, name: str) -> tuple[Road, int]:
-        encounter = decode_tracks(self._tracks) if self._tracks else None
-        return build_road(name, encounter, self.config.road), encounter.start_ns if encounter else 0
+    def _build(self, name: str) -> tuple[Road, bytes | None]:
+        tracks = self._tracks
+        return build_road(name, decode_tracks(tracks) if tracks else None, self.config.road), tracks
 
-    def _publish(self, road: Road, stamp_ns: int) -> None:
-        grid = encode_map(road, stamp_ns)
+    def _publish(self, road: Road, tracks: bytes | None) -> None:
+        """Publish a road sized to the tracks, if there are any."""
+        stamp_ns = stamp_of(tracks, "tracks") if tracks else 0
+        messages = {
+            "road/entries": encode_poses(road.entries, road.frame_id, stamp_ns),
+            "road/exits": encode_poses(road.exits, road.frame_id, stamp_ns),
+            "map": encode_map(road, stamp_ns),
+        }
         stop_if_cancelled()
-        self.send("road/entries", encode_poses(road.entries, road.frame_id, stamp_ns))
-        self.send("road/exits", encode_poses(road.exits, road.frame_id, stamp_ns))
-        self.send("map", grid)
-        self._grid = grid
+        for topic, data in messages.items():
+            self.send(topic, data)
+        template = {"tracks": tracks} if tracks else {}
+        self.send("road/info", encode_belonging("road", messages | template, stamp_ns))
+        self._grid = messages["map"]
         height, width = road.drivable.shape
         message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, {len(road.entries)} entries"
-        self.status(Level.OK, message, "road", stamp_ns)
+        self.status(Level.OK, message, "road", stamp_ns, **identity(messages | template))
 
     def _get_map(self, _request: GetMap.Request, response: GetMap.Response) -> GetMap.Response:
         if self._grid is not None:

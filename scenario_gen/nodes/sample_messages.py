@@ -16,6 +16,7 @@
 
 from collections.abc import Iterator
 
+from msg_conventions.belonging import MAP_HASH, TEMPLATE_HASH
 from msg_conventions.diagnostics import asked_values, encode_diagnostics, scenario_status, Status
 from msg_conventions.ego import ego_messages, ego_values
 from msg_conventions.names import tokens
@@ -35,11 +36,11 @@ def sample_messages(
         yield vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}")
     if result.ego is not None:
         yield from ego_messages(result.ego, stamp)
-    ego = ego_values(result.ego)
+    of_all = {key: closing.values[key] for key in (TEMPLATE_HASH, MAP_HASH)} | ego_values(result.ego)
     for scenario in result.scenarios:
         data = encode_scenario(scenario, stamp)
         yield "scenarios", data
-        more = ego | asked_values(asked, vehicles, scenario)
+        more = of_all | asked_values(asked, vehicles, scenario)
         status = scenario_status(scenario, data, closing.values["request"], node, **more)
         yield "scenarios/info", encode_diagnostics([status], stamp)
     if result.scenarios:

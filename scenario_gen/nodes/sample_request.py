@@ -17,6 +17,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from msg_conventions.belonging import identity
 from msg_conventions.diagnostics import request_status, Status
 from scenario_gen.bags.provenance import parameter_texts, versions
 from scenario_gen.bags.template import read_template, Template
@@ -100,6 +101,5 @@ def answer_request(
         asked, result = outcome.fit.asked, outcome.scenarios
     else:
         result = chain.sample(config, template.routes, asked, count=config.count, progress=advance, cancelled=cancelled)
-    return Answer(
-        template, asked, result, request_status(result, request, node, config.seed, parameter_texts(config) | versions())
-    )
+    provenance = parameter_texts(config) | versions() | identity(messages)
+    return Answer(template, asked, result, request_status(result, request, node, config.seed, provenance))

@@ -23,7 +23,9 @@ from typer.testing import CliRunner
 from msg_conventions.scenarios import digest, encode_scenario
 from msg_conventions.topics import topic_entry
 from scenario_gen.bags import AtomicBag, read_messages, Run, write_run
+from scenario_gen.bags.evaluation import bag_cases
 from scenario_gen.bags.metadata import qos_yaml
+from scenario_gen.bags.run import run_messages
 from scenario_gen.bags.validation import ALTERED, UNUSABLE, validate_bag
 from scenario_gen.cli import app
 from scenario_gen.errors import InputError
@@ -139,6 +141,66 @@ def test_scenarios_that_are_not_as_published_are_named(run, tmp_path):
     assert f"index {index} of request 1 was published as" in found.found[ALTERED].message
     answer = CliRunner().invoke(app, ["validate", str(changed)])
     assert answer.exit_code == 1 and ALTERED in answer.output
+
+
+def several_maps(run, target):
+    """A bag in which the road moved by 1 km after the first set; the stamps are the same."""
+    far = replace(run.road, origin=run.road.origin + np.array((0.0, 1000.0)))
+    moved = tuple(replace(s, position=s.position + np.array((0.0, 1000.0))) for s in run.result.scenarios)
+    states = [s + np.array((0.0, 1000.0, 0.0, 0.0)) for s in (run.fit.asked.start, run.fit.asked.end)]
+    later = replace(run, road=far, result=replace(run.result, scenarios=moved), request="2")
+    later = replace(later, fit=replace(run.fit, asked=BoundaryStates(*states)))
+    with AtomicBag(target) as writer:
+        for k, one in enumerate((run, later)):
+            for topic, data, stamp in run_messages(one):
+                kind, quality = topic_entry(topic)
+                writer.add_topic(f"/here/{topic}", kind, qos_yaml(quality))
+                writer.write(f"/here/{topic}", data, stamp + k * 10**12)
+    return target
+
+
+def test_a_scenario_is_held_against_its_own_map(run, tmp_path):
+    bag = several_maps(run, tmp_path / "two")
+    (found,) = validate_bag(bag)
+    assert (found.scenarios, found.invalid, found.left_out) == (8, 0, {})
+    assert bag_cases(bag)[0].evaluation.value("scenarios", "off_road_rate") == 0.0
+
+
+def test_a_scenario_whose_account_was_lost_is_unaccounted(run, tmp_path):
+    """The last chunk of a recording is lost, and with it what `scenarios/info` said last."""
+    bag = write_run(tmp_path / "run", run)
+    infos = [m.data for m in read_messages(bag) if m.topic.endswith("/scenarios/info")]
+    cut = without_infos(bag, tmp_path / "cut", infos[-3:])
+    (found,) = validate_bag(cut)
+    assert (found.scenarios, found.invalid, found.unaccounted, found.found) == (4, 0, 2, {})
+    answer = CliRunner().invoke(app, ["validate", str(cut)])
+    assert answer.exit_code == 0 and "2 unaccounted" in answer.output
+    (case,) = bag_cases(cut)
+    assert any("2 of 4 scenarios are unaccounted" in note for note in case.evaluation.row("scenarios").notes)
+    assert "unaccounted" in case.evaluation.to_json()
+    first = without_infos(bag, tmp_path / "first", infos[:1])  # one in the middle, beside one that was altered
+    other = encode_scenario(replace(run.result.scenarios[2], seed=1, frame_id="elsewhere"), run.encounter.start_ns)
+    (found,) = validate_bag(rewritten(first, tmp_path / "altered", lambda k, data: other if k == 2 else data))
+    assert (found.unaccounted, found.found[ALTERED].count, found.found[ALTERED].scenario) == (1, 1, 2)
+
+
+def test_a_scenario_without_account_is_held_against_no_map_where_there_are_several(run, tmp_path):
+    bag = several_maps(run, tmp_path / "two")
+    lost = [m.data for m in read_messages(bag) if m.topic.endswith("/scenarios/info")][-2:]
+    (found,) = validate_bag(without_infos(bag, tmp_path / "cut", lost))
+    assert (found.scenarios, found.invalid, found.unaccounted) == (8, 0, 1)
+    assert found.left_out["off_road: no road is known"] == 1
+
+
+def without_infos(bag, target, infos):
+    """Copy a bag without these messages of `scenarios/info`."""
+    with AtomicBag(target) as writer:
+        for message in read_messages(bag):
+            if not message.topic.endswith("/scenarios/info") or message.data not in infos:
+                kind, quality = topic_entry(message.topic)
+                writer.add_topic(message.topic, kind, qos_yaml(quality))
+                writer.write(message.topic, message.data, message.stamp_ns)
+    return target
 
 
 def test_the_command_answers_with_its_exit_code(run, tmp_path):

@@ -50,7 +50,7 @@ def run() -> Run:
 
 def test_every_message_decodes_in_every_reader(run, tmp_path):
     folder = write_run(tmp_path / "bag", [replace(run, namespace="/a"), run])
-    expected = 2 * (8 + 4 + 3 * 5 + 1)
+    expected = 2 * (10 + 4 + 3 * 5 + 1)
     counts = Counter()
     with AnyReader([folder], default_typestore=get_typestore(Stores.EMPTY)) as reader:
         for connection, _, data in reader.messages():
@@ -162,7 +162,7 @@ def test_nothing_half_written_and_no_folder_of_others_is_touched(run, tmp_path):
     write_run(tmp_path / "bag", run)
     with pytest.raises(IndexError):
         write_run(tmp_path / "bag", broken)
-    assert len(list(read_messages(tmp_path / "bag"))) == 28  # the earlier one is still there
+    assert len(list(read_messages(tmp_path / "bag"))) == 30  # the earlier one is still there
     write_run(tmp_path / "bag", run)
     assert [p.name for p in tmp_path.iterdir()] == ["bag"]
     (tmp_path / "mine").mkdir()

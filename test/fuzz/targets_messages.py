@@ -25,6 +25,7 @@ from mutators import BYTES
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
+from msg_conventions.belonging import decode_belonging, hash_of
 from msg_conventions.changepoints import (
     decode_changepoints,
     decode_posterior,
@@ -134,6 +135,10 @@ TARGETS = (
         lambda: [encode_route(route(k), STAMPS, "map") for k in (1, 2)],
         lambda data: (decode_path(data), decode_route(data, STAMPS)),
     ),
+    decoder(
+        "message_belonging", DIAGNOSTICS_TYPE, lambda: of_run("road/info", "fit/info"), lambda d: decode_belonging(d, "info")
+    ),
+    decoder("message_map_hash", MAP_TYPE, lambda: of_run("map"), partial(hash_of, "map")),
     decoder("message_map", MAP_TYPE, lambda: of_run("map"), decode_map),
     decoder("message_poses", POSES_TYPE, lambda: of_run("road/entries", "road/exits"), decode_poses),
     decoder("message_odometry", ODOMETRY_TYPE, lambda: ego("ego/start") + ego("ego/goal"), decode_state),

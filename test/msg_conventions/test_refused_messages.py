@@ -19,8 +19,9 @@ import pytest
 
 from msg_conventions import trajectory
 from msg_conventions.odometry import decode_state, encode_state
-from msg_conventions.paths import decode_path, encode_path
+from msg_conventions.paths import decode_path, decode_route, encode_path
 from msg_conventions.roads import decode_map, decode_poses, encode_map, encode_poses
+from msg_conventions.scenarios import decode_scenario
 from msg_conventions.tracks import decode_tracks
 from msg_conventions.trajectory import Trajectory
 from scenario_gen.arrays import canonical_heading
@@ -51,6 +52,27 @@ def _tracks(vehicles: int, samples: int, frame: str = "local_enu") -> bytes:
 def test_tracks_of_nobody_or_of_an_instant(vehicles, samples, words):
     with pytest.raises(InputError, match=words):
         decode_tracks(_tracks(vehicles, samples))
+
+
+@pytest.mark.parametrize(
+    ("time_ns", "words"),
+    [
+        ((5, 6, 7), "begins at 5e-09 s"),
+        ((0, 5, 5), "a point is not later than the one before"),
+        ((0,), r"1 point\(s\); at least 2"),
+    ],
+)
+def test_scenarios_say_which_rule_of_time_is_broken(time_ns, words):
+    flat = np.zeros((1, len(time_ns)))
+    sent = Trajectory(7, "map", (Vehicle("1"),), np.array(time_ns), np.zeros((1, len(time_ns), 2)), flat, flat, flat)
+    with pytest.raises(InputError, match=f"scenarios: .*{words}"):
+        decode_scenario(trajectory.encode(sent))
+
+
+def test_routes_of_no_poses_or_of_earlier_ones():
+    for count, words in ((0, "the path holds no poses"), (2, "pose 1 bears an earlier stamp than pose 0")):
+        with pytest.raises(InputError, match=words):
+            decode_route(encode_path(np.zeros((count, 3)), np.array([9, 7])[:count], "map", 7), [7, 9])
 
 
 def _messages(frame: str) -> dict[str, tuple[object, bytes]]:

@@ -297,8 +297,10 @@ def test_uneven_tracks_are_refused():
 
     uneven = np.array(sent.time_ns)
     uneven[2] += 1
-    with pytest.raises(InputError, match="even steps"):
+    with pytest.raises(InputError, match=r"sample 2 comes .* even steps"):
         tracks.decode_tracks(trajectory.encode(replace(sent, time_ns=uneven)))
+    with pytest.raises(InputError, match=r"the first sample is at 0\.5 s"):
+        tracks.decode_tracks(trajectory.encode(replace(sent, time_ns=sent.time_ns + 500_000_000)))
 
 
 def test_stamps_beyond_2038_are_refused():

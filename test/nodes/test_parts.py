@@ -21,6 +21,7 @@ import pytest
 from rclpy.parameter import Parameter
 import yaml
 
+from msg_conventions.belonging import encode_belonging
 from msg_conventions.cdr import CdrWriter
 from scenario_gen.errors import InputError
 from scenario_gen.nodes.default_parameters import default_yaml
@@ -55,6 +56,25 @@ def test_inputs_are_complete_only_with_equal_stamps():
     inputs.forget(["vehicle_1/route"])
     inputs.put("changepoints", _message(2))
     assert set(inputs.complete()) == {"tracks", "changepoints", "map"}
+
+
+def test_inputs_are_complete_only_if_they_are_those_that_belong_together():
+    inputs = Inputs(("tracks", "fit", "fit/info"), ("map",))
+    one, other = (CdrWriter().header(1, frame).finish() for frame in ("map", "odom"))
+    messages = {"tracks": _message(1), "map": one, "fit": _message(1)}
+    for topic, data in messages.items():
+        inputs.put(topic, data)
+    assert inputs.missing() == ["fit/info"]
+    inputs.put("fit/info", encode_belonging("fit", messages, 1))
+    complete = inputs.complete()
+    assert complete is not None and not inputs.replaced(complete)
+    inputs.put("map", other)  # the fit is not to this map, even if the planner never says another
+    assert inputs.missing() == ["fit/info of this map"]
+    assert inputs.complete() is None and inputs.replaced(complete)
+    with pytest.raises(InputError, match="fit/info"):
+        inputs.put("fit/info", _message(1))
+    inputs.put("fit/info", encode_belonging("fit", messages | {"map": other}, 1))
+    assert inputs.complete() is not None
 
 
 def test_a_waiting_job_is_replaced_and_a_running_one_cancelled():

@@ -1,0 +1,113 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A set knows its map: another road while sets are at work leaves nothing of the old one beside the new."""
+
+import json
+
+from nav_msgs.srv import LoadMap
+import pytest
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.parameter import Parameter
+from suite_processes import Client, Processes, RESOURCES
+
+from msg_conventions.belonging import decode_belonging, hash_of
+from msg_conventions.diagnostics import decode_diagnostics, Level
+from scenario_gen.bags import read_messages
+from scenario_gen.bags.validation import validate_bag
+
+pytestmark = pytest.mark.dds
+NODES = ("log_player", "road_server", "segmenter", "planner", "gp_sampler", "recorder")
+TINY = "image: tiny.pgm\nresolution: 0.5\norigin: [0.0, 0.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory, domain):
+    """The whole chain, with sets long enough to be disturbed."""
+    folder = tmp_path_factory.mktemp("maps")
+    arguments = {node: [] for node in NODES}
+    arguments["log_player"] = ["-p", f"log_path:={RESOURCES / 'synthetic_c'}"]
+    arguments["road_server"] = ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"]
+    arguments["gp_sampler"] = ["-p", "count:=20", "-p", "seed:=7"]
+    arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
+    made = Processes(folder, domain, arguments)
+    yield made
+    if made.process.poll() is None:
+        made.process.kill()
+
+
+def _infos(client: Client) -> list[dict[str, str]]:
+    return [decode_diagnostics(data)[1][0].values for data in list(client.heard["/scenarios/info"])]
+
+
+def _closed(client: Client, hashed: str) -> bool:
+    return any("published" in values and values["map_hash"] == hashed for values in _infos(client))
+
+
+def _another_road(client: Client, width: float) -> str:
+    """Load the straight road with lanes of another width; return its hash."""
+    parameter = Parameter("road.lane_width", value=width).to_parameter_msg()
+    request = SetParameters.Request(parameters=[parameter])
+    assert client.call(SetParameters, "/road_server/set_parameters", request).results[0].successful
+    before = len(client.heard["/map"])
+    assert client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url="straight")).result == 0
+    return hash_of("map", client.wait("/map", before + 1)[-1])
+
+
+def test_nothing_of_an_old_map_is_said_beside_the_new_one(suite, client):
+    client.hear("/scenarios/info", "/map", "/fit/info")
+    hashes = [hash_of("map", client.wait("/map")[0])]
+    for k in range(10):
+        if k % 3 == 0:  # amid its publication; else while the planner or the sampler is at work, or before
+            client.until(lambda: any(v.get("map_hash") == hashes[-1] for v in _infos(client)), "a scenario on this map")
+        hashes.append(_another_road(client, 3.5 + 0.05 * (k + 1)))
+    client.until(lambda: _closed(client, hashes[-1]), "the set on the last map")
+    assert len(set(hashes)) == 11
+    order = [hashes.index(values["map_hash"]) for values in _infos(client)]
+    assert order == sorted(order), "a scenario on an older map came after one on a newer"
+    assert len({values["template_hash"] for values in _infos(client)}) == 1
+    assert decode_belonging(client.heard["/fit/info"][-1], "fit/info")["map"] == hashes[-1]
+
+
+def test_routes_of_an_old_map_are_not_driven_on_one_that_the_planner_refuses(suite, client, tmp_path):
+    client.hear("/scenarios/info", "/map", "/diagnostics")
+    client.until(lambda: _infos(client) and "published" in _infos(client)[-1], "the last set")
+    (tmp_path / "tiny.pgm").write_bytes(b"P5 20 20 255\n" + b"\xff" * 400)
+    (tmp_path / "tiny.yaml").write_text(TINY)
+    assert client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=str(tmp_path / "tiny.yaml"))).result == 0
+
+    def refused() -> bool:
+        statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
+        return any(s.name == "/planner: plan" and s.level is Level.ERROR for s in statuses)
+
+    client.until(refused, "the planner's refusal")
+    before = len(client.heard["/scenarios/info"])
+    reasons = []
+
+    def is_told() -> bool:
+        answer = client.call(SetParametersAtomically, "/gp_sampler/generate", SetParametersAtomically.Request()).result
+        reasons.append(answer.reason)
+        return not answer.successful and "fit/info of this map" in answer.reason
+
+    client.until(is_told, f"a refusal that says why, of {reasons}")
+    assert len(client.heard["/scenarios/info"]) == before
+
+
+def test_the_bag_is_valid_with_each_scenario_on_its_own_map(suite):
+    assert suite.end() == dict.fromkeys(NODES, 0)
+    bag = suite.folder / "bag"
+    (found,) = validate_bag(bag)
+    assert (found.invalid, found.unaccounted, found.found) == (0, 0, {}), json.dumps(found.left_out)
+    assert not any("off_road" in sentence for sentence in found.left_out)
+    assert len({hash_of("map", m.data) for m in read_messages(bag) if m.topic == "/map"}) == 12
