@@ -33,10 +33,11 @@ from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import RefusedError, ScenarioGenError
 from scenario_gen.nodes.base import REQUESTS, run_nodes, StageNode
 from scenario_gen.nodes.inputs import Inputs, stamp_of
+from scenario_gen.nodes.pacing import unheard
 from scenario_gen.nodes.ros_parameters import values_of_call
-from scenario_gen.nodes.sample_messages import sample_messages
 from scenario_gen.nodes.sample_request import Answer, answer_request, Config
 
+PACED = ("scenarios", "scenarios/info")
 ENDS = ("road/entries", "road/exits")  # of use only where start or end states are asked for
 
 
@@ -98,23 +99,24 @@ class GpSampler(StageNode):
     def _generate(
         self, messages: Mapping[str, bytes], request: str, config: Config, cancelled: Callable[[], bool]
     ) -> Answer | None:
-        """Sample, check and publish; the request's account closes `scenarios/info`. None if it was cancelled."""
+        """Sample, check and publish; the request's account closes `scenarios/info`. None if it was cancelled before its end."""
         if cancelled():
             return None
         node = self.get_fully_qualified_name()
-        answer = answer_request(messages, config, request, node, partial(self._progress, request), cancelled)
-        stamp = answer.template.encounter.start_ns
-        if cancelled():
-            self.status(Level.WARN, f"request {request} was cancelled", f"request {request}", stamp)
-            return None
-        for topic, data in sample_messages(answer.template.encounter, answer.asked, answer.result, answer.closing, node):
-            self.send(topic, data)
-        self.status(answer.closing.level, answer.closing.message, f"request {request}", stamp)
-        return answer
+        progress, send = partial(self._progress, request), partial(self.voice.send_paced, stop=cancelled)
+        with self.voice.paced(PACED, config.patience, partial(self._unheard, request)):
+            answer = answer_request(messages, config, request, node, progress, cancelled, send)
+        stopped = f"request {request} was cancelled: " if "cancelled" in answer.closing.values else ""
+        stamp, said = answer.template.encounter.start_ns, stopped + answer.closing.message
+        self.status(answer.closing.level, said, f"request {request}", stamp)
+        return None if stopped else answer
 
     def _progress(self, request: str, done: int, total: int, stamp_ns: int) -> None:
         if done == total or done % max(1, total // 10) == 0:
             self.status(Level.OK, f"request {request}: {done} of {total}", "progress", stamp_ns)
+
+    def _unheard(self, request: str, topic: str, count: int) -> None:
+        self.status(Level.WARN, unheard(self, topic, count), f"pace of {topic}", request=request, count=str(count))
 
     async def _generate_for_caller(
         self, request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
