@@ -280,6 +280,8 @@ def validate(
             table.add_row(cause, str(entry.count), str(entry.scenario), entry.message)
         if one.found:
             console.print(table)
+        for sentence in one.missing:
+            console.print(f"  {sentence}", soft_wrap=True)
         for sentence, count in one.left_out.items():
             console.print(f"  not applicable to {count}: {sentence}")
     if any(one.invalid for one in found):

@@ -16,11 +16,13 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
+from scenario_gen.bags.accounts import missing_sentences
 from scenario_gen.bags.contents import read_namespaces
 from scenario_gen.bags.reader import DEFAULT, within
 from scenario_gen.bags.told import request_sentence, told_fit, told_numbers, told_requests, told_segmentation, told_values
@@ -103,6 +105,9 @@ def _case(
         config=config,
         seed=seed,
     )
+    missing = missing_sentences(topics[SCENARIOS], topics[INFO])
+    rows = [replace(row, notes=(*row.notes, *missing)) if row.name == SCENARIOS else row for row in evaluation.rows]
+    evaluation = replace(evaluation, rows=tuple(rows))
     ego = decode_scenario(topics["ego/track"][-1], what=f"{namespace}/ego/track")[1] if topics["ego/track"] else None
     if ego is not None and ego.vehicles[0].id in evaluation.vehicles:
         ego = None  # of another request than these scenarios

@@ -35,6 +35,7 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.arrays import Floats
+from scenario_gen.bags.accounts import missing_sentences
 from scenario_gen.bags.contents import Contents, read_namespaces
 from scenario_gen.bags.reader import DEFAULT, within
 from scenario_gen.errors import InputError
@@ -61,13 +62,17 @@ class Found:
 
 @dataclass
 class Validation:
-    """What was found in one namespace: `found` by cause; `left_out` says what could not be checked, and of how many scenarios."""
+    """What was found in one namespace: `found` by cause; `left_out` says what could not be checked, and of how many scenarios.
+
+    `missing` says which requests are not there whole.
+    """
 
     namespace: str
     scenarios: int = 0
     invalid: int = 0
     found: dict[str, Found] = field(default_factory=dict)
     left_out: dict[str, int] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()
 
     def add(self, index: int, violations: Sequence[tuple[str, str]], left_out: Collection[str]) -> None:
         """Count one scenario with its violations (cause, sentence)."""
@@ -135,7 +140,7 @@ def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = D
 
 
 def _validate(namespace: str, topics: Contents, limits: Limits | None) -> Validation:
-    result = Validation(namespace)
+    result = Validation(namespace, missing=missing_sentences(topics["scenarios"], topics[INFO]))
     asked = asked_by_digest([(f"{namespace}/{INFO}", data) for data in topics[INFO]])
     accounts = _accounts(namespace, topics[INFO])
     unaccounted = () if accounts else (f"sha256: there is no account on {INFO}",)

@@ -15,20 +15,22 @@
 """recorder: any topics of any type, as raw CDR, to a bag; `~/start` and `~/stop` begin and end one.
 
 What a publisher offers decides how it is subscribed, so latched topics are recorded from late on too. Messages are logged at the
-time they arrive. The bag is closed on `~/stop`, on Ctrl-C and on SIGTERM; a killed recorder leaves all but the last chunk. What
-is at the bag's place already is never touched. Where the disk is full recording ends with an error on /diagnostics; what was
-written stays, for `scenario-gen reindex`.
+time they arrive. The bag is closed on `~/stop`, on Ctrl-C and on SIGTERM; a killed recorder loses what came in its last seconds.
+What is not recorded is said: on the terminal, on /diagnostics and in metadata.yaml. What is at the bag's place already is never
+touched. Where the disk is full recording ends with an error on /diagnostics; what was written stays, for `scenario-gen reindex`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 import re
 import sys
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.time import Time
 from std_srvs.srv import Trigger
@@ -40,12 +42,14 @@ from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.errors import InputError, of_system
 from scenario_gen.interrupts import uninterrupted
 from scenario_gen.nodes.base import run_nodes
+from scenario_gen.nodes.losses import Losses, remedy
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.offered import offered
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.voice import qos
 from scenario_gen.parameters import check, parameter
 
+HELD = 4.0  # seconds after which what came is written, whole chunk or not
 OF_ALL = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, whatever the namespace
 OF_A_SUITE = (
     r"map|road/(entries|exits)|tracks|changepoints(/live)?|posterior|fit|vehicle_\w+/(route|footprint|fix|speed)"
@@ -103,6 +107,9 @@ class Recorder(Node):  # type: ignore[misc]
         self.create_timer(0.1, self._look_around)
         self._counts = self.create_publisher(DiagnosticArray, "/diagnostics", qos(topic_entry("/diagnostics")[1]))
         self.create_timer(0.5, self._tell_counts)
+        self.create_timer(HELD, self._let_go)
+        self._losses = Losses(self.count_publishers)
+        self._said: dict[str, str] = {}
 
     def autostart(self) -> None:
         """Begin the bag that the parameter names."""
@@ -113,6 +120,7 @@ class Recorder(Node):  # type: ignore[misc]
         config = self.parameters.config
         with _disk_errors():
             self._bag = BagWriter(folder, compress=config.compress, split=Split(config.split_bytes, config.split_seconds))
+        self._losses, self._said = Losses(self.count_publishers), {}
         self.get_logger().info(f"recording to {folder}")
         self._look_around()
 
@@ -127,6 +135,8 @@ class Recorder(Node):  # type: ignore[misc]
         bag, self._bag = self._bag, None
         if bag is None:
             return ""
+        bag.info.lost = dict(self._losses.words(ended=True))
+        self._warn(bag.info.lost)
         with _disk_errors():
             bag.close()
         return str(bag.folder)
@@ -151,8 +161,31 @@ class Recorder(Node):  # type: ignore[misc]
         """Say on /diagnostics how many messages of each topic are in the bag."""
         if self._bag is not None:
             counts = {topic.name: str(topic.count) for topic in self._bag.info.topics}
-            status = Status(f"{self.get_fully_qualified_name()}: recorded", Level.OK, str(self._bag.folder), counts)
-            self._counts.publish(encode_diagnostics([status], self.get_clock().now().nanoseconds))
+            name = self.get_fully_qualified_name()
+            statuses = [Status(f"{name}: recorded", Level.OK, str(self._bag.folder), counts)]
+            lost = self._losses.words()
+            if lost:
+                words = "; ".join(f"{topic}: {said}" for topic, said in lost.items())
+                statuses.append(Status(f"{name}: losses", Level.WARN, f"{words}; {remedy(words)}", lost))
+            self._warn(lost)
+            self._counts.publish(encode_diagnostics(statuses, self.get_clock().now().nanoseconds))
+
+    def _warn(self, lost: Mapping[str, str]) -> None:
+        """Say on the terminal what is new of what is not recorded."""
+        for topic in lost:
+            if lost[topic] != self._said.get(topic):
+                said = f"{topic}: {lost[topic]}; {remedy(lost[topic])}"
+                if self.context.ok():
+                    self.get_logger().warning(said)
+                else:  # ended by a signal; /rosout is gone
+                    print(f"[WARN] [{self.get_name()}]: {said}", file=sys.stderr, flush=True)
+        self._said = dict(lost)
+
+    def _let_go(self) -> None:
+        """Write what came in the last seconds."""
+        if self._bag is not None:
+            with self._guarded():
+                self._bag.let_go()
 
     def _listen(self, topic: str, kind: str) -> None:
         publishers = self.get_publishers_info_by_topic(topic)
@@ -166,18 +199,29 @@ class Recorder(Node):  # type: ignore[misc]
             self._refused.add(topic)
             self.get_logger().error(f"{topic} is not recorded: {error}")
             return
-        self._listening[topic] = self.create_subscription(
-            message, topic, lambda data: self._write(topic, data), qos(quality), raw=True
-        )
+        take, losses = partial(self._write, topic), self._losses
+        lost = SubscriptionEventCallbacks(message_lost=lambda event: losses.told(topic, event.total_count))
 
-    def _write(self, topic: str, data: bytes) -> None:
+        def heard(data: bytes, about: dict[str, Any]) -> None:  # rclpy counts the arguments
+            take(data, about["publication_sequence_number"])
+
+        self._listening[topic] = self.create_subscription(message, topic, heard, qos(quality), raw=True, event_callbacks=lost)
+
+    def _write(self, topic: str, data: bytes, number: int | None) -> None:
         if self._bag is not None:
             now: Time = self.get_clock().now()
-            try:
-                with uninterrupted(), _disk_errors():
-                    self._bag.write(topic, data, now.nanoseconds)
-            except InputError as error:
-                self._give_up(error)
+            with self._guarded():
+                self._bag.write(topic, data, now.nanoseconds)
+            self._losses.take(topic, data, number)
+
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
+        """Finish what is written whatever signal comes, and end the recording where the disk fails."""
+        try:
+            with uninterrupted(), _disk_errors():
+                yield
+        except InputError as error:
+            self._give_up(error)
 
     def _give_up(self, error: InputError) -> None:
         """Say what is wrong and record no more; the node, and others in its process, live on."""
