@@ -82,8 +82,7 @@ class Evaluator(StageNode):
                 self._keep(self._accounts.tell(status, f"{topic}, {status.name}"))
         else:
             self._newest[topic] = data
-        if topic in SCENARIOS:
-            self._news = monotonic()
+        self._news = monotonic()
         self._give_up()
         if not {"tracks", "changepoints"} <= set(self._newest):
             return

@@ -17,7 +17,7 @@
 It generates when the inputs are complete, and on `~/generate`, whose parameters are the node's own, valid for that call only.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from itertools import count
 import sys
@@ -36,8 +36,8 @@ from scenario_gen.nodes.inputs import Inputs, stamp_of
 from scenario_gen.nodes.pacing import unheard
 from scenario_gen.nodes.ros_parameters import values_of_call
 from scenario_gen.nodes.sample_request import Answer, answer_request, Config
+from scenario_gen.requests.chain import Cancelled
 
-PACED = ("scenarios", "scenarios/info")
 ENDS = ("road/entries", "road/exits")  # of use only where start or end states are asked for
 
 
@@ -96,19 +96,17 @@ class GpSampler(StageNode):
         for topic in sorted(wanted):
             self.listen(topic)
 
-    def _generate(
-        self, messages: Mapping[str, bytes], request: str, config: Config, cancelled: Callable[[], bool]
-    ) -> Answer | None:
+    def _generate(self, messages: Mapping[str, bytes], request: str, config: Config, cancelled: Cancelled) -> Answer | None:
         """Sample, check and publish; the request's account closes `scenarios/info`. None if it was cancelled before its end."""
         if cancelled():
             return None
         node = self.get_fully_qualified_name()
         progress, send = partial(self._progress, request), partial(self.voice.send_paced, stop=cancelled)
-        with self.voice.paced(PACED, config.patience, partial(self._unheard, request)):
+        with self.voice.paced(self.OUTPUTS[:2], config.patience, partial(self._unheard, request)):
             answer = answer_request(messages, config, request, node, progress, cancelled, send)
         stopped = f"request {request} was cancelled: " if "cancelled" in answer.closing.values else ""
-        stamp, said = answer.template.encounter.start_ns, stopped + answer.closing.message
-        self.status(answer.closing.level, said, f"request {request}", stamp)
+        said = (stopped + answer.closing.message, f"request {request}", answer.template.encounter.start_ns)
+        self.status(answer.closing.level, *said)
         return None if stopped else answer
 
     def _progress(self, request: str, done: int, total: int, stamp_ns: int) -> None:
@@ -129,7 +127,7 @@ class GpSampler(StageNode):
             response.result.reason = f"request {name}: {error}"
             return response
 
-        def job(cancelled: Callable[[], bool]) -> None:
+        def job(cancelled: Cancelled) -> None:
             try:
                 made = self._generate(messages, name, config, cancelled)
                 message = made.closing.message if made else "cancelled"

@@ -24,6 +24,7 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 import re
 import sys
@@ -44,6 +45,7 @@ from scenario_gen.bags import bag_topics, BagMessage, read_messages
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.nodes.base import run_nodes
 from scenario_gen.nodes.message_classes import message_class
+from scenario_gen.nodes.pacing import Pace, unheard
 from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.voice import qos
@@ -68,6 +70,9 @@ class Config:
     stay: bool = parameter(False, "stay when all is played, so that latched topics are heard later, too")
     paused: bool = parameter(False, "wait for ~/resume before the first message")
     clock: bool = parameter(False, "publish /clock")
+    patience: float = parameter(
+        60.0, "wait so long for subscribers that acknowledge nothing, then go on and warn; 0: for ever", unit="s", low=0.0
+    )
 
     def __post_init__(self) -> None:
         check(self)
@@ -85,6 +90,7 @@ class Player(Node):  # type: ignore[misc]
         self._running = threading.Event()
         self._ended = threading.Event()
         self._offered: dict[str, tuple[Any, bool, int]] = {}
+        self._paces: dict[str, Pace] = {}
         self._clock_publisher = self.create_publisher(Clock, "/clock", 10) if self.parameters.config.clock else None
         self.create_service(Trigger, "~/pause", lambda _, response: self._set_running(response, running=False))
         self.create_service(Trigger, "~/resume", lambda _, response: self._set_running(response, running=True))
@@ -106,6 +112,9 @@ class Player(Node):  # type: ignore[misc]
                 kind, quality = message_class(topic.type), qos(topic.quality)
                 publisher = self.create_publisher(kind, name, quality, qos_overriding_options=QoSOverridingOptions(KINDS))
                 self._offered[topic.name] = (publisher, topic.quality.transient_local, topic.quality.depth)
+                self._paces[topic.name] = Pace(
+                    publisher, publisher.qos_profile.depth, config.patience, partial(self._unheard, name)
+                )
             except InputError as error:
                 self.get_logger().error(f"{name} is not played: {error}")
         if not self._offered:
@@ -129,6 +138,8 @@ class Player(Node):  # type: ignore[misc]
 
     def _leave(self) -> None:
         """Let `run_nodes` end the node, once who listens has everything."""
+        for pace in self._paces.values():
+            pace.end()
         deadline = monotonic() + PATIENCE
         with suppress(InvalidHandle):  # the node is being ended already
             for publisher, _, _ in self._offered.values():
@@ -147,7 +158,15 @@ class Player(Node):  # type: ignore[misc]
             elapsed = self._wait_until((message.stamp_ns - first) * 1e-9 + config.start_offset, elapsed, config, first)
             if self._ended.is_set():
                 return
-            publish(self, self._offered[message.topic][0], message.data)
+            self._publish(message.topic, message.data)
+
+    def _publish(self, topic: str, data: bytes) -> None:
+        """Publish, once it overwrites nothing that is on its way; a replay may take longer than the recording for that."""
+        self._paces[topic].wait(self._ended.is_set)
+        publish(self, self._offered[topic][0], data)
+
+    def _unheard(self, topic: str, count: int) -> None:
+        self.get_logger().warning(unheard(self, topic, count))
 
     def _from_offset(self, config: Config) -> Iterator[BagMessage]:
         """Yield the messages from the offset on; before the first, publish what latched topics hold by then."""
@@ -162,7 +181,7 @@ class Player(Node):  # type: ignore[misc]
                 continue
             for topic in list(latched):
                 for data in latched.pop(topic):
-                    publish(self, self._offered[topic][0], data)
+                    self._publish(topic, data)
             yield message
 
     def _wait_until(self, due: float, elapsed: float, config: Config, first_ns: int) -> float:

@@ -27,6 +27,7 @@ from functools import partial
 from pathlib import Path
 import re
 import sys
+from time import monotonic
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -49,6 +50,7 @@ from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.voice import qos
 from scenario_gen.parameters import check, parameter
 
+REST = 30.0  # seconds that are taken at most, at the end, for what has arrived
 HELD = 4.0  # seconds after which what came is written, whole chunk or not
 OF_ALL = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, whatever the namespace
 OF_A_SUITE = (
@@ -124,12 +126,14 @@ class Recorder(Node):  # type: ignore[misc]
         self.get_logger().info(f"recording to {folder}")
         self._look_around()
 
-    def stop(self) -> str:
-        """Close the bag, if one is open; return its folder.
+    def stop(self, *, rest: bool = True) -> str:
+        """Close the bag, if one is open, with the `rest` that has arrived; return its folder.
 
         Raises:
             InputError: the disk is full, or fails.
         """
+        if rest:
+            self._take_rest()
         for topic in list(self._listening):
             self.destroy_subscription(self._listening.pop(topic))
         bag, self._bag = self._bag, None
@@ -140,6 +144,17 @@ class Recorder(Node):  # type: ignore[misc]
         with _disk_errors():
             bag.close()
         return str(bag.folder)
+
+    def _take_rest(self) -> None:
+        """Record what has arrived and waits to be taken; publishers believe that the recorder has it."""
+        deadline = monotonic() + REST
+        for subscription in list(self._listening.values()):
+            while self._bag is not None and monotonic() < deadline:
+                with subscription.handle:
+                    taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+                if taken is None:
+                    break
+                subscription.callback(*taken)
 
     def destroy_node(self) -> None:
         """Close the bag, then the node."""
@@ -225,7 +240,7 @@ class Recorder(Node):  # type: ignore[misc]
 
     def _give_up(self, error: InputError) -> None:
         """Say what is wrong and record no more; the node, and others in its process, live on."""
-        self.stop()  # nothing more is written to such a bag
+        self.stop(rest=False)  # nothing more is written to such a bag
         self.get_logger().error(str(error))
         told = Status(f"{self.get_fully_qualified_name()}: recording", Level.ERROR, str(error), {"error": "InputError"})
         self._counts.publish(encode_diagnostics([told], self.get_clock().now().nanoseconds))

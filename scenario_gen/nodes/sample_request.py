@@ -38,7 +38,10 @@ class Config(Request):
     seed: int = parameter(0, "seed of the samples, and of the planner where states are asked for", low=0)
     generate_on_input: bool = parameter(True, "generate whenever the inputs are complete or change; false: on ~/generate only")
     patience: float = parameter(
-        10.0, "wait so long for subscribers of scenarios that acknowledge none, then go on and warn; 0: never", unit="s", low=0.0
+        60.0,
+        "wait so long for subscribers of scenarios that acknowledge none, then go on and warn; 0: for ever",
+        unit="s",
+        low=0.0,
     )
     pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
     fitting: FittingConfig = field(default_factory=FittingConfig)

@@ -102,6 +102,7 @@ class Voice:
     def send_paced(self, topic: str, data: bytes, stop: Callable[[], bool]) -> None:
         """Publish as `send` does; on a topic that is paced, once its subscribers have room, or `stop` says so.
 
+        Topics that are paced together take turns: on the last of them nodes of the same process are let take, too.
         Not to be called on the executor's thread.
 
         Raises:
@@ -109,7 +110,8 @@ class Voice:
         """
         if topic in self._paces:
             self._paces[topic].wait(lambda: stop() or not self._heard)
-            let_others_take(self._node.executor, lambda: stop() or not self._heard)
+            if topic == next(reversed(self._paces)):
+                let_others_take(self._node.executor, lambda: stop() or not self._heard)
         self.send(topic, data)
 
     def publish(self, publisher: Any, data: bytes) -> None:
