@@ -43,13 +43,14 @@ class Pace:
         Args:
             publisher: of rclpy.
             depth: messages that it remembers.
-            patience: seconds without any acknowledgement after which its subscribers are not waited for; 0: always wait.
+            patience: seconds without acknowledgement after which its subscribers are not waited for; 0: always wait.
             tell: called when that happens with 0, and when all is acknowledged again, or at `end`, with the number of
                 messages that were published meanwhile.
         """
         self._publisher, self._patience, self._tell = publisher, patience, tell
         self._most = max(1, depth * 9 // 10)
-        self._open = 0  # messages since everything was acknowledged
+        self._open = 0  # messages since everything was acknowledged, or was waited for in vain
+        self._left = patience  # seconds that the next wait may take
         self._alone = False  # a subscriber is not waited for
         self._unheard = 0
 
@@ -57,13 +58,12 @@ class Pace:
         """Wait until one message more overwrites none that is on its way, or `stop` says so."""
         if 8 * self._open >= self._most and self._acknowledged():
             self._done()
-        deadline = monotonic() + self._patience
-        while self._open >= self._most and not self._alone and not stop():
+        deadline = monotonic() + self._left
+        while self._open >= self._most and not stop():
             if self._acknowledged():
                 self._done()
             elif self._patience and monotonic() >= deadline:
-                self._alone = True
-                self._tell(0)
+                self._go_on()
             else:
                 sleep(TICK)
         if self._alone:
@@ -76,9 +76,16 @@ class Pace:
         if self._alone:
             self._done()
 
+    def _go_on(self) -> None:
+        """Wait no more for now, and half as long the next time: twice `patience` in all."""
+        self._open, self._left = 0, 0.5 * self._left
+        if not self._alone:
+            self._alone = True
+            self._tell(0)
+
     def _done(self) -> None:
         unheard, alone = self._unheard, self._alone
-        self._open, self._unheard, self._alone = 0, 0, False
+        self._open, self._unheard, self._alone, self._left = 0, 0, False, self._patience
         if alone:
             self._tell(unheard)
 
