@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks._messages_many import many
 from benchmarks._messages_processes import nodes, publisher
 from benchmarks._size import sized
 from benchmarks.row import Row
@@ -58,6 +59,8 @@ def run() -> list[Row]:
     with free_domain() as domain, tempfile.TemporaryDirectory() as folder:
         rows += _calls(domain, Path(folder))
         rows += [_exit(domain, Path(folder), *how) for how in EXITS]
+    with free_domain() as domain, tempfile.TemporaryDirectory() as folder, _Client(domain) as client:
+        rows += many(domain, Path(folder), client, _until)
     return rows
 
 

@@ -26,15 +26,17 @@ TWIST_TYPE = "geometry_msgs/msg/TwistStamped"
 
 @dataclass(frozen=True)
 class Quality:
-    """Quality of service that a publisher offers; history is always keep_last."""
+    """Quality of service; publishers always keep the last, subscribers that may withhold acknowledgements keep all."""
 
     depth: int = 1
     reliable: bool = True
     transient_local: bool = True
+    keep_all: bool = False
 
 
 LATCHED = Quality()
 MANY = Quality(depth=1000)
+MANY_HEARD = Quality(depth=1000, keep_all=True)  # by who must not lose any: paced publishers then wait for it
 STREAM = Quality(depth=1000, transient_local=False)
 
 TOPICS: dict[str, tuple[str, Quality]] = {

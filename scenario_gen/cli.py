@@ -284,6 +284,8 @@ def validate(
             console.print(
                 f"  {one.unaccounted} unaccounted: scenarios/info does not tell of them (lost with the end of a recording?)"
             )
+        for sentence in one.missing:
+            console.print(f"  {sentence}", soft_wrap=True)
         for sentence, count in one.left_out.items():
             console.print(f"  not applicable to {count}: {sentence}")
     if any(one.invalid for one in found):

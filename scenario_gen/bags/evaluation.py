@@ -23,6 +23,7 @@ from msg_conventions.belonging import MAP_HASH
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
+from scenario_gen.bags.accounts import missing_sentences
 from scenario_gen.bags.belonging import accounts_of, is_ambiguous, map_of, unknown_scenarios
 from scenario_gen.bags.contents import read_namespaces
 from scenario_gen.bags.reader import DEFAULT, within
@@ -111,12 +112,13 @@ def _case(
         config=config,
         seed=seed,
     )
+    notes = list(missing_sentences(topics[SCENARIOS], topics[INFO]))
     lost = sum(account is None for account in unknown_scenarios(topics[SCENARIOS], given).values()) if given else 0
     if lost:
         why = f"{INFO} does not tell of them (lost with the end of a recording?)"
-        note = f"{lost} of {len(scenarios)} scenarios are unaccounted: {why}"
-        rows = (replace(row, notes=(*row.notes, note)) if row.name == SCENARIOS else row for row in evaluation.rows)
-        evaluation = replace(evaluation, rows=tuple(rows))
+        notes.append(f"{lost} of {len(scenarios)} scenarios are unaccounted: {why}")
+    rows = [replace(row, notes=(*row.notes, *notes)) if row.name == SCENARIOS else row for row in evaluation.rows]
+    evaluation = replace(evaluation, rows=tuple(rows))
     ego = decode_scenario(topics["ego/track"][-1], what=f"{namespace}/ego/track")[1] if topics["ego/track"] else None
     if ego is not None and ego.vehicles[0].id in evaluation.vehicles:
         ego = None  # of another request than these scenarios

@@ -21,6 +21,7 @@ from typing import Any
 import yaml
 
 from msg_conventions.topics import Quality
+from scenario_gen.storage.files import LOST
 from scenario_gen.storage.qos import profiles
 
 VERSION = 9
@@ -71,6 +72,7 @@ class BagInfo:
 
     topics: list[TopicInfo] = field(default_factory=list)
     files: list[FileInfo] = field(default_factory=list)
+    lost: dict[str, str] = field(default_factory=dict)  # topic -> what of it is not in the bag
 
 
 def dump(value: Any) -> str:
@@ -137,7 +139,7 @@ def metadata_yaml(info: BagInfo) -> str:
                     }
                     for file in info.files
                 ],
-                "custom_data": None,
+                "custom_data": {f"{LOST}{topic}": words for topic, words in info.lost.items()} or None,
                 "ros_distro": "jazzy",
             }
         }

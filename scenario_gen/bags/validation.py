@@ -36,6 +36,7 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.arrays import Floats
+from scenario_gen.bags.accounts import missing_sentences
 from scenario_gen.bags.belonging import Account, accounts_of, is_ambiguous, map_of, newest, tracks_of, unknown_scenarios
 from scenario_gen.bags.contents import Contents, read_namespaces
 from scenario_gen.bags.reader import DEFAULT, within
@@ -66,6 +67,7 @@ class Validation:
     """What was found in one namespace: `found` by cause; `left_out` says what could not be checked, and of how many scenarios.
 
     `unaccounted` scenarios have no account on `scenarios/info`, though others have; they are valid if nothing else is wrong.
+    `missing` says which requests are not there whole.
     """
 
     namespace: str
@@ -74,6 +76,7 @@ class Validation:
     unaccounted: int = 0
     found: dict[str, Found] = field(default_factory=dict)
     left_out: dict[str, int] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()
 
     def add(self, index: int, violations: Sequence[tuple[str, str]], left_out: Collection[str]) -> None:
         """Count one scenario with its violations (cause, sentence)."""
@@ -141,7 +144,7 @@ def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = D
 
 
 def _validate(namespace: str, topics: Contents, limits: Limits | None) -> Validation:
-    result = Validation(namespace)
+    result = Validation(namespace, missing=missing_sentences(topics["scenarios"], topics[INFO]))
     info = f"{namespace}/{INFO}"
     accounts = accounts_of(topics[INFO], info)
     own = {account["sha256"]: account for account in accounts}

@@ -41,7 +41,7 @@ class Split:
 
 
 class BagWriter:
-    """Writes one bag; a context manager. Flushed chunk by chunk, so a killed process loses the last one only."""
+    """Writes one bag; a context manager. Flushed chunk by chunk, so a killed process loses the last one only (see `let_go`)."""
 
     def __init__(self, folder: Path, *, compress: bool = True, split: Split = Split(), chunk_bytes: int = CHUNK_BYTES) -> None:
         """Create `folder` and its first file.
@@ -57,6 +57,7 @@ class BagWriter:
         self._split = split
         self._topics: dict[str, tuple[TopicInfo, tuple[str, str]]] = {}
         self._broken = False
+        self.held = False  # whether messages have come since the last `let_go`
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
@@ -146,6 +147,24 @@ class BagWriter:
         self._file.add(stamp_ns)
         self._bytes += len(data)
         topic.count += 1
+        self.held = True
+
+    def let_go(self) -> None:
+        """Write the chunk that is begun, if there is one, so that a killed process does not lose it.
+
+        Raises:
+            OSError: the disk is full, or fails; nothing more can be written.
+        """
+        if self._broken or not self.held:
+            return
+        try:
+            with naming(self.folder / self._file.path):
+                self._writer._Writer__finalize_chunk()  # mcap has no public name for it
+                self._stream.flush()
+        except OSError:
+            self._broken = True
+            raise
+        self.held = False
 
     def close(self) -> None:
         """Write indexes and metadata.yaml; where a write has failed, leave the files as they are, for `reindex`.

@@ -14,25 +14,18 @@
 
 """evaluator: `tracks`, `changepoints` and the `scenarios` of a request in; its figures out as `report`."""
 
-from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 import math
 import sys
+from time import monotonic
 
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.diagnostics import (
-    count_in,
-    decode_diagnostics,
-    encode_diagnostics,
-    Level,
-    read_request,
-    Status,
-    take_entry,
-    text_in,
-)
+from msg_conventions.diagnostics import count_in, decode_diagnostics, encode_diagnostics, Level, read_request, Status
 from msg_conventions.scenarios import decode_scenario, digest
+from msg_conventions.topics import MANY_HEARD
 from msg_conventions.tracks import decode_tracks
+from scenario_gen.bags.accounts import Account, Accounts, Match
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import CheckCounts, evaluate, EvaluationConfig, WITH
@@ -40,14 +33,19 @@ from scenario_gen.nodes.base import run_nodes, StageNode
 from scenario_gen.parameters import check, parameter
 
 Told = Sequence[tuple[bytes, Mapping[str, str]]]  # scenarios, each with its entry of `scenarios/info`
+SCENARIOS = ("scenarios", "scenarios/info")
+SETTLED = 5.0  # seconds without news after which it is said what a closed request lacks
 
 
 @dataclass(frozen=True)
 class Config:
     """The evaluator's parameters."""
 
-    seed: int = parameter(0, "seed of the bootstrap", low=0)
-    keep: int = parameter(10_000, "scenarios kept until their request is closed; older ones are forgotten", low=1)
+    seed: int = parameter(0, "seed of the bootstrap, and of the choice of what is measured", low=0)
+    measured: int = parameter(
+        1000, "scenarios of a request that are measured, chosen by the seed where it has more", low=1, high=1000
+    )
+    keep: int = parameter(3000, "scenarios kept of requests that are not whole yet; the oldest requests are given up", low=1)
     wait: int = parameter(100, "closed requests that wait for scenarios on their way; older ones are given up", low=1)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
 
@@ -58,76 +56,77 @@ class Config:
 class Evaluator(StageNode):
     """Measures every request's scenarios against their template once the request is closed."""
 
-    INPUTS = ("tracks", "changepoints", "scenarios", "scenarios/info")
+    INPUTS = ("tracks", "changepoints")
     STAGES = ("interaction", "evaluation")
     OUTPUTS = ("report",)
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("evaluator", Config(), namespace)
         self._newest: dict[str, bytes] = {}
-        self._scenarios: dict[str, bytes] = {}  # by SHA-256
-        self._open: dict[str, dict[str, Mapping[str, str]]] = {}  # request -> index -> entry of `scenarios/info`
-        self._closed: dict[str, Status] = {}  # by request: what its account says, while scenarios of it are still to come
-        self._cut: deque[str] = deque(maxlen=1000)  # requests given up before they were closed
+        self._accounts = Accounts()
+        self._news = math.inf  # when something of scenarios came last
+        self.create_timer(1.0, self._tell_missing)
+
+    def started(self) -> None:
+        """Listen to scenarios so that who paces them waits for this node."""
+        self._accounts = Accounts(self.config.keep)
+        for topic in SCENARIOS:
+            self.listen(topic, MANY_HEARD)
 
     def received(self, topic: str, data: bytes) -> None:
         """Keep what comes, and evaluate a request when all of it is there."""
         if topic == "scenarios":
-            self._scenarios[digest(data)] = data
-            while len(self._scenarios) > self.config.keep:
-                self._scenarios.pop(next(iter(self._scenarios)))
+            self._keep(self._accounts.scenario(digest(data), data))
         elif topic == "scenarios/info":
             for status in decode_diagnostics(data)[1]:
-                if not {"published", "sha256"} & set(status.values):
-                    continue
-                self._take_told(status, f"{topic}, {status.name}")
-            self._give_up()
+                self._keep(self._accounts.tell(status, f"{topic}, {status.name}"))
         else:
             self._newest[topic] = data
+        self._news = monotonic()
+        self._give_up()
         if not {"tracks", "changepoints"} <= set(self._newest):
             return
-        for request, status in list(self._closed.items()):
-            entries = tuple(self._open.get(request, {}).values())
-            if all(v["sha256"] in self._scenarios for v in entries):
-                self._closed.pop(request)
-                self._open.pop(request, None)
-                self._submit(dict(self._newest), [(self._scenarios[v["sha256"]], v) for v in entries], status)
-                for values in entries:  # two may have the same bytes
-                    self._scenarios.pop(values["sha256"], None)
+        for request, account in list(self._accounts.open.items()):
+            if account.whole:
+                self._accounts.forget(request)
+                self._submit(dict(self._newest), account)
 
-    def _take_told(self, status: Status, place: str) -> None:
-        """Keep an entry of a request, or its closing."""
-        request = text_in(status.values, "request", place)
-        if "published" in status.values:
-            count_in(status.values, "published", place)
-            self._closed[request] = status
-            if request in self._cut:
-                self._forget(request)
-            return
-        entry = {key: text_in(status.values, key, place) for key in ("index", "seed", "sha256")}
-        if entry["index"] == "0" and request in self._cut:  # begun anew
-            self._cut.remove(request)
-        take_entry(self._open.setdefault(request, {}), entry)
+    def _keep(self, match: Match | None) -> None:
+        if match is not None:
+            account, entry, data = match
+            account.keep(entry, data, self.config.seed, self.config.measured)
 
     def _give_up(self) -> None:
-        """Forget the oldest requests while more of them wait, or more scenarios are told of, than are kept."""
-        while len(self._closed) > self.config.wait:
-            self._forget(next(iter(self._closed)))
-        while self._open and sum(map(len, self._open.values())) > self.config.keep:
-            self._forget(next(iter(self._open)))
+        """Forget the oldest requests while more of them wait, or more scenarios of them are there, than are kept."""
+        accounts = self._accounts.open
+        closed = [request for request, account in accounts.items() if account.closing]
+        for request in closed[: max(0, len(closed) - self.config.wait)]:
+            self._forget(request)
+        while len(accounts) > 1 and sum(len(account.kept) for account in accounts.values()) > self.config.keep:
+            self._forget(next(iter(accounts)))
 
     def _forget(self, request: str) -> None:
-        """Give up a request, and say how many of its scenarios have not come or are not kept any more."""
-        entries, closing = self._open.pop(request, {}), self._closed.pop(request, None)
-        untold = int(closing.values["published"]) - len(entries) if closing else 0
-        missing = max(untold, 0) + sum(v["sha256"] not in self._scenarios for v in entries.values())
-        if closing is None and request not in self._cut:  # more of it is to come
-            self._cut.append(request)
-        words = f"request {request} is not evaluated: {missing} of its scenarios did not come; see keep and wait"
-        self.status(Level.WARN, words, "requests", request=request)
+        """Give up a request, and say what of it has not come."""
+        said = self._accounts.open[request].sentence()
+        self._accounts.forget(request)
+        self.status(Level.WARN, f"{said}; it is not evaluated; see keep and wait", "requests", request=request)
 
-    def _submit(self, messages: Mapping[str, bytes], scenarios: Told, status: Status) -> None:
-        name = f"request {status.values['request']}"
+    def _tell_missing(self) -> None:
+        """Say what has not come of closed requests, once all is quiet."""
+        if monotonic() - self._news < SETTLED or not self.active:
+            return
+        self._news = math.inf
+        for account in self._accounts.incomplete(closed=True):
+            words = (
+                f"{account.sentence()}: they were lost, or published before this node listened; it is not evaluated without them"
+            )
+            self.status(Level.WARN, words, f"request {account.request}", missing=str(account.missing))
+
+    def _submit(self, messages: Mapping[str, bytes], account: Account) -> None:
+        name, status = f"request {account.request}", account.closing
+        if status is None or "cancelled" in status.values:
+            return
+        scenarios = account.in_order()
         self.work(name, lambda cancelled: None if cancelled() else self._evaluate(messages, scenarios, status))
 
     def _evaluate(self, messages: Mapping[str, bytes], scenarios: Told, status: Status) -> None:
@@ -149,11 +148,13 @@ class Evaluator(StageNode):
             seed=self.config.seed,
         )
         stop_if_cancelled()
-        statuses = []
+        published, statuses = count_in(status.values, "published", told), []
+        chosen = f"measured on {len(decoded)} of {published} scenarios, chosen by seed {self.config.seed}"
         for row in evaluation.rows:
             figures = {key: repr(entry.value) for key, entry in row.values.items() if math.isfinite(entry.value)}
             values = {"request": status.values["request"], "samples": str(row.samples), **figures}
-            statuses.append(Status(f"{self.get_fully_qualified_name()}: {row.name}", Level.OK, "; ".join(row.notes), values))
+            notes = (*row.notes, chosen) if row.name == WITH and len(decoded) < published else row.notes
+            statuses.append(Status(f"{self.get_fully_qualified_name()}: {row.name}", Level.OK, "; ".join(notes), values))
         self.send("report", encode_diagnostics(statuses, encounter.start_ns))
         self.health.settle("requests")
         self.get_logger().info(f"request {status.values['request']} evaluated: {len(decoded)} scenarios")

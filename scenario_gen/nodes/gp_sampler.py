@@ -18,7 +18,7 @@ It generates when the inputs are complete, and on `~/generate`, whose parameters
 `request`, the caller's name for it. /diagnostics says how far it is; `~/cancel_request` ends one, `~/cancel` all.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 import sys
 
@@ -30,11 +30,11 @@ from scenario_gen.nodes.base import run_nodes, StageNode
 from scenario_gen.nodes.generate_services import GenerateServices
 from scenario_gen.nodes.inputs import Inputs
 from scenario_gen.nodes.open_requests import OpenRequest, OpenRequests
-from scenario_gen.nodes.sample_messages import sample_messages
+from scenario_gen.nodes.pacing import unheard
 from scenario_gen.nodes.sample_request import Answer, answer_request, Config
+from scenario_gen.requests.chain import Cancelled
 
 ENDS = ("road/entries", "road/exits")  # of use only where start or end states are asked for
-Asked = Callable[[], bool]  # whether a job was cancelled
 
 
 class GpSampler(StageNode):
@@ -92,36 +92,49 @@ class GpSampler(StageNode):
         for topic in sorted(wanted):
             self.listen(topic)
 
-    def _generate_on_input(self, messages: Mapping[str, bytes], config: Config, cancelled: Asked) -> None:
+    def _generate_on_input(self, messages: Mapping[str, bytes], config: Config, cancelled: Cancelled) -> None:
         if not cancelled():
             self.generate(messages, self._requests.add(job="inputs", wanted=config.count), config, cancelled)
 
-    def over(self, messages: Mapping[str, bytes], cancelled: Asked) -> str:
+    def over(self, messages: Mapping[str, bytes], cancelled: Cancelled) -> str:
         """Say why a request is to be given up; nothing if it is not."""
         return "given up: its inputs were replaced" if self._seen.replaced(messages) else "cancelled" if cancelled() else ""
 
-    def generate(self, messages: Mapping[str, bytes], request: OpenRequest, config: Config, cancelled: Asked) -> Answer | None:
-        """Sample, check and publish; the request's account closes `scenarios/info`. None if it was given up."""
-        over = partial(self.over, messages, cancelled)
+    def over(self, messages: Mapping[str, bytes], cancelled: Cancelled) -> str:
+        """Say why a request is to be given up; nothing if it is not."""
+        return "given up: its inputs were replaced" if self._seen.replaced(messages) else "cancelled" if cancelled() else ""
+
+    def generate(
+        self, messages: Mapping[str, bytes], request: OpenRequest, config: Config, cancelled: Cancelled
+    ) -> Answer | None:
+        """Sample, check and publish; the request's account closes `scenarios/info`. None if it was given up before its end."""
+
+        def given_up() -> bool:  # also amid a set: nothing of an old map is said beside the new one
+            return bool(self.over(messages, cancelled))
+
         level, words, more = Level.WARN, "", dict[str, str]()
         try:
-            if over():
+            if given_up():
                 return None
             self._requests.begin(request)
-            node = self.get_fully_qualified_name()
-            answer = answer_request(messages, config, request.name, node, request.progress, lambda: bool(over()))
-            for topic, data in sample_messages(answer.template.encounter, answer.asked, answer.result, answer.closing, node):
-                if over():  # also amid a set: nothing of an old map is said beside the new one
-                    return None
-                self.send(topic, data)
-            level, words = answer.closing.level, answer.closing.message
+            node, send = self.get_fully_qualified_name(), partial(self.voice.send_paced, stop=given_up)
+            with self.voice.paced(self.OUTPUTS[:2], config.patience, partial(self._unheard, request.name)):
+                answer = answer_request(messages, config, request.name, node, request.progress, given_up, send)
+            words = answer.closing.message
+            if "cancelled" in answer.closing.values:
+                words = f"{self.over(messages, cancelled)}: {words}"
+                return None
+            level = answer.closing.level
             return answer
         except Exception as error:
-            if not over():
+            if not given_up():
                 level, words, more = Level.ERROR, str(error), {"error": type(error).__name__}
             raise
         finally:
-            self._requests.end(request, level, words or over() or "cancelled", **more)
+            self._requests.end(request, level, words or self.over(messages, cancelled) or "cancelled", **more)
+
+    def _unheard(self, request: str, topic: str, count: int) -> None:
+        self.status(Level.WARN, unheard(self, topic, count), f"pace of {topic}", request=request, count=str(count))
 
 
 def main() -> None:

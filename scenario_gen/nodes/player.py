@@ -25,6 +25,7 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from heapq import merge
 from operator import attrgetter
 from pathlib import Path
@@ -50,6 +51,7 @@ from scenario_gen.nodes.base import run_nodes
 from scenario_gen.nodes.frames import find_motion, Frames, Instant
 from scenario_gen.nodes.health import Health
 from scenario_gen.nodes.message_classes import message_class
+from scenario_gen.nodes.pacing import Pace, unheard
 from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.voice import qos
@@ -78,6 +80,9 @@ class Config:
         "tracks", "topic whose motion is told on /tf, as vehicle_<id>: `tracks`, `scenarios`, or its full name; empty: none"
     )
     scenario: int = parameter(0, "which message of that topic, from 0", low=0)
+    patience: float = parameter(
+        60.0, "wait so long for subscribers that acknowledge nothing, then go on and warn; 0: for ever", unit="s", low=0.0
+    )
 
     def __post_init__(self) -> None:
         check(self)
@@ -98,6 +103,7 @@ class Player(Node):  # type: ignore[misc]
         self._ended = threading.Event()
         self._offered: dict[str, tuple[Any, bool, int]] = {}
         self._frames: Frames | None = None
+        self._paces: dict[str, Pace] = {}
         self._clock_publisher = self.create_publisher(Clock, "/clock", 10) if self.parameters.config.clock else None
         self.create_service(Trigger, "~/pause", lambda _, response: self._set_running(response, running=False))
         self.create_service(Trigger, "~/resume", lambda _, response: self._set_running(response, running=True))
@@ -119,6 +125,9 @@ class Player(Node):  # type: ignore[misc]
                 kind, quality = message_class(topic.type), qos(topic.quality)
                 publisher = self.create_publisher(kind, name, quality, qos_overriding_options=QoSOverridingOptions(KINDS))
                 self._offered[topic.name] = (publisher, topic.quality.transient_local, topic.quality.depth)
+                self._paces[topic.name] = Pace(
+                    publisher, publisher.qos_profile.depth, config.patience, partial(self._unheard, name)
+                )
             except InputError as error:
                 self.health.say(Level.ERROR, f"{name} is not played: {error}", "topics", {"error": "InputError"})
         if not self._offered:
@@ -165,6 +174,8 @@ class Player(Node):  # type: ignore[misc]
 
     def _leave(self) -> None:
         """Let `run_nodes` end the node, once who listens has everything."""
+        for pace in self._paces.values():
+            pace.end()
         deadline = monotonic() + PATIENCE
         with suppress(InvalidHandle):  # the node is being ended already
             for publisher in (*(one for one, _, _ in self._offered.values()), *(self._frames.publishers if self._frames else ())):
@@ -184,9 +195,17 @@ class Player(Node):  # type: ignore[misc]
             if self._ended.is_set():
                 return
             if isinstance(message, BagMessage):
-                publish(self, self._offered[message.topic][0], message.data)
+                self._publish(message.topic, message.data)
             elif self._frames is not None:
                 self._frames.tell(message, message.stamp_ns if config.clock else self.get_clock().now().nanoseconds)
+
+    def _publish(self, topic: str, data: bytes) -> None:
+        """Publish, once it overwrites nothing that is on its way; a replay may take longer than the recording for that."""
+        self._paces[topic].wait(self._ended.is_set)
+        publish(self, self._offered[topic][0], data)
+
+    def _unheard(self, topic: str, count: int) -> None:
+        self.health.say(Level.WARN, unheard(self, topic, count), f"pace of {topic}", {"count": str(count)})
 
     def _from_offset(self, config: Config) -> Iterator[BagMessage | Instant]:
         """Yield the messages from the offset on; before the first, publish what latched topics hold by then."""
@@ -203,7 +222,7 @@ class Player(Node):  # type: ignore[misc]
                 continue
             for topic in list(latched):
                 for data in latched.pop(topic):
-                    publish(self, self._offered[topic][0], data)
+                    self._publish(topic, data)
             yield message
 
     def _wait_until(self, due: float, elapsed: float, config: Config, first_ns: int) -> float:

@@ -15,19 +15,22 @@
 """recorder: any topics of any type, as raw CDR, to a bag; `~/start` and `~/stop` begin and end one.
 
 What a publisher offers decides how it is subscribed, so latched topics are recorded from late on too. Messages are logged at the
-time they arrive. The bag is closed on `~/stop`, on Ctrl-C and on SIGTERM; a killed recorder leaves all but the last chunk. What
-is at the bag's place already is never touched. Where the disk is full recording ends with an error on /diagnostics; what was
-written stays, for `scenario-gen reindex`.
+time they arrive. The bag is closed on `~/stop`, on Ctrl-C and on SIGTERM; a killed recorder loses what came in its last seconds.
+What is not recorded is said: on the terminal, on /diagnostics and in metadata.yaml. What is at the bag's place already is never
+touched. Where the disk is full recording ends with an error on /diagnostics; what was written stays, for `scenario-gen reindex`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 import re
 import sys
+from time import monotonic
 from typing import Any
 
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.time import Time
 from std_srvs.srv import Trigger
@@ -39,12 +42,16 @@ from scenario_gen.errors import InputError, of_system
 from scenario_gen.interrupts import uninterrupted
 from scenario_gen.nodes.base import run_nodes
 from scenario_gen.nodes.health import Health
+from scenario_gen.nodes.losses import Losses, remedy
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.offered import offered
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.voice import qos
 from scenario_gen.parameters import check, parameter
 
+REST = 30.0  # seconds that are taken at most, at the end, for what has arrived
+AT_ONCE = 50  # messages of a topic, before others have their turn
+HELD = 4.0  # seconds after which what came is written, whole chunk or not
 OF_ALL = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, whatever the namespace
 OF_A_SUITE = (
     r"map|road/(entries|exits|info)|tracks|changepoints(/live)?|posterior|fit(/info)?|vehicle_\w+/(route|footprint|fix|speed)"
@@ -100,6 +107,9 @@ class Recorder(Node):  # type: ignore[misc]
         self.create_service(Trigger, "~/start", self._start_service)
         self.create_service(Trigger, "~/stop", self._stop_service)
         self.create_timer(0.1, self._look_around)
+        self.create_timer(HELD, self._let_go)
+        self._losses = Losses(self.count_publishers)
+        self._said: dict[str, str] = {}
         self.health = Health(self, self._tell_counts)
         self._say(Level.OK, "nothing is being recorded")
 
@@ -112,22 +122,27 @@ class Recorder(Node):  # type: ignore[misc]
         config = self.parameters.config
         with _disk_errors():
             self._bag = BagWriter(folder, compress=config.compress, split=Split(config.split_bytes, config.split_seconds))
+        self._losses, self._said = Losses(self.count_publishers), {}
         self._say(Level.OK, f"recording to {folder}")
         self._refused.clear()
         self.health.settle("topics")
         self._look_around()
 
-    def stop(self) -> str:
-        """Close the bag, if one is open; return its folder.
+    def stop(self, *, rest: bool = True) -> str:
+        """Close the bag, if one is open, with the `rest` that has arrived; return its folder.
 
         Raises:
             InputError: the disk is full, or fails.
         """
+        if rest:
+            self._take_rest()
         for topic in list(self._listening):
             self.destroy_subscription(self._listening.pop(topic))
         bag, self._bag = self._bag, None
         if bag is None:
             return ""
+        bag.info.lost = dict(self._losses.words(ended=True))
+        self._warn(bag.info.lost)
         with _disk_errors():
             bag.close()
         self._say(Level.OK, f"{bag.folder} is closed")
@@ -135,6 +150,26 @@ class Recorder(Node):  # type: ignore[misc]
 
     def _say(self, level: Level, words: str, subject: str = "recording", **values: str) -> None:
         self.health.say(level, words, subject, values)
+
+    def _take_rest(self) -> None:
+        """Record what has arrived and waits to be taken; publishers believe that the recorder has it."""
+        deadline = monotonic() + REST
+        for topic in list(self._listening):
+            while monotonic() < deadline and self._take_more(topic):
+                pass
+
+    def _take_more(self, topic: str) -> bool:
+        """Record AT_ONCE messages that have arrived, cheaper than one a round of the executor; say whether there may be more."""
+        for _ in range(AT_ONCE):
+            subscription = self._listening.get(topic)
+            if subscription is None or self._bag is None:
+                return False
+            with subscription.handle:
+                taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+            if taken is None:
+                return False
+            self._write(topic, taken[0], taken[1]["publication_sequence_number"])
+        return True
 
     def destroy_node(self) -> None:
         """Close the bag, then the node."""
@@ -157,6 +192,28 @@ class Recorder(Node):  # type: ignore[misc]
         if self._bag is not None:
             counts = {topic.name: str(topic.count) for topic in self._bag.info.topics}
             self.health.say(Level.OK, str(self._bag.folder), "recorded", counts, log=False)
+            lost = self._losses.words()
+            if lost:
+                words = "; ".join(f"{topic}: {said}" for topic, said in lost.items())
+                self.health.say(Level.WARN, f"{words}; {remedy(words)}", "losses", lost, log=False)
+            self._warn(lost)
+
+    def _warn(self, lost: Mapping[str, str]) -> None:
+        """Say on the terminal what is new of what is not recorded."""
+        for topic in lost:
+            if lost[topic] != self._said.get(topic):
+                said = f"{topic}: {lost[topic]}; {remedy(lost[topic])}"
+                if self.context.ok():
+                    self.get_logger().warning(said)
+                else:  # ended by a signal; /rosout is gone
+                    print(f"[WARN] [{self.get_name()}]: {said}", file=sys.stderr, flush=True)
+        self._said = dict(lost)
+
+    def _let_go(self) -> None:
+        """Write what came in the last seconds."""
+        if self._bag is not None:
+            with self._guarded():
+                self._bag.let_go()
 
     def _listen(self, topic: str, kind: str) -> None:
         publishers = self.get_publishers_info_by_topic(topic)
@@ -170,22 +227,34 @@ class Recorder(Node):  # type: ignore[misc]
             self._refused.add(topic)
             self._say(Level.ERROR, f"{topic} is not recorded: {error}", "topics", error="InputError")
             return
-        self._listening[topic] = self.create_subscription(
-            message, topic, lambda data: self._write(topic, data), qos(quality), raw=True
-        )
+        take, losses = partial(self._write, topic), self._losses
+        lost = SubscriptionEventCallbacks(message_lost=lambda event: losses.told(topic, event.total_count))
 
-    def _write(self, topic: str, data: bytes) -> None:
+        def heard(data: bytes, about: dict[str, Any]) -> None:  # rclpy counts the arguments
+            take(data, about["publication_sequence_number"])
+            self._take_more(topic)
+
+        self._listening[topic] = self.create_subscription(message, topic, heard, qos(quality), raw=True, event_callbacks=lost)
+
+    def _write(self, topic: str, data: bytes, number: int | None) -> None:
         if self._bag is not None:
             now: Time = self.get_clock().now()
-            try:
-                with uninterrupted(), _disk_errors():
-                    self._bag.write(topic, data, now.nanoseconds)
-            except InputError as error:
-                self._give_up(error)
+            with self._guarded():
+                self._bag.write(topic, data, now.nanoseconds)
+            self._losses.take(topic, data, number)
+
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
+        """Finish what is written whatever signal comes, and end the recording where the disk fails."""
+        try:
+            with uninterrupted(), _disk_errors():
+                yield
+        except InputError as error:
+            self._give_up(error)
 
     def _give_up(self, error: InputError) -> None:
         """Say what is wrong and record no more; the node, and others in its process, live on."""
-        self.stop()  # nothing more is written to such a bag
+        self.stop(rest=False)  # nothing more is written to such a bag
         self._say(Level.ERROR, str(error), error="InputError")
 
     def _start_service(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -14,9 +14,8 @@
 
 """What gp_sampler publishes of a request: footprints, the ego's slot, every scenario with its account, and the account of all."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Mapping
 
-from msg_conventions.belonging import MAP_HASH, TEMPLATE_HASH
 from msg_conventions.diagnostics import asked_values, encode_diagnostics, scenario_status, Status
 from msg_conventions.ego import ego_messages, ego_values
 from msg_conventions.names import tokens
@@ -24,25 +23,44 @@ from msg_conventions.pictures import encode_footprint, scenario_markers
 from msg_conventions.scenarios import encode_scenario
 from msg_conventions.topics import vehicle_topic
 from scenario_gen.encounter import Encounter
-from scenario_gen.scenario import BoundaryStates, ScenarioSet
+from scenario_gen.scenario import BoundaryStates, Scenario, ScenarioSet
+
+Send = Callable[[str, bytes], None]  # of topic and CDR bytes
 
 
-def sample_messages(
-    encounter: Encounter, asked: BoundaryStates, result: ScenarioSet, closing: Status, node: str
-) -> Iterator[tuple[str, bytes]]:
-    """Yield topic and CDR bytes of every message, in order; `closing` is the request's account, `node` the full name."""
-    stamp, vehicles = encounter.start_ns, encounter.vehicles
-    for vehicle, name in zip(vehicles, tokens(vehicle.id for vehicle in vehicles), strict=True):
-        yield vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}")
-    if result.ego is not None:
-        yield from ego_messages(result.ego, stamp)
-    of_all = {key: closing.values[key] for key in (TEMPLATE_HASH, MAP_HASH)} | ego_values(result.ego)
-    for scenario in result.scenarios:
+class SampleMessages:
+    """Sends a request's messages in order, each scenario as it comes, so that a set need never be in memory."""
+
+    def __init__(self, encounter: Encounter, request: str, node: str, of_all: Mapping[str, str], send: Send) -> None:
+        """Take the template, the request's id, the node's full name, what every account says, and what sends a message."""
+        self._encounter, self._request, self._node, self._of_all, self._send = encounter, request, node, of_all, send
+        self._begun = False
+
+    def _begin(self, ego: Scenario | None) -> None:
+        """Send what stands before the first scenario, once."""
+        if self._begun:
+            return
+        self._begun = True
+        stamp, vehicles = self._encounter.start_ns, self._encounter.vehicles
+        for vehicle, name in zip(vehicles, tokens(vehicle.id for vehicle in vehicles), strict=True):
+            self._send(vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}"))
+        for topic, data in () if ego is None else ego_messages(ego, stamp):
+            self._send(topic, data)
+
+    def scenario(self, scenario: Scenario, asked: BoundaryStates, ego: Scenario | None) -> None:
+        """Send a scenario and its account."""
+        self._begin(ego)
+        stamp = self._encounter.start_ns
         data = encode_scenario(scenario, stamp)
-        yield "scenarios", data
-        more = of_all | asked_values(asked, vehicles, scenario)
-        status = scenario_status(scenario, data, closing.values["request"], node, **more)
-        yield "scenarios/info", encode_diagnostics([status], stamp)
-    if result.scenarios:
-        yield "markers", scenario_markers(result.scenarios[0], stamp)
-    yield "scenarios/info", encode_diagnostics([closing], stamp)
+        self._send("scenarios", data)
+        more = {**self._of_all} | ego_values(ego) | asked_values(asked, self._encounter.vehicles, scenario)
+        status = scenario_status(scenario, data, self._request, self._node, **more)
+        self._send("scenarios/info", encode_diagnostics([status], stamp))
+
+    def close(self, result: ScenarioSet, closing: Status) -> None:
+        """Send the picture of the first scenario and the request's account."""
+        self._begin(result.ego)
+        stamp = self._encounter.start_ns
+        if result.scenarios:
+            self._send("markers", scenario_markers(result.scenarios[0], stamp))
+        self._send("scenarios/info", encode_diagnostics([closing], stamp))

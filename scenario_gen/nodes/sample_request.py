@@ -22,11 +22,12 @@ from msg_conventions.diagnostics import request_status, Status
 from scenario_gen.bags.provenance import parameter_texts, versions
 from scenario_gen.bags.template import read_template, Template
 from scenario_gen.fitting import FittingConfig
+from scenario_gen.nodes.sample_messages import SampleMessages, Send
 from scenario_gen.parameters import check, parameter
 from scenario_gen.planning import PlanningConfig
 from scenario_gen.requests import Chain, Request, run_request
 from scenario_gen.sampling import SamplingConfig
-from scenario_gen.scenario import BoundaryStates, ScenarioSet
+from scenario_gen.scenario import ScenarioSet
 from scenario_gen.validity import Limits
 
 
@@ -37,6 +38,12 @@ class Config(Request):
     count: int = parameter(50, "scenarios to generate", low=1, high=100_000)
     seed: int = parameter(0, "seed of the samples, and of the planner where states are asked for", low=0)
     generate_on_input: bool = parameter(True, "generate whenever the inputs are complete or change; false: on ~/generate only")
+    patience: float = parameter(
+        60.0,
+        "wait so long for subscribers of scenarios that acknowledge none, then go on and warn; 0: for ever",
+        unit="s",
+        low=0.0,
+    )
     pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
     fitting: FittingConfig = field(default_factory=FittingConfig)
     planning: PlanningConfig = field(default_factory=PlanningConfig)
@@ -50,10 +57,9 @@ class Config(Request):
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a request came to: the template, the states asked of its scenarios, the scenarios and their account."""
+    """What a request came to: the template, the scenarios, which are published by then, and their account."""
 
     template: Template
-    asked: BoundaryStates
     result: ScenarioSet
     closing: Status
 
@@ -65,8 +71,9 @@ def answer_request(
     node: str,
     progress: Callable[[int, int, int], None],
     cancelled: Callable[[], bool],
+    send: Send,
 ) -> Answer:
-    """Sample and check; fit and plan anew if start or end states are asked for.
+    """Sample, check and publish; fit and plan anew if start or end states are asked for.
 
     Args:
         messages: of the template, by topic.
@@ -74,7 +81,8 @@ def answer_request(
         request: its id.
         node: the node's full name.
         progress: called with the scenarios and candidates so far, and the template's stamp [ns].
-        cancelled: whether to stop early.
+        cancelled: whether to stop early; what was published by then stays, and the account says so.
+        send: called with topic and CDR bytes of every message, scenarios as they are drawn.
 
     Raises:
         InputError: a message is damaged, or a vehicle that is named does not exist.
@@ -95,11 +103,17 @@ def answer_request(
     def advance(done: int, _total: int, candidates: int) -> None:
         progress(done, candidates, template.encounter.start_ns)
 
-    asked = template.asked
+    out = SampleMessages(template.encounter, request, node, identity(messages), send)
     if config.moves:
-        outcome = run_request(chain, config, count=config.count, progress=advance, cancelled=cancelled)
-        asked, result = outcome.fit.asked, outcome.scenarios
+        result = run_request(
+            chain, config, count=config.count, progress=advance, cancelled=cancelled, found=out.scenario
+        ).scenarios
     else:
-        result = chain.sample(config, template.routes, asked, count=config.count, progress=advance, cancelled=cancelled)
-    provenance = parameter_texts(config) | versions() | identity(messages)
-    return Answer(template, asked, result, request_status(result, request, node, config.seed, provenance))
+        result = chain.sample(
+            config, template.routes, template.asked, count=config.count, progress=advance, cancelled=cancelled, found=out.scenario
+        )
+    stopped = {"cancelled": "true"} if cancelled() and len(result.scenarios) < result.requested else {}
+    told = parameter_texts(config) | versions() | identity(messages) | stopped
+    closing = request_status(result, request, node, config.seed, told)
+    out.close(result, closing)
+    return Answer(template, result, closing)

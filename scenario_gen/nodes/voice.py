@@ -14,14 +14,18 @@
 
 """What a node says: its publishers, which speak while the node is active and fall silent with it."""
 
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from functools import partial
 import threading
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from msg_conventions.topics import Quality, topic_entry
 from scenario_gen.nodes.message_classes import message_class
+from scenario_gen.nodes.pacing import let_others_take, Pace
 from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.worker import stop_if_left_behind
 
@@ -29,6 +33,7 @@ from scenario_gen.nodes.worker import stop_if_left_behind
 def qos(quality: Quality) -> QoSProfile:
     """Return the profile of a topic."""
     return QoSProfile(
+        history=HistoryPolicy.KEEP_ALL if quality.keep_all else HistoryPolicy.KEEP_LAST,
         depth=quality.depth,
         reliability=ReliabilityPolicy.RELIABLE if quality.reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if quality.transient_local else DurabilityPolicy.VOLATILE,
@@ -46,6 +51,7 @@ class Voice:
         self._publishers: dict[str, Any] = {}
         self._one_at_a_time = threading.RLock()
         self._heard = False
+        self._paces: dict[str, Pace] = {}
 
     def begin(self) -> None:
         """Speak from now on."""
@@ -79,6 +85,34 @@ class Voice:
             if self._heard:
                 self.announce(topic)
                 self.publish(self._publishers[topic], data)
+
+    @contextmanager
+    def paced(self, topics: Iterable[str], patience: float, tell: Callable[[str, int], None]) -> Iterator[None]:
+        """Let `send_paced` pace these topics inside; `tell` is called with the topic and what its `Pace` says."""
+        for topic in topics:
+            self.announce(topic)
+            depth = topic_entry(topic)[1].depth
+            self._paces[topic] = Pace(self._publishers[topic], depth, patience, partial(tell, topic))
+        try:
+            yield
+        finally:
+            for topic in topics:
+                self._paces.pop(topic).end()
+
+    def send_paced(self, topic: str, data: bytes, stop: Callable[[], bool]) -> None:
+        """Publish as `send` does; on a topic that is paced, once its subscribers have room, or `stop` says so.
+
+        Topics that are paced together take turns: on the last of them nodes of the same process are let take, too.
+        Not to be called on the executor's thread.
+
+        Raises:
+            CancelledError: on the thread of a job that was left behind.
+        """
+        if topic in self._paces:
+            self._paces[topic].wait(lambda: stop() or not self._heard)
+            if topic == next(reversed(self._paces)):
+                let_others_take(self._node.executor, lambda: stop() or not self._heard)
+        self.send(topic, data)
 
     def publish(self, publisher: Any, data: bytes) -> None:
         """Publish the CDR bytes of any publisher of the node, if it is active.

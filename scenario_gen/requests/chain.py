@@ -27,6 +27,7 @@ from scenario_gen.requests.request import Request
 from scenario_gen.roads import Road
 from scenario_gen.sampling import regenerate, sample_scenarios, SamplingConfig
 from scenario_gen.sampling.ego import others
+from scenario_gen.sampling.sample import Found
 from scenario_gen.scenario import BoundaryStates, Scenario, ScenarioSet
 from scenario_gen.segmentation import Segmentation
 from scenario_gen.validity import Checker, Limits
@@ -99,6 +100,7 @@ class Chain:
         count: int,
         progress: Progress | None = None,
         cancelled: Cancelled | None = None,
+        found: Found | None = None,
     ) -> ScenarioSet:
         """Sample candidates and publish those that the checker proves valid against the template's conflicts and waits.
 
@@ -135,6 +137,7 @@ class Chain:
             ego=ego,
             progress=progress,
             cancelled=cancelled,
+            found=found,
         )
         if request.moves and not made.scenarios and not (cancelled and cancelled()):
             causes = ", ".join(f"{number} × {cause.value}" for cause, number in made.refused.most_common())

@@ -22,6 +22,7 @@ from scenario_gen.planning import Route
 from scenario_gen.requests.chain import Cancelled, Chain, Progress
 from scenario_gen.requests.nearest import ImpossibleError, suggestions
 from scenario_gen.requests.request import Request
+from scenario_gen.sampling.sample import Found
 from scenario_gen.scenario import ScenarioSet
 
 
@@ -42,8 +43,11 @@ def run_request(
     progress: Progress | None = None,
     cancelled: Cancelled | None = None,
     suggest: bool = True,
+    found: Found | None = None,
 ) -> Outcome:
     """Fit, plan, sample and check; `suggest` whether to look for the nearest possible request where this one is not.
+
+    `found` is called with each valid scenario as it is drawn.
 
     Raises:
         InputError: a vehicle that is named does not exist.
@@ -53,7 +57,7 @@ def run_request(
     request.ego_of(chain.encounter)
     try:
         fit, routes = chain.place(request)
-        made = chain.sample(request, routes, fit.asked, count=count, progress=progress, cancelled=cancelled)
+        made = chain.sample(request, routes, fit.asked, count=count, progress=progress, cancelled=cancelled, found=found)
     except RefusedError as error:
         if not request.moves or not suggest:
             raise

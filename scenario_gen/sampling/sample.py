@@ -38,6 +38,7 @@ from scenario_gen.scenario import BoundaryStates, Cause, Scenario, ScenarioSet, 
 from scenario_gen.segmentation.result import Segmentation
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
+Found = Callable[[Scenario, BoundaryStates, Scenario | None], None]  # a valid one, the states asked, the ego's track
 
 LEVELS = (
     Scale(),
@@ -126,6 +127,7 @@ def sample_scenarios(
     ego: int | None = None,
     progress: Callable[[int, int, int], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
+    found: Found | None = None,
 ) -> ScenarioSet:
     """Draw candidates until `count` are valid or the budget is spent.
 
@@ -143,6 +145,7 @@ def sample_scenarios(
         ego: index of the vehicle that is left out of every scenario; its template track is given instead.
         progress: called with (valid so far, count, candidates so far).
         cancelled: asked now and then; if True, the set so far is returned.
+        found: called with each valid scenario as it is drawn, in the set's order.
 
     Returns:
         At most `count` scenarios; fewer if the budget did not suffice, which the account (`refused`) explains. Of more than KEPT
@@ -156,7 +159,8 @@ def sample_scenarios(
     track = None if ego is None else ego_track(encounter, segmentation, routes[ego], asked, ego, road.frame_id)
     if prepared.model is None:
         return ScenarioSet(count, (), 1, Counter({Cause.TIME_LAW: 1}), (prepared.refusal,), track)
-    loop = _Loop(Sampler(prepared.model, seed, road.frame_id), check, count, progress, cancelled)
+    take = None if found is None else lambda scenario: found(scenario, asked, track)
+    loop = _Loop(Sampler(prepared.model, seed, road.frame_id), check, count, progress, cancelled, take)
     loop.run(config.attempts * count)
     said = (*prepared.adaptations, *loop.adaptations)
     return ScenarioSet(count, loop.scenarios(), loop.candidates, loop.refused, said, track)
@@ -190,9 +194,10 @@ class _Loop:
         count: int,
         progress: Callable[[int, int, int], None] | None,
         cancelled: Callable[[], bool] | None,
+        found: Callable[[Scenario], None] | None,
     ) -> None:
         self.sampler, self.check, self.count = sampler, check, count
-        self.progress, self.cancelled = progress, cancelled
+        self.progress, self.cancelled, self.found = progress, cancelled, found
         self.kept: list[Scenario] = []  # the first KEPT
         self.index = array("q")  # of all that are valid
         self.refused: Counter[Cause] = Counter()
@@ -245,6 +250,8 @@ class _Loop:
                     self.index.append(number)
                     if len(self.kept) < KEPT:
                         self.kept.append(scenario)
+                    if self.found:
+                        self.found(scenario)
                 else:
                     self.refused[verdict.violations[0].cause if verdict else Cause.TIME_LAW] += 1
             if self.progress:

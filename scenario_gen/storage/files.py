@@ -23,6 +23,7 @@ from scenario_gen.errors import InputError
 
 SUFFIXES = (".mcap", ".db3")
 METADATA = "metadata.yaml"
+LOST = "scenario_gen.lost:"  # begins the keys of custom_data that tell what is not in the bag, by topic
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,18 @@ def _listed(document: Any, metadata: Path) -> tuple[list[str], str]:
 
 
 def remark(path: Path) -> str:
-    """Return what is to be said of a folder that is read though its metadata.yaml is missing; "" if it is there."""
-    if not path.is_dir() or (path / METADATA).exists():
+    """Return what is to be said of a folder that is read though its metadata.yaml is missing, or says what was not recorded."""
+    if not path.is_dir():
         return ""
+    if (path / METADATA).exists():
+        return "; ".join(f"not whole, by its recorder: {topic}: {words}" for topic, words in _lost(path / METADATA).items())
     return f"{path} has no metadata.yaml: its files are read in order of their names; `scenario-gen reindex {path}` writes it"
+
+
+def _lost(metadata: Path) -> dict[str, str]:
+    """Return what a recorder wrote of what it did not record, by topic."""
+    try:
+        told = read_yaml(metadata)["rosbag2_bagfile_information"]["custom_data"]
+        return {shown(key[len(LOST) :]): shown(text, 400) for key, text in told.items() if key.startswith(LOST)}
+    except (InputError, KeyError, TypeError, AttributeError):
+        return {}

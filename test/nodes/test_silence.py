@@ -21,6 +21,7 @@ import pytest
 from suite_processes import Client, RESOURCES
 
 from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status
+from msg_conventions.scenarios import digest
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.errors import RefusedError
 from scenario_gen.logs import read_log
@@ -145,16 +146,17 @@ def test_the_evaluator_gives_up_requests_whose_scenarios_never_come_and_says_so(
             node.received("scenarios/info", encode_diagnostics([Status("scenario", Level.OK, "", entry)], 0))
             closing = {"request": str(k), "published": "1", "requested": "1"}
             node.received("scenarios/info", encode_diagnostics([Status("request", Level.OK, "", closing)], 0))
-        assert len(node._closed) == len(node._open) == wait
+        accounts = node._accounts.open
+        assert len(accounts) == wait
         node.health._again()  # a second has gone by
-        for k in range(node.config.keep + 10):  # of one request that is never closed
-            entry = {"request": "endless", "index": str(k), "seed": "0", "sha256": f"{many + k:064x}"}
+        for k in range(2 * node.config.measured):  # of one request that is never closed
+            data = f"{k}".encode()
+            entry = {"request": "endless", "index": str(k), "seed": "0", "sha256": digest(data)}
+            node.received("scenarios", data)
             node.received("scenarios/info", encode_diagnostics([Status("scenario", Level.OK, "", entry)], 0))
-        assert sum(map(len, node._open.values())) <= node.config.keep
-        closing = {"request": "endless", "published": str(node.config.keep + 10), "requested": "1"}
-        node.received("scenarios/info", encode_diagnostics([Status("request", Level.OK, "", closing)], 0))
-        assert "endless" not in node._closed | node._open, "part of a request is not evaluated as all of it"
-        last = f"request {many - wait - 1} is not evaluated: 1 of its scenarios did not come"
+        assert accounts["endless"].came == 2 * node.config.measured
+        assert len(accounts["endless"].kept) == node.config.measured
+        last = f"request {many - wait - 1}: 0 of 1 scenarios are there, 1 are missing; it is not evaluated"
         client.until(lambda: last in _said(client), "the warning")
     finally:
         node.destroy_node()

@@ -1,0 +1,108 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a recorder did not record, by topic, and how it knows.
+
+- Where a topic has one publisher, by the numbers that it gives its messages: what is left out was lost, what came before the
+  first one was published before the recording began.
+- Where it has several, by what DDS tells.
+- Scenarios, by their accounts on `scenarios/info`.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from time import monotonic
+
+from msg_conventions.scenarios import digest
+from scenario_gen.bags.accounts import Accounts, INFO, take_info
+
+SETTLED = 5.0  # seconds without news after which what a closed request lacks is missing
+LATE = "began late"
+LOST = "pace the publisher by its acknowledgements, or give the recorder a faster disk and processor"
+BEGIN = "begin to record before what is to be recorded is published"
+
+
+@dataclass
+class Numbers:
+    """The numbers of one topic's messages. `late`: published before the recording; `several`: publishers, whose numbers mix."""
+
+    last: int = 0
+    late: int = 0
+    lost: int = 0
+    told: int = 0  # by DDS
+    several: bool = False
+
+    def take(self, number: int) -> bool:
+        """Take the next message's number; return whether some are left out."""
+        left_out = number - self.last - 1
+        if self.last == 0:
+            self.late = left_out
+        elif left_out > 0:  # a smaller number: its publisher was started again, or says it again
+            self.lost += left_out
+        self.last = number
+        return left_out > 0
+
+    def words(self) -> str:
+        """Say what was not recorded; "" if all was."""
+        lost = self.told if self.several else max(self.lost, self.told)
+        said = [f"{lost} lost"] if lost else []
+        if self.late and not self.several:
+            said.append(f"{self.late} not recorded: {LATE}")
+        return ", ".join(said)
+
+
+class Losses:
+    """What one recording lacks."""
+
+    def __init__(self, publishers: Callable[[str], int]) -> None:
+        """Begin; `publishers` returns how many a topic has."""
+        self._publishers = publishers
+        self._numbers: dict[str, Numbers] = {}
+        self._accounts: dict[str, Accounts] = {}  # by namespace
+        self._news = monotonic()
+
+    def take(self, topic: str, data: bytes, number: int | None) -> None:
+        """Take a message that was recorded, with its publisher's number for it."""
+        numbers = self._numbers.setdefault(topic, Numbers())
+        if number and numbers.take(number) and self._publishers(topic) > 1:
+            numbers.several = True
+        if topic.endswith(("/scenarios", f"/{INFO}")):
+            self._news = monotonic()
+            accounts = self._accounts.setdefault(topic.removesuffix("/info").removesuffix("scenarios"), Accounts())
+            if topic.endswith("/info"):
+                take_info(accounts, data)
+            else:
+                accounts.scenario(digest(data))
+
+    def told(self, topic: str, total: int) -> None:
+        """Take what DDS says: so many messages of a topic have been lost up to now."""
+        self._numbers.setdefault(topic, Numbers()).told = total
+
+    def words(self, *, ended: bool = False) -> Mapping[str, str]:
+        """Say by topic what is not recorded; at the end of the recording also of requests that are not closed."""
+        said = {topic: words for topic, numbers in self._numbers.items() if (words := numbers.words())}
+        for space, accounts in self._accounts.items():
+            accounts.settle()
+            if ended or monotonic() - self._news > SETTLED:
+                topic = f"{space}scenarios"
+                for account in accounts.incomplete(closed=not ended):
+                    said[topic] = "; ".join(filter(None, (said.get(topic), account.sentence())))
+                if topic in said and said.get(f"{topic}/info", "").endswith(LATE):
+                    said[topic] += f"; the recording {LATE}"
+        return said
+
+
+def remedy(words: str) -> str:
+    """Return what can be done about it."""
+    return BEGIN if LATE in words and " lost" not in words else LOST
