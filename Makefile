@@ -43,7 +43,7 @@ $(READY): requirements.lock setup.py
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	$(BIN)/python -m scenario_gen.kernels
+	$(BIN)/python -m scenario_gen.compiling
 	@touch $(READY)
 
 # The report's tests drive Chromium, package.xml is checked by xmllint; where they are missing and cannot be installed here, those tests

@@ -91,6 +91,12 @@ class Voice:
             if self._heard:
                 publish(self._node, publisher, data)
 
+    def insist(self, topic: str, data: bytes) -> None:
+        """Publish the CDR bytes of a topic of the suite, active or not: what keeps the node from becoming active."""
+        with self._one_at_a_time:
+            self.announce(topic)
+            publish(self._node, self._publishers[topic], data)
+
     def withdraw(self) -> None:
         """Take all publishers back, and with them what late joiners would have got."""
         with self._one_at_a_time:
