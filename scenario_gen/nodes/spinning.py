@@ -114,6 +114,10 @@ def _end(nodes: Sequence[Any], executor: SingleThreadedExecutor) -> int:
         except (ScenarioGenError, OSError) as error:  # a bag that cannot be closed, say
             code = tell(error)
     executor.shutdown(timeout_sec=1.0)
+    for node in nodes:
+        # rclpy lets it keep its node, so that others would not hear of the end for 20 s
+        if (machine := getattr(node, "_state_machine", None)) is not None:
+            machine.destroy_when_not_in_use()
     rclpy.try_shutdown()
     return code
 
