@@ -34,7 +34,7 @@ from benchmarks.row import Row
 from scenario_gen.bags import read_messages
 from scenario_gen.nodes.domain import free_domain, this_host_only
 
-NODES = ("evaluator", "gp_sampler", "planner", "segmenter", "road_server", "log_player")[sized(0, quick=4) :]
+NODES = ("evaluator", "gp_sampler", "planner", "segmenter", "road_server", "log_player")[sized(0, quick=5) :]
 LOAD = sized(16, quick=1)
 LAUNCH = 5.0  # seconds that launch gives a node after Ctrl-C, and once more after SIGTERM
 BARE = "import rclpy\nrclpy.init()\nnode = rclpy.create_node('bare')\ntry:\n    rclpy.spin(node)\nexcept BaseException:\n    pass"
@@ -134,7 +134,7 @@ def _exit(folder: Path, domain: int, peer: str) -> list[Row]:
         while not list(bag.glob("*.mcap")):
             time.sleep(0.1)
         with _running(folder, domain, [["-c", "while True: pass"]] * LOAD):
-            time.sleep(3.0)
+            time.sleep(sized(3.0, quick=0.1))
             started, used = time.monotonic(), {process.pid: _cpu(process.pid) for process in processes}
             slowest, killed = 0.0, 0
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
