@@ -51,7 +51,7 @@ $(READY): requirements.lock requirements-ros.lock setup.py
 	$(PYTHON) -m venv $(if $(SOURCED),--system-site-packages) .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes $(LOCKED)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	$(BIN)/python -m scenario_gen.kernels
+	$(BIN)/python -m scenario_gen.compiling
 	@touch $(READY)
 
 # The report's tests drive Chromium, package.xml is checked by xmllint; where they are missing and cannot be installed here, those tests

@@ -12,23 +12,56 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Ctrl-C and SIGTERM, kept out of what must not be cut in two, such as a record that a bag is being given."""
+"""Ctrl-C, SIGTERM and SIGHUP: heard by a thread (nodes), or kept out of what must not be cut in two (commands)."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 import os
 import signal
+import threading
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-_held = False
+_held = 0
 _pending: Callable[[], None] | None = None
 _endings: list[Callable[[], None]] = []
+_orderly: Callable[[], None] | None = None
+_hearing = 0  # the process that has a thread for it; a fork has none
 
 
-def interrupt(_number: int, _frame: object) -> None:
-    """Signal handler of nodes: raise KeyboardInterrupt, at once or when `uninterrupted` work is done."""
-    _now_or_later(_raise)
+def hear() -> None:
+    """Have the signals heard by a thread of their own from now on: whatever else runs goes on undisturbed, compiled code too.
+
+    A signal ends the process at once, or calls what `end_orderly` was given. To be called before there are other threads: those
+    would take the signals.
+    """
+    global _hearing  # noqa: PLW0603
+    if _hearing == os.getpid():
+        return
+    _hearing = os.getpid()
+    heard = {number for number in SIGNALS if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN}
+    signal.pthread_sigmask(signal.SIG_BLOCK, heard)
+    for number in heard:  # one that is ignored (of a job in the background, say) would never come
+        signal.signal(number, lambda number, _: _take(number))  # and should a thread of before take it
+    threading.Thread(target=_hear, args=(heard,), daemon=True, name="signals").start()
+
+
+def end_orderly(end: Callable[[], None]) -> None:
+    """Have `end` called by a signal, on the thread of the signals, instead of ending the process."""
+    global _orderly  # noqa: PLW0603
+    _orderly = end
+
+
+def _hear(heard: set[signal.Signals]) -> None:
+    while True:
+        _take(signal.sigwait(heard))
+
+
+def _take(number: int) -> None:
+    if _orderly is None:
+        _leave(number)
+    else:
+        _orderly()
 
 
 def leave(number: int, _frame: object) -> None:
@@ -52,14 +85,14 @@ def ending(clean_up: Callable[[], None]) -> Iterator[None]:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Let the work inside be finished before a signal takes effect; not to be nested."""
+    """Let the work inside be finished before a signal takes effect; of nested ones the outermost."""
     global _held  # noqa: PLW0603 - a signal has no other place to be noted
-    _held = True
+    _held += 1
     try:
         yield
     finally:
-        _held = False
-    if _pending is not None:
+        _held -= 1
+    if _pending is not None and not _held:
         _pending()
 
 
@@ -71,13 +104,8 @@ def _now_or_later(act: Callable[[], None]) -> None:
         act()
 
 
-def _raise() -> None:
-    raise KeyboardInterrupt
-
-
 def _leave(number: int) -> None:
-    for other in SIGNALS:
-        signal.signal(other, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # a second Ctrl-C does not disturb this
     for clean_up in reversed(_endings):
         with suppress(Exception):
             clean_up()

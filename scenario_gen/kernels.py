@@ -15,16 +15,20 @@
 """Compiled kernels: one decorator, explicit types, compiled once and cached on disk.
 
 Every kernel names its argument types and has one compiled form, which is made (or loaded from the cache) at its first call.
-`compile_all` does so for every kernel of the project; `make` runs it at installation and a node while it configures.
+`python -m scenario_gen.compiling` compiles every kernel of the project; `make` runs it at installation, and nodes that find one
+missing see to it (`scenario_gen/compiling.py`).
 Inputs are `F1`, `I2`, …, read-only to the kernel; outputs are `OUT1`, `OUTI2`, ….
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 import importlib
 import operator
+import os
 from pathlib import Path
 import pkgutil
-from time import perf_counter
+import stat
+import tempfile
 from types import FunctionType, ModuleType
 from typing import Any, cast, TypeVar
 
@@ -54,6 +58,16 @@ OUTB1, OUTB2 = (_array(B, n, readonly=False) for n in (1, 2))
 _registry: list[tuple[Any, tuple[Any, ...]]] = []
 
 
+def _inner(function: Callable[..., Any]) -> list[FunctionType]:
+    """The functions of ours that a compiled function calls."""
+    names = function.__code__.co_names
+    called = [function.__globals__.get(name) for name in names]
+    ours = [module for module in called if isinstance(module, ModuleType) and module.__name__.startswith("scenario_gen.")]
+    called += [getattr(module, name, None) for module in ours for name in names]
+    inner = [getattr(each, "__wrapped__", None) for each in called]  # dispatchers and ufuncs wrap what they compile
+    return [each for each in inner if isinstance(each, FunctionType) and each.__module__.startswith("scenario_gen.")]
+
+
 def _source_stamp(function: Callable[..., Any], seen: set[int]) -> tuple[Any, ...]:
     """What tells whether a compiled function is up to date: the files of the kernels it calls, by time and size.
 
@@ -61,17 +75,13 @@ def _source_stamp(function: Callable[..., Any], seen: set[int]) -> tuple[Any, ..
     """
     seen.add(id(function))
     file = Path(function.__code__.co_filename).stat()
-    names = function.__code__.co_names
-    called = [function.__globals__.get(name) for name in names]
-    ours = [module for module in called if isinstance(module, ModuleType) and module.__name__.startswith("scenario_gen.")]
-    called += [getattr(module, name, None) for module in ours for name in names]
-    inner = [getattr(each, "__wrapped__", None) for each in called]  # dispatchers and ufuncs wrap what they compile
-    stamps = [
-        _source_stamp(each, seen)
-        for each in inner
-        if isinstance(each, FunctionType) and each.__module__.startswith("scenario_gen.") and id(each) not in seen
-    ]
+    stamps = [_source_stamp(each, seen) for each in _inner(function) if id(each) not in seen]
     return (file.st_mtime, file.st_size, *stamps)
+
+
+def code_size(function: Callable[..., Any]) -> int:
+    """Return the bytes of a function's code and of what it calls, a measure of how long it takes to be compiled."""
+    return len(function.__code__.co_code) + sum(code_size(each) for each in _inner(function))
 
 
 def _watch(dispatcher: Any, function: Callable[..., Any]) -> None:
@@ -125,7 +135,6 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         self._declared = declared
         self._arguments = tuple(_argument(function.__name__, each) for each in declared)
         self._compiled: Callable[..., Any] | None = None
-        self.enable_caching()
 
     def compile(self, _types: Any = None) -> Any:
         """Make or load the declared form, whatever is asked for; calls from other kernels come here, too."""
@@ -148,41 +157,70 @@ def kernel(*argument_types: Any, inline: bool = False) -> Callable[[Function], F
     """
 
     def decorate(function: Function) -> Function:
-        if inline:
-            dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-        else:
-            dispatcher = Kernel(function, argument_types)
+        dispatcher = numba.njit(nogil=True, error_model="numpy")(function) if inline else Kernel(function, argument_types)
+        keep(dispatcher, function)
+        if not inline:
             register(dispatcher, argument_types)
-        _watch(dispatcher, function)
         return cast("Function", dispatcher)
 
     return decorate
 
 
+def keep(compiled: Any, function: Callable[..., Any]) -> None:
+    """Have numba keep what it compiles: beside the source, in the user's cache, or else in a temporary folder of the user's."""
+    with suppress(RuntimeError):  # no folder can be written to
+        try:
+            compiled.enable_caching()
+        except RuntimeError:
+            if numba.config.CACHE_DIR or not (folder := _last_resort()):
+                raise
+            numba.config.CACHE_DIR = folder
+            compiled.enable_caching()
+        _watch(compiled, function)
+
+
+def _last_resort() -> str | None:
+    """Return a folder for temporary files that is this user's alone: what is kept there is run."""
+    folder = Path(tempfile.gettempdir()) / f"scenario_gen_kernels_{os.getuid()}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+    except OSError:
+        return None
+    own = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
+    return str(folder) if own else None
+
+
 def register(compiled: Any, argument_types: Any) -> None:
-    """Have `compile_all` call `compiled.compile(argument_types)`."""
+    """Count among the kernels what `compile(argument_types)` compiles, or loads."""
     _registry.append((compiled, argument_types))
 
 
-def compile_all() -> tuple[int, float]:
-    """Compile every kernel of the project, or load it from the cache.
+def registered() -> list[tuple[Any, Any]]:
+    """Return the kernels of all modules that have been imported, with the types of their arguments."""
+    return list(_registry)
 
-    Returns:
-        The number of kernels and the seconds it took.
-    """
+
+def import_all() -> None:
+    """Import every module that may have kernels."""
     import scenario_gen
 
-    started = perf_counter()
     for module in pkgutil.walk_packages(scenario_gen.__path__, "scenario_gen."):
         if ".nodes" not in module.name and not module.name.endswith("__main__"):
             importlib.import_module(module.name)
-    for dispatcher, argument_types in _registry:
-        dispatcher.compile(argument_types)
-    return len(_registry), perf_counter() - started
 
 
-if __name__ == "__main__":
-    from scenario_gen import kernels  # noqa: PLW0406 - the module under its real name, not __main__, holds the registry
+def cache_folder() -> Path | None:
+    """Return the folder of the first kernel's cache; None if nothing can be kept."""
+    path = getattr(_registry[0][0]._cache, "cache_path", None) if _registry else None
+    return Path(path) if path else None
 
-    count, seconds = kernels.compile_all()
-    print(f"{count} kernels ready after {seconds:.1f} s")
+
+def is_cached(compiled: Any, argument_types: Any) -> bool:
+    """Say whether a kernel is in the cache; only the cache's index is read. numba has no public question for it."""
+    if getattr(compiled, "overloads", None):
+        return True  # in this process, too
+    cache = compiled._cache
+    if not hasattr(cache, "_cache_file"):
+        return False
+    return cache._index_key(argument_types, compiled.targetctx.codegen()) in cache._cache_file._load_index()

@@ -26,7 +26,7 @@ PACKAGE = ROOT / "scenario_gen"
 
 # The data flow, first to last; modules of one tuple may import each other.
 ORDER = (
-    ("errors", "guard", "documents", "arrays", "cancelling", "interrupts", "folders", "kernels", "parameters"),
+    ("errors", "guard", "documents", "arrays", "cancelling", "interrupts", "folders", "kernels", "compiling", "parameters"),
     ("exact",),
     ("geodesy", "storage"),
     ("encounter", "scenario", "interaction", "size"),

@@ -26,10 +26,10 @@ from llvmlite import ir
 from numba import types
 from numba.core.ccallback import CFunc
 from numba.extending import intrinsic
-from numba.np.ufunc import _internal
+from numba.np.ufunc import _internal  # type: ignore[attr-defined,unused-ignore]
 import numpy as np
 
-from scenario_gen.kernels import F, I, kernel, register
+from scenario_gen.kernels import F, I, keep, kernel, register
 
 ADDRESSES = types.CPointer(I)
 LOOP = types.void(ADDRESSES, ADDRESSES, ADDRESSES, I)  # of the arrays, the number of elements, the strides [B], and nothing
@@ -88,8 +88,9 @@ class Elementwise:
         source = "\n" * (function.__code__.co_firstlineno - 1) + LOOPS[self._arguments].format(name=function.__name__)
         exec(compile(source, function.__code__.co_filename, "exec"), around)  # numba keeps what has a file
         options = {"nopython": True, "error_model": "numpy"}
-        self._loop = CFunc(around[f"{function.__name__}_loop"], (LOOP.args, LOOP.return_type), {}, options)
-        self._loop.enable_caching()
+        loop: Any = CFunc(around[f"{function.__name__}_loop"], (LOOP.args, LOOP.return_type), {}, options)
+        keep(loop, function)
+        self._loop = loop
         self._cache, self.targetctx = self._loop._cache, self._loop._targetdescr.target_context
         register(self, LOOP)
 

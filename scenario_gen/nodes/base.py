@@ -14,32 +14,25 @@
 
 """What all nodes with a stage have in common: lifecycle, parameters, raw topics, a worker, diagnostics, a clean end."""
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-import signal
-import sys
+from collections.abc import Callable
 from typing import Any
 
-import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.qos import QoSProfile
 
 from msg_conventions.diagnostics import Level, Status
 from msg_conventions.topics import LATCHED, Quality, topic_entry
-from scenario_gen.errors import ScenarioGenError, tell
-from scenario_gen.interrupts import interrupt
-from scenario_gen.nodes.answering import Answers
-from scenario_gen.nodes.compiling import compile_kernels
+from scenario_gen.nodes.compiling import kernels_ready
 from scenario_gen.nodes.health import Health
 from scenario_gen.nodes.inputs import refuse_damaged
 from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.ros_parameters import ConfigParameters
-from scenario_gen.nodes.usage import asks_for_help, help_of, namespaces, show
+from scenario_gen.nodes.spinning import run_nodes
 from scenario_gen.nodes.voice import qos, Voice
 from scenario_gen.nodes.worker import Job, Worker
 
+__all__ = ["REQUESTS", "StageNode", "run_nodes"]
 REQUESTS = QoSProfile(depth=1000)  # ROS's own 10 would drop the oldest of many requests that come at once
 
 
@@ -160,11 +153,8 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     # --- lifecycle --------------------------------------------------------------------------------------------
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Compile the kernels, or load them from the cache, and announce the outputs."""
-        if self.STAGES:
-            self.health.state("configuring: kernels are loaded, or compiled")
-            count, seconds = compile_kernels(self.STAGES)
-            self.get_logger().info(f"{count} kernels ready after {seconds:.1f} s")
+        """Announce the outputs; `run_nodes` has made the kernels ready."""
+        kernels_ready(self.STAGES)
         for topic in self.OUTPUTS:
             self.voice.announce(topic)
         self.health.state("inactive")
@@ -227,56 +217,3 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             self.health.settle(topic)
         except Exception as error:
             self.failed(topic, error)
-
-
-Maker = Callable[[str | None], Any]
-
-
-def run_nodes(make: Maker | Sequence[Maker], arguments: Sequence[str] | None = None) -> int:
-    """Spin one node (or one of each) per `--namespace` until Ctrl-C, SIGTERM, shutdown, or all are done; return the exit code."""
-    arguments = sys.argv if arguments is None else arguments
-    if asks_for_help(arguments):
-        show(help_of(Path(arguments[0]).name, (make,) if callable(make) else make))
-        return 0
-    where = namespaces(arguments)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, interrupt)  # rclpy calls it after its own handler
-    rclpy.init(args=list(arguments))
-    executor = SingleThreadedExecutor()
-    nodes: list[Any] = []
-    code = 0
-    try:
-        for namespace in where:
-            for one in (make,) if callable(make) else make:
-                nodes.append(one(namespace))
-                Answers(nodes[-1])
-                executor.add_node(nodes[-1])
-        for node in nodes:
-            node.autostart()
-        while rclpy.ok() and not all(getattr(node, "done", False) for node in nodes):
-            executor.spin_once()
-        code = max(getattr(node, "exit_code", 0) for node in nodes)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except (ScenarioGenError, OSError) as error:
-        code = tell(error)
-    finally:
-        code = max(code, _end(nodes, executor))
-    return code
-
-
-def _end(nodes: Sequence[Any], executor: SingleThreadedExecutor) -> int:
-    """Destroy the nodes, whatever one of them says to it; return the exit code."""
-    code = 0
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)  # a second Ctrl-C does not disturb the clean end
-    for node in nodes:
-        getattr(node, "cancel", list)()  # all at once, so that none is waited for before another is told
-    for node in nodes:
-        try:
-            node.destroy_node()
-        except (ScenarioGenError, OSError) as error:  # a bag that cannot be closed, say
-            code = tell(error)
-    executor.shutdown(timeout_sec=1.0)
-    rclpy.try_shutdown()
-    return code

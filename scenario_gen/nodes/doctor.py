@@ -178,7 +178,7 @@ def _kernels() -> Finding:
         return Finding(ERROR, "kernels", f"cannot be loaded: {last[0].strip() if last else 'no word of it'}")
     heard = json.loads(output.splitlines()[-1])
     if heard["missing"]:
-        words = f"{heard['missing']} of {heard['kernels']} are not compiled; `python -m scenario_gen.kernels` does it now"
+        words = f"{heard['missing']} of {heard['kernels']} are not compiled; `python -m scenario_gen.compiling` does it now"
         return Finding(WARNING, "kernels", words)
     return Finding(OK, "kernels", f"all {heard['kernels']} are compiled")
 

@@ -15,15 +15,12 @@
 """The doctor's probes, each a process of its own: `speak TOPIC`, `listen TOPIC`, `kernels`. The answer is a line of JSON."""
 
 from collections.abc import Iterator
-import importlib
 import json
-import pkgutil
 import sys
 import time
 from typing import Any
 
-import scenario_gen
-import scenario_gen.nodes
+import scenario_gen.nodes  # noqa: F401  (what the wheels need)
 
 WANTED = 5  # messages
 LOOK = 1.5  # seconds in which other participants' topics come up
@@ -87,14 +84,12 @@ def faults(node: Any, topics: list[tuple[str, list[str]]]) -> Iterator[str]:
 
 def kernels(_topic: str) -> None:
     """Count the kernels that are not in the cache; none is compiled."""
-    from scenario_gen.kernels import _registry
+    from scenario_gen import compiling
+    from scenario_gen import kernels as all_kernels
 
-    for module in pkgutil.walk_packages(scenario_gen.__path__, "scenario_gen."):
-        if ".nodes" not in module.name and not module.name.endswith("__main__"):
-            importlib.import_module(module.name)
-    # numba has no public question for it; load_overload is what compile() asks before it compiles
-    absent = [entry for entry, types in _registry if entry._cache.load_overload(types, entry.targetctx) is None]
-    print(json.dumps({"kernels": len(_registry), "missing": len(absent)}), flush=True)
+    all_kernels.import_all()
+    needed = all_kernels.registered()
+    print(json.dumps({"kernels": len(needed), "missing": len(compiling.missing(needed))}), flush=True)
 
 
 if __name__ == "__main__":

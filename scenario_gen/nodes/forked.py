@@ -28,7 +28,7 @@ import sys
 import traceback
 
 from scenario_gen.nodes.base import StageNode
-from scenario_gen.nodes.compiling import compile_kernels
+from scenario_gen.nodes.compiling import kernels_ready
 
 PATIENCE = 20.0  # seconds that a node has to end by itself; far more than it needs, for machines that are busy
 
@@ -70,7 +70,7 @@ def _load(nodes: list[str]) -> None:
         for made in vars(importlib.import_module(f"scenario_gen.nodes.{node}")).values():
             if isinstance(made, type) and issubclass(made, StageNode):
                 stages |= dict.fromkeys(made.STAGES)
-    count, seconds = compile_kernels(tuple(stages))
+    count, seconds = kernels_ready(tuple(stages))
     say(event="loaded", kernels=count, seconds=seconds)
 
 

@@ -100,10 +100,6 @@ class GpSampler(StageNode):
         """Say why a request is to be given up; nothing if it is not."""
         return "given up: its inputs were replaced" if self._seen.replaced(messages) else "cancelled" if cancelled() else ""
 
-    def over(self, messages: Mapping[str, bytes], cancelled: Cancelled) -> str:
-        """Say why a request is to be given up; nothing if it is not."""
-        return "given up: its inputs were replaced" if self._seen.replaced(messages) else "cancelled" if cancelled() else ""
-
     def generate(
         self, messages: Mapping[str, bytes], request: OpenRequest, config: Config, cancelled: Cancelled
     ) -> Answer | None:

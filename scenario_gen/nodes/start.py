@@ -12,22 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The executables. Each sets the signals first, so that Ctrl-C while the libraries load ends without a traceback."""
+"""The executables. Each listens to signals first, so that Ctrl-C while the libraries load ends it at once."""
 
 from functools import partial
 import importlib
-import os
-import signal
 
-
-def _leave(number: int, _frame: object) -> None:
-    os._exit(128 + number)
+from scenario_gen.interrupts import hear
 
 
 def start(name: str) -> None:
-    """Load the node `name` and run it; rclpy takes the signals over once it is initialised."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _leave)
+    """Load the node `name` and run it."""
+    hear()
     importlib.import_module(f"scenario_gen.nodes.{name}").main()
 
 

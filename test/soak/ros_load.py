@@ -1,0 +1,35 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Start and end of the nodes: six started together, cold and warm, and ended at a load of 16 (see benchmarks/start.py)."""
+
+from collections.abc import Iterator
+import json
+from pathlib import Path
+import subprocess
+import sys
+
+from figures import Figure
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run(_state: Path) -> Iterator[Figure]:
+    """Run the benchmark; what has a target is a promise."""
+    command = [sys.executable, "-m", "benchmarks", "start", "--json"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    for row in json.loads(done.stdout.splitlines()[-1])["rows"]:
+        asked = "-" if row["target"] is None else f"at most {row['target']:g} {row['unit']}"
+        seen = f"{row['value']:.1f} {row['unit']}"
+        yield Figure(row["id"], asked, seen, row["target"] is None or row["value"] <= row["target"])
