@@ -81,7 +81,7 @@ def _source_stamp(function: Callable[..., Any], seen: set[int]) -> tuple[Any, ..
 
 def code_size(function: Callable[..., Any]) -> int:
     """Return the bytes of a function's code and of what it calls, a measure of how long it takes to be compiled."""
-    return len(function.__code__.co_code) + sum(code_size(each) for each in _inner(function))
+    return len(function.__code__.co_code) + sum(map(code_size, _inner(function)))
 
 
 def _watch(dispatcher: Any, function: Callable[..., Any]) -> None:

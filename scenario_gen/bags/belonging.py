@@ -21,6 +21,7 @@ from itertools import pairwise
 from msg_conventions.belonging import hash_of, MAP_HASH, TEMPLATE_HASH
 from msg_conventions.cdr import CdrReader
 from msg_conventions.diagnostics import decode_diagnostics
+from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import digest
 from scenario_gen.errors import InputError
 
@@ -89,7 +90,10 @@ def map_of(account: Account | None, maps: Sequence[bytes], stamp_ns: int, what: 
         InputError: a message, named by `what`, is damaged.
     """
     if own := (account or {}).get(MAP_HASH):
-        return next((data for data in maps if hash_of("map", data) == own), None)
+        found = next((data for data in maps if hash_of("map", data) == own), None)
+        for data in maps if found is None else ():
+            decode_map(data, name=what)  # it may be the one that is damaged
+        return found
     return newest(maps, stamp_ns, what) or (maps[-1] if maps else None)
 
 

@@ -117,10 +117,8 @@ class Evaluator(StageNode):
             return
         self._news = math.inf
         for account in self._accounts.incomplete(closed=True):
-            words = (
-                f"{account.sentence()}: they were lost, or published before this node listened; it is not evaluated without them"
-            )
-            self.status(Level.WARN, words, f"request {account.request}", missing=str(account.missing))
+            why = "they were lost, or published before this node listened; it is not evaluated without them"
+            self.status(Level.WARN, f"{account.sentence()}: {why}", "requests", missing=str(account.missing))
 
     def _submit(self, messages: Mapping[str, bytes], account: Account) -> None:
         name, status = f"request {account.request}", account.closing

@@ -52,6 +52,7 @@ COUNTS = {  # sum() of whole numbers
     "scenario_gen/evaluation/report.py",
     "scenario_gen/evaluation/result.py",
     "scenario_gen/evaluation/summary.py",
+    "scenario_gen/kernels.py",
     "scenario_gen/logs/budgets.py",
     "scenario_gen/logs/parquet.py",
     "scenario_gen/nodes/evaluator.py",

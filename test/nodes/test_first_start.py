@@ -54,7 +54,7 @@ def test_a_node_answers_while_kernels_are_compiled_and_ends_when_asked(segmenter
     state = client.call(GetState, "/segmenter/get_state", GetState.Request())
     assert state.current_state.id == State.PRIMARY_STATE_UNCONFIGURED
     (status,) = decode_diagnostics(client.wait("/diagnostics")[0])[1]
-    assert status.name == "/segmenter: kernels" and status.message.startswith("kernels: ")
+    assert status.name == "/segmenter: state" and status.message.startswith("kernels: ")
     assert status.message.endswith("s; once per machine")
     activate = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE))
     assert not client.call(ChangeState, "/segmenter/change_state", activate).success  # what cannot be is refused, no more
