@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The nodes under storms: requests of 10⁵ scenarios, hostile messages on every input, 8 clients for half an hour, an end at load 16.
+"""The nodes under storms: 10⁵ scenarios in a request, hostile messages on every input, 8 clients for 30 min, an end at load 16.
 
 Each storm is a module: `ros_many`, `ros_hostile`, `ros_load`.
 """
