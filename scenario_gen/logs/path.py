@@ -15,12 +15,15 @@
 """The path a vehicle drove: a penalised cubic B-spline by distance driven (P-spline; Eilers & Marx 1996)."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline  # slow to import
 
 KNOT = 1.0  # m between knots
 MARGIN = 5.0  # m of path beyond both ends, for fixes that lie there
@@ -35,7 +38,7 @@ STRAIGHT = 3.0  # m: a shorter path has no shape of its own
 class Path:
     """A curve by its parameter u (distance driven as first guessed) and its true arc length."""
 
-    curve: BSpline
+    curve: "BSpline"
     parameter: Floats
     length: Floats
 
@@ -56,6 +59,8 @@ class Path:
 
 def fit_path(place: Floats, points: Floats, weight: Floats, noise: float) -> Path:
     """Fit a curve to points (F, 2) at distances driven `place` (F,); weights in (0, 1], noise in metres."""
+    from scipy.interpolate import BSpline
+
     low, high = place.min() - MARGIN, place.max() + MARGIN
     spans = max(int(np.ceil((high - low) / KNOT)), 4)
     step = (high - low) / spans
@@ -88,13 +93,15 @@ def penalise(band: Floats, order: int, weight: float) -> None:
 
 def straight_path(point: Floats, heading: float, low: float, high: float) -> Path:
     """A straight line through `point` where the distance driven is (low + high) / 2."""
+    from scipy.interpolate import BSpline
+
     direction = np.array([exact.cos(heading), exact.sin(heading)])
     ends = np.array([low - MARGIN, high + MARGIN])
     where = point + (ends - (low + high) / 2.0)[:, None] * direction
     return tabulate(BSpline(np.repeat(ends, 2), where, 1), ends[0], ends[1])
 
 
-def tabulate(curve: BSpline, low: float, high: float) -> Path:
+def tabulate(curve: "BSpline", low: float, high: float) -> Path:
     """Measure the curve's arc length."""
     u = np.linspace(low, high, int(np.ceil((high - low) / STEP)) + 1)
     rate = exact.hypot(*curve(u, 1).T)

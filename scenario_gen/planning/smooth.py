@@ -21,9 +21,9 @@ cubic spline through the band is clamped to the asked headings at both ends, and
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints, wrap_angle
@@ -32,6 +32,9 @@ from scenario_gen.planning.band import relax
 from scenario_gen.planning.config import PlanningConfig
 from scenario_gen.roads.clearance import clearance_field, footprint_fits
 from scenario_gen.roads.road import Road
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline  # slow to import
 
 ROUNDS, STEPS = 40, 8  # the band is resampled between rounds
 BEND = exact.power(4.0, 4)  # [m^4] with hold = 1 a kink spreads over about 4 m
@@ -61,7 +64,7 @@ class Targets:
 class Curve:
     """A verified or failed curve: the spline over `knots` (0 .. end), and what is wrong with it."""
 
-    spline: CubicHermiteSpline
+    spline: "CubicHermiteSpline"
     end: float
     curvature: float
     sharpest: Floats  # (2,) where that is
