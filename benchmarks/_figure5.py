@@ -24,8 +24,9 @@ from time import process_time
 from benchmarks._size import sized
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.evaluation import Case, evaluate, Evaluation, ORACLE, render, replay, ReportInput, UNIFORM, WITH, WITHOUT
+from scenario_gen.evaluation import Case, evaluate, Evaluation, ORACLE, replay, UNIFORM, WITH, WITHOUT
 from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints
+from scenario_gen.evaluation.report import render, ReportInput
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import Arm, PipelineConfig, run_arm, without_changepoints
 from scenario_gen.roads import build_road, Road

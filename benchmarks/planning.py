@@ -38,7 +38,7 @@ from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.result import Fit, FittedVehicle
 from scenario_gen.planning import plan_routes, PlanningConfig
-from scenario_gen.planning.ompl_solve import PLANNERS, solve
+from scenario_gen.planning.ompl.solve import PLANNERS, solve
 from scenario_gen.planning.planner import Budget, BudgetSpentError, path_length, plan_patiently, Query
 from scenario_gen.planning.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig
 from scenario_gen.roads.clearance import clearance_in_cells, distance_transform

@@ -74,15 +74,20 @@ def _cpu(pid: int) -> float:
     return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
 
 
-def _active(client: _Client, node: str) -> None:
-    """Wait until a node is active."""
+def _active(client: _Client, nodes: Sequence[str]) -> None:
+    """Wait until all nodes are active; rclpy's own `wait_for_service` looks only every 0.25 s."""
     from lifecycle_msgs.srv import GetState
 
-    service = client.node.create_client(GetState, f"{node}/get_state")
-    service.wait_for_service(600.0)
-    while _done(service.call_async(GetState.Request())).current_state.label != "active":
-        time.sleep(0.05)
-    client.node.destroy_client(service)
+    services = {node: client.node.create_client(GetState, f"{node}/get_state") for node in nodes}
+    waiting = set(nodes)
+    while waiting:
+        for node in sorted(waiting):
+            if services[node].service_is_ready():
+                state = _done(services[node].call_async(GetState.Request()))
+                waiting -= {node} if state.current_state.label == "active" else set()
+        time.sleep(0.02)
+    for service in services.values():
+        client.node.destroy_client(service)
 
 
 def _start(
@@ -93,8 +98,7 @@ def _start(
         variables = {"NUMBA_CACHE_DIR": cache} if cold else {}
         started = time.monotonic()
         with _running(folder, domain, commands, **variables) as processes:
-            for node in NODES:
-                _active(client, node)
+            _active(client, NODES)
             wall, used = time.monotonic() - started, sum(_cpu(process.pid) for process in processes)
             for process in processes:
                 process.send_signal(signal.SIGINT)
@@ -129,8 +133,7 @@ def _exit(folder: Path, domain: int, peer: str) -> list[Row]:
     commands = [["-m", "scenario_gen.nodes.start", node] for node in NODES]
     record = ["-m", "scenario_gen.nodes.start", "recorder", "--ros-args", "-p", f"bag:={bag}", "-p", "topics:=.*"]
     with _running(folder, domain, [*commands, record]) as processes, _Client(domain) as client:
-        for node in NODES:
-            _active(client, node)
+        _active(client, NODES)
         while not list(bag.glob("*.mcap")):
             time.sleep(0.1)
         with _running(folder, domain, [["-c", "while True: pass"]] * LOAD):

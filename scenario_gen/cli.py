@@ -34,8 +34,9 @@ from scenario_gen.bags.regenerate import regenerate_scenario, write_regenerated
 from scenario_gen.bags.validation import validate_bag
 from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, of_system, presentable, printable, RefusedError, ScenarioGenError
-from scenario_gen.evaluation import Case, comparison_table, read_evaluations, summary
+from scenario_gen.evaluation import Case, comparison_table, read_evaluations
 from scenario_gen.evaluation import compare as compare_sets
+from scenario_gen.evaluation.summary import summary
 from scenario_gen.folders import replaced_folder
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled

@@ -22,7 +22,8 @@ from scenario_gen.bags import add_runs, BagWriter, Run
 from scenario_gen.bags.provenance import parameter_texts, sha256_of, versions
 from scenario_gen.bags.told import told_provenance
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import Case, read_evaluations, ReportInput, write_report
+from scenario_gen.evaluation import Case, read_evaluations
+from scenario_gen.evaluation.report import ReportInput, write_report
 from scenario_gen.folders import Kind, write_text
 from scenario_gen.parameters import flatten
 from scenario_gen.pipeline import PipelineConfig

@@ -28,8 +28,10 @@ from rich.console import Console
 from scenario_gen import pipeline
 from scenario_gen.bags import Run, write_run
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import EvaluationConfig, MEASURED, render, ReportInput, summary, UNIFORM, WITH, WITHOUT
+from scenario_gen.evaluation import EvaluationConfig, MEASURED, UNIFORM, WITH, WITHOUT
 from scenario_gen.evaluation.evaluate import measured
+from scenario_gen.evaluation.report import render, ReportInput
+from scenario_gen.evaluation.summary import summary
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.requests import Chain, Request, run_request

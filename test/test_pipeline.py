@@ -21,7 +21,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenario_gen.evaluation import EvaluationConfig, ORACLE, render, ReportInput, UNIFORM, WITH, WITHOUT
+from scenario_gen.evaluation import EvaluationConfig, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.evaluation.report import render, ReportInput
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.pipeline import generate, PipelineConfig

@@ -12,16 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""DTW features (paper V-B), realism, criticality and the report."""
+"""DTW features (paper V-B), realism and criticality. `report` and `summary`, which are slow to import, stand apart."""
 
+from scenario_gen.evaluation.case import Case, ORACLE, UNIFORM, WITH, WITHOUT
 from scenario_gen.evaluation.compare import compare, comparison_table, Difference, read_evaluations
 from scenario_gen.evaluation.dtw import Alignment, dtw, dtw_distance, feature_matrix
 from scenario_gen.evaluation.evaluate import evaluate, EvaluationConfig, MEASURED
 from scenario_gen.evaluation.oracle import replay
 from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints
-from scenario_gen.evaluation.report import Case, ORACLE, render, ReportInput, UNIFORM, WITH, WITHOUT, write_report
 from scenario_gen.evaluation.result import CheckCounts, Evaluation, Metric, Row
-from scenario_gen.evaluation.summary import summary
 
 __all__ = [
     "MEASURED",
@@ -36,7 +35,6 @@ __all__ = [
     "Evaluation",
     "EvaluationConfig",
     "Metric",
-    "ReportInput",
     "Row",
     "compare",
     "comparison_table",
@@ -46,9 +44,6 @@ __all__ = [
     "feature_matrix",
     "linear_changepoints",
     "read_evaluations",
-    "render",
     "replay",
-    "summary",
     "uniform_changepoints",
-    "write_report",
 ]

@@ -22,7 +22,7 @@ from pathlib import Path
 from scenario_gen.documents import read_json
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation.bootstrap import Interval
-from scenario_gen.evaluation.report import WITH
+from scenario_gen.evaluation.case import WITH
 from scenario_gen.evaluation.result import as_markdown, Evaluation, formatted, Metric, SCHEMA
 
 FILE_SCHEMA = {  # evaluation.json of a run, or one evaluation alone

@@ -25,71 +25,18 @@ import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from scenario_gen.encounter import Encounter
 from scenario_gen.evaluation.bootstrap import Interval
+from scenario_gen.evaluation.case import Case, ORACLE, UNIFORM, WITH, WITHOUT
 from scenario_gen.evaluation.policy import content_policy
 from scenario_gen.evaluation.report_data import case_data
 from scenario_gen.evaluation.result import Evaluation, formatted
-from scenario_gen.fitting.result import Fit
 from scenario_gen.folders import write_text
-from scenario_gen.planning.route import Route
-from scenario_gen.roads.road import Road
-from scenario_gen.scenario import Scenario, ScenarioSet
-from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.scenario import ScenarioSet
 
-WITH, WITHOUT, UNIFORM, ORACLE = "with changepoints", "without changepoints", "uniform changepoints", "oracle"
-"""Names of the rows that the report looks for in an evaluation."""
 SIGNIFICANT = 0.03
 """Below this, E without changepoints leaves nothing to gain and the case is not counted."""
 MAX_SAMPLES = 50
 """Scenarios of each arm that a page draws; the figures count all."""
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """One encounter on one road.
-
-    Attributes:
-        encounter: the recorded template.
-        segmentation: its primitives.
-        road: the target road, None if it is not known (a bag without a map).
-        fit: the template on it, None if it is not known.
-        routes: one for each vehicle, or none.
-        with_changepoints: what was generated.
-        without_changepoints: the paper's ablation, None if it was refused.
-        evaluation: of these sets.
-        oracle: the fitted template replayed.
-        without_refused: why there is no ablation.
-        uniform: generated with as many changepoints, evenly spaced in time; None if not asked for or refused.
-        uniform_refused: why it was refused, "" if it was not.
-        row: name of the evaluation's row of `with_changepoints`.
-        valid: how many of those scenarios are valid, where all of a bag's are shown; None: all of them are.
-    """
-
-    encounter: Encounter
-    segmentation: Segmentation
-    road: Road | None
-    fit: Fit | None
-    routes: Sequence[Route]
-    with_changepoints: ScenarioSet
-    without_changepoints: ScenarioSet | None
-    evaluation: Evaluation
-    oracle: Scenario | None = None
-    without_refused: str = ""
-    uniform: ScenarioSet | None = None
-    uniform_refused: str = ""
-    row: str = WITH
-    valid: int | None = None
-
-    @property
-    def title(self) -> str:
-        """Encounter and road, as a heading."""
-        return f"{self.encounter.name} on {self.road.name}" if self.road else self.encounter.name
-
-    @property
-    def published(self) -> int:
-        """Number of valid scenarios."""
-        return len(self.with_changepoints.scenarios) if self.valid is None else self.valid
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,7 +32,7 @@ from scenario_gen.scenario import Scenario
 from scenario_gen.segmentation.result import Segmentation
 
 if TYPE_CHECKING:
-    from scenario_gen.evaluation.report import Case
+    from scenario_gen.evaluation.case import Case
 
 FRAME_PERIOD = 0.2
 """Seconds between the frames that are stored; the page interpolates between them."""

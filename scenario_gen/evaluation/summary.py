@@ -22,7 +22,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from scenario_gen.errors import printable
-from scenario_gen.evaluation.report import Case, WITH, WITHOUT
+from scenario_gen.evaluation.case import Case, WITH, WITHOUT
 from scenario_gen.evaluation.result import formatted
 from scenario_gen.scenario import Cause
 

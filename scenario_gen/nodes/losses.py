@@ -18,6 +18,7 @@
   first one was published before the recording began.
 - Where it has several, by what DDS tells.
 - Scenarios, by their accounts on `scenarios/info`.
+- Of a topic that keeps its newest message only (a map, a route) older ones that were overwritten are not missed.
 """
 
 from collections.abc import Callable, Mapping
@@ -70,10 +71,17 @@ class Losses:
         self._publishers = publishers
         self._numbers: dict[str, Numbers] = {}
         self._accounts: dict[str, Accounts] = {}  # by namespace
+        self._of_newest: set[str] = set()
         self._news = monotonic()
+
+    def only_newest(self, topic: str) -> None:
+        """Miss no message of a topic that keeps its newest one."""
+        self._of_newest.add(topic)
 
     def take(self, topic: str, data: bytes, number: int | None) -> None:
         """Take a message that was recorded, with its publisher's number for it."""
+        if topic in self._of_newest:
+            return
         numbers = self._numbers.setdefault(topic, Numbers())
         if number and numbers.take(number) and self._publishers(topic) > 1:
             numbers.several = True
@@ -87,7 +95,8 @@ class Losses:
 
     def told(self, topic: str, total: int) -> None:
         """Take what DDS says: so many messages of a topic have been lost up to now."""
-        self._numbers.setdefault(topic, Numbers()).told = total
+        if topic not in self._of_newest:
+            self._numbers.setdefault(topic, Numbers()).told = total
 
     def words(self, *, ended: bool = False) -> Mapping[str, str]:
         """Say by topic what is not recorded; at the end of the recording also of requests that are not closed."""

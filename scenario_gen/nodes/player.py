@@ -101,6 +101,7 @@ class Player(Node):  # type: ignore[misc]
         self.exit_code = 0
         self._running = threading.Event()
         self._ended = threading.Event()
+        self._player: threading.Thread | None = None
         self._offered: dict[str, tuple[Any, bool, int]] = {}
         self._frames: Frames | None = None
         self._paces: dict[str, Pace] = {}
@@ -135,7 +136,8 @@ class Player(Node):  # type: ignore[misc]
         self._frames = self._frames_of(config)
         if not config.paused:
             self._running.set()
-        threading.Thread(target=self._play, args=(config,), daemon=True).start()
+        self._player = threading.Thread(target=self._play, args=(config,), daemon=True)
+        self._player.start()
 
     def _frames_of(self, config: Config) -> Frames | None:
         """What is told on /tf: nothing if the bag has a /tf of its own, or /tf is not among the topics to play.
@@ -163,6 +165,8 @@ class Player(Node):  # type: ignore[misc]
                 self._play_once(config)
                 if not config.loop:
                     break
+            if self._ended.is_set():
+                return
             self._at = None
             self.health.say(Level.OK, f"{config.bag}: played", "playing", {})
         except ScenarioGenError as error:
@@ -179,8 +183,8 @@ class Player(Node):  # type: ignore[misc]
         deadline = monotonic() + PATIENCE
         with suppress(InvalidHandle):  # the node is being ended already
             for publisher in (*(one for one, _, _ in self._offered.values()), *(self._frames.publishers if self._frames else ())):
-                while not publisher.wait_for_all_acked(Duration()) and monotonic() < deadline:
-                    self._ended.wait(TICK)
+                while not publisher.wait_for_all_acked(Duration()) and monotonic() < deadline and not self._ended.wait(TICK):
+                    pass
         self.executor.create_task(self._finish)  # to wake the executor alone would not make it look
 
     def _finish(self) -> None:
@@ -258,6 +262,8 @@ class Player(Node):  # type: ignore[misc]
         """End playing, then the node."""
         self._ended.set()
         self._running.set()
+        if self._player is not None:
+            self._player.join(PATIENCE)  # what it still says needs the node
         super().destroy_node()
 
 

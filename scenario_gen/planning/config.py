@@ -17,7 +17,7 @@
 from dataclasses import dataclass, field
 
 from scenario_gen.parameters import check, parameter
-from scenario_gen.planning.ompl_planners import OmplConfig
+from scenario_gen.planning.ompl.planners import OmplConfig
 from scenario_gen.planning.rrt_star_connect import RrtStarConnectConfig
 
 

@@ -103,7 +103,7 @@ def make_planner(config: PlanningConfig) -> Planner:
     """The geometric planner that `config` names."""
     if config.planner == "rrt_star_connect":
         return RrtStarConnect(config.rrt_star_connect)
-    from scenario_gen.planning.ompl_planners import OmplPlanner
+    from scenario_gen.planning.ompl.planners import OmplPlanner
 
     return OmplPlanner(config.planner, config.ompl)
 

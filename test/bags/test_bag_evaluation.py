@@ -33,7 +33,8 @@ from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.bags.told import told_provenance
 from scenario_gen.bags.writer import AtomicBag
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import evaluate, EvaluationConfig, render, ReportInput, write_report
+from scenario_gen.evaluation import evaluate, EvaluationConfig
+from scenario_gen.evaluation.report import render, ReportInput, write_report
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.pipeline import PipelineConfig, run_arm

@@ -22,7 +22,7 @@ from evaluation_worlds import ego_case, report_case
 from PIL import Image
 import pytest
 
-from scenario_gen.evaluation import ReportInput, write_report
+from scenario_gen.evaluation.report import ReportInput, write_report
 
 
 @pytest.fixture(scope="module")

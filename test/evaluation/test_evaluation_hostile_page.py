@@ -24,7 +24,7 @@ from browser_tab import chromium, DESKTOP, Tab
 from evaluation_worlds import report_case
 import pytest
 
-from scenario_gen.evaluation import render, ReportInput, write_report
+from scenario_gen.evaluation.report import render, ReportInput, write_report
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.reproduce import run_case, write_page

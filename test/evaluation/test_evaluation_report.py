@@ -27,9 +27,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from scenario_gen.evaluation import feature_matrix, render, ReportInput, summary, write_report
+from scenario_gen.evaluation import feature_matrix
 from scenario_gen.evaluation.motion import at_count
+from scenario_gen.evaluation.report import render, ReportInput, write_report
 from scenario_gen.evaluation.report_data import case_data, MATRIX_SIZE, pack, runs
+from scenario_gen.evaluation.summary import summary
 
 
 @pytest.fixture(scope="module")

@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from benchmarks._planning_maps import enters_blocked, optimum, t_intersection
-from scenario_gen.planning.ompl_planners import OmplConfig, OmplPlanner
-from scenario_gen.planning.ompl_solve import PLANNERS, solve
+from scenario_gen.planning.ompl.planners import OmplConfig, OmplPlanner
+from scenario_gen.planning.ompl.solve import PLANNERS, solve
 from scenario_gen.planning.planner import Budget, BudgetSpentError, Query
 from scenario_gen.roads.clearance import clearance_in_cells
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One query for one of OMPL's planners, in this process: see `ompl_planners` for the way that cannot hang or crash the caller.
+"""One query for one of OMPL's planners, in this process: see `planners` for the way that cannot hang or crash the caller.
 
 OMPL sees the same exact edge check as our own planner (a motion validator around the compiled kernel), so neither its default
 checking resolution of 1 % of the extent nor a Python callback per state stands in its way. For comparison it can also be

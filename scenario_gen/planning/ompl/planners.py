@@ -49,7 +49,7 @@ class OmplConfig:
 
 
 class OmplPlanner:
-    """One of OMPL's planners; `name` is a key of `ompl_solve.PLANNERS`."""
+    """One of OMPL's planners; `name` is a key of `solve.PLANNERS`."""
 
     def __init__(self, name: str, config: OmplConfig = OmplConfig()) -> None:
         self.name = name
@@ -58,12 +58,12 @@ class OmplPlanner:
     def plan(self, road: Road, query: Query, budget: Budget, seed: int) -> Plan:
         """See `Planner.plan`; an iteration is one look of OMPL's at its termination condition."""
         check_query(road, query)
-        from scenario_gen.planning.ompl_child import search  # loads OMPL
+        from scenario_gen.planning.ompl.child import search  # loads OMPL
 
         started = thread_time()
         ends = to_cells(road, np.stack((query.start, query.goal)))
         context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["scenario_gen.planning.ompl_child"])
+        context.set_forkserver_preload(["scenario_gen.planning.ompl.child"])
         ours, theirs = context.Pipe(duplex=False)
         request = (clearance_in_cells(road), ends, query.radius / road.resolution, self.name, self.config)
         child = context.Process(target=search, args=(theirs, request, budget.iterations, budget.seconds, seed), daemon=True)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What runs in the child process of `ompl_planners`; its server imports this module once, and every child starts from there."""
+"""What runs in the child process of `planners`; its server imports this module once, and every child starts from there."""
 
 import os
 from time import process_time
@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.planning.ompl_solve import solve
+from scenario_gen.planning.ompl.solve import solve
 from scenario_gen.roads.clearance import segment_free
 
 segment_free(np.full((2, 2), 0.5), 0.5, 0.5, 0.5, 0.5, 0.0)  # load the kernel here, not in every child
