@@ -74,9 +74,10 @@ class Losses:
         self._of_newest: set[str] = set()
         self._news = monotonic()
 
-    def only_newest(self, topic: str) -> None:
-        """Miss no message of a topic that keeps its newest one."""
-        self._of_newest.add(topic)
+    def begin(self, topic: str, *, only_newest: bool) -> None:
+        """Begin with a topic; where only the newest message counts, none that was overwritten is missed."""
+        if only_newest:
+            self._of_newest.add(topic)
 
     def take(self, topic: str, data: bytes, number: int | None) -> None:
         """Take a message that was recorded, with its publisher's number for it."""

@@ -228,8 +228,7 @@ class Recorder(Node):  # type: ignore[misc]
             self._say(Level.ERROR, f"{topic} is not recorded: {error}", "topics", error="InputError")
             return
         take, losses = partial(self._write, topic), self._losses
-        if recorded.transient_local and recorded.depth == 1:
-            losses.only_newest(topic)
+        losses.begin(topic, only_newest=recorded.transient_local and recorded.depth == 1)
         lost = SubscriptionEventCallbacks(message_lost=lambda event: losses.told(topic, event.total_count))
 
         def heard(data: bytes, about: dict[str, Any]) -> None:  # rclpy counts the arguments
