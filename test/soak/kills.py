@@ -125,7 +125,10 @@ def names(folder: Path) -> list[str]:
 
 def writing(folder: Path) -> bool:
     """Say whether a file of a new result is there."""
-    return any(folder.glob(f"{PREFIX}*/new/out/*"))
+    try:
+        return any(folder.glob(f"{PREFIX}*/new/out/*"))
+    except FileNotFoundError:  # it took its place while this looked
+        return False
 
 
 def kill_once(target: Target, which: int, duration: float, chance: random.Random) -> str:
