@@ -29,6 +29,7 @@ import typer
 
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags import read_messages, reindex
+from scenario_gen.bags.belonging import UNTOLD
 from scenario_gen.bags.evaluation import bag_cases
 from scenario_gen.bags.regenerate import regenerate_scenario, write_regenerated
 from scenario_gen.bags.validation import validate_bag
@@ -282,9 +283,7 @@ def validate(
         if one.found:
             console.print(table)
         if one.unaccounted:
-            console.print(
-                f"  {one.unaccounted} unaccounted: scenarios/info does not tell of them (lost with the end of a recording?)"
-            )
+            console.print(f"  {one.unaccounted} unaccounted: {UNTOLD}")
         for sentence in one.missing:
             console.print(f"  {sentence}", soft_wrap=True)
         for sentence, count in one.left_out.items():

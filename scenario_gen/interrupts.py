@@ -16,14 +16,13 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
 import os
 import signal
 import threading
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _held = 0
-_pending: Callable[[], None] | None = None
+_pending: int | None = None
 _endings: list[Callable[[], None]] = []
 _orderly: Callable[[], None] | None = None
 _hearing = 0  # the process that has a thread for it; a fork has none
@@ -70,7 +69,11 @@ def leave(number: int, _frame: object) -> None:
     Nothing is raised: an exception out of the blue is swallowed where Python calls back (when a module has been imported, say),
     and compiled code that it meets may crash.
     """
-    _now_or_later(partial(_leave, number))
+    global _pending  # noqa: PLW0603 - a signal has no other place to be noted
+    if _held:
+        _pending = number
+    else:
+        _leave(number)
 
 
 @contextmanager
@@ -86,22 +89,14 @@ def ending(clean_up: Callable[[], None]) -> Iterator[None]:
 @contextmanager
 def uninterrupted() -> Iterator[None]:
     """Let the work inside be finished before a signal takes effect; of nested ones the outermost."""
-    global _held  # noqa: PLW0603 - a signal has no other place to be noted
+    global _held  # noqa: PLW0603
     _held += 1
     try:
         yield
     finally:
         _held -= 1
     if _pending is not None and not _held:
-        _pending()
-
-
-def _now_or_later(act: Callable[[], None]) -> None:
-    global _pending  # noqa: PLW0603
-    if _held:
-        _pending = act
-    else:
-        act()
+        _leave(_pending)
 
 
 def _leave(number: int) -> None:

@@ -25,6 +25,7 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import digest
 from scenario_gen.errors import InputError
 
+UNTOLD = "scenarios/info does not tell of them (lost with the end of a recording?)"  # of scenarios without an account
 Account = Mapping[str, str]
 Counted = tuple[str, int]  # a SHA-256, and the how manieth of its kind
 

@@ -23,8 +23,8 @@ from msg_conventions.belonging import MAP_HASH
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.bags.accounts import missing_sentences
-from scenario_gen.bags.belonging import accounts_of, is_ambiguous, map_of, unknown_scenarios
+from scenario_gen.bags.accounts import INFO, missing_sentences
+from scenario_gen.bags.belonging import accounts_of, is_ambiguous, map_of, unknown_scenarios, UNTOLD
 from scenario_gen.bags.contents import read_namespaces
 from scenario_gen.bags.reader import DEFAULT, within
 from scenario_gen.bags.told import request_sentence, told_fit, told_numbers, told_requests, told_segmentation, told_values
@@ -36,7 +36,7 @@ from scenario_gen.scenario import Scenario, ScenarioSet
 from scenario_gen.storage import BagConfig
 from scenario_gen.validity import Checker, Limits
 
-SCENARIOS, INFO, DIAGNOSTICS = "scenarios", "scenarios/info", "diagnostics"
+SCENARIOS, DIAGNOSTICS = "scenarios", "diagnostics"
 TOPICS = ("tracks", "changepoints", "posterior", "map", "fit", "ego/track", SCENARIOS, INFO, DIAGNOSTICS)
 
 
@@ -115,8 +115,7 @@ def _case(
     notes = list(missing_sentences(topics[SCENARIOS], topics[INFO]))
     lost = sum(account is None for account in unknown_scenarios(topics[SCENARIOS], given).values()) if given else 0
     if lost:
-        why = f"{INFO} does not tell of them (lost with the end of a recording?)"
-        notes.append(f"{lost} of {len(scenarios)} scenarios are unaccounted: {why}")
+        notes.append(f"{lost} of {len(scenarios)} scenarios are unaccounted: {UNTOLD}")
     rows = [replace(row, notes=(*row.notes, *notes)) if row.name == SCENARIOS else row for row in evaluation.rows]
     evaluation = replace(evaluation, rows=tuple(rows))
     ego = decode_scenario(topics["ego/track"][-1], what=f"{namespace}/ego/track")[1] if topics["ego/track"] else None

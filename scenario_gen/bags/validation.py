@@ -36,7 +36,7 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.arrays import Floats
-from scenario_gen.bags.accounts import missing_sentences
+from scenario_gen.bags.accounts import INFO, missing_sentences
 from scenario_gen.bags.belonging import Account, accounts_of, is_ambiguous, map_of, newest, tracks_of, unknown_scenarios
 from scenario_gen.bags.contents import Contents, read_namespaces
 from scenario_gen.bags.reader import DEFAULT, within
@@ -48,7 +48,6 @@ from scenario_gen.storage import BagConfig
 from scenario_gen.validity import Checker, Limits
 
 REFERENCES = ("tracks", "changepoints", "map", "fit")
-INFO = "scenarios/info"
 UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
 ALTERED = "altered_message"  # not the bytes that scenarios/info accounts for
 
@@ -165,7 +164,7 @@ def _validate(namespace: str, topics: Contents, limits: Limits | None) -> Valida
             is_lost = index in unknown and account is None
             place = (stamp, is_lost, *((account or {}).get(key) for key in (TEMPLATE_HASH, MAP_HASH)))
             if place not in references:
-                references[place] = _reference(namespace, topics, stamp, account, is_lost)
+                references[place] = _reference(namespace, topics, accounts, stamp, account, is_lost)
             of_these = b"" if states is None else states.start.tobytes() + states.end.tobytes()
             key = (place, tuple(vehicle.id for vehicle in scenario.vehicles), of_these)
             if key not in checkers:
@@ -199,7 +198,9 @@ class _ReferenceError(Exception):
     """What the scenarios are to be held against cannot be read itself."""
 
 
-def _reference(namespace: str, topics: Contents, stamp: int, account: Account | None, is_lost: bool) -> Reference:
+def _reference(
+    namespace: str, topics: Contents, accounts: Sequence[Account], stamp: int, account: Account | None, is_lost: bool
+) -> Reference:
     """Return what a scenario of the stamp and account is held against; if its account is lost, only what is beyond doubt.
 
     Raises:
@@ -209,7 +210,7 @@ def _reference(namespace: str, topics: Contents, stamp: int, account: Account | 
         found = {topic: newest(topics[topic], stamp, f"{namespace}/{topic}") for topic in REFERENCES}
         tracks = tracks_of(account, topics["tracks"], stamp, f"{namespace}/tracks")
         grid = map_of(account, topics["map"], stamp, f"{namespace}/map")
-        if is_lost and is_ambiguous(topics["map"], accounts_of(topics[INFO], f"{namespace}/{INFO}")):
+        if is_lost and is_ambiguous(topics["map"], accounts):
             grid = None
         road = decode_map(grid, name=f"{namespace}/map")[1] if grid else None
         asked, template, conflicts, waits = None, None, [], None

@@ -39,7 +39,6 @@ from msg_conventions.diagnostics import Level
 from scenario_gen.bags import BagWriter, Split
 from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.errors import InputError, of_system
-from scenario_gen.interrupts import uninterrupted
 from scenario_gen.nodes.base import run_nodes
 from scenario_gen.nodes.health import Health
 from scenario_gen.nodes.losses import Losses, remedy
@@ -246,9 +245,9 @@ class Recorder(Node):  # type: ignore[misc]
 
     @contextmanager
     def _guarded(self) -> Iterator[None]:
-        """Finish what is written whatever signal comes, and end the recording where the disk fails."""
+        """End the recording where the disk fails."""
         try:
-            with uninterrupted(), _disk_errors():
+            with _disk_errors():
                 yield
         except InputError as error:
             self._give_up(error)

@@ -103,7 +103,8 @@ def answer_request(
     def advance(done: int, _total: int, candidates: int) -> None:
         progress(done, candidates, template.encounter.start_ns)
 
-    out = SampleMessages(template.encounter, request, node, identity(messages), send)
+    hashes = identity(messages)
+    out = SampleMessages(template.encounter, request, node, hashes, send)
     if config.moves:
         result = run_request(
             chain, config, count=config.count, progress=advance, cancelled=cancelled, found=out.scenario
@@ -113,7 +114,7 @@ def answer_request(
             config, template.routes, template.asked, count=config.count, progress=advance, cancelled=cancelled, found=out.scenario
         )
     stopped = {"cancelled": "true"} if cancelled() and len(result.scenarios) < result.requested else {}
-    told = parameter_texts(config) | versions() | identity(messages) | stopped
+    told = parameter_texts(config) | versions() | hashes | stopped
     closing = request_status(result, request, node, config.seed, told)
     out.close(result, closing)
     return Answer(template, result, closing)

@@ -144,7 +144,7 @@ def sample_scenarios(
         waits: when a vehicle stands, on the template's clock.
         ego: index of the vehicle that is left out of every scenario; its template track is given instead.
         progress: called with (valid so far, count, candidates so far).
-        cancelled: asked now and then; if True, the set so far is returned.
+        cancelled: asked before each candidate; if True, the set so far is returned.
         found: called with each valid scenario as it is drawn, in the set's order.
 
     Returns:
@@ -226,7 +226,10 @@ class _Loop:
         return Drawn(self.sampler.again, np.array(self.index, dtype=np.int64), BLOCK)
 
     def _done(self, budget: int) -> bool:
-        return len(self.index) >= self.count or self.candidates >= budget or bool(self.cancelled and self.cancelled())
+        return len(self.index) >= self.count or self.candidates >= budget or self._cancelled()
+
+    def _cancelled(self) -> bool:
+        return bool(self.cancelled and self.cancelled())
 
     def _blocks(self, level: int) -> Iterator[tuple[Batch, list[int]]]:
         for number in itertools.count():
@@ -235,12 +238,12 @@ class _Loop:
     def _spend(self, blocks: Iterator[tuple[Batch, list[int]]], most: int) -> tuple[int, int]:
         """Check up to `most` candidates, whole blocks at a time; how many were seen, and how many of them were valid."""
         seen = good = 0
-        while seen < most and len(self.index) < self.count and not (self.cancelled and self.cancelled()):
+        while seen < most and len(self.index) < self.count and not self._cancelled():
             batch, index = next(blocks)
             drawn = batch.scenarios(self.sampler.seed, index, self.sampler.frame_id)
             verdicts = iter(self.check([s for s in drawn if s is not None]))
             for number, scenario, damping in zip(index, drawn, batch.damping, strict=True):
-                if seen == most or len(self.index) == self.count:
+                if seen == most or len(self.index) == self.count or self._cancelled():
                     break
                 seen += 1
                 self.damped += damping < 1.0

@@ -12,9 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A ROS domain of its own for each module, and a client in it."""
+"""A ROS domain of its own for each module, a client in it, and nodes as their executables start them."""
 
 from collections.abc import Iterator
+import os
+import subprocess
+import sys
 
 import pytest
 from suite_processes import Client
@@ -33,3 +36,26 @@ def client(domain: int) -> Iterator[Client]:
     made = Client(domain)
     yield made
     made.close()
+
+
+@pytest.fixture
+def start(domain):
+    """Start a node as its executable does; what is still running at the end is killed."""
+    started = []
+
+    def run(node: str, *more: str, **parameters: object) -> "subprocess.Popen[str]":
+        words = [*more, *(word for name, value in parameters.items() for word in ("-p", f"{name}:={value}"))]
+        process = subprocess.Popen(
+            [sys.executable, "-m", "scenario_gen.nodes.start", node, "--ros-args", *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"},
+        )
+        started.append(process)
+        return process
+
+    yield run
+    for process in started:
+        process.kill()
+        process.communicate()

@@ -15,6 +15,7 @@
 """Real nodes in real processes, and a client to talk to them."""
 
 from collections import defaultdict
+from collections.abc import Iterable, Iterator
 import json
 import os
 from pathlib import Path
@@ -141,3 +142,16 @@ class Client:
         self.thread.join(2.0)
         self.node.destroy_node()
         self.context.try_shutdown()
+
+
+def whole_chain(folder: Path, domain: int, nodes: Iterable[str], *, count: int) -> Iterator[Processes]:
+    """Run nodes on one log, with sets of `count` scenarios and a bag in `folder`; a test that has not ended them has failed."""
+    arguments: dict[str, list[str]] = {node: [] for node in nodes}
+    arguments["log_player"] = ["-p", f"log_path:={RESOURCES / 'synthetic_c'}"]
+    arguments["road_server"] = ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"]
+    arguments["gp_sampler"] = ["-p", f"count:={count}", "-p", "seed:=7"]
+    arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
+    made = Processes(folder, domain, arguments)
+    yield made
+    if made.process.poll() is None:
+        made.process.kill()

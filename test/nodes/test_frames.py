@@ -14,10 +14,6 @@
 
 """What the player tells on /tf and /tf_static, heard by a client and a recorder, and read by other libraries than ours."""
 
-import os
-import subprocess
-import sys
-
 from bag_examples import hand_made_run
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -42,29 +38,6 @@ def run():
 @pytest.fixture(scope="module")
 def bag(run, tmp_path_factory):
     return write_run(tmp_path_factory.mktemp("frames") / "bag", run)
-
-
-@pytest.fixture
-def start(domain):
-    """Start a node as its executable does; what is still running at the end is killed."""
-    started = []
-
-    def begin(node: str, *more: str, **parameters: object) -> "subprocess.Popen[str]":
-        words = [*more, *(word for name, value in parameters.items() for word in ("-p", f"{name}:={value}"))]
-        process = subprocess.Popen(
-            [sys.executable, "-m", "scenario_gen.nodes.start", node, "--ros-args", *words],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env=os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"},
-        )
-        started.append(process)
-        return process
-
-    yield begin
-    for process in started:
-        process.kill()
-        process.communicate()
 
 
 def test_bytes_are_those_of_rosbags_and_are_read_back():

@@ -20,7 +20,7 @@ from nav_msgs.srv import LoadMap
 import pytest
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
-from suite_processes import Client, Processes, RESOURCES
+from suite_processes import Client, whole_chain
 
 from msg_conventions.belonging import decode_belonging, hash_of
 from msg_conventions.diagnostics import decode_diagnostics, Level
@@ -35,16 +35,7 @@ TINY = "image: tiny.pgm\nresolution: 0.5\norigin: [0.0, 0.0, 0.0]\nnegate: 0\noc
 @pytest.fixture(scope="module")
 def suite(tmp_path_factory, domain):
     """The whole chain, with sets long enough to be disturbed."""
-    folder = tmp_path_factory.mktemp("maps")
-    arguments = {node: [] for node in NODES}
-    arguments["log_player"] = ["-p", f"log_path:={RESOURCES / 'synthetic_c'}"]
-    arguments["road_server"] = ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"]
-    arguments["gp_sampler"] = ["-p", "count:=20", "-p", "seed:=7"]
-    arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
-    made = Processes(folder, domain, arguments)
-    yield made
-    if made.process.poll() is None:
-        made.process.kill()
+    yield from whole_chain(tmp_path_factory.mktemp("maps"), domain, NODES, count=20)
 
 
 def _infos(client: Client) -> list[dict[str, str]]:

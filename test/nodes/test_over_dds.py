@@ -18,7 +18,7 @@ import math
 import time
 
 import pytest
-from suite_processes import Client, Processes, RESOURCES
+from suite_processes import Client, RESOURCES, whole_chain
 
 from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.fits import decode_fit
@@ -36,16 +36,7 @@ CHAIN = ("log_player", "segmenter", "planner", "gp_sampler", "road_server", "eva
 @pytest.fixture(scope="module")
 def suite(tmp_path_factory, domain):
     """All nodes, at work on one log; ended as Ctrl-C does, and then looked at."""
-    folder = tmp_path_factory.mktemp("suite")
-    arguments = {node: [] for node in CHAIN}
-    arguments["log_player"] = ["-p", f"log_path:={LOG}"]
-    arguments["road_server"] = ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"]
-    arguments["gp_sampler"] = ["-p", "count:=4", "-p", "seed:=7"]
-    arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
-    made = Processes(folder, domain, arguments)
-    yield made
-    if made.process.poll() is None:
-        made.process.kill()
+    yield from whole_chain(tmp_path_factory.mktemp("suite"), domain, CHAIN, count=4)
 
 
 def _generate(client: Client, name: str = "/gp_sampler/generate", **values):

@@ -15,11 +15,9 @@
 """The recorder and the player as processes: types of no concern to the suite, a kill, and bags of genuine rosbag2."""
 
 from collections import Counter
-import os
 from pathlib import Path
 import signal
 import subprocess
-import sys
 
 from mcap.reader import make_reader
 import pytest
@@ -34,29 +32,6 @@ from scenario_gen.cli import app
 pytestmark = pytest.mark.dds
 
 QUEUE = 1000
-
-
-@pytest.fixture
-def start(domain):
-    """Start a node as its executable does; what is still running at the end is killed."""
-    started = []
-
-    def run(node: str, *more: str, **parameters: object) -> "subprocess.Popen[str]":
-        words = [*more, *(word for name, value in parameters.items() for word in ("-p", f"{name}:={value}"))]
-        process = subprocess.Popen(
-            [sys.executable, "-m", "scenario_gen.nodes.start", node, "--ros-args", *words],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env=os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"},
-        )
-        started.append(process)
-        return process
-
-    yield run
-    for process in started:
-        process.kill()
-        process.communicate()
 
 
 def publisher(client: Client, kind: type, topic: str):

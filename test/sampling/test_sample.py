@@ -280,6 +280,16 @@ def test_progress_and_cancellation():
     assert "cancelled" in found.adaptations
 
 
+def test_nothing_is_given_out_after_a_cancellation():
+    *head, waits = scene()
+    given = []
+    made = sample_scenarios(
+        *head, all_valid, count=500, waits=waits, found=lambda *a: given.append(a[0]), cancelled=lambda: len(given) == 3
+    )
+    assert [s.index for s in given] == [s.index for s in made.scenarios]
+    assert len(given) == 3
+
+
 def test_a_wait_stands_where_the_vehicle_does_not_where_it_creeps():
     *head, _ = scene()
     law = prepare(*head, (Wait(1, 6.8, 13.2),), SamplingConfig()).model.vehicles[1].law
