@@ -11,7 +11,7 @@ SOURCED := $(if $(AMENT_PREFIX_PATH),$(shell $(PYTHON) -c 'import os, rclpy, sys
 	print("yes" if not wheel and any(rclpy.__file__.startswith(path + os.sep) for path in paths) else "")' 2>/dev/null))
 LOCKED := -r requirements.lock $(if $(SOURCED),,-r requirements-ros.lock)
 
-.PHONY: demo test soak bench audit licences install tools clean
+.PHONY: demo test soak bench audit licences core counts docs install tools clean
 
 demo: $(READY)
 	$(BIN)/scenario-gen demo --ros --out out/demo
@@ -19,8 +19,7 @@ demo: $(READY)
 test: $(READY) tools
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -n 3 --dist loadgroup --durations=10; tests=$$?; wait $$types && exit $$tests
 
 # Long tests: `make soak PART=kills` runs one part; a part that was stopped goes on where it was. One table at the end.
 soak: $(READY)
@@ -33,12 +32,30 @@ bench: $(READY)
 
 # Known vulnerabilities of all that is locked. It fails, too, where it could not look everything up.
 audit: .venv-audit/.ready
-	.venv-audit/bin/python test/packaging/audit.py requirements.lock requirements-ros.lock requirements-bench.lock requirements-audit.lock
+	.venv-audit/bin/python test/packaging/audit.py requirements.lock requirements-ros.lock requirements-bench.lock requirements-audit.lock requirements-docs.lock
 
 .venv-audit/.ready: requirements-audit.lock
 	$(PYTHON) -m venv .venv-audit
 	.venv-audit/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-audit.lock
 	@touch .venv-audit/.ready
+
+# The core without any extra, in an environment of its own.
+core: $(READY)
+	$(BIN)/python test/packaging/core_install.py
+
+# The counts in docs/architecture.md: before the last two reworks, and now.
+counts: $(READY)
+	$(BIN)/python test/packaging/counts.py --write docs/architecture.md 665a212 8e530ca
+
+# The site, in out/docs: built from the sources, which are not imported.
+docs: .venv-docs/.ready
+	.venv-docs/bin/python -m sphinx -q -W --keep-going -b html docs out/docs
+	@echo "out/docs/index.html"
+
+.venv-docs/.ready: requirements-docs.lock
+	$(PYTHON) -m venv .venv-docs
+	.venv-docs/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-docs.lock
+	@touch .venv-docs/.ready
 
 licences: $(READY)
 	$(BIN)/python test/packaging/licences.py
@@ -66,4 +83,4 @@ tools:
 	  echo "Not here, and the tests that need it will be skipped: $$need"
 
 clean:
-	rm -rf .venv .venv-audit build install log out
+	rm -rf .venv .venv-audit .venv-docs build install log out

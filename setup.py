@@ -14,6 +14,7 @@
 
 """Build rules for colcon (ament_python) and pip alike; tool settings are in pyproject.toml."""
 
+from itertools import chain
 from pathlib import Path
 
 from setuptools import find_packages, setup
@@ -21,25 +22,36 @@ from setuptools import find_packages, setup
 NAME = "scenario_gen"
 NODES = ("segmenter", "planner", "gp_sampler", "road_server", "log_player", "evaluator", "recorder", "player", "suite")
 
-# What is needed at run time is named first. ROS itself comes from a Jazzy installation, or from wheels as an extra.
+# ROS itself comes from a Jazzy installation, or from wheels as an extra.
 
 
-def needed(name: str) -> list[str]:
-    """Return what a list of requirements asks for at run time."""
-    listed = Path(name).read_text(encoding="utf-8").partition("# to build and to test")[0].splitlines()
-    return [line for line in listed if line and not line.startswith("#")]
+def needed(name: str) -> dict[str, list[str]]:
+    """Return what a list of requirements asks for at run time, by the heading above it."""
+    found: dict[str, list[str]] = {}
+    for line in Path(name).read_text(encoding="utf-8").partition("# to build and to test")[0].splitlines():
+        if line.startswith("#"):
+            heading = line.removeprefix("# ").removeprefix("extra ")
+        elif line:
+            found.setdefault(heading, []).append(line)
+    return found
 
+
+EXTRAS = needed("requirements.in")
+CORE = EXTRAS.pop("core")
+EXTRAS["cli"] += [*EXTRAS["bags"], *EXTRAS["parquet"], *EXTRAS["report"]]
+EXTRAS["all"] = [*EXTRAS["cli"], *EXTRAS["planners"]]
+EXTRAS["ros"] = [*EXTRAS["all"], *chain.from_iterable(needed("requirements-ros.in").values())]
 
 setup(
     name=NAME,
-    version="0.2.0",
-    description="New multi-vehicle traffic encounters from recorded ones, as ROS 2 nodes and as one command",
+    version="0.3.0",
+    description="New multi-vehicle traffic encounters from recorded ones, as a library, as one command and as ROS 2 nodes",
     license="Apache-2.0",
     maintainer="The scenario_gen developers",
     maintainer_email="scenario_gen@users.noreply.github.com",
     python_requires=">=3.11,<3.14",
     packages=find_packages(include=["scenario_gen*", "msg_conventions*"]),
-    package_data={NAME: ["py.typed", "resources/*", "resources/**/*", "evaluation/assets/*", "nodes/*.xml"]},
+    package_data={NAME: ["py.typed", "resources/*", "resources/**/*", "report/assets/*", "nodes/*.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -47,8 +59,8 @@ setup(
         (f"share/{NAME}/launch", [str(path) for path in sorted(Path("launch").glob("*.launch.py"))]),
         (f"share/{NAME}/examples", [str(path) for path in sorted(Path("examples").glob("*.*"))]),
     ],
-    install_requires=needed("requirements.in"),
-    extras_require={"ros": needed("requirements-ros.in"), "test": ["pytest"]},
+    install_requires=CORE,
+    extras_require=EXTRAS | {"test": ["pytest"]},  # by which colcon knows how to test
     zip_safe=False,
     entry_points={
         "console_scripts": [

@@ -15,22 +15,28 @@
 """Figure 5 of the paper as numbers: every recorded encounter and the three bundled cases, on two or three roads each."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 import re
 from time import process_time
 
 from benchmarks._size import sized
-from scenario_gen.encounter import Encounter
+from scenario_gen.config import PipelineConfig
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.evaluation import Case, evaluate, Evaluation, ORACLE, replay, UNIFORM, WITH, WITHOUT
-from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints
-from scenario_gen.evaluation.report import render, ReportInput
+from scenario_gen.evaluation import evaluate_scenarios, replay
+from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints, without_changepoints
 from scenario_gen.logs import read_log
-from scenario_gen.pipeline import Arm, PipelineConfig, run_arm, without_changepoints
-from scenario_gen.roads import build_road, Road
-from scenario_gen.segmentation import segment, Segmentation
+from scenario_gen.nearest import attempt
+from scenario_gen.report.page import render, ReportInput
+from scenario_gen.roads import build_road
+from scenario_gen.segmentation import segment
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.evaluation import Evaluation
+from scenario_gen.types.generation import GenerationResult, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.request import Request
+from scenario_gen.types.road import Road
+from scenario_gen.types.segmentation import Segmentation
 
 COUNT, SEEDS = sized((50, (7, 8, 9)), quick=(4, (7,)))
 LOGS = sized(None, quick=1)
@@ -89,7 +95,7 @@ def _measure(
     """One case with every seed of planning and sampling; none where the segmenter's arm is refused."""
     try:
         road = build_road(name, encounter, config.road)
-        made = {seed: run_arm(encounter, segmentation, road, config, count=COUNT, seed=seed) for seed in SEEDS}
+        made = {seed: attempt(encounter, segmentation, road, config, Request(), count=COUNT, seed=seed) for seed in SEEDS}
     except (InputError, RefusedError) as error:
         say(f"{encounter.name} on {Path(name).stem}: {error}")
         return []
@@ -103,7 +109,7 @@ def _measure(
         arms = {WITH: arm}
         for name_of, reference in references.items():
             try:
-                arms[name_of] = run_arm(encounter, reference, road, config, count=COUNT, seed=seed, reference=True)
+                arms[name_of] = attempt(encounter, reference, road, config, Request(), count=COUNT, seed=seed, waits=())
             except RefusedError as error:
                 say(f"{encounter.name} on {road.name}, seed {seed}, {name_of}: {error}")
         found.append(_evaluated(encounter, arms, road, own_road=own_road, seed=seed))
@@ -113,16 +119,16 @@ def _measure(
     return found
 
 
-def _evaluated(encounter: Encounter, arms: dict[str, Arm], road: Road, *, own_road: bool, seed: int) -> Measured:
+def _evaluated(encounter: Encounter, arms: dict[str, GenerationResult], road: Road, *, own_road: bool, seed: int) -> Measured:
     """Evaluate the arms, and with the first seed make the report too."""
     started = process_time()
-    with_, without = arms[WITH], arms.get(WITHOUT)
-    oracle = replay(encounter, with_.fit, road.frame_id)
-    rows = {arm: made.scenarios.scenarios for arm, made in arms.items()} | {ORACLE: (oracle,)}
-    evaluation = evaluate(encounter, with_.segmentation, rows, road=road.name)
+    with_ = arms[WITH]
+    oracle = replay(encounter, with_.placed()[1], road.frame_id)
+    rows = {arm: made.generated.scenarios for arm, made in arms.items()} | {ORACLE: (oracle,)}
+    evaluation = evaluate_scenarios(encounter, rows, changepoints=len(with_.segmentation.changepoints), road=road.name)
     if seed != SEEDS[0]:
         return Measured(evaluation, own_road, seed, 0.0)
-    made = without.scenarios if without else None
-    case = Case(encounter, with_.segmentation, road, with_.fit, with_.routes, with_.scenarios, made, evaluation, oracle)
+    references = {WITHOUT: arms[WITHOUT].generated} if WITHOUT in arms else {}
+    case = replace(with_, references=references, evaluation=evaluation, oracle=oracle)
     render(ReportInput([case]))
     return Measured(evaluation, own_road, seed, process_time() - started)

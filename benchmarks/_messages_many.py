@@ -21,8 +21,8 @@ from typing import Any
 from benchmarks._messages_processes import nodes
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.bags import bag_topics
 from scenario_gen.logs.synthetic import bundled
+from scenario_gen.storage.messages import bag_topics
 
 COUNT = sized(100_000, quick=30)
 MOST = 1024.0  # MiB

@@ -22,7 +22,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from scenario_gen.arrays import Bools, Floats
-from scenario_gen.roads.road import Road
+from scenario_gen.types.road import Road
 
 NOWHERE = np.empty((0, 3))
 SIZE = 1000

@@ -31,9 +31,9 @@ import shapely
 from benchmarks._recheck_motion import advance, boxes_at, Lanes, Paces, SLOT, TOUCH
 from benchmarks._sampling_cases import cases, Prepared
 from scenario_gen.arrays import Bools, Floats, Ints
-from scenario_gen.encounter import Encounter
-from scenario_gen.roads import Road
-from scenario_gen.scenario import BoundaryStates, Scenario
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import BoundaryStates, Scenario
 from scenario_gen.validity import Limits
 
 ALIKE = 0.5  # rad, headings of vehicles on the same path
@@ -181,7 +181,7 @@ class Recheck:
             account.waits += every
             for wanted, limit in ((standing, self.limits.stand_speed), (every, self.limits.creep_speed)):
                 if wanted and sum(int(length + 1e-6) for length in _stands(s, v, limit)) < wanted:
-                    account.add("moving_wait", f"vehicle {v} in scenario {s.index}")
+                    account.add("stop_not_kept", f"vehicle {v} in scenario {s.index}")
                     break
 
 

@@ -26,7 +26,7 @@ import numpy as np
 import shapely
 
 from scenario_gen.arrays import Bools, Floats, Ints
-from scenario_gen.scenario import Scenario
+from scenario_gen.types.scenario import Scenario
 
 RESOLUTION = 1e-3  # s, the shortest step
 SLOT = 1e3  # s, longer than any scenario: lane n has the times n * SLOT ...

@@ -23,19 +23,23 @@ import numpy as np
 
 from benchmarks._size import sized
 from scenario_gen.arrays import Floats
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import ScenarioGenError
 from scenario_gen.evaluation import replay
 from scenario_gen.evaluation.distributions import compare, QUANTITIES, values_of
 from scenario_gen.evaluation.motion import at_count, at_period
-from scenario_gen.fitting import Fit, fit_template
-from scenario_gen.interaction import Conflict, find_conflicts, find_waits, pair_conflict, Wait
+from scenario_gen.fitting import fit_template
 from scenario_gen.logs import read_log
-from scenario_gen.planning import plan_routes, Route
-from scenario_gen.roads import build_road, Road
+from scenario_gen.roads import build_road
+from scenario_gen.routing import plan_routes
 from scenario_gen.sampling import sample_scenarios, SamplingConfig
-from scenario_gen.scenario import Scenario, ScenarioSet, Verdict
-from scenario_gen.segmentation import segment, Segmentation
+from scenario_gen.segmentation import segment
+from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, pair_conflict, Wait
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.fit import Fit
+from scenario_gen.types.road import Road
+from scenario_gen.types.route import Route
+from scenario_gen.types.scenario import Scenario, ScenarioSet, Verdict
+from scenario_gen.types.segmentation import Segmentation
 from scenario_gen.validity import Checker
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
@@ -57,7 +61,9 @@ class Prepared:
     conflicts: tuple[Conflict, ...]
     waits: tuple[Wait, ...]
 
-    def sample(self, count: int, seed: int = 0, config: SamplingConfig | None = None, *, checked: bool = True) -> ScenarioSet:
+    def sample(
+        self, count: int, seed: int = 0, config: SamplingConfig = SamplingConfig(), *, checked: bool = True
+    ) -> ScenarioSet:
         """Sample `count` scenarios; unchecked, every candidate counts as valid."""
         checker = Checker(self.road, self.fit.asked, self.conflicts, self.waits)
         check = checker.check if checked else lambda scenarios: [Verdict() for _ in scenarios]

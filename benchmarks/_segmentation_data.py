@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.encounter import Encounter, Vehicle
+from scenario_gen.types.encounter import Encounter, Vehicle
 
 
 @dataclass(frozen=True)

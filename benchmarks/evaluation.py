@@ -31,7 +31,8 @@ from scipy.spatial.distance import cdist
 from benchmarks._figure5 import LINEAR, measure, Measured, SEEDS
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.evaluation import dtw_distance, feature_matrix, UNIFORM, WITH, WITHOUT
+from scenario_gen.evaluation import dtw_distance, feature_matrix
+from scenario_gen.types.generation import UNIFORM, WITH, WITHOUT
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 STEPS = sized(3000, quick=100)

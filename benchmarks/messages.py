@@ -34,11 +34,11 @@ from benchmarks.row import Row
 from msg_conventions.paths import encode_path
 from msg_conventions.scenarios import decode_scenario, encode_scenario
 from scenario_gen.arrays import Floats
-from scenario_gen.bags import bag_topics
-from scenario_gen.encounter import Vehicle
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.nodes.domain import free_domain, this_host_only
-from scenario_gen.scenario import Scenario
+from scenario_gen.storage.messages import bag_topics
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.scenario import Scenario
 
 POINTS = 200
 SCENARIOS = sized(1000, quick=20)

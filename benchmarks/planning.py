@@ -34,17 +34,17 @@ from benchmarks._planning_maps import clutter, enters_blocked, lane, optimum, re
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.arrays import Floats
-from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import RefusedError
-from scenario_gen.fitting.result import Fit, FittedVehicle
-from scenario_gen.planning import plan_routes, PlanningConfig
-from scenario_gen.planning.ompl.solve import PLANNERS, solve
-from scenario_gen.planning.planner import Budget, BudgetSpentError, path_length, plan_patiently, Query
-from scenario_gen.planning.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig
 from scenario_gen.roads.clearance import clearance_in_cells, distance_transform
-from scenario_gen.roads.flood import component_at, components, connected
-from scenario_gen.roads.road import Road
-from scenario_gen.scenario import BoundaryStates
+from scenario_gen.roads.connectivity import component_at, components, connected
+from scenario_gen.routing import plan_routes, PlanningConfig
+from scenario_gen.routing.search.ompl.solve import PLANNERS, solve
+from scenario_gen.routing.search.planner import Budget, BudgetSpentError, path_length, plan_with_retry, Query
+from scenario_gen.routing.search.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import BoundaryStates
 
 SEEDS = sized(20, quick=1)
 BUDGETS = sized((0.01, 0.1, 1.0), quick=(0.01,))  # [s] of CPU time
@@ -234,7 +234,7 @@ def _recorded(queries: int = QUERIES_OF_A_MAP) -> list[Row]:
                 ways += 1
                 started = process_time()
                 try:
-                    plan_patiently(RrtStarConnect(), road, Query(start, goal, radius), PlanningConfig().iterations, seed)
+                    plan_with_retry(RrtStarConnect(), road, Query(start, goal, radius), PlanningConfig().iterations, seed)
                 except BudgetSpentError:
                     failed += 1
                 times.append(process_time() - started)

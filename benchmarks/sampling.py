@@ -23,13 +23,13 @@ from benchmarks._sampling_cases import arrival_spread, cases, displacement, disp
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.arrays import Floats
-from scenario_gen.encounter import Encounter, Vehicle
-from scenario_gen.interaction import find_conflicts
-from scenario_gen.planning import Route
-from scenario_gen.roads import Road
 from scenario_gen.sampling import sample_scenarios
-from scenario_gen.scenario import BoundaryStates
-from scenario_gen.segmentation import Segmentation
+from scenario_gen.template.interaction import find_conflicts
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.road import Road
+from scenario_gen.types.route import Route
+from scenario_gen.types.scenario import BoundaryStates
+from scenario_gen.types.segmentation import Segmentation
 from scenario_gen.validity import Checker
 
 COUNT = sized(200, quick=4)  # scenarios per recorded encounter and road

@@ -36,13 +36,7 @@ from benchmarks._segmentation_scores import changes, f1, hamming, smoother
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.segmentation import (
-    OnlineSegmenter,
-    SamplerConfig,
-    segment,
-    segment_series,
-    SegmentationConfig,
-)
+from scenario_gen.segmentation import OnlineSegmenter, SamplerConfig, segment, segment_series, SegmentationConfig
 
 SEEDS = range(9101, sized(9113, quick=9102))
 SEEDS_OF_A = range(9101, sized(9141, quick=9102))  # short sequences, so more of them

@@ -23,10 +23,10 @@ from benchmarks._recheck import recheck_published
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.arrays import Floats
-from scenario_gen.encounter import Vehicle
-from scenario_gen.interaction import find_conflicts, Wait
-from scenario_gen.roads.road import Road
-from scenario_gen.scenario import BoundaryStates, Scenario
+from scenario_gen.template.interaction import find_conflicts, Wait
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import BoundaryStates, Scenario
 from scenario_gen.validity import Checker
 
 Drive = tuple[float, float, float, float]  # x [m], y [m], yaw [rad], speed [m/s]
@@ -64,7 +64,7 @@ def _rechecked(count: int) -> list[Row]:
     account, planned = recheck_published(count)
     if not account.scenarios:
         return [Row("published scenarios re-checked", 0.0, "", "higher", 1.0, "no recorded data, or none can be planned")]
-    wrong, moving = account.found.pop("passing_order", 0), account.found.pop("moving_wait", 0)
+    wrong, moving = account.found.pop("passing_order", 0), account.found.pop("stop_not_kept", 0)
     causes = ", ".join(f"{n} × {cause}" for cause, n in account.found.most_common())
     return [
         Row(

@@ -30,6 +30,15 @@ HEADER = b"\x00\x01\x00\x00"  # encapsulation: CDR, little-endian, no options
 NANOSECONDS = 1_000_000_000
 
 
+def stamp_of(data: bytes, what: str) -> int:
+    """Return the stamp [ns] of a message that begins with a header.
+
+    Raises:
+        InputError: naming `what`, it is damaged.
+    """
+    return CdrReader(data, what).stamp()
+
+
 class CdrWriter:
     """Appends values at their natural alignment, counted from the byte after the encapsulation header."""
 
@@ -47,7 +56,11 @@ class CdrWriter:
         return self
 
     def pack(self, code: str, *values: float) -> "CdrWriter":
-        """Append numbers of one struct `code` ('I' uint32, 'i' int32, 'd' float64, 'f' float32, 'B' uint8, ...)."""
+        """Append numbers of one struct `code` ('I' uint32, 'i' int32, 'd' float64, 'f' float32, 'B' uint8, ...).
+
+        Raises:
+            InputError: a number is out of range.
+        """
         self.align(struct.calcsize("<" + code))
         try:
             self._bytes += struct.pack(f"<{len(values)}{code}", *values)
@@ -61,7 +74,11 @@ class CdrWriter:
         return self.pack("I", len(data)).raw(data)
 
     def stamp(self, nanoseconds: int) -> "CdrWriter":
-        """Append builtin_interfaces/Time (or Duration): int32 seconds, uint32 nanoseconds."""
+        """Append builtin_interfaces/Time (or Duration): int32 seconds, uint32 nanoseconds.
+
+        Raises:
+            InputError: the seconds need more than 32 bits.
+        """
         seconds, rest = divmod(nanoseconds, NANOSECONDS)
         if not -(2**31) <= seconds < 2**31:
             raise InputError(f"stamp {nanoseconds} ns does not fit a ROS time (32-bit seconds, until 2038)")
@@ -107,7 +124,11 @@ class CdrReader:
         return struct.unpack("<" + code, self._take(size, size))[0]
 
     def count(self, size: int = 1) -> int:
-        """Read the length of a sequence whose items take at least `size` bytes each."""
+        """Read the length of a sequence whose items take at least `size` bytes each.
+
+        Raises:
+            InputError: less than that is left.
+        """
         count, left = int(self.one("I")), len(self._data) - self.place
         if count * size > left:
             raise InputError(f"{self._what}: {count} items are announced where {left} bytes are left")
@@ -118,16 +139,20 @@ class CdrReader:
         return int(self.one("I"))
 
     def array(self, dtype: npt.DTypeLike, count: int, alignment: int) -> npt.NDArray[Any]:
-        """Read `count` items of a numpy type, the first one aligned; nothing (no padding either) if `count` is 0."""
+        """Read `count` items (n,) of a numpy type, the first one aligned; nothing (no padding either) if `count` is 0."""
         kind = np.dtype(dtype)
         return np.frombuffer(self._take(kind.itemsize * count, alignment) if count else b"", dtype=kind, count=count)
 
     def floats(self, count: int) -> Floats:
-        """Read `count` float64 that belong to one or more structures."""
+        """Read `count` float64 (n,), of any unit, that belong to one or more structures."""
         return self.array("<f8", count, 8)
 
     def string(self) -> str:
-        """Read a string."""
+        """Read a string.
+
+        Raises:
+            InputError: it is not UTF-8, or the message ends before it.
+        """
         data = bytes(self._take(self.count(), 1))
         try:
             return data[:-1].decode()
@@ -139,7 +164,7 @@ class CdrReader:
         return int(self.one("i")) * NANOSECONDS + int(self.one("I"))
 
     def aligned(self, dtype: npt.DTypeLike, count: int) -> npt.NDArray[Any] | None:
-        """Read `count` structures that each end at a multiple of 8 bytes; None, and nothing read, if less is left.
+        """Read `count` structures (n,) that each end at a multiple of 8 bytes; None, and nothing read, if less is left.
 
         The type begins with 4 bytes and a padding to 8, which the first structure does without where it begins amid 8.
         """
@@ -157,7 +182,11 @@ class CdrReader:
         return self.stamp(), self.string()
 
     def framed_header(self) -> tuple[int, str]:
-        """Read the std_msgs/Header of a message with positions: its frame may not be empty."""
+        """Read the std_msgs/Header of a message with positions: its frame may not be empty.
+
+        Raises:
+            InputError: it is empty.
+        """
         stamp_ns, frame_id = self.header()
         if not frame_id:
             raise InputError(f"{self._what}: header.frame_id is empty; name the frame that the positions are in")

@@ -23,20 +23,18 @@ Both bear the stamp of their tracks. QoS: reliable, transient_local, depth 1.
 first sample, since when the same vehicles have been there. QoS: reliable, transient_local, depth 1000.
 """
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 
 from msg_conventions import trajectory
 from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.diagnostics import Level, Status
 from msg_conventions.tracks import FRAME
 from msg_conventions.trajectory import Trajectory, TYPE
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
-
-if TYPE_CHECKING:
-    from scenario_gen.segmentation.live import LiveChangepoints
-    from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
 
 __all__ = [
     "POSTERIOR_TYPE",
@@ -46,6 +44,8 @@ __all__ = [
     "encode_changepoints",
     "encode_live_changepoints",
     "encode_posterior",
+    "segment_descriptions",
+    "segmentation_status",
 ]
 
 POSTERIOR_TYPE = "sensor_msgs/msg/PointCloud2"
@@ -54,7 +54,7 @@ POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("vehicle", "<u2"), 
 DATATYPES = {"<f4": FLOAT32, "<u2": UINT16, "<f8": FLOAT64}
 
 
-def encode_changepoints(encounter: Encounter, segmentation: "Segmentation") -> bytes:
+def encode_changepoints(encounter: Encounter, segmentation: Segmentation) -> bytes:
     """Return the states at the changepoints as CDR bytes."""
     at = segmentation.changepoints
     return trajectory.encode(
@@ -71,7 +71,7 @@ def encode_changepoints(encounter: Encounter, segmentation: "Segmentation") -> b
     )
 
 
-def encode_live_changepoints(found: "LiveChangepoints") -> bytes:
+def encode_live_changepoints(found: LiveChangepoints) -> bytes:
     """Return newly confirmed changepoints as CDR bytes; accelerations are not known yet: 0."""
     return trajectory.encode(
         Trajectory(
@@ -87,7 +87,7 @@ def encode_live_changepoints(found: "LiveChangepoints") -> bytes:
     )
 
 
-def decode_changepoints(data: bytes, encounter: Encounter, what: str = "changepoints") -> "Segmentation":
+def decode_changepoints(data: bytes, encounter: Encounter, what: str = "changepoints") -> Segmentation:
     """Return the segmentation that the message and its tracks describe: a primitive of its own for every segment.
 
     Shared labels, probabilities and descriptions are in `posterior` and the diagnostics; no later stage needs them.
@@ -95,8 +95,6 @@ def decode_changepoints(data: bytes, encounter: Encounter, what: str = "changepo
     Raises:
         InputError: the message is damaged, bears another stamp, or has a changepoint off the template's clock.
     """
-    from scenario_gen.segmentation.result import Segmentation
-
     message = trajectory.decode(data, what)
     if message.stamp_ns != encounter.start_ns:
         raise InputError(f"{what}: stamp {message.stamp_ns} ns is not that of the tracks ({encounter.start_ns} ns)")
@@ -114,7 +112,7 @@ def decode_changepoints(data: bytes, encounter: Encounter, what: str = "changepo
     )
 
 
-def encode_posterior(encounter: Encounter, segmentation: "Segmentation") -> bytes:
+def encode_posterior(encounter: Encounter, segmentation: Segmentation) -> bytes:
     """Return labels and changepoint probabilities as CDR bytes of a PointCloud2."""
     n, samples = encounter.speed.shape
     cloud = np.zeros((n, samples), dtype=POINT)
@@ -130,14 +128,12 @@ def encode_posterior(encounter: Encounter, segmentation: "Segmentation") -> byte
     return writer.raw(cloud.tobytes()).pack("B", 1).finish()
 
 
-def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str = "posterior") -> "Segmentation":
+def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str = "posterior") -> Segmentation:
     """Return the segmentation; its sentences for people travel on the diagnostics.
 
     Raises:
         InputError: the message is damaged or not of this convention.
     """
-    from scenario_gen.segmentation.result import Segmentation
-
     reader = CdrReader(data, what)
     reader.header()
     n, samples = reader.number(), reader.number()
@@ -160,3 +156,15 @@ def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str 
         changepoint_probability=cloud["p"][0].astype(np.float64),
         descriptions=descriptions,
     )
+
+
+def segmentation_status(segmentation: Segmentation, node: str) -> Status:
+    """Return what the segmenter found, in words; `node` is its full name."""
+    values = {f"segment.{k}": text for k, text in enumerate(segmentation.descriptions)}
+    message = f"{len(segmentation.changepoints)} changepoints, {segmentation.n_primitives} primitives"
+    return Status(f"{node}: segmentation", Level.OK, message, values)
+
+
+def segment_descriptions(statuses: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
+    """Return the sentences of such a status, one for each segment; `statuses` are key-values by subject."""
+    return tuple(text for key, text in statuses.get("segmentation", {}).items() if key.startswith("segment."))

@@ -12,10 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The ego slot on the wire: `ego/start`, `ego/goal` (odometry.py) and `ego/track` (trajectory.py, one vehicle).
+"""The ego slot ⇄ `ego/start`, `ego/goal` (nav_msgs/Odometry) and `ego/track` (conventions: trajectory.py; one vehicle).
 
 They belong to the request whose `scenarios/info` names the vehicle as its `ego`; being latched, they are those of the last such
-request. `ego/track` is the vehicle's template along its planned route, on the template's clock, not a scenario's.
+request. Frame: the road's. Stamp: the template's, also for the goal (when it is reached stands in `ego/track`).
+Odometry: `child_frame_id` is `vehicle_<id>`, `pose.pose` the centre of the footprint, z = 0, yaw as a quaternion,
+`twist.twist.linear.x` the speed along the heading, m/s. Covariances and all else are 0. QoS: reliable, transient_local, depth 1.
+`ego/track` is the vehicle's template along its planned route, on the template's clock, not a scenario's.
 """
 
 from collections.abc import Iterator
@@ -23,11 +26,45 @@ import json
 
 import numpy as np
 
-from msg_conventions.names import token
-from msg_conventions.odometry import encode_state
+from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.roads import pose_rows, poses_of
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.arrays import Floats
-from scenario_gen.scenario import Scenario
+from scenario_gen.errors import InputError
+from scenario_gen.types.names import token
+from scenario_gen.types.scenario import Scenario
+
+STATE_TYPE = "nav_msgs/msg/Odometry"
+_COVARIANCE = 36
+
+
+def encode_state(state: Floats, child_frame_id: str, frame_id: str, stamp_ns: int) -> bytes:
+    """Return the state (4,) x [m], y [m], yaw [rad], speed [m/s] as CDR bytes.
+
+    Raises:
+        InputError: a value is not finite.
+    """
+    if not np.isfinite(state).all():
+        raise InputError("a state with a value that is not finite cannot be sent")
+    writer = CdrWriter().header(stamp_ns, frame_id).string(child_frame_id)
+    writer.pack("d", *pose_rows(state[None, :3])[0], *[0.0] * _COVARIANCE)
+    return writer.pack("d", float(state[3]), *[0.0] * (5 + _COVARIANCE)).finish()
+
+
+def decode_state(data: bytes, what: str = "state") -> tuple[int, str, str, Floats]:
+    """Return stamp [ns], frame, child frame and the state (4,).
+
+    Raises:
+        InputError: the message is damaged, or a value is not finite.
+    """
+    reader = CdrReader(data, what)
+    stamp_ns, frame_id = reader.framed_header()
+    child = reader.string()
+    row = reader.floats(7 + _COVARIANCE)
+    speed = float(reader.floats(6 + _COVARIANCE)[0])
+    if not np.isfinite(speed):
+        raise InputError(f"{what}: the speed is not finite")
+    return stamp_ns, frame_id, child, np.append(poses_of(row[None, :7], what)[0], speed)
 
 
 def end_states(track: Scenario) -> tuple[Floats, Floats]:

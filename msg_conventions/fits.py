@@ -16,33 +16,34 @@
 
 Points are the anchors (start, changepoints, end) in the road's frame, at the template's times; the first and last are the
 states asked of every scenario, speed included. Speeds in between are the template's, scaled, for whoever wants them.
-What the fitting decided travels as sentences in diagnostics. QoS: reliable, transient_local, depth 1.
+What the fitting decided travels on the diagnostics, a status for each vehicle. QoS: reliable, transient_local, depth 1.
 """
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+import json
+import math
 
 import numpy as np
 
 from msg_conventions import trajectory
+from msg_conventions.diagnostics import Level, Status
 from msg_conventions.trajectory import Trajectory, TYPE
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.encounter import Encounter
-from scenario_gen.errors import InputError
-from scenario_gen.scenario import BoundaryStates
+from scenario_gen.errors import guarded, InputError
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.scenario import BoundaryStates
 
-if TYPE_CHECKING:
-    from scenario_gen.fitting.result import Fit
-
-__all__ = ["TYPE", "anchor_stamps", "decode_fit", "encode_fit"]
+__all__ = ["TYPE", "anchor_stamps", "decode_asked", "decode_fit", "decode_fitted", "encode_fit", "fit_statuses"]
 
 
 def anchor_stamps(encounter: Encounter, changepoints: Ints) -> list[int]:
-    """Return the K + 2 stamps [ns] of start, changepoints and end on the template's clock."""
+    """Return the K + 2 stamps [ns] of start, changepoints (K,) and end on the template's clock."""
     index = [0, *changepoints.tolist(), encounter.speed.shape[1] - 1]
     return [encounter.start_ns + k * encounter.dt_ns for k in index]
 
 
-def encode_fit(encounter: Encounter, fit: "Fit", frame_id: str) -> bytes:
+def encode_fit(encounter: Encounter, fit: Fit, frame_id: str) -> bytes:
     """Return the anchors as CDR bytes; `frame_id` is the road's."""
     poses = np.stack([vehicle.anchors for vehicle in fit.fitted])
     speed = encounter.speed[:, fit.anchor_index] * np.array([[vehicle.scale] for vehicle in fit.fitted])
@@ -73,3 +74,56 @@ def decode_fit(data: bytes, what: str = "fit") -> tuple[int, str, BoundaryStates
         raise InputError(f"{what}: {len(message.time_ns)} point(s); a start and an end are needed")
     state = np.concatenate([message.position, message.heading[..., None], message.speed[..., None]], axis=-1)
     return message.stamp_ns, message.frame_id, BoundaryStates(start=state[:, 0], end=state[:, -1]), state[..., :3]
+
+
+def decode_asked(data: bytes, what: str = "fit") -> dict[str, tuple[Floats, Floats]]:
+    """Return the asked start and end (4,) x, y, yaw, speed by vehicle id.
+
+    Raises:
+        InputError: as `decode_fit`.
+    """
+    asked = decode_fit(data, what)[2]
+    vehicles = trajectory.decode(data, what).vehicles
+    return {vehicle.id: (asked.start[k], asked.end[k]) for k, vehicle in enumerate(vehicles)}
+
+
+def fit_statuses(fit: Fit, node: str, more: Mapping[str, str] | None = None) -> tuple[Status, ...]:
+    """Return what the fitting decided: one status per vehicle, one for the notes; each with what `more` says of it."""
+    per_vehicle = tuple(
+        Status(
+            f"{node}: fit of {vehicle.id}",
+            Level.OK if float(fitted.moved.max()) < 1.0 else Level.WARN,
+            f"{fitted.manoeuvre}, scale {fitted.scale:.3f}, moved by at most {float(fitted.moved.max()):.2f} m",
+            {
+                "manoeuvre": fitted.manoeuvre,
+                "scale": repr(fitted.scale),
+                "moved_m": json.dumps(fitted.moved.tolist()),
+                "stands": json.dumps([bool(value) for value in fitted.stands]),
+                **(more or {}),
+            },
+        )
+        for vehicle, fitted in zip(fit.vehicles, fit.fitted, strict=True)
+    )
+    notes = {f"note.{k}": note for k, note in enumerate(fit.notes)}
+    return (*per_vehicle, Status(f"{node}: fit", Level.OK, "template fitted to the road", notes | dict(more or {})))
+
+
+def decode_fitted(anchors: Floats, statuses: Mapping[str, Mapping[str, str]], vehicle: str) -> FittedVehicle:
+    """Return what the fitting decided of a vehicle.
+
+    Args:
+        anchors: (K + 2, 3) x, y, yaw, as `decode_fit` returns them.
+        statuses: key-values of the planner's statuses by subject.
+        vehicle: its id.
+
+    Raises:
+        InputError: it is not there, or damaged.
+    """
+    values = statuses.get(f"fit of {vehicle}", {})
+    with guarded(f"fit of {vehicle}: damaged, or not there"):
+        moved = np.array(json.loads(values["moved_m"]), dtype=np.float64)
+        stands = np.array(json.loads(values["stands"]), dtype=np.bool_)
+        scale, manoeuvre = float(values["scale"]), values["manoeuvre"]
+    if moved.shape != anchors.shape[:1] or stands.ndim != 1 or not np.isfinite(moved).all() or not 0.0 < scale < math.inf:
+        raise InputError(f"fit of {vehicle}: damaged")
+    return FittedVehicle(anchors=anchors, moved=moved, stands=stands, scale=scale, manoeuvre=manoeuvre)

@@ -14,7 +14,7 @@
 
 """Coordinate frames ⇄ tf2_msgs/TFMessage: `/tf`, of the vehicles that the player moves, and `/tf_static`.
 
-Parent: the frame of the trajectory that is told (`local_enu` of tracks, the road's of scenarios). Child: `vehicle_<id>`, at the
+Parent: the frame of the trajectory that is played (`local_enu` of tracks, the road's of scenarios). Child: `vehicle_<id>`, at the
 footprint's centre, x ahead. QoS: reliable; /tf volatile, /tf_static transient_local, depth 1.
 """
 

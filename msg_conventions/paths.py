@@ -23,7 +23,6 @@ Arc length does not travel; it is the sum of the chords.
 from collections.abc import Sequence
 from functools import lru_cache
 import struct
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,15 +32,17 @@ from msg_conventions.yaw import half_angle
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import InputError
-
-if TYPE_CHECKING:
-    from scenario_gen.planning.route import Route
+from scenario_gen.types.route import Route
 
 TYPE = "nav_msgs/msg/Path"
 
 
 def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) -> bytes:
-    """Return (M, 3) x, y, yaw with their (M,) stamps as CDR bytes of a nav_msgs/Path."""
+    """Return (M, 3) x, y, yaw with their (M,) stamps as CDR bytes of a nav_msgs/Path.
+
+    Raises:
+        InputError: a value is not finite, or a stamp is no ROS time.
+    """
     count = len(poses)
     if not count:
         return CdrWriter().header(stamp_ns, frame_id).pack("I", 0).finish()
@@ -103,7 +104,7 @@ def chord_length(points: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(exact.hypot(*np.diff(points[:, :2], axis=0).T))])
 
 
-def encode_route(route: "Route", anchors_ns: Sequence[int], frame_id: str) -> bytes:
+def encode_route(route: Route, anchors_ns: Sequence[int], frame_id: str) -> bytes:
     """Return the route as CDR bytes; `anchors_ns` (K + 2,) are the template's stamps at the anchors, the first its own."""
     index, stamps = [int(route.anchor[0])], [anchors_ns[0]]
     for k in range(1, len(route.anchor)):
@@ -118,14 +119,12 @@ def encode_route(route: "Route", anchors_ns: Sequence[int], frame_id: str) -> by
     return encode_path(route.points[index], np.array(stamps, dtype=np.int64), frame_id, anchors_ns[0])
 
 
-def decode_route(data: bytes, anchors_ns: Sequence[int], what: str = "route") -> tuple[str, "Route"]:
+def decode_route(data: bytes, anchors_ns: Sequence[int], what: str = "route") -> tuple[str, Route]:
     """Return the frame and the route.
 
     Raises:
         InputError: the message is damaged, bears another stamp, or has no pose at an anchor's stamp.
     """
-    from scenario_gen.planning.route import Route
-
     stamp_ns, frame_id, poses, stamps = decode_path(data, what)
     if stamp_ns != anchors_ns[0]:
         raise InputError(f"{what}: stamp {stamp_ns} ns is not that of the template ({anchors_ns[0]} ns)")

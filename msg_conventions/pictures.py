@@ -23,11 +23,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
-from msg_conventions.names import tokens
 from msg_conventions.roads import pose_rows
 from scenario_gen.arrays import Floats
-from scenario_gen.encounter import Vehicle
-from scenario_gen.scenario import Scenario
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.names import tokens
+from scenario_gen.types.scenario import Scenario
 
 FOOTPRINT_TYPE = "geometry_msgs/msg/PolygonStamped"
 MARKERS_TYPE = "visualization_msgs/msg/MarkerArray"
@@ -43,7 +43,7 @@ def encode_footprint(vehicle: Vehicle, stamp_ns: int, frame_id: str) -> bytes:
 
 
 def decode_footprint(data: bytes, what: str = "footprint") -> Floats:
-    """Return (corners, 2) metres.
+    """Return corners (n, 2) [m].
 
     Raises:
         InputError: the message is damaged.

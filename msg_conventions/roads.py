@@ -20,8 +20,6 @@ of it. Stamp: that of the template the road was made for, or 0 for one that suit
 The road's name does not travel: nothing is computed from it.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
@@ -29,9 +27,7 @@ from msg_conventions.trajectory import FARTHEST
 from msg_conventions.yaw import check_quaternions, half_angle, yaw
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
-
-if TYPE_CHECKING:
-    from scenario_gen.roads.road import Road
+from scenario_gen.types.road import Road
 
 MAP_TYPE = "nav_msgs/msg/OccupancyGrid"
 POSES_TYPE = "geometry_msgs/msg/PoseArray"
@@ -61,7 +57,7 @@ def poses_of(rows: Floats, what: str) -> Floats:
     return np.column_stack([rows[:, :2], yaw(rows[:, 3:])])
 
 
-def encode_map(road: "Road", stamp_ns: int) -> bytes:
+def encode_map(road: Road, stamp_ns: int) -> bytes:
     """Return the grid as CDR bytes."""
     height, width = road.drivable.shape
     origin = [*road.origin, 0.0, 0.0, 0.0, 0.0, 1.0]
@@ -88,14 +84,12 @@ def decode_poses(data: bytes, what: str = "poses") -> tuple[int, str, Floats]:
     return stamp_ns, frame_id, poses_of(reader.floats(7 * count).reshape(count, 7), what)
 
 
-def decode_map(data: bytes, entries: bytes | None = None, exits: bytes | None = None, name: str = "map") -> tuple[int, "Road"]:
+def decode_map(data: bytes, entries: bytes | None = None, exits: bytes | None = None, name: str = "map") -> tuple[int, Road]:
     """Return the stamp [ns] and the road; without entries and exits it has none (a plain map server sends none).
 
     Raises:
         InputError: the message is damaged, the map is rotated or empty, or the frames disagree.
     """
-    from scenario_gen.roads.road import Road
-
     reader = CdrReader(data, name)
     stamp_ns, frame_id = reader.framed_header()
     reader.stamp()

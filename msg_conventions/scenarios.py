@@ -26,7 +26,7 @@ from msg_conventions import trajectory
 from msg_conventions.cdr import NANOSECONDS
 from msg_conventions.trajectory import Trajectory, TYPE
 from scenario_gen.errors import InputError
-from scenario_gen.scenario import Scenario
+from scenario_gen.types.scenario import Scenario
 
 __all__ = ["TYPE", "decode_scenario", "digest", "encode_scenario"]
 

@@ -20,26 +20,10 @@ QoS: reliable, volatile, depth 1000.
 
 import math
 
-import numpy as np
-
 from msg_conventions.cdr import CdrReader, CdrWriter
-from scenario_gen import exact, geodesy
-from scenario_gen.arrays import Floats
-from scenario_gen.encounter import Encounter
-from scenario_gen.errors import InputError
+from scenario_gen import exact
 
 FIXED, GPS, COVARIANCE_UNKNOWN = 0, 1, 0  # of NavSatStatus and NavSatFix
-
-
-def geodetic(encounter: Encounter) -> Floats:
-    """Return latitude and longitude (N, T, 2) [degrees] of an encounter's positions.
-
-    Raises:
-        InputError: its log came in metres, so it has no place on the globe.
-    """
-    if encounter.origin is None:
-        raise InputError(f"encounter {encounter.name!r} came in metres without an origin; it cannot be streamed as NavSatFix")
-    return np.stack(geodesy.geodetic(encounter.position, encounter.origin), axis=-1)
 
 
 def encode_fix(latitude: float, longitude: float, stamp_ns: int, frame_id: str) -> bytes:

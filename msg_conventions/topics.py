@@ -14,24 +14,14 @@
 
 """Every topic of the suite: its type and its quality of service, in one table (docs/interfaces.md says the same in words)."""
 
-from dataclasses import dataclass
 import re
 
-from msg_conventions import diagnostics, frames, odometry, paths, pictures, roads, trajectory
+from msg_conventions import diagnostics, ego, frames, paths, pictures, roads, trajectory
+from scenario_gen.types.qos import Quality
 
 CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
 FIX_TYPE = "sensor_msgs/msg/NavSatFix"
 TWIST_TYPE = "geometry_msgs/msg/TwistStamped"
-
-
-@dataclass(frozen=True)
-class Quality:
-    """Quality of service; publishers always keep the last, subscribers that may withhold acknowledgements keep all."""
-
-    depth: int = 1
-    reliable: bool = True
-    transient_local: bool = True
-    keep_all: bool = False
 
 
 LATCHED = Quality()
@@ -55,8 +45,8 @@ TOPICS: dict[str, tuple[str, Quality]] = {
     "vehicle_*/footprint": (pictures.FOOTPRINT_TYPE, LATCHED),
     "vehicle_*/fix": (FIX_TYPE, STREAM),
     "vehicle_*/speed": (TWIST_TYPE, STREAM),
-    "ego/start": (odometry.TYPE, LATCHED),
-    "ego/goal": (odometry.TYPE, LATCHED),
+    "ego/start": (ego.STATE_TYPE, LATCHED),
+    "ego/goal": (ego.STATE_TYPE, LATCHED),
     "ego/track": (trajectory.TYPE, LATCHED),
     "scenarios": (trajectory.TYPE, MANY),
     "scenarios/info": (diagnostics.TYPE, MANY),

@@ -23,8 +23,8 @@ import numpy as np
 
 from msg_conventions import trajectory
 from msg_conventions.trajectory import Trajectory, TYPE
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
+from scenario_gen.types.encounter import Encounter
 
 __all__ = ["FRAME", "TYPE", "decode_tracks", "encode_tracks"]
 

@@ -21,22 +21,25 @@ z = 0, yaw as a quaternion. `velocities[i].linear.x`: speed along the heading, m
 m/s². All other components are zero; nothing is NaN.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+import re
 
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter, NANOSECONDS
-from msg_conventions.names import joint_names, vehicle_of
 from msg_conventions.yaw import check_quaternions, quaternion, yaw
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.names import tokens
 
 TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
 FARTHEST = 1e8  # m from the frame's origin: more than any geodetic grid has
 FASTEST = 1e4  # m/s: what drives is slower, and what follows from speeds can still be reckoned with
 MANY = 10_000  # vehicles: beyond, a message is not laid out as one table
 LONGEST_NS = 7200 * NANOSECONDS  # of an encounter or a scenario
+SMALLEST, LARGEST = 0.01, 1000.0  # metres of a footprint
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +61,33 @@ class Trajectory:
     heading: Floats
     speed: Floats
     acceleration: Floats
+
+
+def joint_names(vehicles: Sequence[Vehicle]) -> tuple[str, ...]:
+    """Return `<token>:<length>x<width>` of each vehicle, metres: the message needs no second one beside it."""
+    names = tokens(vehicle.id for vehicle in vehicles)
+    return tuple(f"{name}:{vehicle.length!r}x{vehicle.width!r}" for name, vehicle in zip(names, vehicles, strict=True))
+
+
+def vehicle_of(joint_name: str) -> Vehicle:
+    """Return the vehicle of a joint name; one without a footprint gets the default size of a car.
+
+    Raises:
+        InputError: the footprint is not two lengths of a vehicle.
+    """
+    name, colon, size = joint_name.partition(":")
+    if not colon:
+        return Vehicle(name)
+    match = re.fullmatch(r"([0-9.eE+-]+)x([0-9.eE+-]+)", size)
+    try:
+        length, width = (float(value) for value in match.groups()) if match else (0.0, 0.0)
+    except ValueError:
+        length = width = 0.0
+    if not (SMALLEST <= length <= LARGEST and SMALLEST <= width <= LARGEST):
+        raise InputError(
+            f"joint name {joint_name!r}: expected <id>:<length>x<width>, {SMALLEST:g} to {LARGEST:g} m each, e.g. car:4.8x1.9"
+        )
+    return Vehicle(name, length, width)
 
 
 def _point_type(n: int) -> np.dtype[np.void]:

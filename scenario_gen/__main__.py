@@ -15,7 +15,9 @@
 """The executable `scenario-gen`. It sets the signals first, so that Ctrl-C and SIGTERM end it without a traceback at any time."""
 
 import signal
+import sys
 
+from scenario_gen.errors import MissingExtraError, needs
 from scenario_gen.interrupts import leave, SIGNALS
 
 
@@ -24,7 +26,11 @@ def main() -> None:
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # as for nohup, or a job in the background
             signal.signal(number, leave)
-    from scenario_gen.cli import main as run
+    try:
+        needs("cli", "rich", "typer")
+        from scenario_gen.cli import main as run
+    except MissingExtraError as error:
+        sys.exit(f"error: {error}")
 
     run()
 

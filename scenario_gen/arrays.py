@@ -25,7 +25,7 @@ LARGEST_ANGLE = 3.141592653  # the last whole nanoradian inside (-pi, pi); round
 
 
 def frozen(values: npt.ArrayLike) -> Floats:
-    """Return `values` as a C-contiguous, read-only float64 array (a copy if it was writable)."""
+    """Return `values` as a C-contiguous, read-only float64 array of any shape (a copy if it was writable)."""
     return _sealed(np.array(values, dtype=np.float64, order="C"))
 
 
@@ -36,7 +36,7 @@ def _sealed(array: Floats) -> Floats:
 
 
 def frozen_ints(values: npt.ArrayLike) -> Ints:
-    """Return `values` as a C-contiguous, read-only int64 array (a copy if it was writable)."""
+    """Return `values` as a C-contiguous, read-only int64 array of any shape (a copy if it was writable)."""
     array = np.array(values, dtype=np.int64, order="C")
     array.setflags(write=False)
     return array
@@ -58,7 +58,7 @@ def canonical_angle(angle: npt.ArrayLike) -> Floats:
 
 
 def canonical_heading(heading: npt.ArrayLike) -> Floats:
-    """Canonical angles made continuous along the last axis (time or path)."""
+    """Canonical angles (..., T) [rad] made continuous along the last axis (time or path)."""
     angle = canonical_angle(heading)
     jumps = (np.abs(angle[..., 1:] - angle[..., :-1]) > np.pi).any()
     return _sealed(np.unwrap(angle, axis=-1) if jumps else angle + 0.0)  # most have none, and unwrapping costs ten times as much
@@ -69,3 +69,15 @@ def canonical_poses(poses: npt.ArrayLike, *, continuous: bool = False) -> Floats
     array = np.array(poses, dtype=np.float64, order="C")
     array[..., 2] = canonical_heading(array[..., 2]) if continuous else canonical_angle(array[..., 2])
     return frozen(array)
+
+
+def runs(flags: Bools, bridge: int = 0) -> list[tuple[int, int]]:
+    """Return begin and end (exclusive) of each run of True in `flags` (T,), joined over at most `bridge` False."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    joined: list[tuple[int, int]] = []
+    for begin, end in edges.reshape(-1, 2).tolist():
+        if joined and begin - joined[-1][1] <= bridge:
+            joined[-1] = (joined[-1][0], end)
+        else:
+            joined.append((begin, end))
+    return joined

@@ -22,8 +22,7 @@ from typing import Any, NoReturn
 
 import yaml
 
-from scenario_gen.errors import InputError
-from scenario_gen.guard import guarded
+from scenario_gen.errors import guarded, InputError
 
 MOST_YAML = 512 * 1024  # bytes; the parameters of all stages take 9 kB, the metadata of a bag of 1000 topics 500 kB
 MOST_JSON = 8 * 1024 * 1024  # bytes; the figures of one case take 9 kB

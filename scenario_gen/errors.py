@@ -12,8 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The errors that a person sees; each message names the place (file, row, topic, parameter) and what to do."""
+"""The errors of the project, what is shown of them, and how those of libraries become ours."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
 import sys
 
 LONGEST = 500  # characters of a message about an input: what is quoted from a broken file may be of any length
@@ -34,6 +37,25 @@ class InputError(ScenarioGenError):
 
     def __init__(self, message: str) -> None:
         super().__init__(presentable(message))
+
+
+class MissingExtraError(ScenarioGenError, ImportError):
+    """A library is not installed that only some uses need; the message names the extra that brings it."""
+
+
+def needs(extra: str, *modules: str) -> None:
+    """Refuse to go on where a module of an extra is not installed.
+
+    Args:
+        extra: a key of `extras_require` in setup.py.
+        modules: top-level names; they are looked for, not imported.
+
+    Raises:
+        MissingExtraError: one is missing.
+    """
+    missing = [name for name in modules if find_spec(name) is None]
+    if missing:
+        raise MissingExtraError(f"{', '.join(missing)} not installed; `pip install 'scenario_gen[{extra}]'` brings it")
 
 
 def presentable(text: str) -> str:
@@ -66,3 +88,33 @@ def tell(error: ScenarioGenError | OSError) -> int:
     own = of_system(error) if isinstance(error, OSError) else error
     print(f"error: {presentable(str(own))}", file=sys.stderr)
     return own.exit_code
+
+
+@contextmanager
+def guarded(where: str, *kinds: type[Exception], remedy: str = "") -> Iterator[None]:
+    """Turn what a library raises while it decodes into an InputError; the block holds nothing but calls into that library.
+
+    Args:
+        where: the file and the place in it; begins the message.
+        kinds: what to turn; everything by default, for a decoder that meets damaged bytes may fail in any way, and with
+            none of our own code in the block no fault of ours can hide behind it.
+        remedy: what to do; ends the message.
+
+    Raises:
+        InputError: the library failed; names `where`, what the library said, and `remedy`.
+    """
+    turned = kinds or (Exception,)
+    try:
+        yield
+    except ScenarioGenError:
+        raise
+    except turned as error:
+        raise InputError(f"{where}: {said(error)}" + (f"; {remedy}" if remedy else "")) from error
+
+
+def said(error: Exception) -> str:
+    """Return what an error says in one line, with its kind where it says little or nothing."""
+    if isinstance(error, MemoryError):
+        return "asks for more memory than there is"
+    text = " ".join(str((isinstance(error, OSError) and error.strerror) or error).split())
+    return text if len(text.split()) > 1 else f"{type(error).__name__} {text}".strip()

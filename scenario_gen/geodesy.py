@@ -23,6 +23,8 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
+from scenario_gen.errors import InputError
+from scenario_gen.types.encounter import Encounter
 
 SEMI_MAJOR, FLATTENING = 6378137.0, 1.0 / 298.257223563  # WGS84
 ECCENTRICITY2 = FLATTENING * (2.0 - FLATTENING)
@@ -70,3 +72,14 @@ def geodetic(position: Floats, origin: tuple[float, float]) -> tuple[Floats, Flo
         latitude = latitude + off[..., 1] / (meridian * _RADIANS)
         longitude = longitude + off[..., 0] / (normal0 * max(cos0, 1e-9) * _RADIANS)
     return latitude, longitude
+
+
+def latitude_longitude(encounter: Encounter) -> Floats:
+    """Return latitude and longitude (N, T, 2) [degrees] of an encounter's positions.
+
+    Raises:
+        InputError: its log came in metres, so it has no place on the globe.
+    """
+    if encounter.origin is None:
+        raise InputError(f"encounter {encounter.name!r} came in metres without an origin; it cannot be streamed as NavSatFix")
+    return np.stack(geodetic(encounter.position, encounter.origin), axis=-1)

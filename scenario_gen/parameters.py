@@ -18,6 +18,7 @@ from dataclasses import Field, field, fields, is_dataclass, replace
 import math
 from pathlib import Path
 from typing import Any, TypeVar
+import warnings
 
 from scenario_gen.documents import parse_yaml, read_yaml, shown, WHOLE
 from scenario_gen.errors import InputError
@@ -33,9 +34,21 @@ def parameter(
     low: float | None = None,
     high: float | None = None,
     choices: tuple[str, ...] = (),
+    was: str = "",
 ) -> Any:
-    """Declare one parameter of a frozen configuration dataclass; bounds are inclusive."""
-    return field(default=default, metadata={"meaning": meaning, "unit": unit, "low": low, "high": high, "choices": choices})
+    """Declare one parameter of a frozen configuration dataclass; bounds are inclusive.
+
+    Args:
+        default: its value, which also gives its type.
+        meaning: what it is, for people.
+        unit: of its values, "" for a plain number.
+        low: least value, None for no bound.
+        high: largest value, None for no bound.
+        choices: the texts allowed, none for any.
+        was: its name in the version before this one, which is still taken, with a warning.
+    """
+    meta = {"meaning": meaning, "unit": unit, "low": low, "high": high, "choices": choices, "was": was}
+    return field(default=default, metadata=meta)
 
 
 def check(config: Any) -> None:
@@ -78,6 +91,20 @@ def flatten(config: Any, prefix: str = "") -> dict[str, tuple["Field[Any]", Any]
     return flat
 
 
+def former_name(name: str, entry: "Field[Any]") -> str:
+    """Return the dotted name in the version before this one of the parameter `name`; the same name if it has not changed."""
+    return name.removesuffix(entry.name) + (entry.metadata["was"] or entry.name)
+
+
+def current_name(config: Any, name: str) -> str:
+    """Return the dotted name of the parameter that is called `name`, or was so one version ago, which is warned of."""
+    for known, (entry, _) in flatten(config).items():
+        if name != known and name == former_name(known, entry):
+            warnings.warn(f"parameter {name} is called {known} now; the old name goes with the next version", FutureWarning, 3)
+            return known
+    return name
+
+
 def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
     """Return a copy of `config` with the dotted names in `values` set.
 
@@ -88,7 +115,7 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
     nested: dict[str, dict[str, Any]] = {}
     known = {entry.name: entry for entry in fields(config)}  # type: ignore[arg-type]
     for name, value in values.items():
-        head, _, rest = name.partition(".")
+        head, _, rest = current_name(config, name).partition(".")
         if head not in known or bool(rest) != is_dataclass(getattr(config, head)):
             raise InputError(f"unknown parameter {prefix}{shown(name)}; `scenario-gen parameters` lists them")
         if rest:
@@ -110,7 +137,7 @@ def assigned(config: Config, assignment: str) -> Config:
     name, equals, text = assignment.partition("=")
     if not equals:
         raise InputError(f"--set {shown(assignment)}: write it as name=value")
-    known = flatten(config)
+    known, name = flatten(config), current_name(config, name)
     if name not in known:
         raise InputError(f"unknown parameter {shown(name)}; `scenario-gen parameters` lists them")
     is_text = isinstance(known[name][0].default, str)  # stays text: vehicle "007" is no number

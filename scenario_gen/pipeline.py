@@ -14,170 +14,99 @@
 
 """The whole method on one screen: an encounter and a road in, valid new scenarios and their evaluation out."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
-import numpy as np
-
-from scenario_gen.encounter import Encounter
+from scenario_gen.config import PipelineConfig
 from scenario_gen.errors import RefusedError
-from scenario_gen.evaluation import (
-    Case,
-    CheckCounts,
-    evaluate,
-    EvaluationConfig,
-    MEASURED,
-    ORACLE,
-    replay,
-    UNIFORM,
-    uniform_changepoints,
-    WITH,
-    WITHOUT,
-)
-from scenario_gen.fitting import Fit, FittingConfig
-from scenario_gen.logs import LogConfig
-from scenario_gen.planning import PlanningConfig, Route
-from scenario_gen.requests import Chain, refuse_too_large, Request, run_request
-from scenario_gen.roads import build_road, Road, RoadConfig
-from scenario_gen.sampling import SamplingConfig
-from scenario_gen.scenario import ScenarioSet
-from scenario_gen.segmentation import segment, Segmentation, SegmentationConfig
-from scenario_gen.storage import BagConfig
-from scenario_gen.validity import Limits
+from scenario_gen.evaluation import evaluate, MEASURED, replay, uniform_changepoints, without_changepoints
+from scenario_gen.fitting import fit_template
+from scenario_gen.nearest import attempt, nearest_if_impossible
+from scenario_gen.roads import build_road
+from scenario_gen.routing import plan_routes
+from scenario_gen.sampling import Progress, sample_scenarios
+from scenario_gen.segmentation import segment
+from scenario_gen.template.interaction import waits_to_keep
+from scenario_gen.template.size import refuse_too_large
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.generation import GenerationResult, UNIFORM, WITHOUT
+from scenario_gen.types.request import Request
+from scenario_gen.types.road import Road
+from scenario_gen.validity import Checker
 
-Progress = Callable[[int, int, int], None]
-
-
-@dataclass(frozen=True)
-class PipelineConfig:
-    """The parameters of every stage."""
-
-    log: LogConfig = field(default_factory=LogConfig)
-    segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
-    road: RoadConfig = field(default_factory=RoadConfig)
-    fitting: FittingConfig = field(default_factory=FittingConfig)
-    planning: PlanningConfig = field(default_factory=PlanningConfig)
-    sampling: SamplingConfig = field(default_factory=SamplingConfig)
-    limits: Limits = field(default_factory=Limits)
-    evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
-    bag: BagConfig = field(default_factory=BagConfig)
-
-
-@dataclass(frozen=True, eq=False)
-class Arm:
-    """What the chain made of one set of changepoints."""
-
-    segmentation: Segmentation
-    fit: Fit
-    routes: tuple[Route, ...]
-    scenarios: ScenarioSet
+__all__ = ["PipelineConfig", "generate", "with_evaluation", "with_references"]
 
 
 def generate(
     encounter: Encounter,
-    road_name: str,
-    config: PipelineConfig,
+    road: Road | str,
+    config: PipelineConfig = PipelineConfig(),
     *,
-    count: int,
-    seed: int,
-    request: Request = Request(),  # noqa: B008 - frozen
+    count: int = 50,
+    seed: int = 0,
+    request: Request = Request(),
     progress: Progress | None = None,
-) -> Case:
-    """Segment, fit, plan, sample, check and evaluate.
+) -> GenerationResult:
+    """Segment, fit, plan, sample (every candidate is checked) and evaluate.
+
+    Args:
+        encounter: the template.
+        road: the target, of `build_road`, or the name or path that this takes.
+        config: the parameters of every stage.
+        count: valid scenarios wanted.
+        seed: of all randomness.
+        request: a vehicle to be left out for a planner under test, and start and end states.
+        progress: called with scenarios so far, scenarios wanted, candidates so far.
 
     Raises:
-        InputError: the road cannot be read, or a vehicle of the request does not exist.
+        InputError: a vehicle of the request does not exist.
         RefusedError: the encounter is too large, the template does not fit the road, there is no way, or what the request
             asks cannot be had; the message says why, and what nearby can.
     """
     refuse_too_large(encounter)
-    request.ego_of(encounter)
-    road = build_road(road_name, encounter, config.road)
+    ego = request.ego_of(encounter)
+    if isinstance(road, str):
+        road = build_road(road, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)
-    arm = run_arm(encounter, segmentation, road, config, count=count, seed=seed, request=request, progress=progress)
-    return with_ablation(encounter, road, arm, config, count=count, seed=seed, request=request)
+    with nearest_if_impossible(encounter, segmentation, road, config, request, count=count, seed=seed):
+        fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
+        routes = plan_routes(road, fit, config.planning, seed)
+        waits = waits_to_keep(encounter, segmentation)
+        check = Checker.of_template(encounter, road, fit.asked, waits, config.limits, ego).check
+        generated = sample_scenarios(
+            encounter, segmentation, road, routes, fit.asked, check, config.sampling,
+            count=count, seed=seed, waits=waits, request=request, progress=progress,
+        )  # fmt: skip
+    made = GenerationResult(encounter, segmentation, road, fit, routes, generated, seed)
+    return with_evaluation(with_references(made, config, request), config)
 
 
-def run_arm(
-    encounter: Encounter,
-    segmentation: Segmentation,
-    road: Road,
+def with_references(
+    made: GenerationResult,
     config: PipelineConfig,
-    *,
-    count: int,
-    seed: int,
-    request: Request = Request(),  # noqa: B008 - frozen
-    progress: Progress | None = None,
-    reference: bool = False,
-) -> Arm:
-    """Fit the changepoints to the road, plan between them, sample and check.
+    request: Request = Request(),
+) -> GenerationResult:
+    """Add what a result is measured against: sets without changepoints and, if `evaluation.uniform`, with uniform ones.
 
-    A `reference`, which the segmenter's changepoints are measured against, knows of the template what its own changepoints
-    tell: a wait whose ends were known besides would be two more of them.
+    A reference knows of the template what its own changepoints tell, so no wait is asked of it: a wait whose ends were known
+    besides would be two more of them. Of a reference no more scenarios are made than are measured.
     """
-    stages = (config.fitting, config.planning, config.sampling, config.limits)
-    chain = Chain(encounter, segmentation, road, seed, *stages, holds_waits=not reference)
-    outcome = run_request(chain, request, count=count, progress=progress, suggest=not reference)
-    return Arm(segmentation, outcome.fit, outcome.routes, outcome.scenarios)
-
-
-def without_changepoints(segmentation: Segmentation) -> Segmentation:
-    """Return the ablation of paper V-B: the same encounter as one primitive."""
-    return replace(
-        segmentation,
-        labels=np.zeros_like(segmentation.labels),
-        changepoints=np.zeros(0, dtype=np.int64),
-        descriptions=("the whole encounter as one primitive",),
-    )
-
-
-def with_ablation(
-    encounter: Encounter,
-    road: Road,
-    arm: Arm,
-    config: PipelineConfig,
-    *,
-    count: int,
-    seed: int,
-    request: Request = Request(),  # noqa: B008 - frozen
-) -> Case:
-    """Run the chain again without changepoints and, unless `evaluation.uniform` is off, with uniform ones; evaluate all.
-
-    Beside them stands the fitted template (the oracle row). Of these references no more are made than are measured.
-    """
-    others = {WITHOUT: without_changepoints(arm.segmentation)}
-    if config.evaluation.uniform and arm.segmentation.changepoints.size:
-        others[UNIFORM] = uniform_changepoints(arm.segmentation)
-    arms, refused = {WITH: arm}, {}
+    road, fit = made.placed()
+    others = {WITHOUT: without_changepoints(made.segmentation)}
+    if config.evaluation.uniform and made.segmentation.changepoints.size:
+        others[UNIFORM] = uniform_changepoints(made.segmentation)
+    references, refusals = {}, {}
+    few = min(made.generated.requested, MEASURED)
     for name, segmentation in others.items():
         try:
-            few = min(count, MEASURED)
-            arms[name] = run_arm(encounter, segmentation, road, config, count=few, seed=seed, request=request, reference=True)
+            references[name] = attempt(
+                made.encounter, segmentation, road, config, request, count=few, seed=made.seed, waits=()
+            ).generated
         except RefusedError as error:
-            refused[name] = str(error)
-    made = {name: one.scenarios for name, one in arms.items()}
-    oracle = replay(encounter, arm.fit, road.frame_id)
-    evaluation = evaluate(
-        encounter,
-        arm.segmentation,
-        {name: one.scenarios for name, one in made.items()} | {ORACLE: (oracle,)},
-        checks={name: CheckCounts.of_set(one) for name, one in made.items()},
-        oracle=ORACLE,
-        road=road.name,
-        config=config.evaluation,
-        seed=seed,
-    )
-    return Case(
-        encounter=encounter,
-        segmentation=arm.segmentation,
-        road=road,
-        fit=arm.fit,
-        routes=arm.routes,
-        with_changepoints=arm.scenarios,
-        without_changepoints=made.get(WITHOUT),
-        evaluation=evaluation,
-        oracle=oracle,
-        without_refused=refused.get(WITHOUT, ""),
-        uniform=made.get(UNIFORM),
-        uniform_refused=refused.get(UNIFORM, ""),
-    )
+            refusals[name] = str(error)
+    oracle = replay(made.encounter, fit, road.frame_id)
+    return replace(made, references=references, refusals=refusals, oracle=oracle)
+
+
+def with_evaluation(made: GenerationResult, config: PipelineConfig) -> GenerationResult:
+    """Add the evaluation of all sets of a result, and of the fitted template replayed (the oracle row)."""
+    return replace(made, evaluation=evaluate(made, config.evaluation))

@@ -15,26 +15,35 @@
 """What a request leaves behind: a bag, a report and the figures."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 import json
 from pathlib import Path
 
-from scenario_gen.bags import add_runs, BagWriter, Run
-from scenario_gen.bags.provenance import parameter_texts, sha256_of, versions
-from scenario_gen.bags.told import told_provenance
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import Case, read_evaluations
-from scenario_gen.evaluation.report import ReportInput, write_report
+from scenario_gen.evaluation import read_evaluations
 from scenario_gen.folders import Kind, write_text
 from scenario_gen.parameters import flatten
 from scenario_gen.pipeline import PipelineConfig
-from scenario_gen.requests import Request
-from scenario_gen.storage import BagConfig
+from scenario_gen.recordings.provenance import parameter_texts, sha256_of, versions
+from scenario_gen.recordings.read import INFO, read_recording
+from scenario_gen.recordings.write import add_results
+from scenario_gen.report.page import ReportInput, write_report
+from scenario_gen.storage.config import BagConfig
+from scenario_gen.storage.writer import BagWriter
+from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types.request import Request
 
 BAG, REPORT, FIGURES, TABLE = "bag", "report.html", "evaluation.json", "evaluation.md"
 
 
 def write_results(
-    folder: Path, cases: Sequence[Case], *, seed: int, title: str, quality: Sequence[str], provenance: Mapping[str, str]
+    folder: Path,
+    cases: Sequence[GenerationResult],
+    *,
+    seed: int,
+    title: str,
+    quality: Sequence[str],
+    provenance: Mapping[str, str],
 ) -> None:
     """Write bag, report and figures of all cases to `folder`.
 
@@ -52,13 +61,13 @@ def write_results(
     if not (folder / BAG).exists():
         names = namespaces(len(cases))
         with BagWriter(folder / BAG) as bag:
-            add_runs(bag, [as_run(case, seed, name, provenance) for case, name in zip(cases, names, strict=True)])
+            add_results(bag, {name: replace(case, provenance=provenance) for name, case in zip(names, cases, strict=True)})
     write_report(folder / REPORT, ReportInput(cases, title, quality, provenance))
     figures = {"provenance": dict(provenance), "cases": [json.loads(case.evaluation.to_json()) for case in cases]}
     write_text(folder / FIGURES, json.dumps(figures, indent=2) + "\n")
 
 
-def write_evaluation(folder: Path, cases: Sequence[Case], bag: Path, config: BagConfig) -> None:
+def write_evaluation(folder: Path, cases: Sequence[GenerationResult], bag: Path, config: BagConfig) -> None:
     """Write report, figures and table of what a bag was found to hold to `folder`, which `replaced_folder` gives.
 
     Raises:
@@ -67,11 +76,11 @@ def write_evaluation(folder: Path, cases: Sequence[Case], bag: Path, config: Bag
     found = [case.evaluation for case in cases]
     write_text(folder / TABLE, as_table(cases) + "\n")
     write_text(folder / FIGURES, json.dumps({"cases": [json.loads(one.to_json()) for one in found]}, indent=2) + "\n")
-    facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | told_provenance(bag, config)
+    facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | read_recording(bag, config, (INFO,)).provenance
     write_report(folder / REPORT, ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts))
 
 
-def as_table(cases: Sequence[Case]) -> str:
+def as_table(cases: Sequence[GenerationResult]) -> str:
     """Return the figures of all cases as Markdown."""
     return "\n\n".join(case.evaluation.to_markdown() for case in cases)
 
@@ -103,27 +112,6 @@ GENERATED = Kind("generated", _is_generated)
 EVALUATED = Kind("evaluated", _is_evaluated)
 
 
-def as_run(case: Case, seed: int, namespace: str = "", provenance: Mapping[str, str] | None = None) -> Run:
-    """Return the case as the bag writer takes it.
-
-    Raises:
-        InputError: its road or its fit is not known.
-    """
-    if case.road is None or case.fit is None:
-        raise InputError(f"{case.title}: without a road and a fit it cannot be written as a run")
-    return Run(
-        encounter=case.encounter,
-        road=case.road,
-        segmentation=case.segmentation,
-        fit=case.fit,
-        routes=tuple(case.routes),
-        result=case.with_changepoints,
-        seed=seed,
-        namespace=namespace,
-        provenance=provenance or {},
-    )
-
-
 def namespaces(count: int) -> list[str]:
     """Return one ROS namespace per case; a single case needs none."""
     return [""] if count == 1 else [f"/case_{k + 1}" for k in range(count)]
@@ -135,7 +123,7 @@ def provenance_of(
     count: int,
     roads: Sequence[str],
     config: PipelineConfig,
-    request: Request = Request(),  # noqa: B008 - frozen
+    request: Request = Request(),
 ) -> dict[str, str]:
     """Return everything needed to do it again: log hashes, seed, versions, the request and all parameters."""
     facts = {f"log {path.name}": f"sha256 {sha256_of(path)}" for path in logs}

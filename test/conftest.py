@@ -12,15 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Shared fixtures: where the recorded data is, and a rule that CI may not skip, with one exception."""
+"""Shared fixtures: where the recorded data is; a rule that CI may not skip, with one exception; the short form of the tests."""
 
 import os
 from pathlib import Path
 
+from lengths import DATA, LONG
 import pytest
 from skips import NO_LAUNCH
-
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 
 
 @pytest.fixture(scope="session")
@@ -38,6 +37,18 @@ def crashes() -> Path:
     if not folder.is_dir():
         pytest.skip(f"files that broke a reader not found at {folder}; set SCENARIO_GEN_DATA to the folder beside it")
     return folder
+
+
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """In the short form leave out what is marked `long`; let one worker run a file, unless it is marked `spread`."""
+    left_out = [] if LONG else [item for item in items if item.get_closest_marker("long")]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if not item.get_closest_marker("long")]
+    for item in items:
+        if not item.get_closest_marker("spread"):
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 
 def _not_in_ci(report: pytest.TestReport | pytest.CollectReport) -> None:

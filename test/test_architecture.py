@@ -15,9 +15,11 @@
 """The shape of the house: stages import only what stands before them, rclpy only in the nodes, nothing local leaks out."""
 
 import ast
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 import re
 import subprocess
+import sys
 
 import pytest
 
@@ -26,23 +28,28 @@ PACKAGE = ROOT / "scenario_gen"
 
 # The data flow, first to last; modules of one tuple may import each other.
 ORDER = (
-    ("errors", "guard", "documents", "arrays", "cancelling", "interrupts", "folders", "kernels", "compiling", "parameters"),
+    ("errors", "documents", "arrays", "cancelling", "interrupts", "folders", "kernels", "compiling", "parameters", "terminal"),
     ("exact",),
-    ("geodesy", "storage"),
-    ("encounter", "scenario", "interaction", "size"),
+    ("types",),
+    ("geodesy", "curve", "storage"),
+    ("recordings",),
     ("logs",),
+    ("template",),
     ("segmentation",),
     ("roads",),
     ("fitting",),
-    ("planning",),
+    ("routing",),
     ("sampling",),
     ("validity",),
-    ("requests",),
     ("evaluation",),
+    ("config",),
+    ("nearest",),
     ("pipeline",),
-    ("bags",),
+    ("report",),
+    ("review",),
     ("results", "reproduce"),
-    ("nodes", "terminal", "cli", "__main__"),
+    ("batch",),
+    ("nodes", "demo", "cli", "__main__"),
 )
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])
@@ -76,10 +83,74 @@ def test_a_stage_imports_only_what_stands_before_it(path):
             assert RANK[parts[1]] <= RANK[stage(path)], f"{path.name} imports {name}"
 
 
+FOUNDATION = ("types", "errors", "arrays", "exact", "documents")  # of scenario_gen, for the conventions
+
+
+@pytest.mark.parametrize("path", PYTHON_FILES, ids=str)
+def test_the_conventions_stand_on_the_types_and_below_recordings_and_nodes(path):
+    """Messages are made and read by recordings and nodes alone, and know of nothing but the types."""
+    names = [name.split(".") for name in imported(path)]
+    if PACKAGE not in path.parents:
+        assert {parts[1] for parts in names if parts[0] == "scenario_gen" and len(parts) > 1} <= set(FOUNDATION)
+    elif stage(path) not in ("recordings", "nodes"):
+        assert "msg_conventions" not in {parts[0] for parts in names}
+
+
+def module(path: Path) -> str:
+    """Return the dotted name of a file; of `__init__.py`, its package's."""
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def modules_imported(path: Path, known: set[str]) -> set[str]:
+    """Return the modules among the `known` that a file imports: of `from package import module`, the module."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+            found |= {name if name in known else node.module for name in names}
+    return found & known
+
+
+def folder(name: str) -> str:
+    """Return what a module belongs to: a folder or a single file of scenario_gen, or the conventions."""
+    return ".".join(name.split(".")[: 1 + name.startswith("scenario_gen")])
+
+
+def circle(graph: dict[str, set[str]]) -> list[str]:
+    """Return the names of a circle in {name: what it imports}, none if there is none."""
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_no_modules_and_no_folders_import_each_other_in_a_circle():
+    """Imports inside of functions and those for type checkers count; the public names are looked up lazily, and do not."""
+    files = {module(path): path for path in PYTHON_FILES if path != PACKAGE / "__init__.py"}
+    graph = {name: modules_imported(path, set(files)) - {name} for name, path in files.items()}
+    folders: dict[str, set[str]] = {}
+    for name, names in graph.items():
+        folders.setdefault(folder(name), set()).update({folder(one) for one in names} - {folder(name)})
+    assert len(graph) > 200 and any(graph.values())
+    assert circle(graph) == [] and circle(folders) == []
+    assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}})
+
+
 @pytest.mark.parametrize("path", PYTHON_FILES, ids=str)
 def test_rclpy_is_imported_only_in_the_nodes(path):
     if PACKAGE / "nodes" not in path.parents:
         assert not {name for name in imported(path) if name.split(".")[0] == "rclpy"}
+
+
+def test_the_command_line_loads_no_library_before_a_command_needs_it():
+    """Else `scenario-gen --help` takes seconds."""
+    heavy = {"numpy", "scipy", "numba", "pandas", "shapely", "plotly", "jinja2", "rosbags", "yaml"}
+    program = "import sys, scenario_gen.__main__, scenario_gen.cli; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+    assert not heavy & set(loaded)
 
 
 def test_no_file_needs_a_map():

@@ -25,9 +25,9 @@ from PIL import Image
 import pytest
 import yaml
 
-from scenario_gen.bags import read_messages
 from scenario_gen.cli import main
 from scenario_gen.logs.synthetic import bundled
+from scenario_gen.storage.messages import read_messages
 
 
 @pytest.fixture

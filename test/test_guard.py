@@ -18,8 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from scenario_gen.errors import InputError, LONGEST, RefusedError
-from scenario_gen.guard import guarded
+from scenario_gen.errors import guarded, InputError, LONGEST, RefusedError
 
 
 @given(st.text(), st.integers(0, 3000))

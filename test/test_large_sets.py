@@ -19,26 +19,30 @@ import json
 import sys
 import tracemalloc
 
+from given import answer, Given
 from hypothesis import given
 from hypothesis import strategies as st
+from lengths import LONG
 import numpy as np
 import pytest
 from rich.console import Console
 
 from scenario_gen import pipeline
-from scenario_gen.bags import Run, write_run
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import EvaluationConfig, MEASURED, UNIFORM, WITH, WITHOUT
+from scenario_gen.evaluation import EvaluationConfig, MEASURED
 from scenario_gen.evaluation.evaluate import measured
-from scenario_gen.evaluation.report import render, ReportInput
-from scenario_gen.evaluation.summary import summary
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.requests import Chain, Request, run_request
+from scenario_gen.recordings.write import write_recording
+from scenario_gen.report.page import render, ReportInput
+from scenario_gen.report.summary import summary
 from scenario_gen.roads import build_road
-from scenario_gen.sampling import sample
+from scenario_gen.sampling import regenerate, sample
 from scenario_gen.sampling.sample import BLOCK, index_of, LEVEL_SIZE, LEVELS, place_of
 from scenario_gen.segmentation import segment
+from scenario_gen.template.interaction import waits_to_keep
+from scenario_gen.types.generation import UNIFORM, WITH, WITHOUT
+from scenario_gen.types.request import Request
 
 FIELDS = ("time", "position", "heading", "speed", "acceleration")
 
@@ -46,11 +50,11 @@ FIELDS = ("time", "position", "heading", "speed", "acceleration")
 @pytest.fixture(scope="module")
 def chain():
     encounter = read_log([bundled("b")]).encounters[0]
-    return Chain(encounter, segment(encounter, seed=7), build_road("t_intersection", encounter), 7)
+    return Given(encounter, segment(encounter, seed=7), build_road("t_intersection", encounter), 7)
 
 
 def made(chain, count):
-    return run_request(chain, Request(), count=count).scenarios
+    return answer(chain, Request(), count=count).generated
 
 
 def same(one, other):
@@ -96,9 +100,9 @@ def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
     assert max(s.index for s in beyond.scenarios) >= sample.LEVEL_SLOTS * 2 * BLOCK
     assert all(a.position.tobytes() == b.position.tobytes() for a, b in zip(plain.scenarios, beyond.scenarios, strict=True))
     last = beyond.scenarios[-1]
-    _, routes = chain.place(Request())
-    fit, _ = chain.place(Request())
-    assert same(chain.scenario(Request(), routes, fit.asked, last.index), last)
+    placed, waits = answer(chain, Request(), count=1), waits_to_keep(chain.encounter, chain.segmentation)
+    told = (chain.encounter, chain.segmentation, chain.road, placed.routes, placed.fit.asked)
+    assert same(regenerate(*told, seed=chain.seed, index=last.index, waits=waits), last)
 
 
 @given(st.integers(MEASURED + 1, 10**12))
@@ -113,25 +117,24 @@ def test_of_a_large_set_evenly_spaced_runs_are_measured(size):
 
 
 def test_memory_does_not_grow_with_the_number_of_scenarios(chain, monkeypatch, tmp_path):
-    """Sampled, checked and written: 1,200 scenarios more, of some 15 kB each, raise the peak by less than a tenth of that."""
+    """Sampled, checked and written: scenarios of some 15 kB each raise the peak by less than a tenth of that (short: a third)."""
     monkeypatch.setattr(sample, "KEPT", 100)
-    segmentation, road = chain.segmentation, chain.road
 
     def peak(count):
         tracemalloc.reset_peak()
-        outcome = run_request(chain, Request(), count=count)
-        assert len(outcome.scenarios.scenarios) == count
-        run = Run(chain.encounter, road, segmentation, outcome.fit, outcome.routes, outcome.scenarios, seed=7)
-        write_run(tmp_path / str(count), run)
+        outcome = answer(chain, Request(), count=count)
+        assert len(outcome.generated.scenarios) == count
+        write_recording(tmp_path / str(count), outcome)
         return tracemalloc.get_traced_memory()[1]
 
-    peak(200)  # what is loaded and compiled once
+    small, large = (300, 1500) if LONG else (120, 420)
+    peak(110)  # what is loaded and compiled once
     tracemalloc.start()
     try:
-        few, many = peak(300), peak(1500)
+        few, many = peak(small), peak(large)
     finally:
         tracemalloc.stop()
-    assert many - few < 1_500_000, f"{few} bytes for 300 scenarios, {many} for 1500"
+    assert many - few < 1_500_000, f"{few} bytes for {small} scenarios, {many} for {large}"
 
 
 def test_that_only_a_part_was_measured_is_said(chain, monkeypatch):
@@ -150,4 +153,4 @@ def test_that_only_a_part_was_measured_is_said(chain, monkeypatch):
     console = Console(width=200, record=True, file=StringIO())
     console.print(summary([case]))
     assert "24/24 valid" in (text := console.export_text()) and "(of 10, evenly spaced)" in text
-    assert len(case.without_changepoints.scenarios) == 10
+    assert len(case.references[WITHOUT].scenarios) == 10

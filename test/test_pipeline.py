@@ -21,11 +21,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenario_gen.evaluation import EvaluationConfig, ORACLE, UNIFORM, WITH, WITHOUT
-from scenario_gen.evaluation.report import render, ReportInput
+from scenario_gen.evaluation import EvaluationConfig
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.report.page import render, ReportInput
+from scenario_gen.types.generation import ORACLE, UNIFORM, WITH, WITHOUT
 
 QUICK = EvaluationConfig(resamples=50)
 
@@ -42,10 +43,10 @@ def case(encounter):
 
 def test_every_arm_has_its_row_and_its_account(case):
     assert [row.name for row in case.evaluation.rows] == ["template", WITH, WITHOUT, UNIFORM, ORACLE]
-    assert len(case.uniform.scenarios) == 4 and case.uniform_refused == ""
+    assert len(case.references[UNIFORM].scenarios) == 4 and not case.refusals
     accepted = case.evaluation.value(UNIFORM, "acceptance")
-    assert accepted == pytest.approx(1.0 - sum(case.uniform.refused.values()) / case.uniform.candidates)
-    same = np.array_equal(case.uniform.scenarios[0].speed, case.with_changepoints.scenarios[0].speed)
+    assert accepted == pytest.approx(1.0 - sum(case.references[UNIFORM].refused.values()) / case.references[UNIFORM].candidates)
+    same = np.array_equal(case.references[UNIFORM].scenarios[0].speed, case.generated.scenarios[0].speed)
     assert not same, "other changepoints, other scenarios"
 
 
@@ -59,7 +60,7 @@ def test_the_report_shows_it(case):
 def test_it_can_be_left_out_and_changes_nothing_else(encounter, case):
     config = PipelineConfig(evaluation=replace(QUICK, uniform=False))
     plain = generate(encounter, "t_intersection", config, count=4, seed=3)
-    assert plain.uniform is None and plain.evaluation.row(UNIFORM) is None
+    assert UNIFORM not in plain.references and plain.evaluation.row(UNIFORM) is None
     rows = [{row["name"]: row for row in json.loads(one.evaluation.to_json())["rows"]} for one in (plain, case)]
     assert set(rows[1]) - set(rows[0]) == {UNIFORM}
     assert all(rows[0][name] == rows[1][name] for name in rows[0])

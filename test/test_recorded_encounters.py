@@ -12,48 +12,48 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The main job on every recorded encounter: valid new scenarios on at least two roads, re-checked by independent means."""
+"""The main job on recorded encounters: valid new scenarios on at least two roads, re-checked by independent means.
 
-import os
-from pathlib import Path
+The short form takes three encounters and few scenarios; the long one, `make soak PART=tests`, all of both.
+"""
 
+from lengths import ENCOUNTERS, LONG, SOME_ENCOUNTERS
 import numpy as np
 from oracle import oracle_violations
 import pytest
 
 from scenario_gen.errors import RefusedError
-from scenario_gen.evaluation import Case, WITH, WITHOUT
-from scenario_gen.interaction import find_conflicts, find_waits
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.template.interaction import find_conflicts, find_waits
+from scenario_gen.types.generation import GenerationResult, WITH, WITHOUT
 
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
-ENCOUNTERS = sorted((DATA / "trajectories").glob("*/encounter_*.csv"))
 ROADS = ("corridor", "four_way", "t_intersection", "straight")
 OWN_MAPS = ("USA_Lanker-2_13_T-1", "USA_Peach-4_2_T-1")
-COUNT = 50
+COUNT = 50 if LONG else 10
 CONFIG = PipelineConfig()
+pytestmark = pytest.mark.spread
 
 
 def test_the_recorded_encounters_are_there(data):
     assert len(ENCOUNTERS) >= 9, data
 
 
-def recheck(case: Case) -> list[str]:
+def recheck(case: GenerationResult) -> list[str]:
     """Return what the independent oracle finds wrong with the published scenarios."""
     encounter = case.encounter
     conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
     waits = find_waits(encounter)
     return [
         f"scenario {scenario.index}: {violation}"
-        for scenario in case.with_changepoints.scenarios
+        for scenario in case.generated.scenarios
         for violation in oracle_violations(scenario, case.road, case.fit.asked, conflicts, waits, CONFIG.limits, dt=0.05)
     ]
 
 
-def assert_sound(case: Case) -> None:
+def assert_sound(case: GenerationResult) -> None:
     """The claims that hold for every generated set."""
-    made = case.with_changepoints
+    made = case.generated
     assert len(made.scenarios) == COUNT, made.refused
     assert made.candidates == COUNT + sum(made.refused.values())
     assert recheck(case) == []
@@ -65,7 +65,7 @@ def assert_sound(case: Case) -> None:
 
 
 @pytest.mark.data()
-@pytest.mark.parametrize("path", ENCOUNTERS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", SOME_ENCOUNTERS, ids=lambda path: path.stem)
 def test_generates_valid_scenarios_on_at_least_two_roads(path, data):
     (encounter,) = read_log(path).encounters
     done, refusals = [], []
@@ -83,7 +83,7 @@ def test_generates_valid_scenarios_on_at_least_two_roads(path, data):
 
 
 @pytest.mark.data()
-@pytest.mark.parametrize("path", [p for p in ENCOUNTERS if p.parent.name.startswith("ngsim")], ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [p for p in SOME_ENCOUNTERS if p.parent.name.startswith("ngsim")], ids=lambda path: path.stem)
 def test_ngsim_encounters_run_on_their_own_recorded_map(path, data):
     (encounter,) = read_log(path).encounters
     name = next(name for name in OWN_MAPS if name.split("-")[0].removeprefix("USA_") in path.stem)
@@ -96,8 +96,6 @@ def test_same_seed_same_scenarios_and_another_seed_others(data):
     path = next(path for path in ENCOUNTERS if "encounter_b" in path.name)
     (encounter,) = read_log(path).encounters
     first, again, other = (generate(encounter, "corridor", CONFIG, count=3, seed=seed) for seed in (7, 7, 8))
-    for a, b, c in zip(
-        first.with_changepoints.scenarios, again.with_changepoints.scenarios, other.with_changepoints.scenarios, strict=True
-    ):
+    for a, b, c in zip(first.generated.scenarios, again.generated.scenarios, other.generated.scenarios, strict=True):
         assert a.position.tobytes() == b.position.tobytes() and a.speed.tobytes() == b.speed.tobytes()
         assert a.position.shape != c.position.shape or not np.array_equal(a.position, c.position)

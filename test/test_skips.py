@@ -30,7 +30,7 @@ CASES = {
 
 @pytest.mark.parametrize(("ci", "said"), [(True, "1 failed, 1 skipped, 1 error"), (False, "3 skipped")])
 def test_only_what_needs_launch_may_be_skipped_in_ci(tmp_path, ci, said):
-    own = {name: Path(__file__).with_name(name).read_text() for name in ("conftest.py", "skips.py")}
+    own = {name: Path(__file__).with_name(name).read_text() for name in ("conftest.py", "lengths.py", "skips.py")}
     for name, text in (own | CASES).items():
         (tmp_path / name).write_text(text)
     environment = {name: value for name, value in os.environ.items() if name not in ("CI", "PYTEST_ADDOPTS")}

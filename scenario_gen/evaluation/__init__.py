@@ -12,38 +12,29 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""DTW features (paper V-B), realism and criticality. `report` and `summary`, which are slow to import, stand apart."""
+"""DTW features (paper V-B), realism and criticality."""
 
-from scenario_gen.evaluation.case import Case, ORACLE, UNIFORM, WITH, WITHOUT
 from scenario_gen.evaluation.compare import compare, comparison_table, Difference, read_evaluations
 from scenario_gen.evaluation.dtw import Alignment, dtw, dtw_distance, feature_matrix
-from scenario_gen.evaluation.evaluate import evaluate, EvaluationConfig, MEASURED
+from scenario_gen.evaluation.evaluate import evaluate, evaluate_scenarios, EvaluationConfig, MEASURED
 from scenario_gen.evaluation.oracle import replay
-from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints
-from scenario_gen.evaluation.result import CheckCounts, Evaluation, Metric, Row
+from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints, without_changepoints
 
 __all__ = [
     "MEASURED",
-    "ORACLE",
-    "UNIFORM",
-    "WITH",
-    "WITHOUT",
     "Alignment",
-    "Case",
-    "CheckCounts",
     "Difference",
-    "Evaluation",
     "EvaluationConfig",
-    "Metric",
-    "Row",
     "compare",
     "comparison_table",
     "dtw",
     "dtw_distance",
     "evaluate",
+    "evaluate_scenarios",
     "feature_matrix",
     "linear_changepoints",
     "read_evaluations",
     "replay",
     "uniform_changepoints",
+    "without_changepoints",
 ]

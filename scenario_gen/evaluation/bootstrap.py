@@ -25,17 +25,9 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
+from scenario_gen.types.evaluation import Interval
 
 Statistic = Callable[[Floats], Floats]
-
-
-@dataclass(frozen=True)
-class Interval:
-    """An estimate and its confidence interval; NaN bounds mean that there is none (a single sample)."""
-
-    value: float
-    low: float = float("nan")
-    high: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)

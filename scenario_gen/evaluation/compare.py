@@ -21,9 +21,8 @@ from pathlib import Path
 
 from scenario_gen.documents import read_json
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation.bootstrap import Interval
-from scenario_gen.evaluation.case import WITH
-from scenario_gen.evaluation.result import as_markdown, Evaluation, formatted, Metric, SCHEMA
+from scenario_gen.types.evaluation import as_markdown, Evaluation, formatted, Interval, Metric, SCHEMA
+from scenario_gen.types.generation import WITH
 
 FILE_SCHEMA = {  # evaluation.json of a run, or one evaluation alone
     "type": "object",

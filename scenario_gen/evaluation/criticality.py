@@ -21,7 +21,7 @@ import numpy as np
 
 from scenario_gen.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.evaluation.motion import Motion
-from scenario_gen.interaction import find_conflicts
+from scenario_gen.template.interaction import find_conflicts
 
 
 @dataclass(frozen=True)

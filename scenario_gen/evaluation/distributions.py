@@ -56,7 +56,7 @@ QUANTITIES = (
 
 
 def values_of(motion: Motion) -> dict[str, Floats]:
-    """Return all values of every quantity in one motion, flat.
+    """Return {quantity id: all its values (n,) in one motion}, in the units of QUANTITIES (m, s, rad).
 
     Acceleration, jerk and yaw rate are differentiated from speed and heading, for recorded and generated motion alike; the
     gap is the distance between two footprints. A motion shorter than the smoothing has no jerk.
@@ -126,6 +126,12 @@ def wasserstein(a: Floats, b: Floats) -> float:
 
 def compare(quantity: Quantity, template: Floats, samples: Sequence[Floats], points: int = 513) -> Comparison:
     """Compare the values of one quantity; bins are `quantity.bin_width` wide and aligned at zero.
+
+    Args:
+        quantity: what the values are, and in which unit.
+        template: (n,) its values in the template.
+        samples: its values in each sample, (n,) each, of any number.
+        points: numbers of values at which the cumulative distributions are given, at most.
 
     Raises:
         InputError: the values lie so far apart that there would be too many bins.

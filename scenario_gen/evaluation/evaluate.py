@@ -21,22 +21,23 @@ from itertools import chain
 import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import likeness, variety
-from scenario_gen.evaluation.bootstrap import Bootstrap, Interval, wilson
+from scenario_gen.evaluation import diversity, similarity
+from scenario_gen.evaluation.bootstrap import Bootstrap, wilson
 from scenario_gen.evaluation.criticality import Criticality, criticality
 from scenario_gen.evaluation.distributions import compare, QUANTITIES, values_of
 from scenario_gen.evaluation.metrics import LIMIT_CAUSES, METRICS
 from scenario_gen.evaluation.motion import at_count, at_period, Motion, of_vehicles, stacked
-from scenario_gen.evaluation.result import CheckCounts, Evaluation, Row, TEMPLATE
 from scenario_gen.parameters import check, parameter
-from scenario_gen.scenario import Cause, Scenario
-from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.evaluation import CheckCounts, Evaluation, Interval, Row, TEMPLATE
+from scenario_gen.types.generation import GenerationResult, ORACLE
+from scenario_gen.types.scenario import Cause, Scenario, ScenarioSet
 
 MEASURED = 1000
 """Scenarios of a set that are measured; of a larger one this many, in RUNS evenly spaced runs of consecutive ones."""
 RUNS = 20
+Scenarios = Sequence[Scenario] | ScenarioSet
 
 
 @dataclass(frozen=True)
@@ -70,25 +71,47 @@ class _Reference:
     seed: int
 
 
-def evaluate(
+def evaluate(made: GenerationResult, config: EvaluationConfig = EvaluationConfig()) -> Evaluation:
+    """Measure what was generated, beside its references and the fitted template replayed (the oracle row).
+
+    Args:
+        made: as `generate` returns it.
+        config: how to measure.
+
+    Returns:
+        One row for the recorded template, one for `generated` and for each reference, and the oracle's if there is one.
+
+    Raises:
+        InputError: a scenario has a vehicle that the encounter has not.
+    """
+    sets: dict[str, Scenarios] = {made.row: made.generated, **made.references}
+    if made.oracle is not None:
+        sets[ORACLE] = (made.oracle,)
+    road = made.road.name if made.road else ""
+    points = len(made.segmentation.changepoints)
+    return evaluate_scenarios(made.encounter, sets, changepoints=points, road=road, config=config, seed=made.seed)
+
+
+def evaluate_scenarios(
     encounter: Encounter,
-    segmentation: Segmentation,
-    rows: Mapping[str, Sequence[Scenario]],
+    sets: Scenarios | Mapping[str, Scenarios],
     *,
+    changepoints: int = 0,
     checks: Mapping[str, CheckCounts] | None = None,
-    oracle: str = "oracle",
+    oracle: str = ORACLE,
     road: str = "",
     config: EvaluationConfig = EvaluationConfig(),
     seed: int = 0,
 ) -> Evaluation:
-    """Measure sets of scenarios against their template.
+    """Measure scenarios, wherever they come from, against their template.
 
     Args:
         encounter: the recorded template.
-        segmentation: its primitives; only their number is used, since more changepoints always fit better.
-        rows: sets of scenarios by name, e.g. "with changepoints", "without changepoints", "oracle". An empty set gives an
-            empty row, with a note. Of a set of more than MEASURED scenarios that many are measured, see `measured`.
-        checks: the checker's account of the candidates of a row, where there is one.
+        sets: scenarios, or several sets of them by name, each a row: "mine", "oracle". A `ScenarioSet` brings its account of
+            candidates along. An empty set gives an empty row, with a note. Of a set of more than MEASURED
+            scenarios that many are measured, see `measured`.
+        changepoints: their number K stands beside E, for more changepoints always fit better.
+        checks: the checker's account of the candidates of a row, where its set brings none.
         oracle: the row whose first scenario is the fitted template, to which displacements are measured.
         road: name of the road, for the heading.
         config: how to measure.
@@ -103,6 +126,9 @@ def evaluate(
     Raises:
         InputError: a scenario has a vehicle that the encounter has not.
     """
+    named = sets if isinstance(sets, Mapping) else {"scenarios": sets}
+    counts = {name: CheckCounts.of_set(one) for name, one in named.items() if isinstance(one, ScenarioSet)} | dict(checks or {})
+    rows = {name: one.scenarios if isinstance(one, ScenarioSet) else one for name, one in named.items()}
     sizes = {name: len(scenarios) for name, scenarios in rows.items()}
     rows = {name: measured(scenarios) for name, scenarios in rows.items()}
     steps = min(encounter.speed.shape[1], config.max_steps)
@@ -112,14 +138,13 @@ def evaluate(
     critical = criticality(clocked, config.ttc_horizon)
     motion = chosen(at_count(encounter, steps), ids)
     reference = _Reference(motion, values_of(clocked), critical, fitted, config, seed)
-    counts = checks or {}
     found = [_measure(name, scenarios, sizes[name], reference, counts.get(name)) for name, scenarios in rows.items()]
     return Evaluation(
         encounter=encounter.name,
         road=road,
         vehicles=ids,
         duration=encounter.duration,
-        changepoints=len(segmentation.changepoints),
+        changepoints=changepoints,
         level=config.level,
         resamples=config.resamples,
         seed=seed,
@@ -187,19 +212,19 @@ def _measure(name: str, scenarios: Sequence[Scenario], size: int, reference: _Re
     ids = [vehicle.id for vehicle in reference.motion.vehicles]
     position, speed = stacked([chosen(at_count(scenario, steps), ids) for scenario in scenarios])
     clocked = [chosen(at_period(scenario, config.period), ids) for scenario in scenarios]
-    values |= _likeness(reference, position, speed, bootstrap)
+    values |= _similarity(reference, position, speed, bootstrap)
     values |= _distributions(reference, clocked, bootstrap)
     values |= _criticality(reference, clocked, bootstrap)
-    table = variety.displacements(position)
-    values["diversity"] = bootstrap.interval(lambda weights: variety.diversity(table, weights))
+    table = diversity.displacements(position)
+    values["diversity"] = bootstrap.interval(lambda weights: diversity.diversity(table, weights))
     if fitted is not None:
-        error = variety.displacement_to(position, fitted.position)
-        values["min_ade"] = bootstrap.interval(lambda weights: variety.least(error, weights))
+        error = diversity.displacement_to(position, fitted.position)
+        values["min_ade"] = bootstrap.interval(lambda weights: diversity.weighted_min(error, weights))
     return Row(name, len(scenarios), values, _notes(len(scenarios), size, values, config))
 
 
 def _pairs(scenarios: Sequence[Scenario]) -> Ints:
-    """(S,) number of each scenario's mirrored pair: the sampler draws candidates 2k and 2k + 1 of a seed as mirror images.
+    """(S,) number of each scenario's antithetic pair: the sampler draws candidates 2k and 2k + 1 of a seed as mirror images.
 
     Scenarios that share a number were not numbered by the sampler; each is a pair of its own.
     """
@@ -210,16 +235,16 @@ def _pairs(scenarios: Sequence[Scenario]) -> Ints:
     return np.array([pairs.setdefault((seed, index // 2), len(pairs)) for seed, index in numbers], dtype=np.int64)
 
 
-def _likeness(reference: _Reference, position: Floats, speed: Floats, bootstrap: Bootstrap) -> dict[str, Interval]:
+def _similarity(reference: _Reference, position: Floats, speed: Floats, bootstrap: Bootstrap) -> dict[str, Interval]:
     """E and the correlation: Euclidean distance for position, Manhattan for speed, as in the paper."""
     motion = reference.motion
-    places = likeness.likeness(motion.position, position, "euclidean")
-    paces = likeness.likeness(motion.speed[..., None], speed[..., None], "manhattan")
+    places = similarity.pair_similarities(motion.position, position, "euclidean")
+    paces = similarity.pair_similarities(motion.speed[..., None], speed[..., None], "manhattan")
     return {
-        "e_position": bootstrap.interval(lambda weights: likeness.mean_error(places, weights)),
-        "e_speed": bootstrap.interval(lambda weights: likeness.mean_error(paces, weights)),
-        "correlation_position": bootstrap.interval(lambda weights: likeness.mean_correlation(places, weights)),
-        "correlation_speed": bootstrap.interval(lambda weights: likeness.mean_correlation(paces, weights)),
+        "e_position": bootstrap.interval(lambda weights: similarity.mean_error(places, weights)),
+        "e_speed": bootstrap.interval(lambda weights: similarity.mean_error(paces, weights)),
+        "correlation_position": bootstrap.interval(lambda weights: similarity.mean_correlation(places, weights)),
+        "correlation_speed": bootstrap.interval(lambda weights: similarity.mean_correlation(paces, weights)),
     }
 
 

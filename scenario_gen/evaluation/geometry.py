@@ -18,8 +18,8 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
-from scenario_gen.encounter import Vehicle
 from scenario_gen.evaluation.motion import Motion
+from scenario_gen.types.encounter import Vehicle
 
 STILL = 1e-6  # m/s; what closes more slowly does not close: rounding alone makes equal velocities differ
 

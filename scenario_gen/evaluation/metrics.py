@@ -15,25 +15,27 @@
 """The catalogue of metrics: what each figure is called, its unit, and what it means."""
 
 from scenario_gen.evaluation.distributions import QUANTITIES
-from scenario_gen.evaluation.result import Metric
-from scenario_gen.scenario import Cause
+from scenario_gen.types.evaluation import Metric
+from scenario_gen.types.scenario import Cause
 
 LIMIT_CAUSES = (Cause.SPEED, Cause.LONGITUDINAL_ACCELERATION, Cause.LATERAL_ACCELERATION, Cause.CURVATURE)
 """Causes that count as a violated limit."""
 
-_LIKENESS, _REALISM, _CRITICAL, _VALID, _VARIETY = (
-    "Likeness to the template",
+_SIMILARITY, _REALISM, _CRITICAL, _VALID, _DIVERSITY = (
+    "Similarity to the template",
     "Distributions against the template",
     "Criticality",
     "Validity of the candidates",
-    "Variety",
+    "Diversity",
 )
 
 METRICS: tuple[Metric, ...] = (
-    Metric("e_position", "E position", "", "lower", _LIKENESS, "‖mean feature matrix − template's‖ / ‖template's‖, of positions"),
-    Metric("e_speed", "E speed", "", "lower", _LIKENESS, "‖mean feature matrix − template's‖ / ‖template's‖, of speeds"),
-    Metric("correlation_position", "correlation position", "", "higher", _LIKENESS, "of the mean matrix with the template's"),
-    Metric("correlation_speed", "correlation speed", "", "higher", _LIKENESS, "of the mean matrix with the template's"),
+    Metric(
+        "e_position", "E position", "", "lower", _SIMILARITY, "‖mean feature matrix − template's‖ / ‖template's‖, of positions"
+    ),
+    Metric("e_speed", "E speed", "", "lower", _SIMILARITY, "‖mean feature matrix − template's‖ / ‖template's‖, of speeds"),
+    Metric("correlation_position", "correlation position", "", "higher", _SIMILARITY, "of the mean matrix with the template's"),
+    Metric("correlation_speed", "correlation speed", "", "higher", _SIMILARITY, "of the mean matrix with the template's"),
     *(
         Metric(
             f"js_{q.id}", f"JS {q.label}", "bit", "lower", _REALISM, f"Jensen–Shannon divergence, bins of {q.bin_width} {q.unit}"
@@ -61,9 +63,9 @@ METRICS: tuple[Metric, ...] = (
     Metric(
         "limit_rate", "limit violated", "%", "lower", _VALID, "share of candidates refused for speed, acceleration or curvature"
     ),
-    Metric("diversity", "diversity", "m", "", _VARIETY, "mean displacement between two samples"),
+    Metric("diversity", "diversity", "m", "", _DIVERSITY, "mean displacement between two samples"),
     Metric(
-        "coverage", "coverage", "%", "higher", _VARIETY, "share of the template's values in histogram bins that the set visits"
+        "coverage", "coverage", "%", "higher", _DIVERSITY, "share of the template's values in histogram bins that the set visits"
     ),
-    Metric("min_ade", "min ADE", "m", "lower", _VARIETY, "mean displacement of the nearest sample to the fitted template"),
+    Metric("min_ade", "min ADE", "m", "lower", _DIVERSITY, "mean displacement of the nearest sample to the fitted template"),
 )

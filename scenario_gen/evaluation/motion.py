@@ -20,9 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.arrays import Floats, frozen
-from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import InputError
-from scenario_gen.scenario import Scenario
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.scenario import Scenario
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,5 +90,5 @@ def of_vehicles(motion: Motion, rows: Sequence[int]) -> Motion:
 
 
 def stacked(motions: Sequence[Motion]) -> tuple[Floats, Floats]:
-    """Stack S motions of equal T: positions (S, N, T, 2) and speeds (S, N, T)."""
+    """Stack S motions of equal T: positions (S, N, T, 2) [m] and speeds (S, N, T) [m/s]."""
     return np.stack([motion.position for motion in motions]), np.stack([motion.speed for motion in motions])

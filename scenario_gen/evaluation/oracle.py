@@ -18,9 +18,9 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
-from scenario_gen.encounter import Encounter
-from scenario_gen.fitting.result import Fit, FittedVehicle
-from scenario_gen.scenario import Scenario
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.scenario import Scenario
 
 MIN_CHORD = 0.5
 """Metres: below it a chord gives no direction (eq 8) and no scale (eq 9)."""

@@ -23,16 +23,27 @@ from dataclasses import replace
 import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.encounter import Encounter
-from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.segmentation import Segmentation
 
 
 def with_changepoints_at(segmentation: Segmentation, changepoints: Ints, what: str) -> Segmentation:
-    """Return a segmentation of the same encounter with other changepoints, every segment a primitive of its own."""
+    """Return a segmentation of the same encounter with changepoints (K,), every segment a primitive of its own."""
     labels = np.zeros(len(segmentation.labels), dtype=np.int64)
     labels[changepoints] = 1
     told = tuple(f"{what} {k + 1}" for k in range(len(changepoints) + 1))
     return replace(segmentation, labels=np.cumsum(labels), changepoints=changepoints, descriptions=told)
+
+
+def without_changepoints(segmentation: Segmentation) -> Segmentation:
+    """Return the ablation of paper V-B: the same encounter as one primitive."""
+    none = np.zeros(0, dtype=np.int64)
+    return replace(
+        segmentation,
+        labels=np.zeros_like(segmentation.labels),
+        changepoints=none,
+        descriptions=("the whole encounter as one primitive",),
+    )
 
 
 def uniform_changepoints(segmentation: Segmentation) -> Segmentation:

@@ -40,7 +40,7 @@ EPSILON = 2.220446049250313e-16
 
 @kernel(inline=True)
 def dot(a: Floats, b: Floats) -> float:
-    """Return the inner product of two rows: four running sums, then ((0 + 1) + (2 + 3)), then what is left over."""
+    """Return the inner product of two rows (n,): four running sums, then ((0 + 1) + (2 + 3)), then what is left over."""
     n = len(a) // 4 * 4
     s0 = s1 = s2 = s3 = 0.0
     for k in range(0, n, 4):
@@ -84,6 +84,9 @@ def matmul(a: Numbers, b: Numbers) -> Floats:
     """Return the matrix product, with the shapes of `numpy.matmul`: stacks (..., n, k) and (..., k, m), vectors at either side.
 
     A row of the result does not depend on how many rows there are: one sample alone has the bits it has among many.
+
+    Raises:
+        ValueError: the inner sizes differ.
     """
     left, right = a.ndim == 1, b.ndim == 1
     p = a[None, :] if left else a

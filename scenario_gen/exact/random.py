@@ -21,7 +21,7 @@ from scenario_gen.exact.functions import ndtri
 
 
 def standard_normal(generator: np.random.Generator, shape: tuple[int, ...]) -> Floats:
-    """Return independent standard normal numbers of that shape, by inversion.
+    """Return independent standard normal numbers of that shape, any shape, by inversion.
 
     numpy's own come from its ziggurat, whose tails call the C library's logarithm. Here the generator gives 53 random
     bits a number, exactly, and the rest is `ndtri`. The largest that can be drawn is 8.3.

@@ -16,7 +16,6 @@
 
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.fitting.fit import fit_template
-from scenario_gen.fitting.oracle import fitted_template
-from scenario_gen.fitting.result import Fit, FittedVehicle
+from scenario_gen.types.fit import Fit, FittedVehicle
 
-__all__ = ["Fit", "FittedVehicle", "FittingConfig", "fit_template", "fitted_template"]
+__all__ = ["Fit", "FittedVehicle", "FittingConfig", "fit_template"]

@@ -19,16 +19,16 @@ from itertools import pairwise
 import numpy as np
 
 from scenario_gen.arrays import Bools, Floats, frozen_ints, Ints
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.fitting.placement import Placement
-from scenario_gen.fitting.result import Fit, FittedVehicle
-from scenario_gen.roads.repair import nearest_pose_with_room
-from scenario_gen.roads.road import Road
-from scenario_gen.roads.tracks import Track
-from scenario_gen.scenario import BoundaryStates
-from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.roads.clearance import nearest_pose_with_room
+from scenario_gen.template.tracks import Track
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import BoundaryStates
+from scenario_gen.types.segmentation import Segmentation
 
 _STAND_LENGTH = 0.5  # metres
 STAND_SPEED = 0.3  # m/s: slower is standing
@@ -60,8 +60,8 @@ def finish(
             anchors[progress == progress[0]] = given[i, 0, :3]
         if given is not None and wanted[1] and not track.still:
             anchors[progress == progress[-1]] = given[i, 1, :3]
-        anchors, moved, said = _repaired(road, track, anchors, progress, [float(t) for t in index * encounter.dt], config)
-        notes += said
+        anchors, moved, sentences = _repaired(road, track, anchors, progress, [float(t) for t in index * encounter.dt], config)
+        notes += sentences
         moved = moved + placement.moved[i]
         if moved.max() > config.max_move:
             raise RefusedError(
@@ -122,7 +122,7 @@ def _repaired(
     """Anchors (K + 2, 3), how far each was moved (K + 2,), and sentences about it."""
     anchors = anchors.copy()
     moved = np.zeros(len(anchors))
-    said = []
+    sentences = []
     for k in range(len(anchors)):
         if k and progress[k] == progress[k - 1]:
             anchors[k], moved[k] = anchors[k - 1], moved[k - 1]
@@ -138,5 +138,5 @@ def _repaired(
             )
         anchors[k], moved[k] = answer
         if moved[k] > 0.0:
-            said.append(f"vehicle {vehicle.id}: its {what} had no room and was moved by {moved[k]:.2f} m")
-    return anchors, moved, said
+            sentences.append(f"vehicle {vehicle.id}: its {what} had no room and was moved by {moved[k]:.2f} m")
+    return anchors, moved, sentences

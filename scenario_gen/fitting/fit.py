@@ -15,24 +15,27 @@
 """One door to the fitting: which way of placing a template is tried on which road."""
 
 from collections.abc import Callable
+from functools import lru_cache
+import math
 
 import numpy as np
 
 from scenario_gen.arrays import Floats
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import RefusedError
+from scenario_gen.fitting.asked import refuse_impossible, refuse_misfits
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.fitting.finish import finish
-from scenario_gen.fitting.given import place_given
-from scenario_gen.fitting.identity import place_in_own_frame
-from scenario_gen.fitting.junction import is_laned, place_at_junction
+from scenario_gen.fitting.given import place_given, place_in_own_frame
+from scenario_gen.fitting.junction import has_lanes, place_at_junction
 from scenario_gen.fitting.lanes import place_along_lanes
 from scenario_gen.fitting.placement import Placement
-from scenario_gen.fitting.result import Fit
 from scenario_gen.fitting.search import place_by_search
-from scenario_gen.roads.road import Road
-from scenario_gen.roads.tracks import clean_tracks, Track
-from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.template.tracks import clean_tracks, Track
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.fit import Fit
+from scenario_gen.types.request import Request
+from scenario_gen.types.road import Road
+from scenario_gen.types.segmentation import Segmentation
 
 _AT_HOME = 0.98  # share of footprints with room at which any road is taken for the template's own
 _NEAR_HOME = 0.5  # the same for a map without lanes to go by: recorded cars leave recorded maps here and there
@@ -42,11 +45,12 @@ def fit_template(
     encounter: Encounter,
     segmentation: Segmentation,
     road: Road,
-    config: FittingConfig = FittingConfig(),  # noqa: B008 - frozen
+    config: FittingConfig = FittingConfig(),
     *,
     starts: Floats | None = None,
     goals: Floats | None = None,
-    partial: bool = False,
+    request: Request = Request(),
+    max_speed: float = math.inf,
 ) -> Fit:
     """Place a template on a road (paper III-A, eqs 7-9 put right).
 
@@ -55,26 +59,36 @@ def fit_template(
         segmentation: its changepoints; they decide which anchors are reported, never where start and end are.
         road: the target.
         config: which way, and how far things may be scaled and moved.
-        starts: (N, 3) or (N, 4) given start poses x [m], y [m], yaw [rad], and speeds [m/s]; with `goals`.
+        starts: (N, 3) or (N, 4) given start poses x [m], y [m], yaw [rad], and speeds [m/s] of all vehicles; with `goals`.
         goals: likewise the end.
-        partial: a row of NaN is not given but left to the road's own placement.
+        request: the start and end states that are asked for, of some vehicles; the others are the road's own placement.
+        max_speed: [m/s] that no asked state may exceed.
 
     Raises:
-        RefusedError: it does not fit; the message says why, with figures.
-        InputError: `starts` and `goals` disagree with the encounter.
+        RefusedError: it does not fit, or a state that is asked for cannot be had; the message says why, with figures.
+        InputError: `starts` and `goals` disagree with the encounter, or a vehicle that is named does not exist.
     """
+    if request.moves:
+        return _fit_asked(encounter, segmentation, road, config, request, max_speed)
     if starts is not None or goals is not None:
-        base = _place(encounter, road, config) if partial and _has_gaps(starts, goals) else None
-        placement, given = place_given(encounter, road, config, starts, goals, base)
+        placement, given = place_given(encounter, road, config, starts, goals)
         return finish(encounter, segmentation, road, placement, config, given)
     return finish(encounter, segmentation, road, _place(encounter, road, config), config)
 
 
-def _has_gaps(*given: Floats | None) -> bool:
-    """Whether a state is left open."""
-    return any(rows is not None and bool(np.isnan(rows).any()) for rows in given)
+def _fit_asked(
+    encounter: Encounter, segmentation: Segmentation, road: Road, config: FittingConfig, request: Request, max_speed: float
+) -> Fit:
+    starts, goals = (request.rows(end, encounter) for end in ("starts", "goals"))
+    refuse_impossible(encounter, road, starts, goals, max_speed)
+    base = _place(encounter, road, config) if np.isnan(starts).any() or np.isnan(goals).any() else None
+    placement, given = place_given(encounter, road, config, starts, goals, base)
+    fit = finish(encounter, segmentation, road, placement, config, given)
+    refuse_misfits(fit, starts, goals)
+    return fit
 
 
+@lru_cache(maxsize=1)  # changepoints have no part in it: the references have the same
 def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement:
     if config.placement == "identity":
         return place_in_own_frame(encounter, road, config)[0]
@@ -95,7 +109,7 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         reasons.append(f"in its own frame, {error}")
     if own is not None and share >= _AT_HOME:
         return own
-    if is_laned(road):
+    if has_lanes(road):
         order, reasons = ("lanes", "junction"), []
     elif own is not None and share >= _NEAR_HOME:
         return own

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Start and goal given by the user: eqs 7-9, put right, one vehicle at a time."""
+"""Start and goal given: by the template's own frame, or by the user (eqs 7-9, put right)."""
 
 from dataclasses import replace
 
@@ -20,16 +20,41 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
-from scenario_gen.encounter import Encounter
+from scenario_gen.curve import Curve
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.fitting.finish import STAND_SPEED
-from scenario_gen.fitting.placement import check_scale, Placement
+from scenario_gen.fitting.placement import check_scale, max_repair, Placement, share_with_room
 from scenario_gen.fitting.routes import draw_route
 from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.roads.curve import Curve
-from scenario_gen.roads.road import Road
-from scenario_gen.roads.tracks import clean_tracks, Track
+from scenario_gen.template.separation import own_paths
+from scenario_gen.template.tracks import clean_tracks, Track
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.road import Road
+
+
+def place_in_own_frame(encounter: Encounter, road: Road, config: FittingConfig) -> tuple[Placement, float]:
+    """Leave the template where it was recorded (only pulled apart where the record has vehicles overlap).
+
+    Returns:
+        The placement, and the share of sampled footprints that have room as they are.
+
+    Raises:
+        RefusedError: a sampled pose is farther than `max_move` from the nearest with room.
+    """
+    separation = own_paths(encounter)
+    shares = [float(share_with_room(road, track)) for track in separation.tracks]
+    max_repair([t for t, share in zip(separation.tracks, shares, strict=True) if share < 1.0], road, config.max_move)
+    n = len(separation.tracks)
+    placement = Placement(
+        tracks=separation.tracks,
+        scale=frozen(np.ones(n)),
+        manoeuvre=tuple("wait" if track.still else "own path" for track in separation.tracks),
+        moved=separation.moved,
+        notes=(f"placed on road {road.name} in the template's own frame", *separation.notes),
+    )
+    return placement, float(np.mean(shares))
+
 
 _CHORD = 2.0  # metres: a shorter one gives no direction (eq 8) and no scale (eq 9)
 _SAME_PLACE = 0.5  # metres
@@ -81,8 +106,8 @@ def place_given(
         moves.append(0.0)
         which = "start and goal" if wanted[n].all() else "start" if wanted[n, 0] else "goal"
         notes.append(f"vehicle {track.vehicle.id}: {which} as given, {how}")
-    said = (*(() if base is None else base.notes), *notes)
-    return Placement(tuple(placed), frozen(scales), tuple(manoeuvres), frozen(moves), said), given
+    sentences = (*(() if base is None else base.notes), *notes)
+    return Placement(tuple(placed), frozen(scales), tuple(manoeuvres), frozen(moves), sentences), given
 
 
 def _ends_of(base: Placement, encounter: Encounter) -> Floats:

@@ -25,16 +25,15 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen, wrap_angle
-from scenario_gen.encounter import Vehicle
+from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
-from scenario_gen.fitting.placement import check_scale, kept_apart, Placement
-from scenario_gen.fitting.relations import Equation, equations, find_relations, Relation
+from scenario_gen.fitting.placement import check_scale, Equation, equations, find_relations, Placement, Relation, separated
 from scenario_gen.fitting.routes import draw_route, draw_u_turn
 from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.roads.curve import Curve
-from scenario_gen.roads.road import Road
-from scenario_gen.roads.tracks import Track
+from scenario_gen.template.tracks import Track
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.road import Road
 
 _BEAM = 24
 _INSTANTS = 15
@@ -84,7 +83,7 @@ def place_at_junction(tracks: tuple[Track, ...], road: Road, config: FittingConf
     for track, own in zip(tracks, ways, strict=True):
         if not own:
             raise RefusedError(
-                f"vehicle {track.vehicle.id} {_doing(track)}: road {road.name} has no way for that "
+                f"vehicle {track.vehicle.id} {_manoeuvre_of(track)}: road {road.name} has no way for that "
                 f"({len(road.entries)} entries, {len(road.exits)} exits)"
             )
     relations = find_relations(tracks)
@@ -95,7 +94,7 @@ def place_at_junction(tracks: tuple[Track, ...], road: Road, config: FittingConf
         choice = _search(tracks, ways, relations, scale)
         if choice.lost == 0 and choice.turned <= _HEADING_LIMIT and choice.beyond <= 0.0:
             return _placed(tracks, road, choice, scale, relations, config)
-        reasons.append(_why_not(choice, scale))
+        reasons.append(_misfit_reason(choice, scale))
         if choice.lost or choice.turned > _HEADING_LIMIT:
             break  # no scale mends that
     if not reasons:
@@ -103,13 +102,13 @@ def place_at_junction(tracks: tuple[Track, ...], road: Road, config: FittingConf
     raise RefusedError(f"the template does not fit the ways of road {road.name}: {reasons[0]}")
 
 
-def is_laned(road: Road) -> bool:
+def has_lanes(road: Road) -> bool:
     """True if a route for a car can be drawn from every entry: the road's entries and exits are lanes that explain it."""
     ways = _all_ways(Vehicle("car"), road, u_turns=False)
     return len(road.entries) > 0 and {way.entry for way in ways} == set(range(len(road.entries)))
 
 
-def _doing(track: Track) -> str:
+def _manoeuvre_of(track: Track) -> str:
     if track.makes_u_turn:
         return "makes a U-turn"
     turn = float(np.degrees(track.curve.points[-1, 2] - track.curve.points[0, 2]))
@@ -118,7 +117,7 @@ def _doing(track: Track) -> str:
     return f"turns {'left' if turn > 0 else 'right'} by {abs(turn):.0f}°"
 
 
-def _why_not(choice: _Choice, scale: float) -> str:
+def _misfit_reason(choice: _Choice, scale: float) -> str:
     if choice.lost:
         return f"the best assignment loses {choice.lost} of the template's crossings or shared lanes"
     if choice.turned > _HEADING_LIMIT:
@@ -203,7 +202,7 @@ class _Solver:
             start[i] = float(np.median(station - self.driven[i][::3]))
         if untied:
             rotation, shift, yaw = self._align(ways, start, members)
-        return self._judged(ways, start, members, lost, rotation, shift, yaw)
+        return self._checked(ways, start, members, lost, rotation, shift, yaw)
 
     def _equations(self, k: int, relation: Relation, one: _Way, two: _Way) -> tuple[Equation, ...] | None:
         key = (k, id(one), id(two))
@@ -239,7 +238,7 @@ class _Solver:
         rotation = _rotation(yaw)
         return self.scale * rotation, cb - exact.matmul(rotation, ca), yaw
 
-    def _judged(
+    def _checked(
         self,
         ways: dict[int, _Way],
         start: dict[int, float],
@@ -311,7 +310,7 @@ def _placed(
         manoeuvres.append("wait" if track.still else _name(way.turn))
         notes.append(
             f"vehicle {track.vehicle.id} takes entry {way.entry} and exit {way.leave} ({_name(way.turn)}), "
-            f"{begin:.1f} m to {end:.1f} m of {way.curve.length:.1f} m; {_doing(track)} in the template"
+            f"{begin:.1f} m to {end:.1f} m of {way.curve.length:.1f} m; {_manoeuvre_of(track)} in the template"
         )
     for r in relations:
         a, b = tracks[r.a].vehicle.id, tracks[r.b].vehicle.id
@@ -319,7 +318,7 @@ def _placed(
     notes.append(f"assignment chosen at a cost of {choice.cost:.1f} m²")
     n = len(tracks)
     placement = Placement(tuple(placed), frozen(np.full(n, scale)), tuple(manoeuvres), frozen(np.zeros(n)), tuple(notes))
-    return kept_apart(placement, config, sideways=0.0)
+    return separated(placement, config, sideways=0.0)
 
 
 def _name(turn: float) -> str:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Placing a template along a road's lanes: following, meeting, passing, changing lanes, on a line laid out straight.
+"""Placing a template along a road's lanes: following, oncoming, passing, changing lanes, on a line laid out straight.
 
 Eq 9 in path coordinates is one-dimensional: stations on the template's reference line, times s, are stations on the lane.
 All vehicles share one map, so the gaps between them survive.
@@ -24,14 +24,14 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen, wrap_angle
+from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
-from scenario_gen.fitting.placement import check_scale, kept_apart, Placement
+from scenario_gen.fitting.placement import check_scale, Placement, separated
 from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.roads.curve import Curve
-from scenario_gen.roads.road import Road
-from scenario_gen.roads.tracks import Track
-from scenario_gen.roads.unrolled import unroll, Unrolled
+from scenario_gen.template.frenet import FrenetTracks, to_frenet
+from scenario_gen.template.tracks import Track
+from scenario_gen.types.road import Road
 
 _COLLINEAR = 0.3  # metres
 _PARALLEL = np.radians(2.0)
@@ -61,9 +61,9 @@ def place_along_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConf
         RefusedError: it turns or crosses, or the road has too few lanes or is too short.
     """
     axes = _axes(road, tracks)
-    compact = unroll(tracks)
-    for unrolled in (compact.spread(), compact):
-        needed = {sign: int(unrolled.lane[unrolled.direction == sign].max(initial=-1)) + 1 for sign in (1, -1)}
+    compact = to_frenet(tracks)
+    for frenet in (compact.spread(), compact):
+        needed = {sign: int(frenet.lane[frenet.direction == sign].max(initial=-1)) + 1 for sign in (1, -1)}
         fitting = [axis for axis in axes if len(axis.ahead) >= needed[1] and len(axis.against) >= needed[-1]]
         if fitting:
             break
@@ -75,24 +75,24 @@ def place_along_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConf
         )
     axis = max(fitting, key=lambda a: round(a.length, 1))
     half = np.array([[track.vehicle.length / 2.0] for track in tracks])
-    low, high = float((unrolled.station - half).min()), float((unrolled.station + half).max())
+    low, high = float((frenet.station - half).min()), float((frenet.station + half).max())
     centre, scale = (low + high) / 2.0, 1.0
     if high - low > axis.length - 2.0 * _END_ROOM:
         cars = float(2.0 * half.max())
         scale = (axis.length - 2.0 * _END_ROOM - cars) / (high - low - cars)
         check_scale(scale, f"the template is {high - low:.0f} m long, road {road.name} {axis.length:.0f} m: it", config)
-    placed = tuple(_lay(track, i, unrolled, axis, centre, scale) for i, track in enumerate(tracks))
+    placed = tuple(_placed_track(track, i, frenet, axis, centre, scale) for i, track in enumerate(tracks))
     manoeuvres = tuple("wait" if track.still else "straight" for track in tracks)
-    notes = tuple(_note(track, i, unrolled) for i, track in enumerate(tracks))
+    notes = tuple(_note(track, i, frenet) for i, track in enumerate(tracks))
     if scale != 1.0:
         notes = (f"scaled by {scale:.3f} to fit the road's length", *notes)
     placement = Placement(placed, frozen(np.full(len(tracks), scale)), manoeuvres, frozen(np.zeros(len(tracks))), notes)
-    return kept_apart(placement, config, sideways=0.0)
+    return separated(placement, config, sideways=0.0)
 
 
-def _note(track: Track, i: int, unrolled: Unrolled) -> str:
-    way = "along" if unrolled.direction[i] > 0 else "against"
-    start, end = unrolled.lane[i]
+def _note(track: Track, i: int, frenet: FrenetTracks) -> str:
+    way = "along" if frenet.direction[i] > 0 else "against"
+    start, end = frenet.lane[i]
     lane = f"in lane {start}" if start == end else f"changing from lane {start} to lane {end}"
     return f"vehicle {track.vehicle.id} drives {way} the main direction {lane} (counted from its left)"
 
@@ -134,17 +134,17 @@ def _belongs(entry: Floats, axis: _Axis) -> bool:
     return bool(turned < _PARALLEL or turned > np.pi - _PARALLEL)
 
 
-def _lay(track: Track, i: int, unrolled: Unrolled, axis: _Axis, centre: float, scale: float) -> Track:
+def _placed_track(track: Track, i: int, frenet: FrenetTracks, axis: _Axis, centre: float, scale: float) -> Track:
     """One vehicle in its lane."""
-    sign = int(unrolled.direction[i])
-    along = axis.length / 2.0 + scale * (unrolled.station[i] - centre)  # metres from the axis' beginning
+    sign = int(frenet.direction[i])
+    along = axis.length / 2.0 + scale * (frenet.station[i] - centre)  # metres from the axis' beginning
     lanes = axis.ahead if sign > 0 else axis.against
-    start, end = float(lanes[unrolled.lane[i, 0]]), float(lanes[unrolled.lane[i, 1]])
+    start, end = float(lanes[frenet.lane[i, 0]]), float(lanes[frenet.lane[i, 1]])
     along = along if sign > 0 else axis.length - along  # metres driven since the beginning of its own lane
     begin = axis.begin if sign > 0 else axis.begin + axis.length * np.array([exact.cos(axis.yaw), exact.sin(axis.yaw)])
     yaw = axis.yaw if sign > 0 else axis.yaw + np.pi
     s = np.arange(0.0, max(along[-1] - along[0], 1.0) + 1.0, 0.5)
-    aside = start + (end - start) * _blend(along - along[0], unrolled.change[i], s, abs(end - start))
+    aside = start + (end - start) * _blend(along - along[0], frenet.change[i], s, abs(end - start))
     x = along[0] + s
     xy = begin + np.outer(x, [exact.cos(yaw), exact.sin(yaw)]) + np.outer(aside, [-exact.sin(axis.yaw), exact.cos(axis.yaw)])
     curve = Curve.through(xy)

@@ -12,21 +12,24 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A template placed on a road: what every way of placing it answers, before changepoints come in."""
+"""A placement of a template on a road, its scale, and whether it keeps who comes from which side."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 
-from scenario_gen.arrays import Floats
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, wrap_angle
+from scenario_gen.curve import crossings, Curve
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
-from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.roads.repair import nearest_pose_with_room
-from scenario_gen.roads.road import Road
-from scenario_gen.roads.separation import separate
-from scenario_gen.roads.tracks import Track
+from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room
+from scenario_gen.template.path_crossing import path_crossing
+from scenario_gen.template.separation import separate
+from scenario_gen.template.tracks import Track
+from scenario_gen.types.road import Road
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +60,7 @@ def check_scale(scale: float, what: str, config: FittingConfig) -> None:
         )
 
 
-def kept_apart(placement: Placement, config: FittingConfig, *, sideways: float) -> Placement:
+def separated(placement: Placement, config: FittingConfig, *, sideways: float) -> Placement:
     """Shift vehicles that come too close on this road, as little as possible."""
     separation = separate(placement.tracks, config.clearance, config.max_move, sideways=sideways)
     return Placement(
@@ -69,13 +72,13 @@ def kept_apart(placement: Placement, config: FittingConfig, *, sideways: float) 
     )
 
 
-def room(road: Road, track: Track, every: int = 5) -> Floats:
-    """Share of the track's samples (every n-th and the last) at which its footprint has room: a number from 0 to 1."""
+def share_with_room(road: Road, track: Track, every: int = 5) -> Floats:
+    """Share (scalar array), 0 to 1, of the track's samples (every n-th and the last) at which its footprint has room."""
     poses = np.concatenate((track.poses[:-1:every], track.poses[-1:]))
     return np.asarray(footprint_fits(road, poses, track.vehicle.length, track.vehicle.width).mean())
 
 
-def farthest_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:
+def max_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:
     """How far [m] the worst sampled footprint (twice a second, and the ends) is from a pose with room.
 
     Raises:
@@ -93,3 +96,88 @@ def farthest_repair(tracks: Sequence[Track], road: Road, max_move: float) -> flo
                 )
             farthest = max(farthest, answer[1])
     return farthest
+
+
+_SAME_LANE = 1.75  # metres
+_SAME_WAY = np.radians(30.0)
+_ANGLE = np.radians(15.0)
+
+
+class Kind(Enum):
+    """How two paths relate."""
+
+    CROSSING = "crosses"
+    SHARED_START = "shares its entry lane with"
+    SHARED_END = "shares its exit lane with"
+
+
+@dataclass(frozen=True)
+class Relation:
+    """Vehicles `a` and `b` (indices): at `at_a` and `at_b` metres of their paths they are at the same place."""
+
+    kind: Kind
+    a: int
+    b: int
+    at_a: float
+    at_b: float
+
+
+@dataclass(frozen=True, eq=False)
+class Equation:
+    """coefficients · A = value, with a weight."""
+
+    terms: tuple[tuple[int, float], ...]
+    value: float
+    weight: float
+
+
+def find_relations(tracks: tuple[Track, ...]) -> tuple[Relation, ...]:
+    """One relation for each pair that shares a lane or crosses."""
+    found = []
+    for a in range(len(tracks)):
+        for b in range(a + 1, len(tracks)):
+            relation = _relation(a, tracks[a], b, tracks[b])
+            if relation is not None:
+                found.append(relation)
+    return tuple(found)
+
+
+def _relation(a: int, one: Track, b: int, two: Track) -> Relation | None:
+    for first, second, x, y in ((a, b, one, two), (b, a, two, one)):  # does x start on y's path?
+        at = _on_path(x.curve.at(0.0), y, beyond=0.0)
+        if at is not None:
+            return Relation(Kind.SHARED_START, first, second, 0.0, at)
+    crossing = path_crossing(one, two)
+    if crossing is not None:
+        return Relation(Kind.CROSSING, a, b, crossing.first, crossing.second)
+    for first, second, x, y in ((a, b, one, two), (b, a, two, one)):  # does x end on y's path?
+        at = _on_path(x.curve.at(x.travelled), y, beyond=0.0)
+        if at is not None and not x.still:
+            return Relation(Kind.SHARED_END, first, second, x.travelled, at)
+    return None
+
+
+def _on_path(pose: Floats, track: Track, beyond: float) -> float | None:
+    station, offset = track.curve.project(pose[None, :2])
+    s = float(station[0])
+    turned = abs(float(wrap_angle(np.asarray(track.curve.at(s)[2] - pose[2]))))
+    on = abs(float(offset[0])) < _SAME_LANE and turned < _SAME_WAY and -beyond <= s <= track.travelled + beyond
+    return s if on else None
+
+
+def equations(relation: Relation, one: Curve, two: Curve, scale: float) -> tuple[Equation, ...] | None:
+    """The relation on two routes as equations, or None if these routes do not have it."""
+    a, b, la, lb = relation.a, relation.b, scale * relation.at_a, scale * relation.at_b
+    if relation.kind is Kind.SHARED_START:
+        if float(exact.hypot(*(one.points[0, :2] - two.points[0, :2]))) > 0.5:
+            return None
+        return (Equation(((a, 1.0), (b, -1.0)), lb - la, 2.0),)
+    if relation.kind is Kind.SHARED_END:
+        if float(exact.hypot(*(one.points[-1, :2] - two.points[-1, :2]))) > 0.5:
+            return None
+        return (Equation(((a, 1.0), (b, -1.0)), (one.length - la) - (two.length - lb), 1.0),)
+    found = crossings(one, two, _ANGLE)
+    if len(found) == 0:
+        return None
+    at_a, at_b = found[len(found) // 2]
+    return (Equation(((a, 1.0),), float(at_a) - la, 1.0), Equation(((b, 1.0),), float(at_b) - lb, 1.0))

@@ -20,7 +20,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, wrap_angle
-from scenario_gen.roads.curve import Curve
+from scenario_gen.curve import Curve
 
 _RADII = (12.0, 10.5, 9.25, 8.0, 7.0, 6.25, 5.5, 5.0)  # metres, tried from the gentlest
 _ARC_STEP = 0.5
@@ -33,7 +33,7 @@ Fits = Callable[[Floats], bool]
 
 
 def draw_route(entry: Floats, leave: Floats, fits: Fits) -> Curve | None:
-    """The route from an entry pose (3,) to an exit pose (3,), or None if none can be drawn where `fits` allows it."""
+    """The route from an entry pose (3,) x, y [m], yaw [rad] to an exit pose, or None if `fits` allows none."""
     turn = float(wrap_angle(np.asarray(leave[2] - entry[2])))
     ahead, left = _relative(entry, leave[:2])
     if abs(turn) < _PARALLEL:
@@ -52,7 +52,7 @@ def draw_route(entry: Floats, leave: Floats, fits: Fits) -> Curve | None:
 
 
 def draw_u_turn(entry: Floats, leave: Floats, apex: float, fits: Fits) -> Curve | None:
-    """The route that drives `apex` metres, turns round in a half circle, and leaves by the lane beside it."""
+    """The route between two poses (3,) that drives `apex` metres, makes a half circle and leaves by the lane beside it."""
     turn = float(wrap_angle(np.asarray(leave[2] - entry[2])))
     ahead, left = _relative(entry, leave[:2])
     radius = abs(left) / 2.0

@@ -27,13 +27,13 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.cancelling import stop_if_cancelled
+from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
-from scenario_gen.fitting.placement import farthest_repair, kept_apart, Placement, room
+from scenario_gen.fitting.placement import max_repair, Placement, separated, share_with_room
 from scenario_gen.roads.clearance import clearance_field
-from scenario_gen.roads.curve import Curve
-from scenario_gen.roads.road import Road
-from scenario_gen.roads.tracks import Track
+from scenario_gen.template.tracks import Track
+from scenario_gen.types.road import Road
 
 _CELL = 1.0  # metres of the coarse search
 _TURNS = 72
@@ -97,7 +97,7 @@ def _tried(
     """The placement of one similarity, the share of its footprints that have room, the farthest repair [m]."""
     moved = _moved(tracks, centre, motion)
     n = len(tracks)
-    placement = kept_apart(
+    placement = separated(
         Placement(
             tracks=moved,
             scale=frozen(np.full(n, motion.scale)),
@@ -111,8 +111,8 @@ def _tried(
         config,
         sideways=1.0,
     )
-    share = float(min(room(road, track) for track in placement.tracks))
-    return placement, share, farthest_repair(placement.tracks, road, config.max_move)
+    share = float(min(share_with_room(road, track) for track in placement.tracks))
+    return placement, share, max_repair(placement.tracks, road, config.max_move)
 
 
 def _discs(tracks: tuple[Track, ...]) -> tuple[Floats, Floats]:

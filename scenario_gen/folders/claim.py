@@ -34,7 +34,7 @@ import tempfile
 import time
 
 from scenario_gen.errors import InputError
-from scenario_gen.folders.disk import discard, is_gone, is_there, naming
+from scenario_gen.folders.disk import discard, is_gone, naming
 from scenario_gen.folders.marker import is_marked, objection
 
 PREFIX, GUARD = ".scenario_gen-", ".scenario_gen.lock"
@@ -84,7 +84,7 @@ class Claim:
     def release(self) -> None:
         """Remove all that is not in its place; but an earlier result that could not be put back stays for the next run."""
         try:
-            if is_gone(self.old) or is_there(self.place):
+            if is_gone(self.old) or os.path.lexists(self.place):
                 _remove(self.folder)
         finally:
             os.close(self.lock)

@@ -55,11 +55,8 @@ def sync(path: Path) -> None:
 
 def sync_tree(folder: Path) -> None:
     """`sync` all that is in a folder, then the folder."""
-    for path in sorted(folder.iterdir()):
-        if path.is_dir():
-            sync_tree(path)
-        else:
-            sync(path)
+    for path in sorted(folder.rglob("*"), reverse=True):  # what is in a folder comes before it
+        sync(path)
     sync(folder)
 
 
@@ -79,15 +76,6 @@ def exchange(one: Path, other: Path) -> bool:
     if number in UNKNOWN:
         return False
     raise OSError(number, os.strerror(number), str(other))
-
-
-def is_there(path: Path) -> bool:
-    """Say whether there surely is something of that name."""
-    try:
-        path.lstat()
-    except OSError:
-        return False
-    return True
 
 
 def is_gone(path: Path) -> bool:

@@ -14,33 +14,19 @@
 
 """rosbag2 bags, MCAP and SQLite: per-vehicle fixes and speeds, odometry, or tracks that are encounters already."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from rosbags.typesys import get_typestore, Stores
-
-from msg_conventions import trajectory
-from msg_conventions.streams import speed_of
-from msg_conventions.tracks import decode_tracks
-from msg_conventions.yaw import yaw
-from scenario_gen import exact
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
-from scenario_gen.guard import guarded
-from scenario_gen.logs.budgets import check_size, check_vehicles
-from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import RawLog, Rows, Segment
-from scenario_gen.storage import BagConfig, open_bag
+from scenario_gen.logs.config import listed, LogConfig
+from scenario_gen.logs.raw import check_size, check_vehicles, RawLog, Rows, Segment
+from scenario_gen.recordings.samples import decode_sample, decode_tracks, FIX, ODOMETRY, TRACKS, TWIST
+from scenario_gen.storage.bag import open_bag
+from scenario_gen.storage.config import BagConfig
+from scenario_gen.types.encounter import Encounter
 
-FIX = "sensor_msgs/msg/NavSatFix"
-TWIST = "geometry_msgs/msg/TwistStamped"
-ODOMETRY = "nav_msgs/msg/Odometry"
-USED = (FIX, TWIST, ODOMETRY, trajectory.TYPE)
-STORES = get_typestore(Stores.ROS2_JAZZY)  # the four types are standard, so bags without type definitions read as well
+USED = (FIX, TWIST, ODOMETRY, TRACKS)
 
 
 @dataclass
@@ -57,7 +43,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     """Read the topics that this project knows; several bags are one log."""
     topics = read_topics(paths, config)
     label = str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
-    tracks = [topic for topic in topics if topic.type == trajectory.TYPE]
+    tracks = [topic for topic in topics if topic.type == TRACKS]
     name = paths[0].stem if paths[0].is_file() else paths[0].name
     if tracks:
         return read_tracks(tracks, name, label, others=[topic.name for topic in topics if topic not in tracks])
@@ -70,7 +56,7 @@ def read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
     Raises:
         InputError: a file is damaged or too large, or no topic can be used.
     """
-    wanted = [name.strip() for name in config.topics.split(",") if name.strip()]
+    wanted = listed(config.topics)
     found: dict[str, Topic] = {}
     seen: dict[str, str] = {}
     bounds = BagConfig(most_bytes=config.size_limit << 20)
@@ -92,7 +78,7 @@ def read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
     if not found:
         raise InputError(
             f"{paths[0]}: no topic to read. It has {listing(seen)}. Needed is {FIX} with {TWIST}, or {ODOMETRY}, one per "
-            f"vehicle, or a topic named tracks of {trajectory.TYPE}; the parameter topics chooses by name"
+            f"vehicle, or a topic named tracks of {TRACKS}; the parameter topics chooses by name"
         )
     return [found[name] for name in sorted(found)]
 
@@ -101,7 +87,7 @@ def is_used(topic: str, kind: str, wanted: list[str]) -> bool:
     """Return whether a topic is read; of trajectories only those called tracks, unless asked for by name."""
     if wanted:
         return topic in wanted and kind in USED
-    return kind in USED and (kind != trajectory.TYPE or topic.rpartition("/")[2] == "tracks")
+    return kind in USED and (kind != TRACKS or topic.rpartition("/")[2] == "tracks")
 
 
 def listing(seen: dict[str, str]) -> str:
@@ -116,7 +102,11 @@ def vehicle_id(topic: str) -> str:
 
 
 def read_streams(topics: list[Topic], name: str, label: str, config: LogConfig) -> RawLog:
-    """Collect fixes, speeds and odometry per vehicle."""
+    """Collect fixes, speeds and odometry per vehicle.
+
+    Raises:
+        InputError: a message is damaged, positions are of two kinds, or a vehicle has none, or there are too many vehicles.
+    """
     if len({topic.type == ODOMETRY for topic in topics if topic.type != TWIST}) > 1:
         mixed = listing({topic.name: topic.type for topic in topics})
         raise InputError(f"{label} has both {FIX} and {ODOMETRY} ({mixed}); choose with the parameter topics")
@@ -129,8 +119,7 @@ def read_streams(topics: list[Topic], name: str, label: str, config: LogConfig) 
     for topic in topics:
         segments.append(Segment(row, f"{label}, topic {topic.name}", "message", 1))
         vehicle = vehicles.setdefault(owners[topic.name], Rows())
-        take = {FIX: take_fix, TWIST: take_twist, ODOMETRY: take_odometry}[topic.type]
-        if collect(topic, take, vehicle, row, label):
+        if collect(topic, vehicle, row, label):
             unstamped.append(topic.name)
         row += len(topic.data)
     notes = [f"{len(unstamped)} topic(s) bear no header stamps, so the time of reception is used: {', '.join(unstamped)}"]
@@ -168,37 +157,18 @@ def own(topics: list[Topic], label: str) -> dict[str, str]:
     return owners
 
 
-def collect(topic: Topic, take: Callable[[Any, Rows, int, int], None], vehicle: Rows, row: int, label: str) -> bool:
+def collect(topic: Topic, vehicle: Rows, row: int, label: str) -> bool:
     """Decode the messages of a topic; return whether their headers bear no stamps."""
     unstamped = False
     for number, (received, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
-        with guarded(f"{label}, topic {topic.name}, message {number + 1}: not a {topic.type}"):
-            message: Any = STORES.deserialize_cdr(data, topic.type)
-        stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-        unstamped |= stamp == 0
-        take(message, vehicle, stamp or received, row + number)
+        sample = decode_sample(data, topic.type, f"{label}, topic {topic.name}, message {number + 1}")
+        unstamped |= sample.stamp_ns == 0
+        stamp = sample.stamp_ns or received
+        if sample.position is not None:
+            vehicle.fixes.append((stamp, row + number, *sample.position, sample.heading))
+        if sample.speed is not None:
+            vehicle.speeds.append((stamp, row + number, sample.speed))
     return unstamped
-
-
-def take_fix(message: Any, vehicle: Rows, stamp: int, row: int) -> None:
-    """A NavSatFix; one without a fix (status below 0) has no position."""
-    known = message.status.status >= 0
-    position = (message.latitude, message.longitude) if known else (math.nan, math.nan)
-    vehicle.fixes.append((stamp, row, *position, math.nan))
-
-
-def take_twist(message: Any, vehicle: Rows, stamp: int, row: int) -> None:
-    """A TwistStamped."""
-    vehicle.speeds.append((stamp, row, speed_of(message.twist.linear.x, message.twist.linear.y)))
-
-
-def take_odometry(message: Any, vehicle: Rows, stamp: int, row: int) -> None:
-    """An Odometry: pose in its frame, speed in the body frame."""
-    pose, linear = message.pose.pose, message.twist.twist.linear
-    turn = pose.orientation
-    heading = float(yaw(np.array([turn.x, turn.y, turn.z, turn.w])))
-    vehicle.fixes.append((stamp, row, pose.position.x, pose.position.y, heading))
-    vehicle.speeds.append((stamp, row, exact.hypot(linear.x, linear.y)))
 
 
 def read_tracks(topics: list[Topic], name: str, label: str, others: list[str]) -> RawLog:
@@ -212,37 +182,9 @@ def read_tracks(topics: list[Topic], name: str, label: str, others: list[str]) -
         for number, data in enumerate(dict.fromkeys(topic.data)):
             where = f"{label}, topic {topic.name}, message {number + 1}"
             found = decode_tracks(data, where)
-            values = {key: getattr(found, key) for key in found.__dataclass_fields__}
-            encounters.append(Encounter(**(values | {"name": name if whole == 1 else f"{name}-{len(encounters) + 1}"})))
+            encounters.append(replace(found, name=name if whole == 1 else f"{name}-{len(encounters) + 1}"))
     if others:
         notes.append(
             f"read from {', '.join(topic.name for topic in topics)}; the parameter topics can choose {', '.join(others)}"
         )
     return RawLog(name, False, (), row, tuple(segments), tuple(notes), encounters=tuple(encounters))
-
-
-def between(encounter: Encounter, config: LogConfig) -> Encounter:
-    """Return the encounter in the asked time window and with the asked vehicles.
-
-    Raises:
-        InputError: a vehicle is unknown, or fewer than two vehicles or samples are left.
-    """
-    names = [name.strip() for name in config.vehicles.split(",") if name.strip()]
-    ids = [vehicle.id for vehicle in encounter.vehicles]
-    for unknown in (name for name in names if name not in ids):
-        raise InputError(f"parameter vehicles: {encounter.name} has no vehicle {unknown!r}; it has {', '.join(ids)}")
-    if config.start >= encounter.duration:
-        raise InputError(f"parameter start is {config.start:g} s, but {encounter.name} is only {encounter.duration:.1f} s long")
-    rows = [ids.index(name) for name in dict.fromkeys(names)] or list(range(len(ids)))
-    first = math.ceil(config.start / encounter.dt - 1e-9)
-    last = math.floor(config.end / encounter.dt + 1e-9) + 1 if config.end else len(encounter.time)
-    return Encounter(
-        name=encounter.name,
-        vehicles=tuple(encounter.vehicles[n] for n in rows),
-        start_ns=encounter.start_ns + first * encounter.dt_ns,
-        dt_ns=encounter.dt_ns,
-        position=encounter.position[rows, first:last],
-        heading=encounter.heading[rows, first:last],
-        speed=encounter.speed[rows, first:last],
-        origin=encounter.origin,
-    )

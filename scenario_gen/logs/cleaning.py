@@ -14,7 +14,8 @@
 
 """Cleaning: what cannot be true is dropped and counted; what is left is in order of time, in metres."""
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -23,10 +24,14 @@ from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.errors import InputError
 from scenario_gen.geodesy import local_frame
-from scenario_gen.logs.budgets import check_clock, FARTHEST, LATEST_NS
-from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.raw import Observations, RawLog
 
+LATEST_NS = 2**62  # years 1823 to 2116: so the difference of any two stamps fits in 64 bits
+SLOWEST = 5.0  # s between fixes: a slower source says nothing of how a vehicle drives, or its unit of time is another one
+FARTHEST = 1e8  # m from the origin of any frame: a quarter of the way to the moon
+UNITS = {"milliseconds": ("ms", 1e-3), "microseconds": ("us", 1e-6), "nanoseconds": ("ns", 1e-9)}
+USUAL = (0.005, 2.0)  # s between fixes of usual sources
 FASTEST = 70.0  # m/s: no road vehicle's measured speed is above it (an SPMD unit sends 163.8 for "unknown")
 JUMP_SLACK = 3.0  # m that a fix may lie beyond what the speeds allow: GPS noise
 JUMP_SPEED = 10.0  # m/s by which a measured speed may be wrong before a fix counts as a jump
@@ -66,7 +71,7 @@ class Drops:
     first: dict[str, int] = field(default_factory=dict)
 
     def add(self, reason: str, rows: Ints) -> None:
-        """Count `rows` as dropped for `reason`."""
+        """Count `rows` (K,) of the log as dropped for `reason`."""
         if len(rows):
             self.count[reason] = self.count.get(reason, 0) + len(rows)
             self.first[reason] = min(self.first.get(reason, int(rows[0])), int(rows.min()))
@@ -84,7 +89,8 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Track, ...], Drops, tup
     drops = Drops()
     for reason, row in log.dropped:
         drops.add(reason, np.array([row]))
-    sound = [sound_observations(vehicle, log.geographic, drops) for vehicle in chosen(log, config)]
+    known = {vehicle.id: vehicle for vehicle in log.vehicles}
+    sound = [sound_observations(known[name], log.geographic, drops) for name in picked(list(known), config, log.name)]
     window = time_window(sound, log, drops, config)
     sound = [within(vehicle, *window) for vehicle in sound]
     if not any(len(vehicle.fix_ns) for vehicle in sound):
@@ -97,16 +103,6 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Track, ...], Drops, tup
         reason = next(iter(drops.count))
         raise InputError(f"{log.where(drops.first[reason])}: {reason} ({drops.count[reason]} such rows), and strict is set")
     return tuple(track for track in tracks if len(track.fix_ns) >= 2), drops, origin
-
-
-def chosen(log: RawLog, config: LogConfig) -> tuple[Observations, ...]:
-    """Return the vehicles that the parameter `vehicles` names, all by default."""
-    names = [name.strip() for name in config.vehicles.split(",") if name.strip()]
-    known = {vehicle.id: vehicle for vehicle in log.vehicles}
-    for name in names:
-        if name not in known:
-            raise InputError(f"parameter vehicles: {log.name} has no vehicle {name!r}; it has {', '.join(known)}")
-    return tuple(known[name] for name in dict.fromkeys(names)) if names else log.vehicles
 
 
 def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) -> Observations:
@@ -133,12 +129,12 @@ def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) ->
 
 
 def beyond(stamps: Ints) -> Bools:
-    """Return which stamps [ns] are too far from 1970 to be subtracted from each other."""
+    """Return which stamps (T,) [ns] are too far from 1970 to be subtracted from each other."""
     return (stamps < -LATEST_NS) | (stamps > LATEST_NS)
 
 
 def judge(checks: list[tuple[str, Any]], rows: Ints, drops: Drops) -> Bools:
-    """Return the rows that fail no check; each that fails counts once, for the first reason."""
+    """Return which rows (T,) fail no check of (T,) flags; each that fails counts once, for the first reason."""
     keep = np.ones(len(rows), dtype=bool)
     for reason, bad in checks:
         drops.add(reason, rows[keep & bad])
@@ -147,18 +143,11 @@ def judge(checks: list[tuple[str, Any]], rows: Ints, drops: Drops) -> Bools:
 
 
 def select(vehicle: Observations, fixes: Bools | Ints, speeds: Bools | Ints) -> Observations:
-    """Return the vehicle with only the chosen observations, in the order given."""
-    return Observations(
-        id=vehicle.id,
-        fix_ns=vehicle.fix_ns[fixes],
-        fix=vehicle.fix[fixes],
-        fix_row=vehicle.fix_row[fixes],
-        heading=vehicle.heading[fixes],
-        speed_ns=vehicle.speed_ns[speeds],
-        speed=vehicle.speed[speeds],
-        speed_row=vehicle.speed_row[speeds],
-        length=vehicle.length,
-        width=vehicle.width,
+    """Return the vehicle with only the chosen observations, in the order given: flags (F,) and (S,), or indices."""
+    return replace(
+        vehicle,
+        **{name: getattr(vehicle, name)[fixes] for name in ("fix_ns", "fix", "fix_row", "heading")},
+        **{name: getattr(vehicle, name)[speeds] for name in ("speed_ns", "speed", "speed_row")},
     )
 
 
@@ -208,16 +197,15 @@ def to_metres(
     else:
         middle = np.round(np.percentile(everything, [5, 95], axis=0).mean(axis=0), 5)  # a few wrong fixes do not move it
         origin = (float(middle[0]), float(middle[1]))
-    projected = []
-    for vehicle in vehicles:
-        fix = local_frame(vehicle.fix[:, 0], vehicle.fix[:, 1], origin)
-        values = {name: getattr(vehicle, name) for name in vehicle.__dataclass_fields__}
-        projected.append(Observations(**(values | {"fix": fix})))
-    return origin, projected
+    return origin, [replace(vehicle, fix=local_frame(vehicle.fix[:, 0], vehicle.fix[:, 1], origin)) for vehicle in vehicles]
 
 
 def parse_origin(text: str) -> tuple[float, float]:
-    """Read `latitude,longitude`."""
+    """Return latitude and longitude of a text `latitude,longitude`, in degrees.
+
+    Raises:
+        InputError: it is not of that form, or no place on the globe.
+    """
     try:
         latitude, longitude = (float(part) for part in text.split(","))
     except ValueError as error:
@@ -253,11 +241,49 @@ def in_order(vehicle: Observations, log: RawLog, drops: Drops) -> Observations:
 
 
 def first_of_each(stamps: Ints) -> tuple[Ints, Ints]:
-    """Indices of the first row of each stamp in order of time, and of the rows that repeat one."""
+    """Return, of stamps (T,), the indices of the first row of each in order of time, and of the rows that repeat one."""
     order = np.argsort(stamps, kind="stable")
     new = np.ones(len(order), dtype=bool)
     new[1:] = np.diff(stamps[order]) > 0
     return order[new], order[~new]
+
+
+def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig) -> None:
+    """Refuse tracks whose common clock would have more than `tick_limit` ticks, or whose unit of time seems to be wrong.
+
+    The clock has a tick for every period between a vehicle's first and last stamp: one wrong stamp puts them years apart, and
+    the clock then asks for hundreds of gibibytes.
+
+    Args:
+        vehicles: stamps in order.
+        log: names the places.
+        config: holds the limit and the period.
+
+    Raises:
+        InputError: the clock is too long, or the fixes are too far apart in time.
+    """
+    vehicles = [vehicle for vehicle in vehicles if len(vehicle.fix_ns) >= 2]
+    if not vehicles:
+        return
+    typical = float(np.median(np.concatenate([np.diff(vehicle.fix_ns) for vehicle in vehicles]))) * 1e-9
+    if typical > max(SLOWEST, config.longest_gap):
+        likely = [(name, unit) for name, (unit, factor) in UNITS.items() if USUAL[0] <= typical * factor <= USUAL[1]]
+        said = f"this looks like {likely[0][0]} read as seconds; " if likely else ""
+        raise InputError(
+            f"{log.where(int(vehicles[0].fix_row[1]))}: positions are {typical:g} s apart (median), at most {SLOWEST:g} s make a "
+            f"track; {said}name the unit with the parameter columns, time=<column>:{likely[0][1] if likely else '<unit>'}"
+        )
+    spans = [int(vehicle.fix_ns[-1]) - int(vehicle.fix_ns[0]) for vehicle in vehicles]
+    ticks = round(sum(int(span) for span in spans) / (config.period * 1e9))
+    if ticks > config.tick_limit:
+        longest = vehicles[int(np.argmax(spans))]
+        after = int(np.argmax(np.diff(longest.fix_ns))) + 1
+        gap = int(longest.fix_ns[after]) - int(longest.fix_ns[after - 1])
+        raise InputError(
+            f"{log.where(int(longest.fix_row[after]))}: the stamp of vehicle {longest.id[:50]} is {gap * 1e-9:g} s after the one "
+            f"before, so the clock has {ticks} ticks of {config.period:g} s in all; at most {config.tick_limit} are made: "
+            "correct the stamp, cut the log (parameters start, end), or raise the parameter tick_limit"
+        )
 
 
 def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig) -> Track:
@@ -289,7 +315,13 @@ def reach(vehicle: Observations) -> Floats:
 
 
 def reachable(seconds: Floats, fix: Floats, limit: Floats) -> Bools:
-    """Return which fixes can be reached from the last one believed."""
+    """Return which fixes (F,) can be reached from the last one believed.
+
+    Args:
+        seconds: (F,) their stamps.
+        fix: (F, 2) [m].
+        limit: (F,) the fastest that the vehicle may have been [m/s].
+    """
     keep = np.ones(len(fix), dtype=bool)
     last, doubted = 0, 0
     for i in range(1, len(fix)):

@@ -20,6 +20,7 @@ import math
 from pathlib import Path
 
 from scenario_gen.errors import InputError
+from scenario_gen.logs.config import listed
 
 # Names a quantity goes by, the preferred one first; a clock that all files share is preferred to one that starts with the file.
 NAMES: dict[str, tuple[str, ...]] = {
@@ -35,26 +36,18 @@ NAMES: dict[str, tuple[str, ...]] = {
     "width": ("width", "vehicle_width"),
 }
 # Factor to seconds, metres, m/s, radians or degrees (positions); a name without a suffix has the first unit.
+PLACES = {"m": 1.0, "km": 1e3, "ft": 0.3048, "cm": 0.01}
+SIZES = {"m": 1.0, "ft": 0.3048, "cm": 0.01, "mm": 0.001}
+DEGREES = {"deg": 1.0, "rad": math.degrees(1.0)}
+SPEEDS = {"mps": 1.0, "ms": 1.0, "m_s": 1.0, "kmh": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.44704, "kn": 1852 / 3600, "fps": 0.3048}
 UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "sec": 1.0, "ns": 1e-9, "us": 1e-6, "ms": 1e-3},
     "vehicle": {},
-    "lat": {"deg": 1.0, "rad": math.degrees(1.0)},
-    "lon": {"deg": 1.0, "rad": math.degrees(1.0)},
-    "x": {"m": 1.0, "km": 1e3, "ft": 0.3048, "cm": 0.01},
-    "y": {"m": 1.0, "km": 1e3, "ft": 0.3048, "cm": 0.01},
-    "speed": {
-        "mps": 1.0,
-        "ms": 1.0,
-        "m_s": 1.0,
-        "kmh": 1 / 3.6,
-        "kph": 1 / 3.6,
-        "mph": 0.44704,
-        "kn": 1852 / 3600,
-        "fps": 0.3048,
-    },
+    **dict.fromkeys(("lat", "lon"), DEGREES),
+    **dict.fromkeys(("x", "y"), PLACES),
+    **dict.fromkeys(("length", "width"), SIZES),
+    "speed": SPEEDS,
     "heading": {"rad": 1.0, "deg": math.pi / 180.0, "north_deg": math.nan, "cw_deg": math.nan},
-    "length": {"m": 1.0, "ft": 0.3048, "cm": 0.01, "mm": 0.001},
-    "width": {"m": 1.0, "ft": 0.3048, "cm": 0.01, "mm": 0.001},
 }
 CLOCKWISE = ("course", "bearing")  # by convention degrees clockwise from north
 
@@ -77,7 +70,7 @@ def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Co
     names = {name.strip().lower(): name for name in header}
     found: dict[str, Column] = {}
     without: set[str] = set()
-    for part in filter(None, (p.strip() for p in option.split(","))):
+    for part in listed(option):
         quantity, _, name = (p.strip() for p in part.partition("="))
         if quantity not in NAMES:
             raise InputError(f"parameter columns: {quantity!r} is none of {', '.join(NAMES)} (write quantity=column, …)")
@@ -92,38 +85,36 @@ def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Co
             raise InputError(f"parameter columns: {quantity} has no unit {unit!r}; choose one of {', '.join(UNITS[quantity])}")
         found[quantity] = as_column(quantity, names[name.lower()], unit)
     for quantity, aliases in NAMES.items():
-        if quantity not in found and quantity not in without:
-            candidates = [
-                candidate for alias in aliases for candidate in (alias, *(f"{alias}_{unit}" for unit in UNITS[quantity]))
-            ]
-            match = next((names[candidate] for candidate in candidates if candidate in names), None)
-            if match is not None:
-                found[quantity] = as_column(quantity, match)
-    if (
-        found.get("time", Column("", 1.0)).name.strip().lower() == "gentime" and "heading" in found
-    ):  # basic safety messages with a header
+        if quantity in found or quantity in without:
+            continue
+        suffixes = ("", *(f"_{unit}" for unit in UNITS[quantity]))
+        candidates = (f"{alias}{suffix}" for alias in aliases for suffix in suffixes)
+        match = next((names[candidate] for candidate in candidates if candidate in names), None)
+        if match is not None:
+            found[quantity] = as_column(quantity, match)
+    if "heading" in found and "time" in found and found["time"].name.strip().lower() == "gentime":  # basic safety messages
         found["heading"] = Column(found["heading"].name, math.pi / 180.0, clockwise=True)
     return complete(found, without, path, names)
 
 
 def complete(found: dict[str, Column], without: set[str], path: Path, names: dict[str, str]) -> dict[str, Column]:
-    """Check that all needed columns are there; latitude and longitude win over x and y."""
-    if "lat" in found and "lon" in found:
-        found = {quantity: column for quantity, column in found.items() if quantity not in ("x", "y")}
-    elif "x" in found and "y" in found:
-        found = {quantity: column for quantity, column in found.items() if quantity not in ("lat", "lon")}
-    else:
-        raise InputError(missing("position (lat and lon, or x and y)", "x=…,y=…", path, names))
-    for quantity in ("time", "speed"):
-        if quantity not in found and (quantity == "time" or quantity not in without):
-            hint = f"{quantity}=…" + (" or speed=none to take it from the positions" if quantity == "speed" else "")
-            raise InputError(missing(quantity, hint, path, names))
-    return found
+    """Return what is read of the columns: latitude and longitude win over x and y.
 
-
-def missing(quantity: str, hint: str, path: Path, names: dict[str, str]) -> str:
-    """Say which column is missing and what to do."""
-    return f"{path} has no column for {quantity}; it has {', '.join(names.values())}. Name it with the parameter columns, {hint}"
+    Raises:
+        InputError: a needed column is missing.
+    """
+    lacks = None
+    if not ({"lat", "lon"} <= found.keys() or {"x", "y"} <= found.keys()):
+        lacks = ("position (lat and lon, or x and y)", "x=…,y=…")
+    elif "time" not in found:
+        lacks = ("time", "time=…")
+    elif "speed" not in found and "speed" not in without:
+        lacks = ("speed", "speed=… or speed=none to take it from the positions")
+    if lacks:
+        there = ", ".join(names.values())
+        raise InputError(f"{path} has no column for {lacks[0]}; it has {there}. Name it with the parameter columns, {lacks[1]}")
+    unused = ("x", "y") if {"lat", "lon"} <= found.keys() else ("lat", "lon")
+    return {quantity: column for quantity, column in found.items() if quantity not in unused}
 
 
 def as_column(quantity: str, name: str, unit: str = "") -> Column:

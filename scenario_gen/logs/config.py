@@ -14,8 +14,10 @@
 
 """Parameters of reading a log."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from scenario_gen.errors import InputError
 from scenario_gen.parameters import check, parameter
 
 FORMATS = ("auto", "spmd", "table", "bag")
@@ -53,11 +55,15 @@ class LogConfig:
     proximity: float = parameter(
         100.0, "vehicles nearer than this meet (the range of DSRC in the paper)", unit="m", low=1.0, high=2000.0
     )
-    shortest: float = parameter(5.0, "shortest encounter", unit="s", low=0.5, high=600.0)
-    longest: float = parameter(60.0, "longest encounter; longer ones are cut in equal parts", unit="s", low=2.0, high=3600.0)
+    min_duration: float = parameter(5.0, "shortest encounter", unit="s", low=0.5, high=600.0, was="shortest")
+    max_duration: float = parameter(
+        60.0, "longest encounter; longer ones are cut in equal parts", unit="s", low=2.0, high=3600.0, was="longest"
+    )
     travel: float = parameter(5.0, "distance that at least one vehicle of an encounter covers", unit="m", low=0.0, high=1000.0)
     standstill: float = parameter(10.0, "when all stand longer than this, the encounter is over", unit="s", low=1.0, high=600.0)
-    most_vehicles: int = parameter(4, "largest number of vehicles in an encounter cut from a longer log", low=2, high=64)
+    max_vehicles: int = parameter(
+        4, "largest number of vehicles in an encounter cut from a longer log", low=2, high=64, was="most_vehicles"
+    )
     size_limit: int = parameter(256, "largest log that is read, counted decompressed", unit="MiB", low=1, high=1_000_000)
     row_limit: int = parameter(2_000_000, "most rows or messages of a log", low=1)
     vehicle_limit: int = parameter(10_000, "most vehicles of a log", low=2)
@@ -65,3 +71,20 @@ class LogConfig:
 
     def __post_init__(self) -> None:
         check(self)
+
+
+def listed(text: str) -> list[str]:
+    """Return the parts of a text that are separated by commas, without those that are empty."""
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
+def picked(known: Sequence[str], config: LogConfig, where: str) -> list[str]:
+    """Return the vehicles that the parameter `vehicles` names, all by default.
+
+    Raises:
+        InputError: one of them is not there; the message lists those that are.
+    """
+    names = listed(config.vehicles)
+    for unknown in (name for name in names if name not in known):
+        raise InputError(f"parameter vehicles: {where} has no vehicle {unknown!r}; it has {', '.join(known)}")
+    return list(dict.fromkeys(names)) or list(known)

@@ -12,38 +12,160 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Cutting a log into encounters: who is near whom, for how long, and who belongs to the group.
+"""From clean tracks to encounters: smooth pieces between long gaps, who is near whom, and who belongs to the group.
 
-A *meeting* is a pair of vehicles nearer than `proximity` for at least `shortest` seconds; those longer than `longest` are cut.
-Encounters grow from meetings: the strongest one first, joined by vehicles that are near for most of the time, up to
-`most_vehicles`; the interval is the one in which all of them are present and near. Then the meetings inside the encounter are
+A *pair interval* is a time in which two vehicles are nearer than `proximity`, for at least `min_duration` seconds; those longer
+than `max_duration` are cut.
+Encounters grow from pair intervals: the strongest one first, joined by vehicles that are near for most of the time, up to
+`max_vehicles`; the interval is the one in which all of them are present and near. Then the pairs inside the encounter are
 used up, and the next begins.
-In a log of few vehicles (as cut by a person) every meeting counts, and a vehicle joins that meets any member. In a longer one
-only those meetings count in which somebody moves and the two interact (places and times come close, `space_time_gap`: they
+In a log of few vehicles (as cut by a person) every pair interval counts, and a vehicle joins that meets any member. In a longer
+one only those count in which somebody moves and the two interact (places and times come close, `space_time_gap`: they
 cross, follow, merge or pass), and a vehicle joins that so meets all the members.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Bools
+from scenario_gen.arrays import Bools, Floats, runs
+from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, SLOWEST, Track
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.intervals import runs
-from scenario_gen.logs.pieces import Piece
+from scenario_gen.logs.quality import VehicleQuality
+from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing
 
+TURNED = np.radians(120.0)  # who drives off from a stop this far from where it came from has reversed, or turned on the spot
+MOST_TICKS = 100_000  # of a piece: smoothing takes 3 kB for each
+LEVER = 3.0  # m over which that direction is measured
 PRESENT = 0.6  # a vehicle that is there for less of the interval is left out; for more, it shortens the interval
 INTERACTS = 6.0  # m: the space-time gap below which two vehicles have to do with each other
 LAG = 2.0  # m/s: what a second between two vehicles at the same place is worth in metres
-APART = 1.0  # s that a pair may be out of range within one meeting
+APART = 1.0  # s that a pair may be out of range within one pair interval
 REST = 2.0  # s of a long standstill that stay with the encounter before or after it
 
 
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A vehicle's smooth motion between two long gaps, on the log's common clock."""
+
+    track: Track
+    smooth: Smooth
+
+    @property
+    def first(self) -> int:
+        """Tick of the first sample."""
+        return self.smooth.first
+
+    @property
+    def last(self) -> int:
+        """Tick after the final sample."""
+        return self.smooth.first + len(self.smooth.speed)
+
+    def position(self, first: int, last: int) -> Floats:
+        """Positions (T, 2) [m] from tick `first` to before tick `last`."""
+        return self.smooth.position[first - self.first : last - self.first]
+
+    def speed(self, first: int, last: int) -> Floats:
+        """Speeds (T,) [m/s], likewise."""
+        return self.smooth.speed[first - self.first : last - self.first]
+
+
+def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Piece], VehicleQuality]:
+    """Cut a track at gaps, relocations and reversals, and smooth each piece.
+
+    A gap may always be two and a half of the source's own periods long, so that a source of 1 Hz is not cut to bits.
+    """
+    seconds = np.diff(track.fix_ns) * 1e-9
+    usual = float(np.median(seconds))
+    longest = longest_bridge(seconds, config)
+    step = exact.hypot(*np.diff(track.fix, axis=0).T)
+    gaps = (seconds > longest) | (step > JUMP_SLACK + FASTEST * seconds)
+    back = reversals(track, config)
+    cuts = gaps | back | laps(track, config)
+    bridged = (seconds > 1.5 * max(usual, config.period)) & ~gaps
+    smoothed = [(part, smooth_piece(part, origin_ns, config)) for part in parts(track, cuts)]
+    pieces = [Piece(part, smooth) for part, smooth in smoothed if smooth is not None]
+    smooths = [piece.smooth for piece in pieces]
+
+    def rms(name: str) -> float:
+        values = np.concatenate([np.zeros(0), *(getattr(smooth, name) for smooth in smooths)])
+        return float(np.sqrt(np.square(values).mean())) if len(values) else 0.0
+
+    quality = VehicleQuality(
+        id=track.id,
+        fixes=len(track.fix_ns),
+        seconds=sum(int(piece.last - piece.first - 1) for piece in pieces) * config.period,
+        pieces=len(pieces),
+        bridged=int(bridged.sum()),
+        longest_bridged=float(seconds[bridged].max(initial=0.0)),
+        cut=int(gaps.sum()),
+        longest_cut=float(seconds[gaps].max(initial=0.0)),
+        reversals=int((back & ~gaps).sum()),
+        speed_before=rms("before"),
+        speed_after=rms("after"),
+        changed=rms("changed"),
+        moved=rms("moved"),
+        moved_most=max((float(smooth.moved.max()) for smooth in smooths), default=0.0),
+    )
+    return pieces, quality
+
+
+def laps(track: Track, config: LogConfig) -> Bools:
+    """(F-1,) where a track of hours is cut, so that the memory which smoothing takes does not grow with it."""
+    lap = (track.fix_ns - track.fix_ns[0]) // round(MOST_TICKS * config.period * 1e9)
+    new: Bools = np.diff(lap) > 0
+    return new
+
+
+def longest_bridge(seconds: Floats, config: LogConfig) -> float:
+    """Return the longest gap [s] that is bridged in a track whose fixes are `seconds` (F-1,) apart."""
+    return max(config.longest_gap, 2.5 * min(float(np.median(seconds)), SLOWEST)) + 1e-6
+
+
+def reversals(track: Track, config: LogConfig) -> Bools:
+    """(F-1,) where to cut because the vehicle drives back where it came from after a stop: a heading cannot follow that."""
+    seconds = (track.fix_ns - track.fix_ns[0]).astype(np.float64) * 1e-9
+    speed_t = (track.speed_ns - track.fix_ns[0]).astype(np.float64) * 1e-9
+    speed = track.speed
+    if not len(speed):
+        speed_t, speed = seconds, speed_of_fixes(seconds, track.fix)
+    ticks = config.period * np.arange(max(int(seconds[-1] / config.period), 1) + 1, dtype=np.float64)
+    cuts = np.zeros(len(seconds) - 1, dtype=bool)
+    for begin, end in runs(standing(ticks, seconds, track.fix, speed_t, speed)):
+        first, last = np.searchsorted(seconds, (ticks[begin], ticks[end - 1])).tolist()
+        before = departure(track.fix[first::-1])
+        after = departure(track.fix[last:])
+        if before is not None and after is not None and float(exact.matmul(before, after)) > -exact.cos(TURNED):
+            cuts[min((first + last) // 2, len(cuts) - 1)] = True
+    return cuts
+
+
+def departure(fix: Floats) -> Floats | None:
+    """Return the unit vector (2,) from the first fix (F, 2) [m] to the first one that is `LEVER` away, None if there is none."""
+    offset = fix - fix[0]
+    away = exact.hypot(offset[:, 0], offset[:, 1])
+    far = np.flatnonzero(away > LEVER)
+    return offset[far[0]] / away[far[0]] if len(far) else None
+
+
+def parts(track: Track, cuts: Bools) -> list[Track]:
+    """Split a track after each True of `cuts` (F-1,); parts of one fix are left out."""
+    edges = [0, *(np.flatnonzero(cuts) + 1).tolist(), len(track.fix_ns)]
+    found = []
+    for begin, end in pairwise(edges):
+        if end - begin < 2:
+            continue
+        during = (track.speed_ns >= track.fix_ns[begin]) & (track.speed_ns <= track.fix_ns[end - 1])
+        fixes = {name: getattr(track, name)[begin:end] for name in ("fix_ns", "fix", "heading")}
+        found.append(replace(track, **fixes, speed_ns=track.speed_ns[during], speed=track.speed[during]))
+    return found
+
+
 @dataclass(frozen=True)
-class Meeting:
+class PairInterval:
     """Pieces `i` and `j` are near each other from tick `first` to before tick `last`; a smaller gap interacts more."""
 
     i: int
@@ -64,25 +186,25 @@ class Group:
 
 def find_groups(pieces: Sequence[Piece], config: LogConfig) -> tuple[tuple[Group, ...], tuple[str, ...]]:
     """Return the encounters in order of time, and notes on vehicles that were left out or shortened one."""
-    few = len({piece.track.id for piece in pieces}) <= config.most_vehicles
-    meetings = find_meetings(pieces, config, few=few)
+    few = len({piece.track.id for piece in pieces}) <= config.max_vehicles
+    pairs = find_pair_intervals(pieces, config, few=few)
     groups, notes = [], []
-    while meetings:
-        meetings.sort(key=lambda m: (m.gap, m.first - m.last, m.first, m.i, m.j))
-        group, remarks = grow(meetings, pieces, config, few=few)
+    while pairs:
+        pairs.sort(key=lambda m: (m.gap, m.first - m.last, m.first, m.i, m.j))
+        group, remarks = grow(pairs, pieces, config, few=few)
         whole = split(group, pieces, config)
         groups += whole
         notes += remarks if whole else []
-        meetings = left_over(meetings, group, config)
+        pairs = left_over(pairs, group, config)
     groups.sort(key=lambda group: (group.first, group.last, group.members))
     return tuple(groups), tuple(notes)
 
 
-def find_meetings(pieces: Sequence[Piece], config: LogConfig, *, few: bool) -> list[Meeting]:
-    """Return all meetings of two different vehicles; with `few` vehicles each has gap 0."""
+def find_pair_intervals(pieces: Sequence[Piece], config: LogConfig, *, few: bool) -> list[PairInterval]:
+    """Return all pair intervals of two different vehicles; with `few` vehicles each has gap 0."""
     found = []
     order = sorted(range(len(pieces)), key=lambda i: pieces[i].first)
-    least = ticks(config.shortest, config) + 1
+    least = ticks(config.min_duration, config) + 1
     for a, i in enumerate(order):
         for j in order[a + 1 :]:
             if pieces[j].first > pieces[i].last - least:
@@ -90,17 +212,17 @@ def find_meetings(pieces: Sequence[Piece], config: LogConfig, *, few: bool) -> l
             if pieces[i].track.id == pieces[j].track.id:
                 continue
             begin = max(pieces[i].first, pieces[j].first)
-            for low, high in runs(near(pieces[i], pieces[j], config), ticks(APART, config)):
+            for low, high in runs(distances(pieces[i], pieces[j]) < config.proximity, ticks(APART, config)):
                 for first, last in windows(begin + low, begin + high, config):
                     gap = 0.0 if few else space_time_gap(pieces[i], pieces[j], first, last, config)
                     if last - first >= least and gap <= INTERACTS:
-                        found.append(Meeting(min(i, j), max(i, j), first, last, gap))
+                        found.append(PairInterval(min(i, j), max(i, j), first, last, gap))
     return found
 
 
 def windows(first: int, last: int, config: LogConfig) -> list[tuple[int, int]]:
-    """Cut a long meeting at whole multiples of `longest` on the common clock, so that all who meet are cut alike."""
-    longest, least = ticks(config.longest, config), ticks(config.shortest, config) + 1
+    """Cut a long pair interval at whole multiples of `max_duration` on the common clock, so that all who meet are cut alike."""
+    longest, least = ticks(config.max_duration, config), ticks(config.min_duration, config) + 1
     if last - first <= longest:
         return [(first, last)]
     inside = [edge for edge in range(longest, last, longest) if first + least <= edge <= last - least]
@@ -112,13 +234,16 @@ def ticks(seconds: float, config: LogConfig) -> int:
     return round(seconds / config.period)
 
 
-def near(a: Piece, b: Piece, config: LogConfig) -> Bools:
-    """At which of their common ticks two pieces are within range."""
-    first, last = max(a.first, b.first), min(a.last, b.last)
-    if last <= first:
-        return np.zeros(0, dtype=bool)
-    gap = a.smooth.position[first - a.first : last - a.first] - b.smooth.position[first - b.first : last - b.first]
-    return exact.hypot(gap[:, 0], gap[:, 1]) < config.proximity
+def distances(a: Piece, b: Piece) -> Floats:
+    """Distances (T,) [m] of two pieces at their common ticks; empty where they have none."""
+    first = max(a.first, b.first)
+    last = max(min(a.last, b.last), first)
+    return exact.hypot(*(a.position(first, last) - b.position(first, last)).T)
+
+
+def driven(piece: Piece, first: int, last: int, config: LogConfig) -> float:
+    """Distance [m] that a piece drives from tick `first` to before tick `last`."""
+    return float(piece.speed(first, last).sum() * config.period)
 
 
 def space_time_gap(a: Piece, b: Piece, first: int, last: int, config: LogConfig) -> float:
@@ -126,30 +251,28 @@ def space_time_gap(a: Piece, b: Piece, first: int, last: int, config: LogConfig)
 
     Two of whom neither drives `travel` metres have nothing to do with each other: infinite.
     """
-    driven = max(p.smooth.speed[first - p.first : last - p.first].sum() * config.period for p in (a, b))
-    if driven < config.travel:
+    if max(driven(piece, first, last, config) for piece in (a, b)) < config.travel:
         return float("inf")
     every = max(ticks(0.3, config), 1)
     time = np.arange(first, last, every) * config.period
-    at_a = a.smooth.position[first - a.first : last - a.first : every]
-    at_b = b.smooth.position[first - b.first : last - b.first : every]
+    at_a, at_b = a.position(first, last)[::every], b.position(first, last)[::every]
     apart = exact.hypot(at_a[:, None, 0] - at_b[None, :, 0], at_a[:, None, 1] - at_b[None, :, 1])
     return float((apart + LAG * np.abs(time[:, None] - time[None, :])).min())
 
 
-def grow(meetings: list[Meeting], pieces: Sequence[Piece], config: LogConfig, *, few: bool) -> tuple[Group, list[str]]:
-    """Grow an encounter from the strongest meeting."""
-    seed = meetings[0]
+def grow(pairs: list[PairInterval], pieces: Sequence[Piece], config: LogConfig, *, few: bool) -> tuple[Group, list[str]]:
+    """Grow an encounter from the strongest pair interval."""
+    seed = pairs[0]
     members, first, last = [seed.i, seed.j], seed.first, seed.last
     notes: list[str] = []
     refused: set[int] = set()
-    while len(members) < config.most_vehicles:
+    while len(members) < config.max_vehicles:
         candidates: dict[int, list[float]] = {}
         here = {pieces[m].track.id for m in members}
-        for meeting in meetings:
-            for inside, other in ((meeting.i, meeting.j), (meeting.j, meeting.i)):
+        for pair in pairs:
+            for inside, other in ((pair.i, pair.j), (pair.j, pair.i)):
                 if inside in members and other not in refused and pieces[other].track.id not in here:
-                    candidates.setdefault(other, []).append(meeting.gap)
+                    candidates.setdefault(other, []).append(pair.gap)
         candidates = {other: gaps for other, gaps in candidates.items() if few or len(gaps) >= len(members)}
         if not candidates:
             break
@@ -157,7 +280,7 @@ def grow(meetings: list[Meeting], pieces: Sequence[Piece], config: LogConfig, *,
         best = min(candidates, key=lambda other: (spans[other][0] - spans[other][1], min(candidates[other]), other))
         begin, end = spans[best]
         share, name = (end - begin) / (last - first), pieces[best].track.id
-        if share < PRESENT or end - begin < ticks(config.shortest, config) + 1:
+        if share < PRESENT or end - begin < ticks(config.min_duration, config) + 1:
             refused.add(best)
             if share > 0.0:
                 notes.append(
@@ -186,7 +309,7 @@ def common_span(
     flags = np.zeros(last - first, dtype=bool)
     for member in members:
         begin = max(piece.first, pieces[member].first)
-        close = near(piece, pieces[member], config)
+        close = distances(piece, pieces[member]) < config.proximity
         low, high = max(begin, first), min(begin + len(close), last)
         if high > low:
             flags[low - first : high - first] |= close[low - begin : high - begin]
@@ -198,32 +321,32 @@ def common_span(
 def split(group: Group, pieces: Sequence[Piece], config: LogConfig) -> list[Group]:
     """Cut a group where all stand for long, and into equal parts where it lasts too long; keep the parts with motion."""
     members = [pieces[m] for m in group.members]
-    stands = np.all([p.smooth.speed[group.first - p.first : group.last - p.first] < 0.1 for p in members], axis=0)
+    stands = np.all([p.speed(group.first, group.last) < 0.1 for p in members], axis=0)
     rest, busy = ticks(REST, config), np.ones(len(stands), dtype=bool)
     for begin, end in runs(stands):
         if end - begin > ticks(config.standstill, config):
             busy[begin + rest : end - rest] = False
     found = []
     for begin, end in runs(busy):
-        parts = max(int(np.ceil((end - begin - 1) * config.period / config.longest - 1e-9)), 1)
+        parts = max(int(np.ceil((end - begin - 1) * config.period / config.max_duration - 1e-9)), 1)
         edges = np.linspace(begin, end - 1, parts + 1).round().astype(int)
         for low, high in pairwise(edges.tolist()):
             part = Group(group.members, group.first + low, group.first + high + 1)
-            driven = [p.smooth.speed[part.first - p.first : part.last - p.first].sum() * config.period for p in members]
-            if part.last - part.first > ticks(config.shortest, config) and max(driven) >= config.travel:
+            farthest = max(driven(p, part.first, part.last, config) for p in members)
+            if part.last - part.first > ticks(config.min_duration, config) and farthest >= config.travel:
                 found.append(part)
     return found
 
 
-def left_over(meetings: list[Meeting], group: Group, config: LogConfig) -> list[Meeting]:
-    """Return what remains of the meetings when those inside the group are used up."""
-    least = ticks(config.shortest, config) + 1
+def left_over(pairs: list[PairInterval], group: Group, config: LogConfig) -> list[PairInterval]:
+    """Return what remains of the pair intervals when those inside the group are used up."""
+    least = ticks(config.min_duration, config) + 1
     remaining = []
-    for meeting in meetings:
-        if meeting.i not in group.members or meeting.j not in group.members:
-            remaining.append(meeting)
+    for pair in pairs:
+        if pair.i not in group.members or pair.j not in group.members:
+            remaining.append(pair)
             continue
-        for first, last in ((meeting.first, min(meeting.last, group.first)), (max(meeting.first, group.last), meeting.last)):
+        for first, last in ((pair.first, min(pair.last, group.first)), (max(pair.first, group.last), pair.last)):
             if last - first >= least:
-                remaining.append(Meeting(meeting.i, meeting.j, first, last, meeting.gap))
+                remaining.append(PairInterval(pair.i, pair.j, first, last, pair.gap))
     return remaining

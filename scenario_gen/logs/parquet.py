@@ -26,11 +26,10 @@ import pandas as pd
 import pyarrow as pa
 from pyarrow import compute, parquet
 
-from scenario_gen.errors import InputError
-from scenario_gen.guard import guarded
-from scenario_gen.logs.budgets import check_size
+from scenario_gen.errors import guarded, InputError
 from scenario_gen.logs.columns import Column, find_columns
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.raw import check_size
 
 BATCH = 1 << 16  # rows
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # of the units of time in Arrow

@@ -15,6 +15,14 @@
 """The data-quality summary of a log: what was read, dropped, bridged, reconciled, and what the record itself gets wrong."""
 
 from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import shapely
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats
+from scenario_gen.types.encounter import Encounter
 
 
 @dataclass(frozen=True)
@@ -121,3 +129,25 @@ def vehicle_line(vehicle: VehicleQuality) -> str:
         f"{vehicle.speed_before:.2f} → {vehicle.speed_after:.2f} m/s RMS, speeds changed by {vehicle.changed:.2f} m/s, "
         f"positions by {vehicle.moved:.2f} m RMS (at most {vehicle.moved_most:.1f} m)"
     )
+
+
+def footprints(encounter: Encounter, vehicle: int) -> Floats:
+    """Return the corners (T, 4, 2) [m] of a vehicle's footprint, counter-clockwise from the rear right."""
+    body = encounter.vehicles[vehicle]
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [body.length / 2.0, body.width / 2.0]
+    cos, sin = exact.cos(encounter.heading[vehicle]), exact.sin(encounter.heading[vehicle])
+    turn = np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=-2)
+    turned: Floats = exact.matmul(corners, np.swapaxes(turn, 1, 2)) + encounter.position[vehicle][:, None, :]
+    return turned
+
+
+def find_overlaps(encounter: Encounter) -> tuple[Overlap, ...]:
+    """Return the pairs whose footprints overlap at some sample, with the share of samples and the largest area."""
+    polygons = [shapely.polygons(footprints(encounter, n)) for n in range(len(encounter.vehicles))]
+    found = []
+    for a, b in combinations(range(len(polygons)), 2):
+        area = shapely.area(shapely.intersection(polygons[a], polygons[b]))
+        share = float((area > 0.0).mean())
+        if share > 0.0:
+            found.append(Overlap(encounter.vehicles[a].id, encounter.vehicles[b].id, share, float(area.max())))
+    return tuple(found)

@@ -12,19 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What every source of logs delivers: observations per vehicle, with the place each of them came from."""
+"""What every reader of logs delivers: observations per vehicle, with the place each of them came from, within bounds."""
 
 from bisect import bisect_right
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.encounter import Encounter
+from scenario_gen.errors import InputError
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.types.encounter import Encounter
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,18 +116,43 @@ class RawLog:
         return f"{segment.label}, {segment.unit} {segment.number + row - segment.first}"
 
 
-class LogSource(Protocol):
-    """A reader of one format: the modules `bag`, `spmd` and `table` are such."""
-
-    def read(self, paths: Sequence[Path], config: LogConfig) -> RawLog:
-        """Read the files as one log.
-
-        Raises:
-            InputError: a file cannot be read; names the file and the place.
-        """
-        ...
-
-
 def natural(name: str) -> tuple[int, int, str]:
     """Sort key of names in which whole numbers sort by value, before the rest."""
     return (0, int(name), name) if name.isascii() and name.isdigit() else (1, 0, name)
+
+
+def check_size(where: str, size: int, rows: int, config: LogConfig) -> None:
+    """Refuse a log of more than `size_limit` or `row_limit`.
+
+    Args:
+        where: the file; begins the message.
+        size: bytes, decompressed.
+        rows: rows or messages.
+        config: holds the limits.
+
+    Raises:
+        InputError: it is too large.
+    """
+    if size > config.size_limit << 20:
+        raise InputError(
+            f"{where} holds {size / 2**20:.1f} MiB (decompressed, as far as it was read); at most {config.size_limit} MiB are "
+            "read: cut the log, or raise the parameter size_limit"
+        )
+    if rows > config.row_limit:
+        raise InputError(
+            f"{where} holds {rows} rows or more; at most {config.row_limit} are read: cut the log, or raise the parameter "
+            "row_limit"
+        )
+
+
+def check_vehicles(where: str, count: int, config: LogConfig) -> None:
+    """Refuse a log of more than `vehicle_limit` vehicles.
+
+    Raises:
+        InputError: there are too many.
+    """
+    if count > config.vehicle_limit:
+        raise InputError(
+            f"{where}: {count} vehicles, at most {config.vehicle_limit} are read; check the vehicle column (parameter columns), "
+            "or raise the parameter vehicle_limit"
+        )

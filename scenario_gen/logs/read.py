@@ -14,24 +14,28 @@
 
 """From a path to encounters: choose the reader, clean, smooth, cut."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import combinations
+import math
 from pathlib import Path
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.encounter import Encounter, Vehicle
-from scenario_gen.errors import InputError
+from scenario_gen.errors import guarded, InputError, needs
 from scenario_gen.logs.cleaning import clean, Drops
-from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.encounters import find_groups, Group
-from scenario_gen.logs.overlaps import find_overlaps
-from scenario_gen.logs.pieces import Piece, pieces_of
-from scenario_gen.logs.quality import Dropped, EncounterQuality, Quality, VehicleQuality
+from scenario_gen.logs.config import LogConfig, picked
+from scenario_gen.logs.encounters import distances, find_groups, Group, Piece, pieces_of
+from scenario_gen.logs.quality import Dropped, EncounterQuality, find_overlaps, Quality, VehicleQuality
 from scenario_gen.logs.raw import natural, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
-from scenario_gen.logs.sources import read_raw
+from scenario_gen.storage.files import files_of
+from scenario_gen.types.encounter import Encounter, Vehicle
+
+TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
+SPMD_FIELDS = 19  # of a line; `tables.COLUMNS` names them
+Reader = Callable[[Sequence[Path], LogConfig], RawLog]
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,7 @@ class LogResult:
     quality: Quality
 
 
-def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogConfig()) -> LogResult:  # noqa: B008 - frozen
+def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogConfig()) -> LogResult:
     """Read a log and cut it into encounters.
 
     Args:
@@ -112,7 +116,7 @@ def unmet(vehicles: Sequence[VehicleQuality], met: set[str], config: LogConfig) 
     """Say who is in no encounter, and whose measured speeds were not believed."""
     doubted = [v.id for v in vehicles if v.changed > DOUBTED]
     left = [v for v in vehicles if v.id not in met]
-    if len(left) > config.most_vehicles:
+    if len(left) > config.max_vehicles:
         said = [f"{len(left)} of {len(vehicles)} vehicles are in no encounter: {', '.join(v.id for v in left)}"]
     else:
         said = [f"vehicle {v.id} is in no encounter: there for {v.seconds:.1f} s" for v in left]
@@ -121,11 +125,29 @@ def unmet(vehicles: Sequence[VehicleQuality], met: set[str], config: LogConfig) 
 
 def as_recorded(log: RawLog, config: LogConfig) -> LogResult:
     """Encounters that were recorded as such stay as they are, bit for bit; only the window and the vehicles are chosen."""
-    from scenario_gen.logs.bag import between
-
     encounters = tuple(between(encounter, config) for encounter in log.encounters)
     summary = Quality(log.name, log.rows, (), (), tuple(map(encounter_quality, encounters)), log.notes)
     return LogResult(encounters, summary)
+
+
+def between(encounter: Encounter, config: LogConfig) -> Encounter:
+    """Return the encounter in the asked time window and with the asked vehicles.
+
+    Raises:
+        InputError: a vehicle is unknown, or fewer than two vehicles or samples are left.
+    """
+    ids = [vehicle.id for vehicle in encounter.vehicles]
+    rows = [ids.index(name) for name in picked(ids, config, encounter.name)]
+    if config.start >= encounter.duration:
+        raise InputError(f"parameter start is {config.start:g} s, but {encounter.name} is only {encounter.duration:.1f} s long")
+    first = math.ceil(config.start / encounter.dt - 1e-9)
+    last = math.floor(config.end / encounter.dt + 1e-9) + 1 if config.end else len(encounter.time)
+    return replace(
+        encounter,
+        vehicles=tuple(encounter.vehicles[n] for n in rows),
+        start_ns=encounter.start_ns + first * encounter.dt_ns,
+        **{name: getattr(encounter, name)[rows, first:last] for name in ("position", "heading", "speed")},
+    )
 
 
 def encounter_quality(encounter: Encounter) -> EncounterQuality:
@@ -147,10 +169,9 @@ def make_encounter(
     notes = []
     position, heading, speed = [], [], []
     for piece in members:
-        span = slice(group.first - piece.first, group.last - piece.first)
-        position.append(piece.smooth.position[span])
-        speed.append(piece.smooth.speed[span])
-        facing = piece.smooth.heading[span]
+        position.append(piece.position(group.first, group.last))
+        speed.append(piece.speed(group.first, group.last))
+        facing = piece.smooth.heading[group.first - piece.first : group.last - piece.first]
         if np.isnan(facing).any():
             notes.append(f"vehicle {piece.track.id} never moves and its heading is not recorded: taken as east")
             facing = np.zeros(len(facing))
@@ -181,16 +202,86 @@ def too_few(log: RawLog, names: list[str], drops: Drops) -> str:
 
 def no_meeting(log: RawLog, pieces: Sequence[Piece], config: LogConfig) -> str:
     """Say why no encounter was found."""
-    nearest, who = np.inf, "no two vehicles are there at the same time"
-    for i, a in enumerate(pieces):
-        for b in pieces[i + 1 :]:
-            first, last = max(a.first, b.first), min(a.last, b.last)
-            if a.track.id != b.track.id and last > first:
-                gap = a.smooth.position[first - a.first : last - a.first] - b.smooth.position[first - b.first : last - b.first]
-                least = float(exact.hypot(gap[:, 0], gap[:, 1]).min())
-                if least < nearest:
-                    nearest, who = least, f"{a.track.id} and {b.track.id} come closest, to {least:.0f} m"
+    pairs = [(a, b) for a, b in combinations(pieces, 2) if a.track.id != b.track.id and len(distances(a, b))]
+    who = "no two vehicles are there at the same time"
+    if pairs:
+        nearest, (a, b) = min(((float(distances(a, b).min()), (a, b)) for a, b in pairs), key=lambda pair: pair[0])
+        who = f"{a.track.id} and {b.track.id} come closest, to {nearest:.0f} m"
     return (
-        f"{log.segments[0].label}: no two vehicles are within {config.proximity:g} m for {config.shortest:g} s while one "
-        f"drives {config.travel:g} m ({who}); see the parameters proximity, shortest, travel and longest_gap"
+        f"{log.segments[0].label}: no two vehicles are within {config.proximity:g} m for {config.min_duration:g} s while one "
+        f"drives {config.travel:g} m ({who}); see the parameters proximity, min_duration, travel and longest_gap"
     )
+
+
+def is_bag(path: Path) -> bool:
+    """Return whether it is a bag's folder or a bare .mcap or .db3 file."""
+    return bool(files_of(path).files)
+
+
+def is_spmd(path: Path) -> bool:
+    """Return whether the first line has 19 fields and all of them are numbers or empty."""
+    if path.suffix.lower() not in (".csv", ".txt"):
+        return False
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        fields = file.readline().split(",")
+    try:
+        return len(fields) == SPMD_FIELDS and bool([float(field.strip() or "nan") for field in fields])
+    except ValueError:
+        return False
+
+
+def is_table(path: Path) -> bool:
+    """Return whether the name says table."""
+    return path.suffix.lower() in TABLES
+
+
+ACCEPTS = {"bag": is_bag, "spmd": is_spmd, "table": is_table}  # asked in this order: a headerless table is SPMD
+
+
+def reader(name: str) -> Reader:
+    """Return the reader of a format; its libraries are loaded only now, for each takes up to a second."""
+    if name == "bag":
+        needs("bags", "lz4", "mcap", "rosbags", "zstandard")
+        from scenario_gen.logs import bag
+
+        return bag.read
+    from scenario_gen.logs import tables
+
+    return partial(tables.read, spmd=name == "spmd")
+
+
+def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
+    """Read one log from files or a folder with the first reader that accepts all of them.
+
+    Raises:
+        InputError: nothing is there, no reader accepts it, or the one that does cannot read it.
+    """
+    with guarded(str(paths[0]), OSError):  # no permission, a name too long, a file that goes away
+        files = [file for path in paths for file in present(path)]
+        formats = ACCEPTS if config.format == "auto" else {config.format: lambda _: True}
+        name = next((name for name, accepts in formats.items() if all(accepts(file) for file in files)), "")
+    if not name:
+        raise InputError(
+            f"{paths[0]} is none of the known logs: {', '.join(TABLES)} tables and SPMD files, "
+            "rosbag2 folders, .mcap, .db3; set the parameter format if its name misleads"
+        )
+    return reader(name)(files, config)
+
+
+def present(path: Path) -> list[Path]:
+    """Return the files to read of a path: those of a folder of tables; a file and a bag's folder stand for themselves.
+
+    Raises:
+        InputError: there is nothing there that can be read.
+    """
+    if not path.exists():
+        raise InputError(f"{path} does not exist")
+    if not (path.is_file() or path.is_dir()):
+        raise InputError(f"{path} is neither a file nor a folder")
+    if path.is_dir() and not any(path.iterdir()):
+        raise InputError(f"{path} is an empty folder")
+    if path.is_file() and path.stat().st_size == 0:
+        raise InputError(f"{path} is empty (0 bytes); record or copy it again")
+    if path.is_file() or is_bag(path):
+        return [path]
+    return sorted(file for file in path.iterdir() if is_table(file) and file.stat().st_size) or [path]

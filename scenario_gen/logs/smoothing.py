@@ -14,25 +14,30 @@
 
 """Reconciling positions with measured speeds: a vehicle moves forward along a smooth path.
 
-A track becomes a path (a curve by arc length, `path.py`) and a motion along it (place and speed over time, `motion.py`),
-fitted in turn. The path is smooth in *distance*, so GPS noise does not become heading noise however slowly the vehicle
-creeps; the motion is smooth in *time*, never runs backwards, keeps to the limits of a car and is still where the car stands.
-So position, speed and heading agree by construction: the distance between samples is the mean of their speeds times dt, and
-the heading is the path's direction, held while standing.
+A track becomes a path (a curve by arc length, `Path`) and a motion along it (place and speed over time, `Motion`), fitted in
+turn. The path is smooth in *distance*, so GPS noise does not become heading noise however slowly the vehicle creeps; the motion
+is smooth in *time*, never runs backwards, keeps to the limits of a car and is still where the car stands. So position, speed and
+heading agree by construction: the distance between samples is the mean of their speeds times dt, and the heading is the path's
+direction, held while standing.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
+import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats
+from scenario_gen.arrays import Bools, Floats, Ints, runs
+from scenario_gen.errors import InputError
 from scenario_gen.logs.cleaning import Track
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.intervals import runs
-from scenario_gen.logs.motion import Motion
-from scenario_gen.logs.path import fit_path, Path, STRAIGHT, straight_path
+
+if TYPE_CHECKING:
+    from scipy import sparse  # slow to import
+    from scipy.interpolate import BSpline
 
 STANDS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
 STILL = 0.1  # m/s: below this it is not on its way to or from standing
@@ -40,6 +45,194 @@ CREEPS = 1.0  # m: fixes that move further than this while the speed is zero say
 DOUBTED = 3.0  # m/s: a speed that differs more from that of the fixes has no say in the first layout; if most do, in nothing
 MOVED = 0.5  # m: who moves less has no direction of travel
 ROUNDS = 3  # of path and motion in turn
+KNOT = 1.0  # m between knots
+MARGIN = 5.0  # m of path beyond both ends, for fixes that lie there
+STEP = 0.1  # m between the points of the table from parameter to arc length
+CURVATURE = 0.1  # 1/m: spectral density of the curvature, about 0.1 1/m over 10 m
+STEERING = 0.002  # 1/m³: spectral density of the curvature's change, about 0.02 1/m² over 5 m
+CREEP = 0.2  # m: fixes closer together than this share one weight, for GPS noise is no steering
+STRAIGHT = 3.0  # m: a shorter path has no shape of its own
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The path a vehicle drove: a penalised cubic B-spline by distance driven (P-spline; Eilers & Marx 1996).
+
+    Attributes:
+        curve: position (..., 2) [m] by parameter u, the distance driven as first guessed [m].
+        parameter: (K,) increasing u of a table.
+        length: (K,) the arc length [m] there.
+    """
+
+    curve: "BSpline"
+    parameter: Floats
+    length: Floats
+
+    def project(self, guess: Floats, points: Floats) -> tuple[Floats, Floats]:
+        """Return arc lengths (F,) [m] of the points' feet on the curve, and the points' distances (F,) [m] from it.
+
+        Args:
+            guess: (F,) parameters [m] near the feet.
+            points: (F, 2) [m].
+        """
+        tangent = self.curve(guess, 1)
+        gap = points - self.curve(guess)
+        foot = guess + (gap * tangent).sum(axis=1) / (np.square(tangent)).sum(axis=1)
+        foot = np.clip(foot, self.parameter[0], self.parameter[-1])
+        return np.interp(foot, self.parameter, self.length), exact.hypot(*(points - self.curve(foot)).T)
+
+    def pose(self, arc: Floats) -> tuple[Floats, Floats]:
+        """Return positions (T, 2) [m] and headings (T,) [rad], unwrapped, at arc lengths (T,) [m]."""
+        u = np.interp(arc, self.length, self.parameter)
+        tangent = self.curve(u, 1)
+        return self.curve(u), np.unwrap(exact.arctan2(tangent[:, 1], tangent[:, 0]))
+
+
+def fit_path(place: Floats, points: Floats, weight: Floats, noise: float) -> Path:
+    """Fit a curve to points (F, 2) at distances driven `place` (F,); weights in (0, 1], noise in metres."""
+    from scipy.interpolate import BSpline
+
+    low, high = place.min() - MARGIN, place.max() + MARGIN
+    spans = max(int(np.ceil((high - low) / KNOT)), 4)
+    step = (high - low) / spans
+    knots = low + step * np.arange(-3, spans + 4)
+    spread = np.gradient(place) if len(place) > 1 else np.ones(1)
+    weight = weight * np.clip(np.abs(spread) / CREEP, 0.005, 1.0) / np.square(noise)
+    count = spans + 3
+    band = np.zeros((4, count))
+    right = np.zeros((count, 2))
+    rows = BSpline.design_matrix(np.clip(place, low, high - 1e-9), knots, 3).tocsr()
+    values = rows.data.reshape(-1, 4)
+    start = rows.indices.reshape(-1, 4)[:, 0]
+    for i in range(4):
+        np.add.at(right, start + i, (weight * values[:, i])[:, None] * points)
+        for j in range(i + 1):
+            np.add.at(band[i - j], start + j, weight * values[:, i] * values[:, j])
+    penalise(band, 2, exact.power(step, -3) / CURVATURE)
+    penalise(band, 3, exact.power(step, -5) / STEERING)
+    return tabulate(BSpline(knots, exact.solve_banded(band, right), 3), low, high)
+
+
+def penalise(band: Floats, order: int, weight: float) -> None:
+    """Add weight · ‖differences of that order‖² to a lower band matrix (4, n)."""
+    stencil = np.array({2: [1.0, -2.0, 1.0], 3: [-1.0, 3.0, -3.0, 1.0]}[order])
+    last = band.shape[1] - order
+    for i in range(order + 1):
+        for j in range(i + 1):
+            band[i - j, j : j + last] += weight * stencil[i] * stencil[j]
+
+
+def straight_path(point: Floats, heading: float, low: float, high: float) -> Path:
+    """Return a straight line through `point` (2,) [m] where the distance driven is (low + high) / 2."""
+    from scipy.interpolate import BSpline
+
+    direction = np.array([exact.cos(heading), exact.sin(heading)])
+    ends = np.array([low - MARGIN, high + MARGIN])
+    where = point + (ends - (low + high) / 2.0)[:, None] * direction
+    return tabulate(BSpline(np.repeat(ends, 2), where, 1), ends[0], ends[1])
+
+
+def tabulate(curve: "BSpline", low: float, high: float) -> Path:
+    """Measure the curve's arc length."""
+    u = np.linspace(low, high, int(np.ceil((high - low) / STEP)) + 1)
+    rate = exact.hypot(*curve(u, 1).T)
+    length = low + np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(u))])
+    return Path(curve, u, length)
+
+
+class Motion:
+    """How far along its path a vehicle is: a quadratic B-spline on the common clock, fitted by a quadratic program.
+
+    With coefficients c_0 … c_T and ticks i = 0 … T-1: place s_i = (c_i + c_{i+1})/2, speed v_i = (c_{i+1} - c_i)/dt, and the
+    acceleration between two ticks is constant. Second and third differences of c are acceleration and jerk, so limits on speed
+    and acceleration are sparse linear inequalities, and where a vehicle stands its coefficients are one variable: v = 0 exactly.
+    """
+
+    def __init__(self, stands: Bools, config: LogConfig) -> None:
+        """Set the program up; `stands` (T,) tells at which ticks the speed is zero."""
+        from scipy import sparse
+
+        dt = config.period
+        count = len(stands) + 1
+        group = np.concatenate([[0], np.cumsum(~stands)])  # v_i = 0 makes c_{i+1} the variable of c_i
+        self.dt, self.ticks = dt, len(stands)
+        self.merge = sparse.csr_array((np.ones(count), (np.arange(count), group)))
+        first = self._differences(1) / dt
+        second = self._differences(2) / np.square(dt)
+        third = self._differences(3) * (np.sqrt(dt) / (config.jerk * exact.power(dt, 3)))
+        self.prior = (third.T @ third).tocsc()
+        self.constraints = sparse.vstack([-first, second, -second], format="csc")
+        rows = second.shape[0]
+        self.bounds = np.concatenate(
+            [np.zeros(first.shape[0]), np.full(rows, config.acceleration_limit), np.full(rows, config.braking_limit)]
+        )
+
+    def _differences(self, order: int) -> "sparse.csr_array":
+        """Differences of the coefficients, over the merged variables."""
+        matrix = self.merge
+        for _ in range(order):
+            matrix = matrix[1:] - matrix[:-1]
+        return matrix
+
+    def _weights(self, seconds: Floats, *, speed: bool = False) -> tuple[Ints, tuple[Floats, Floats, Floats]]:
+        """The first of the three coefficients that count at any times (F,), and the weights (F,) of each: place or speed."""
+        tick = np.clip(np.floor(seconds / self.dt).astype(np.int64), 0, max(self.ticks - 2, 0))
+        u = seconds / self.dt - tick
+        if speed:
+            return tick, ((u - 1.0) / self.dt, (1.0 - 2.0 * u) / self.dt, u / self.dt)
+        return tick, (np.square(1.0 - u) / 2.0, 0.5 + u - np.square(u), np.square(u) / 2.0)
+
+    def _basis(self, seconds: Floats, *, speed: bool) -> "sparse.csr_array":
+        """Rows that evaluate the place or the speed at any time, over the merged variables."""
+        from scipy import sparse
+
+        tick, weights = self._weights(seconds, speed=speed)
+        column = np.concatenate([tick, tick + 1, tick + 2])
+        entries = (np.concatenate(weights), (np.tile(np.arange(len(seconds)), 3), column))
+        return sparse.csr_array(entries, shape=(len(seconds), self.ticks + 1)) @ self.merge
+
+    def solve(self, observed: Sequence[tuple[Floats, Floats, Floats, bool]]) -> Floats:
+        """Return the coefficients (T+1,) that fit best.
+
+        Args:
+            observed: (seconds, values, standard deviations, whether the values are speeds rather than places).
+
+        Raises:
+            InputError: the solver finds no solution.
+        """
+        from scipy import sparse
+
+        quadratic, linear = self.prior, np.zeros(self.merge.shape[1])
+        for seconds, values, deviation, speed in observed:
+            rows = self._basis(seconds, speed=speed)
+            weighted = rows.T * (1.0 / np.square(deviation))
+            quadratic = quadratic + weighted @ rows
+            linear = linear - weighted @ values
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
+        cones = [clarabel.NonnegativeConeT(len(self.bounds))]
+        upper = sparse.triu(quadratic, format="csc")
+        solution = clarabel.DefaultSolver(upper, linear, self.constraints, self.bounds, cones, settings).solve()
+        if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+            raise InputError(f"speeds and positions cannot be reconciled ({solution.status}); check their units")
+        merged = np.maximum.accumulate(np.asarray(solution.x))  # the solver's tolerance must not drive backwards
+        coefficients: Floats = self.merge @ merged
+        return coefficients
+
+    def place(self, coefficients: Floats, seconds: Floats) -> Floats:
+        """Return the distances driven (F,) [m] at any times (F,) [s], of coefficients (T+1,)."""
+        tick, (w0, w1, w2) = self._weights(seconds)
+        place: Floats = w0 * coefficients[tick] + w1 * coefficients[tick + 1] + w2 * coefficients[tick + 2]
+        return place
+
+    def at_ticks(self, coefficients: Floats) -> tuple[Floats, Floats]:
+        """Return distances driven (T,) [m] and speeds (T,) [m/s] at the ticks, of coefficients (T+1,)."""
+        return (coefficients[1:] + coefficients[:-1]) / 2.0, np.diff(coefficients) / self.dt
+
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline  # slow to import
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +310,15 @@ def smooth_piece(piece: Track, origin_ns: int, config: LogConfig) -> Smooth | No
 
 
 def layout(ticks: Floats, stands: Bools, speed: Floats, raw: Floats, seconds: Floats) -> Floats:
-    """A first guess of the distance driven at `seconds`: its speed integrated, or that of the fixes where it is far off."""
+    """Return a first guess of the distances driven (F,) [m]: the speed integrated, or that of the fixes where it is far off.
+
+    Args:
+        ticks: (T,) seconds.
+        stands: (T,) whether it stands there.
+        speed: (T,) measured [m/s].
+        raw: (T,) of the fixes [m/s].
+        seconds: (F,) when it is asked for.
+    """
     rate = np.where(stands, 0.0, np.where(np.abs(speed - raw) > DOUBTED, raw, speed))
     driven = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(ticks))])
     guess: Floats = np.interp(seconds, ticks, driven)
@@ -125,7 +326,14 @@ def layout(ticks: Floats, stands: Bools, speed: Floats, raw: Floats, seconds: Fl
 
 
 def path_of(guess: Floats, piece: Track, weight: Floats, noise: float) -> Path:
-    """Fit the path; one too short to have a shape is straight, in the recorded heading where there is one."""
+    """Fit the path; one too short to have a shape is straight, in the recorded heading where there is one.
+
+    Args:
+        guess: (F,) distances driven at the fixes [m].
+        piece: the fixes.
+        weight: (F,) in (0, 1].
+        noise: standard deviation of the fixes [m].
+    """
     low, high = float(guess.min()), float(guess.max())
     if high - low >= STRAIGHT:
         return fit_path(guess, piece.fix, weight, noise)
@@ -152,7 +360,7 @@ def speed_of_fixes(seconds: Floats, fix: Floats, window: float = 0.5) -> Floats:
 
 
 def estimated_noise(fix: Floats) -> float:
-    """Standard deviation of the fixes [m]: from their residuals about local parabolas."""
+    """Return the standard deviation [m] of fixes (F, 2) [m]: from their residuals about local parabolas."""
     half = min(15, (len(fix) - 1) // 2)
     if half < 3:
         return 0.5
@@ -164,7 +372,7 @@ def estimated_noise(fix: Floats) -> float:
 
 
 def white_equivalent(noise: Floats) -> float:
-    """Standard deviation of the white noise that says as little about the mean as this coloured noise.
+    """Return the standard deviation of the white noise that says as little about the mean as this coloured noise (T,) [m, m/s].
 
     Values beyond three robust deviations are pulled in; the deviation is then scaled by the root of the autocorrelation
     time, 1 + 2 Σ ρ_l over the lags before the first ρ_l below 0.1.

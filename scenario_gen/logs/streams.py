@@ -24,13 +24,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.arrays import Floats
-from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
 from scenario_gen.logs.cleaning import clean, RELOCATED, Track
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.pieces import longest_bridge
+from scenario_gen.logs.encounters import longest_bridge
 from scenario_gen.logs.raw import natural, RawLog, Rows, Segment
 from scenario_gen.logs.smoothing import speed_of_fixes
+from scenario_gen.types.encounter import Vehicle
 
 WINDOW_NS = 3_000_000_000  # of the past that is cleaned again for every sample: enough to tell a jump from a new place
 FAR_NS = 10_000_000_000  # a stamp this far from the newest one belongs to another time, or is wrong
@@ -56,13 +56,13 @@ class Sample:
 
 
 class Streams:
-    """Buffers the newest `longest` seconds of streams and samples them; memory does not grow with time.
+    """Buffers the newest `max_duration` seconds of streams and samples them; memory does not grow with time.
 
     Messages may come in any order, twice, or not at all, as long as they are less than `late` seconds behind the newest one;
     the samples are then those of messages in order. (Later ones still count in `take`.)
     """
 
-    def __init__(self, config: LogConfig = LogConfig(), late: float = 0.5) -> None:  # noqa: B008 - frozen
+    def __init__(self, config: LogConfig = LogConfig(), late: float = 0.5) -> None:
         """Start empty; `config` is that of a log, `start`, `end` and `strict` do not apply."""
         self.origin = config.origin
         self._config = replace(config, start=0.0, end=0.0, strict=False, vehicles="")
@@ -104,14 +104,14 @@ class Streams:
         if self._counts(stamp_ns):
             for rows in self._of(vehicle):
                 rows.fixes.append((stamp_ns, self._count, latitude, longitude, np.nan))
-                del rows.fixes[: -round(MOST * self._config.longest)]
+                del rows.fixes[: -round(MOST * self._config.max_duration)]
 
     def put_speed(self, vehicle: str, stamp_ns: int, speed: float) -> None:
         """Take a speed in [m/s]."""
         if self._counts(stamp_ns):
             for rows in self._of(vehicle):
                 rows.speeds.append((stamp_ns, self._count, speed))
-                del rows.speeds[: -round(MOST * self._config.longest)]
+                del rows.speeds[: -round(MOST * self._config.max_duration)]
 
     def _of(self, vehicle: str) -> tuple[Rows, Rows]:
         return self._whole.setdefault(vehicle, Rows()), self._recent.setdefault(vehicle, Rows())

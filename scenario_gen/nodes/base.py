@@ -15,25 +15,24 @@
 """What all nodes with a stage have in common: lifecycle, parameters, raw topics, a worker, diagnostics, a clean end."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.qos import QoSProfile
+from rclpy.task import Future
 
 from msg_conventions.diagnostics import Level, Status
-from msg_conventions.topics import LATCHED, Quality, topic_entry
-from scenario_gen.nodes.compiling import kernels_ready
-from scenario_gen.nodes.health import Health
+from msg_conventions.topics import LATCHED, topic_entry
+from scenario_gen.nodes.diagnostics import NodeDiagnostics
 from scenario_gen.nodes.inputs import refuse_damaged
-from scenario_gen.nodes.message_classes import message_class
 from scenario_gen.nodes.ros_parameters import ConfigParameters
-from scenario_gen.nodes.spinning import run_nodes
-from scenario_gen.nodes.voice import qos, Voice
+from scenario_gen.nodes.topics import create_subscription, Outputs
 from scenario_gen.nodes.worker import Job, Worker
+from scenario_gen.types.qos import Quality
 
-__all__ = ["REQUESTS", "StageNode", "run_nodes"]
 REQUESTS = QoSProfile(depth=1000)  # ROS's own 10 would drop the oldest of many requests that come at once
+Result = TypeVar("Result")
 
 
 class StageNode(LifecycleNode):  # type: ignore[misc]
@@ -44,17 +43,17 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     """
 
     INPUTS: tuple[str, ...] = ()
-    OUTPUTS: tuple[str, ...] = ()  # announced while configuring, so that listeners are there before the first message
-    STAGES: tuple[str, ...] = ()  # packages of scenario_gen whose kernels are compiled while configuring
+    OUTPUTS: tuple[str, ...] = ()  # advertised while configuring, so that listeners are there before the first message
+    STAGES: tuple[str, ...] = ()  # packages of scenario_gen whose kernels are compiled before it is configured
 
     def __init__(self, name: str, config: Any, namespace: str | None = None) -> None:
         self._together = ReentrantCallbackGroup()
         super().__init__(name, namespace=namespace)
-        self.voice = Voice(self)
-        self.health = Health(self, self.ticked, listening=False)
-        self.health.state("unconfigured")
-        self._inputs: dict[str, Any] = {}
-        self._heard: dict[str, tuple[bytes, Any]] = {}
+        self.outputs = Outputs(self)
+        self.diagnostics = NodeDiagnostics(self, self.update_diagnostics, enabled=False)
+        self.diagnostics.state("unconfigured")
+        self._listening: dict[str, Any] = {}
+        self._latched: dict[str, tuple[bytes, Any]] = {}
         self._worker: Worker | None = None
         self.parameters = ConfigParameters(self, config)
         self.declare_parameter("autostart", True)
@@ -89,27 +88,24 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         """Begin what needs no input; called at activation."""
 
     def stopped(self) -> None:
-        """End what was begun and forget what was heard; called at deactivation, when no work runs any more."""
+        """End what was begun and forget what was received; called at deactivation, when no work runs any more."""
 
     def listen(self, topic: str, quality: Quality | None = None) -> None:
         """Subscribe to a topic of the suite, raw; `received` gets its messages. `quality`: another one than the suite's."""
-        if topic not in self._inputs:
-            kind, own = topic_entry(topic)
-            take = self._receive_latched if own == LATCHED else self._receive
-            self._inputs[topic] = self.create_subscription(
-                message_class(kind), topic, lambda data: take(topic, data), qos(quality or own), raw=True
-            )
+        if topic not in self._listening:
+            take = self._receive_latched if topic_entry(topic)[1] == LATCHED else self._receive
+            self._listening[topic] = create_subscription(self, topic, lambda data: take(topic, data), quality)
 
     def ignore(self, topic: str) -> None:
         """End a subscription."""
-        if topic in self._inputs:
-            self.destroy_subscription(self._inputs.pop(topic))
-            self._heard.pop(topic, None)
-            self.health.settle(topic)
+        if topic in self._listening:
+            self.destroy_subscription(self._listening.pop(topic))
+            self._latched.pop(topic, None)
+            self.diagnostics.resolve(topic)
 
     def send(self, topic: str, data: bytes) -> None:
         """Publish the CDR bytes of a topic of the suite, if the node is active."""
-        self.voice.send(topic, data)
+        self.outputs.send(topic, data)
 
     def serve(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
         """Offer a service; whatever goes wrong in it, the caller gets an answer and the node lives on."""
@@ -119,7 +115,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
                 return callback(request, response)
             except Exception as error:
                 self.failed(name, error)
-                self.health.settle(name)
+                self.diagnostics.resolve(name)
                 return response
 
         self.create_service(kind, name, guarded, qos_profile=REQUESTS)
@@ -127,45 +123,70 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     def work(self, name: str, job: Job) -> None:
         """Run a job off the executor's thread; a waiting one of the same name is replaced, a running one cancelled."""
         if self._worker is not None:
-            self._worker.submit(name, job)
+            self._worker.submit(name, lambda cancelled: None if cancelled() else job(cancelled))
+
+    async def result_of(
+        self, name: str, job: Callable[[Callable[[], bool]], Result], failed: Callable[[Exception], Result]
+    ) -> Result:
+        """Run a job off the executor's thread for a service, also if it is cancelled before its turn; return its result.
+
+        Args:
+            name: of the job.
+            job: called with a function that says whether it has been cancelled.
+            failed: returns the result of a job that raises; the error is reported on /diagnostics all the same.
+        """
+        answer, executor = Future(), self.executor
+
+        def run(cancelled: Callable[[], bool]) -> None:
+            try:
+                answer.set_result(job(cancelled))
+            except Exception as error:
+                answer.set_result(failed(error))
+                raise
+            finally:
+                executor.wake()
+
+        if self._worker is not None:
+            self._worker.submit(name, run)
+        result: Result = await answer
+        return result
 
     def cancel(self, only: str | None = None) -> list[str]:
         """Cancel all jobs, or those of one name; return their names."""
         return self._worker.cancel(only) if self._worker is not None else []
 
     def report(self, *statuses: Status, stamp_ns: int = 0) -> None:
-        """Say statuses on /diagnostics, until others about the same are said."""
-        self.health.report(*statuses, stamp_ns=stamp_ns)
+        """Report statuses on /diagnostics, until others about the same are reported."""
+        self.diagnostics.report(*statuses, stamp_ns=stamp_ns)
 
     def status(self, level: Level, message: str, subject: str = "status", stamp_ns: int = 0, **values: str) -> None:
-        """Say one status on /diagnostics and log it; a job that was left behind ends here, before it is logged."""
-        self.health.say(level, message, subject, values, stamp_ns)
+        """Report one status on /diagnostics and log it; an abandoned job ends here, before it is logged."""
+        self.diagnostics.status(level, message, subject, values, stamp_ns)
 
     def failed(self, name: str, error: BaseException) -> None:
-        """Say on /diagnostics that something went wrong; the node lives on."""
-        self.health.failed(name, error)
+        """Report on /diagnostics that something went wrong; the node lives on."""
+        self.diagnostics.failed(name, error)
 
-    def ticked(self) -> None:
-        """Bring up to date, each second, what /diagnostics says of the work that goes on."""
+    def update_diagnostics(self) -> None:
+        """Bring up to date, each second, what /diagnostics reports of the work that goes on."""
         if self._worker is not None:
-            self.health.state("active", **self._worker.account())
+            self.diagnostics.state("active", **self._worker.account())
 
     # --- lifecycle --------------------------------------------------------------------------------------------
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Announce the outputs; `run_nodes` has made the kernels ready."""
-        kernels_ready(self.STAGES)
+        """Advertise the outputs; `run_nodes` has made the kernels ready."""
         for topic in self.OUTPUTS:
-            self.voice.announce(topic)
-        self.health.state("inactive")
+            self.outputs.advertise(topic)
+        self.diagnostics.state("inactive")
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Subscribe to the inputs."""
-        self._worker = Worker(self.failed, self.get_name(), self.health.settle)
-        self.voice.begin()
-        self.health.listen(to_work=True)
-        self.health.state("active")
+        self._worker = Worker(self.failed, self.get_name(), self.diagnostics.resolve)
+        self.outputs.activate()
+        self.diagnostics.enable(True)
+        self.diagnostics.state("active")
         for topic in self.INPUTS:
             self.listen(topic)
         self.started()
@@ -178,8 +199,8 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Withdraw what was published."""
-        self.voice.withdraw()
-        self.health.state("unconfigured")
+        self.outputs.destroy()
+        self.diagnostics.state("unconfigured")
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -188,15 +209,15 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         return super().on_shutdown(state)
 
     def _stop(self) -> None:
-        self.voice.silence()
-        self.health.listen(to_work=False)
-        for topic in list(self._inputs):
+        self.outputs.deactivate()
+        self.diagnostics.enable(False)
+        for topic in list(self._listening):
             self.ignore(topic)
         if self._worker is not None:
             self._worker.close()
             self._worker = None
             self.stopped()
-            self.health.state("inactive")
+            self.diagnostics.state("inactive")
 
     def destroy_node(self) -> None:
         """End the work, then the node."""
@@ -205,8 +226,8 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     def _receive_latched(self, topic: str, data: bytes) -> None:
         """Take an input in, unless it is the last one word for word and the parameters are, too: then its node was restarted."""
-        if self._heard.get(topic) != (data, self.config):
-            self._heard[topic] = (data, self.config)
+        if self._latched.get(topic) != (data, self.config):
+            self._latched[topic] = (data, self.config)
             self._receive(topic, data)
 
     def _receive(self, topic: str, data: bytes) -> None:
@@ -214,6 +235,6 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         try:
             refuse_damaged(topic, data)
             self.received(topic, data)
-            self.health.settle(topic)
+            self.diagnostics.resolve(topic)
         except Exception as error:
             self.failed(topic, error)

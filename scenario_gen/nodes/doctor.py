@@ -15,10 +15,11 @@
 """doctor: what is wrong with an environment, and what to do about it; works without ROS, and says so.
 
 Only the standard library is imported here: `python -m scenario_gen.nodes.doctor` still answers where `scenario-gen doctor` cannot
-start for want of a package. What needs rclpy or numba runs in processes of its own (doctor_probe.py): a crash there is a finding.
+start for want of a package. What needs rclpy or numba runs in processes of its own, the probes: a crash there is a finding. Each
+is `python -m scenario_gen.nodes.doctor PROBE TOPIC`, and answers with a line of JSON.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import metadata
 import importlib.util
@@ -27,12 +28,13 @@ import os
 from pathlib import Path
 import subprocess
 import sys
+import time
 from typing import Any
 
 OK, WARNING, ERROR = "ok", "warning", "error"
 PYTHONS = ((3, 11), (3, 13))
 MODULES = (
-    *("numpy", "scipy", "numba", "ompl", "daqp", "clarabel", "mcap", "mcap_ros2", "rosbags", "pandas", "pyarrow"),
+    *("numpy", "scipy", "numba", "ompl", "daqp", "clarabel", "mcap", "rosbags", "pandas", "pyarrow"),
     *("shapely", "PIL", "yaml", "jinja2", "plotly", "typer", "rich"),
 )
 INTERFACES = (
@@ -42,6 +44,8 @@ INTERFACES = (
 RANGES = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE", "CYCLONEDDS_URI")
 PATIENCE = 20.0  # seconds for two processes to start and to meet
+WANTED = 5  # messages
+LOOK = 1.5  # seconds in which other participants' topics come up
 
 
 @dataclass(frozen=True)
@@ -60,13 +64,13 @@ def examine(environment: Mapping[str, str] | None = None) -> Iterator[Finding]:
     yield packages("packages", MODULES, "install requirements.lock (`make install`)")
     yield _kernels()
     if importlib.util.find_spec("rclpy") is None:
-        words = "not here: everything works but the nodes and `demo --ros`. Source a Jazzy installation, or `make install`"
-        yield Finding(WARNING, "ROS 2", words)
+        message = "not here: everything works but the nodes and `demo --ros`. Source a Jazzy installation, or `make install`"
+        yield Finding(WARNING, "ROS 2", message)
         return
     yield installation(environment)
     yield packages("interfaces", INTERFACES, "install ros-jazzy-common-interfaces, or source a Jazzy installation")
     yield from variables(environment)
-    yield from meeting(environment)
+    yield from discovery(environment)
 
 
 def python(version: tuple[int, ...]) -> Finding:
@@ -93,8 +97,10 @@ def installation(environment: Mapping[str, str]) -> Finding:
     if Path(sys.prefix) in origin.parents:
         version = next((metadata.version(name) for name in ("ros-jazzy-rclpy",) if _installed(name)), "of unknown version")
         if distribution:
-            words = f"the wheels' rclpy ({version}) hides that of the sourced ROS ({distribution}); use a shell with one of both"
-            return Finding(WARNING, "ROS 2", words)
+            message = (
+                f"the wheels' rclpy ({version}) hides that of the sourced ROS ({distribution}); use a shell with one of both"
+            )
+            return Finding(WARNING, "ROS 2", message)
         return Finding(OK, "ROS 2", f"Jazzy wheels, rclpy {version}")
     if distribution != "jazzy":
         return Finding(
@@ -132,7 +138,7 @@ def variables(environment: Mapping[str, str]) -> Iterator[Finding]:
             yield Finding(ERROR, "DDS profile", f"{name} names {path}, which is not there")
 
 
-def meeting(environment: Mapping[str, str]) -> Iterator[Finding]:
+def discovery(environment: Mapping[str, str]) -> Iterator[Finding]:
     """Let two processes talk on the domain, and look at the topics that are visible there."""
     topic = f"scenario_gen_doctor_{os.getpid()}"
     speaker = _child("speak", topic, environment)
@@ -146,51 +152,117 @@ def meeting(environment: Mapping[str, str]) -> Iterator[Finding]:
         speaker.kill()
         _, silence = speaker.communicate()
     if not output.strip():
-        last = [line for line in (errors + silence).splitlines() if line.strip()][-1:]
-        yield Finding(ERROR, "DDS", f"rclpy does not start: {last[0].strip() if last else 'no word of it'}")
+        yield Finding(ERROR, "DDS", f"rclpy does not start: {_last_line(errors + silence)}")
         return
     yield from judged(json.loads(output.splitlines()[-1]))
 
 
-def judged(heard: Mapping[str, Any]) -> Iterator[Finding]:
-    """Judge what the listener heard and saw."""
-    yield Finding(OK, "RMW", heard["rmw"])
-    if heard["received"]:
-        yield Finding(
-            OK, "loop-back", f"two processes met after {heard['seconds']:.1f} s and {heard['received']} messages arrived"
-        )
+def judged(seen: Mapping[str, Any]) -> Iterator[Finding]:
+    """Judge what the listener received and saw."""
+    yield Finding(OK, "RMW", seen["rmw"])
+    if seen["received"]:
+        yield Finding(OK, "loop-back", f"two processes met after {seen['seconds']:.1f} s and {seen['received']} messages arrived")
     else:
-        words = (
+        message = (
             "two processes on this host do not hear each other: look at the firewall, multicast on the loopback device, /dev/shm"
         )
-        yield Finding(ERROR, "loop-back", words)
-    for fault in heard["faults"]:
+        yield Finding(ERROR, "loop-back", message)
+    for fault in seen["faults"]:
         yield Finding(ERROR, "QoS", fault)
-    if not heard["faults"]:
-        yield Finding(OK, "QoS", f"no mismatch among {heard['topics']} visible topics")
+    if not seen["faults"]:
+        yield Finding(OK, "QoS", f"no mismatch among {seen['topics']} visible topics")
 
 
 def _kernels() -> Finding:
     child = _child("kernels", "", os.environ)
     output, errors = child.communicate()
     if not output.strip():
-        last = [line for line in errors.splitlines() if line.strip()][-1:]
-        return Finding(ERROR, "kernels", f"cannot be loaded: {last[0].strip() if last else 'no word of it'}")
-    heard = json.loads(output.splitlines()[-1])
-    if heard["missing"]:
-        words = f"{heard['missing']} of {heard['kernels']} are not compiled; `python -m scenario_gen.compiling` does it now"
-        return Finding(WARNING, "kernels", words)
-    return Finding(OK, "kernels", f"all {heard['kernels']} are compiled")
+        return Finding(ERROR, "kernels", f"cannot be loaded: {_last_line(errors)}")
+    seen = json.loads(output.splitlines()[-1])
+    if seen["missing"]:
+        message = f"{seen['missing']} of {seen['kernels']} are not compiled; `python -m scenario_gen.compiling` does it now"
+        return Finding(WARNING, "kernels", message)
+    return Finding(OK, "kernels", f"all {seen['kernels']} are compiled")
 
 
-def _child(part: str, topic: str, environment: Mapping[str, str]) -> "subprocess.Popen[str]":
+def _last_line(text: str) -> str:
+    return next((line.strip() for line in reversed(text.splitlines()) if line.strip()), "it does not say why")
+
+
+def _child(probe: str, topic: str, environment: Mapping[str, str]) -> "subprocess.Popen[str]":
     return subprocess.Popen(
-        [sys.executable, "-m", "scenario_gen.nodes.doctor_probe", part, topic],
+        [sys.executable, "-m", "scenario_gen.nodes.doctor", probe, topic],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         env=dict(environment),
     )
+
+
+def _speak(topic: str) -> None:
+    """Publish until killed."""
+    import rclpy
+    from std_msgs.msg import String
+
+    rclpy.init()
+    node = rclpy.create_node("doctor_speaker", enable_rosout=False, start_parameter_services=False)
+    publisher = node.create_publisher(String, topic, 10)
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end:
+        publisher.publish(String(data="hear me"))
+        time.sleep(0.05)
+
+
+def _listen(topic: str) -> None:
+    """Count what arrives, look around, and say so."""
+    import rclpy
+    from rclpy.utilities import get_rmw_implementation_identifier
+    from std_msgs.msg import String
+
+    rclpy.init()
+    node = rclpy.create_node("doctor_listener", enable_rosout=False, start_parameter_services=False)
+    received: list[float] = []
+    node.create_subscription(String, topic, lambda _: received.append(time.monotonic()), 10)
+    begin = time.monotonic()
+    while len(received) < WANTED and time.monotonic() - begin < 12.0:
+        rclpy.spin_once(node, timeout_sec=0.1)
+    time.sleep(max(0.0, begin + LOOK - time.monotonic()))
+    topics = node.get_topic_names_and_types()
+    answer = {
+        "rmw": get_rmw_implementation_identifier(),
+        "received": len(received),
+        "seconds": received[0] - begin if received else 0.0,
+        "topics": len(topics),
+        "faults": sorted(set(_faults(node, topics))),
+    }
+    print(json.dumps(answer), flush=True)
+    node.destroy_node()
+    rclpy.shutdown()
+
+
+def _faults(node: Any, topics: list[tuple[str, list[str]]]) -> Iterator[str]:
+    """Yield a sentence for every publisher and subscription that do not suit each other."""
+    from rclpy.qos import qos_check_compatible, QoSCompatibility
+
+    for topic, kinds in topics:
+        if len(kinds) > 1:
+            yield f"{topic} has several types: {', '.join(kinds)}"
+        for publisher in node.get_publishers_info_by_topic(topic):
+            for subscription in node.get_subscriptions_info_by_topic(topic):
+                level, reason = qos_check_compatible(publisher.qos_profile, subscription.qos_profile)
+                if level == QoSCompatibility.ERROR:
+                    ends = (f"{end.node_namespace.rstrip('/')}/{end.node_name}" for end in (publisher, subscription))
+                    yield f"{topic}: {' → '.join(ends)} cannot connect: {reason}"
+
+
+def _count_kernels(_topic: str) -> None:
+    """Count the kernels that are not in the cache; none is compiled."""
+    from scenario_gen import compiling
+    from scenario_gen import kernels as all_kernels
+
+    all_kernels.import_all()
+    needed = all_kernels.registered()
+    print(json.dumps({"kernels": len(needed), "missing": len(compiling.missing(needed))}), flush=True)
 
 
 def main() -> int:
@@ -202,5 +274,10 @@ def main() -> int:
     return worst
 
 
+PROBES: dict[str, Callable[[str], None]] = {"speak": _speak, "listen": _listen, "kernels": _count_kernels}
+
 if __name__ == "__main__":
-    sys.exit(main())
+    if len(sys.argv) > 1:
+        PROBES[sys.argv[1]](sys.argv[2])
+    else:
+        sys.exit(main())

@@ -17,23 +17,24 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 import math
-import sys
 from time import monotonic
 
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.diagnostics import count_in, decode_diagnostics, encode_diagnostics, Level, read_request, Status
+from msg_conventions.diagnostics import encode_diagnostics, Level, Status
+from msg_conventions.scenario_info import decode_info, INFO, RequestSummary, ScenarioEntry
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.topics import MANY_HEARD
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.bags.accounts import Account, Accounts, Match
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import CheckCounts, evaluate, EvaluationConfig, WITH
-from scenario_gen.nodes.base import run_nodes, StageNode
+from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
+from scenario_gen.nodes.base import StageNode
 from scenario_gen.parameters import check, parameter
+from scenario_gen.recordings.requests import Match, RequestTracker, TrackedRequest
+from scenario_gen.types.generation import WITH
 
-Told = Sequence[tuple[bytes, Mapping[str, str]]]  # scenarios, each with its entry of `scenarios/info`
-SCENARIOS = ("scenarios", "scenarios/info")
+Entries = Sequence[tuple[bytes, ScenarioEntry]]  # scenarios, each with its entry of `scenarios/info`
+SCENARIOS = ("scenarios", INFO)
 SETTLED = 5.0  # seconds without news after which it is said what a closed request lacks
 
 
@@ -57,107 +58,98 @@ class Evaluator(StageNode):
     """Measures every request's scenarios against their template once the request is closed."""
 
     INPUTS = ("tracks", "changepoints")
-    STAGES = ("interaction", "evaluation")
+    STAGES = ("template", "evaluation")
     OUTPUTS = ("report",)
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("evaluator", Config(), namespace)
         self._newest: dict[str, bytes] = {}
-        self._accounts = Accounts()
+        self._requests = RequestTracker()
         self._news = math.inf  # when something of scenarios came last
-        self.create_timer(1.0, self._tell_missing)
+        self.create_timer(1.0, self._report_missing)
 
     def started(self) -> None:
         """Listen to scenarios so that who paces them waits for this node."""
-        self._accounts = Accounts(self.config.keep)
+        self._requests = RequestTracker(self.config.keep)
         for topic in SCENARIOS:
             self.listen(topic, MANY_HEARD)
 
     def received(self, topic: str, data: bytes) -> None:
         """Keep what comes, and evaluate a request when all of it is there."""
         if topic == "scenarios":
-            self._keep(self._accounts.scenario(digest(data), data))
-        elif topic == "scenarios/info":
-            for status in decode_diagnostics(data)[1]:
-                self._keep(self._accounts.tell(status, f"{topic}, {status.name}"))
+            self._keep(self._requests.add_scenario(digest(data), data))
+        elif topic == INFO:
+            for info in decode_info(data, topic):
+                self._keep(self._requests.add_info(info))
         else:
             self._newest[topic] = data
         self._news = monotonic()
         self._give_up()
         if not {"tracks", "changepoints"} <= set(self._newest):
             return
-        for request, account in list(self._accounts.open.items()):
-            if account.whole:
-                self._accounts.forget(request)
-                self._submit(dict(self._newest), account)
+        for name, request in list(self._requests.open.items()):
+            if request.whole:
+                self._requests.forget(name)
+                self._submit(dict(self._newest), request)
 
     def _keep(self, match: Match | None) -> None:
         if match is not None:
-            account, entry, data = match
-            account.keep(entry, data, self.config.seed, self.config.measured)
+            request, entry, data = match
+            request.keep(entry, data, self.config.seed, self.config.measured)
 
     def _give_up(self) -> None:
         """Forget the oldest requests while more of them wait, or more scenarios of them are there, than are kept."""
-        accounts = self._accounts.open
-        closed = [request for request, account in accounts.items() if account.closing]
-        for request in closed[: max(0, len(closed) - self.config.wait)]:
-            self._forget(request)
-        while len(accounts) > 1 and sum(len(account.kept) for account in accounts.values()) > self.config.keep:
-            self._forget(next(iter(accounts)))
+        requests = self._requests.open
+        closed = [name for name, request in requests.items() if request.summary]
+        for name in closed[: max(0, len(closed) - self.config.wait)]:
+            self._forget(name)
+        while len(requests) > 1 and sum(len(request.kept) for request in requests.values()) > self.config.keep:
+            self._forget(next(iter(requests)))
 
     def _forget(self, request: str) -> None:
         """Give up a request, and say what of it has not come."""
-        said = self._accounts.open[request].sentence()
-        self._accounts.forget(request)
+        said = self._requests.open[request].sentence()
+        self._requests.forget(request)
         self.status(Level.WARN, f"{said}; it is not evaluated; see keep and wait", "requests", request=request)
 
-    def _tell_missing(self) -> None:
+    def _report_missing(self) -> None:
         """Say what has not come of closed requests, once all is quiet."""
         if monotonic() - self._news < SETTLED or not self.active:
             return
         self._news = math.inf
-        for account in self._accounts.incomplete(closed=True):
+        for request in self._requests.incomplete(closed=True):
             why = "they were lost, or published before this node listened; it is not evaluated without them"
-            self.status(Level.WARN, f"{account.sentence()}: {why}", "requests", missing=str(account.missing))
+            self.status(Level.WARN, f"{request.sentence()}: {why}", "requests", missing=str(request.missing))
 
-    def _submit(self, messages: Mapping[str, bytes], account: Account) -> None:
-        name, status = f"request {account.request}", account.closing
-        if status is None or "cancelled" in status.values:
+    def _submit(self, messages: Mapping[str, bytes], request: TrackedRequest) -> None:
+        name, summary = f"request {request.request}", request.summary
+        if summary is None or summary.cancelled:
             return
-        scenarios = account.in_order()
-        self.work(name, lambda cancelled: None if cancelled() else self._evaluate(messages, scenarios, status))
+        scenarios = request.in_order()
+        self.work(name, lambda _: self._evaluate(messages, scenarios, summary))
 
-    def _evaluate(self, messages: Mapping[str, bytes], scenarios: Told, status: Status) -> None:
+    def _evaluate(self, messages: Mapping[str, bytes], scenarios: Entries, summary: RequestSummary) -> None:
         encounter = decode_tracks(messages["tracks"])
         segmentation = decode_changepoints(messages["changepoints"], encounter)
-        told = "scenarios/info"
-        decoded = [
-            decode_scenario(data, seed=count_in(v, "seed", told), index=count_in(v, "index", told)) for data, v in scenarios
-        ]
+        decoded = [decode_scenario(data, seed=entry.seed, index=entry.index) for data, entry in scenarios]
         if any(stamp != encounter.start_ns for stamp, _ in decoded):
-            raise InputError(f"request {status.values['request']}: its scenarios are not those of the newest tracks")
-        account = read_request(status, tuple(scenario for _, scenario in decoded))
-        evaluation = evaluate(
+            raise InputError(f"request {summary.request}: its scenarios are not those of the newest tracks")
+        found = summary.result(tuple(scenario for _, scenario in decoded))
+        evaluation = evaluate_scenarios(
             encounter,
-            segmentation,
-            {WITH: account.scenarios},
-            checks={WITH: CheckCounts.of_set(account)},
+            {WITH: found},
+            changepoints=len(segmentation.changepoints),
             config=self.config.evaluation,
             seed=self.config.seed,
         )
         stop_if_cancelled()
-        published, statuses = count_in(status.values, "published", told), []
-        chosen = f"measured on {len(decoded)} of {published} scenarios, chosen by seed {self.config.seed}"
+        statuses = []
+        chosen = f"measured on {len(decoded)} of {summary.published} scenarios, chosen by seed {self.config.seed}"
         for row in evaluation.rows:
             figures = {key: repr(entry.value) for key, entry in row.values.items() if math.isfinite(entry.value)}
-            values = {"request": status.values["request"], "samples": str(row.samples), **figures}
-            notes = (*row.notes, chosen) if row.name == WITH and len(decoded) < published else row.notes
+            values = {"request": summary.request, "samples": str(row.samples), **figures}
+            notes = (*row.notes, chosen) if row.name == WITH and len(decoded) < summary.published else row.notes
             statuses.append(Status(f"{self.get_fully_qualified_name()}: {row.name}", Level.OK, "; ".join(notes), values))
         self.send("report", encode_diagnostics(statuses, encounter.start_ns))
-        self.health.settle("requests")
-        self.get_logger().info(f"request {status.values['request']} evaluated: {len(decoded)} scenarios")
-
-
-def main() -> None:
-    """Run the node."""
-    sys.exit(run_nodes(Evaluator))
+        self.diagnostics.resolve("requests")
+        self.get_logger().info(f"request {summary.request} evaluated: {len(decoded)} scenarios")

@@ -18,7 +18,6 @@
 are written to standard output as JSON lines. Ctrl-C, SIGTERM, or the end of standard input ends all nodes.
 """
 
-import importlib
 import json
 import os
 from pathlib import Path
@@ -27,8 +26,8 @@ import signal
 import sys
 import traceback
 
-from scenario_gen.nodes.base import StageNode
-from scenario_gen.nodes.compiling import kernels_ready
+from scenario_gen.nodes.process import kernels_ready
+from scenario_gen.nodes.start import node_class, start
 
 PATIENCE = 20.0  # seconds that a node has to end by itself; far more than it needs, for machines that are busy
 
@@ -52,8 +51,7 @@ def _become(node: str, arguments: list[str], log: str) -> None:
         null = os.open(os.devnull, os.O_RDONLY)
         os.dup2(null, 0)
         sys.argv = [node, *arguments]
-        importlib.import_module(f"scenario_gen.nodes.{node}").main()
-        code = 0
+        start(node)
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else 1
     except BaseException:
@@ -65,12 +63,8 @@ def _become(node: str, arguments: list[str], log: str) -> None:
 
 def _load(nodes: list[str]) -> None:
     """Import the nodes and compile, or load, the kernels of their stages: what every fork will share."""
-    stages: dict[str, None] = {}
-    for node in nodes:
-        for made in vars(importlib.import_module(f"scenario_gen.nodes.{node}")).values():
-            if isinstance(made, type) and issubclass(made, StageNode):
-                stages |= dict.fromkeys(made.STAGES)
-    count, seconds = kernels_ready(tuple(stages))
+    stages = dict.fromkeys(stage for node in nodes for stage in getattr(node_class(node), "STAGES", ()))
+    count, seconds = kernels_ready(stages)
     say(event="loaded", kernels=count, seconds=seconds)
 
 

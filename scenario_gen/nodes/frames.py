@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What moves while a bag is played: frames `vehicle_<id>` on /tf, and the footprints in them; the player alone tells them.
+"""What moves while a bag is played: frames `vehicle_<id>` on /tf, and the footprints in them; the player alone publishes them.
 
 They follow one motion: the `tracks` of a bag, or one of its `scenarios`. Its first sample is at the bag's time of the message,
 and each sample is a message of its own, so that what listens has the very poses of the trajectory and fills in between.
@@ -28,17 +28,15 @@ import numpy as np
 from rclpy.node import Node
 
 from msg_conventions.frames import decode_frames, encode_frames
-from msg_conventions.names import tokens
 from msg_conventions.pictures import encode_footprint
-from msg_conventions.topics import topic_entry, vehicle_topic
+from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import FRAME
 from msg_conventions.trajectory import decode, Trajectory, TYPE
-from scenario_gen.bags import bag_topics, read_messages
 from scenario_gen.errors import InputError
-from scenario_gen.nodes.message_classes import message_class
-from scenario_gen.nodes.publishing import publish
-from scenario_gen.nodes.voice import qos
-from scenario_gen.storage import BagConfig
+from scenario_gen.nodes.topics import create_publisher, create_subscription, publish
+from scenario_gen.storage.config import BagConfig
+from scenario_gen.storage.messages import bag_topics, read_messages
+from scenario_gen.types.names import tokens
 
 MAP = "map"
 OWN = 100  # transforms of ours that may be underway
@@ -55,7 +53,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Instant:
-    """Sample `k` of a motion, at a time of the bag: what is to be told there depends on the clock then."""
+    """Sample `k` of a motion, at a time of the bag: what is to be published there depends on the clock then."""
 
     k: int
     stamp_ns: int
@@ -88,7 +86,7 @@ def find_motion(bag: Path, wanted: str, number: int, config: BagConfig) -> Motio
 
 
 class Frames:
-    """Tells one motion, unless another publisher tells the same frames: then who has told less of them gives in."""
+    """Publishes one motion, unless another publisher publishes the same frames: then who has published less of them gives in."""
 
     def __init__(self, node: Node, motion: Motion) -> None:
         self._node, self._motion = node, motion
@@ -96,50 +94,46 @@ class Frames:
         self._children = tuple(f"vehicle_{name}" for name in names)
         space = motion.topic.rpartition("/tracks")[0] or motion.topic.rpartition("/scenarios")[0]
         self._tf, tie, *self._footprints = (
-            self._offer(topic) for topic in ("/tf", "/tf_static", *(f"{space}/{vehicle_topic(n, 'footprint')}" for n in names))
+            create_publisher(node, topic)
+            for topic in ("/tf", "/tf_static", *(f"{space}/{vehicle_topic(n, 'footprint')}" for n in names))
         )
         self.publishers = (self._tf, tie, *self._footprints)
         self._own: deque[bytes] = deque(maxlen=OWN)
-        self._told = 0
+        self._published = 0
         self._given_in = False
-        kind, quality = topic_entry("/tf")
-        node.create_subscription(message_class(kind), "/tf", self._hear, qos(quality), raw=True)
+        create_subscription(node, "/tf", self._yield_to_others)
         # The suite's maps and tracks have no place on the earth in common but where a map is the template's own.
         publish(node, tie, encode_frames(np.zeros((1, 3)), [FRAME], MAP, 0))
-
-    def _offer(self, topic: str) -> Any:
-        kind, quality = topic_entry(topic)
-        return self._node.create_publisher(message_class(kind), topic, qos(quality))
 
     def instants(self) -> Iterator[Instant]:
         """Yield the samples, each at its time of the bag."""
         for k, time_ns in enumerate(self._motion.trajectory.time_ns.tolist()):
             yield Instant(k, self._motion.begin_ns + time_ns)
 
-    def tell(self, instant: Instant, stamp_ns: int) -> None:
+    def publish(self, instant: Instant, stamp_ns: int) -> None:
         """Publish one sample's frames, and the footprints in them."""
         if self._given_in:
             return
-        told = self._motion.trajectory
-        poses = np.column_stack((told.position[:, instant.k], told.heading[:, instant.k]))
-        data = encode_frames(poses, self._children, told.frame_id, stamp_ns)
+        motion = self._motion.trajectory
+        poses = np.column_stack((motion.position[:, instant.k], motion.heading[:, instant.k]))
+        data = encode_frames(poses, self._children, motion.frame_id, stamp_ns)
         self._own.append(data)
-        self._told += 1
+        self._published += 1
         publish(self._node, self._tf, data)
-        for publisher, vehicle, frame in zip(self._footprints, told.vehicles, self._children, strict=True):
+        for publisher, vehicle, frame in zip(self._footprints, motion.vehicles, self._children, strict=True):
             publish(self._node, publisher, encode_footprint(vehicle, stamp_ns, frame))
 
-    def _hear(self, data: bytes, info: dict[str, Any]) -> None:
-        """Give in to whoever tells one of these frames and has published more on /tf."""
+    def _yield_to_others(self, data: bytes, info: dict[str, Any]) -> None:
+        """Give in to whoever publishes one of these frames and has published more on /tf."""
         if self._given_in or data in self._own:
             return
         try:
             others = {child for _, _, child, _ in decode_frames(data)} & set(self._children)
         except InputError:
             return
-        if others and info["publication_sequence_number"] >= self._told:
+        if others and info["publication_sequence_number"] >= self._published:
             self._given_in = True
             self._node.get_logger().error(
-                f"another publisher of /tf tells {', '.join(sorted(others))}: this player tells no frames any more; "
+                f"another publisher of /tf publishes {', '.join(sorted(others))}: this player publishes no frames any more; "
                 "play one motion at a time in a ROS domain, or set the parameter frames to ''"
             )

@@ -20,19 +20,17 @@ It generates when the inputs are complete, and on `~/generate`, whose parameters
 
 from collections.abc import Mapping
 from functools import partial
-import sys
 
 from msg_conventions.diagnostics import Level
-from msg_conventions.names import tokens
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.nodes.base import run_nodes, StageNode
-from scenario_gen.nodes.generate_services import GenerateServices
+from scenario_gen.nodes.base import StageNode
 from scenario_gen.nodes.inputs import Inputs
-from scenario_gen.nodes.open_requests import OpenRequest, OpenRequests
-from scenario_gen.nodes.pacing import unheard
-from scenario_gen.nodes.sample_request import Answer, answer_request, Config
-from scenario_gen.requests.chain import Cancelled
+from scenario_gen.nodes.sampling_answer import Answer, answer_request, Config
+from scenario_gen.nodes.sampling_requests import OpenRequest, OpenRequests
+from scenario_gen.nodes.topics import unacknowledged
+from scenario_gen.sampling import Cancelled
+from scenario_gen.types.names import tokens
 
 ENDS = ("road/entries", "road/exits")  # of use only where start or end states are asked for
 
@@ -41,29 +39,28 @@ class GpSampler(StageNode):
     """Samples valid scenarios around the planned routes."""
 
     INPUTS = ("map", *ENDS, "tracks", "changepoints", "fit", "fit/info")
-    STAGES = ("interaction", "roads", "fitting", "planning", "sampling", "validity")
+    STAGES = ("template", "roads", "fitting", "routing", "sampling", "validity")
     OUTPUTS = ("scenarios", "scenarios/info", "markers")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("gp_sampler", Config(), namespace)
         paired = ("tracks", "changepoints", "fit", "fit/info", *(("map",) if self.config.pair_map else ()))
-        self._seen = Inputs(paired, () if self.config.pair_map else ("map",))
+        self.inputs = Inputs(paired, () if self.config.pair_map else ("map",))
         self._routes: set[str] = set()
-        self._requests = OpenRequests(self, self.cancel)
-        GenerateServices(self, self._requests)
+        self._requests = OpenRequests(self)
 
     def stopped(self) -> None:
         """Forget the inputs: being latched, they come again."""
-        self._seen.clear()
+        self.inputs.clear()
 
-    def ticked(self) -> None:
-        """Say how far the request at work is."""
-        super().ticked()
-        self._requests.tell()
+    def update_diagnostics(self) -> None:
+        """Report how far the request at work is."""
+        super().update_diagnostics()
+        self._requests.report()
 
     def received(self, topic: str, data: bytes) -> None:
         """Generate when everything is there."""
-        self._seen.put(topic, data)
+        self.inputs.put(topic, data)
         if topic == "tracks":
             self._follow(data)
         config = self.config
@@ -74,65 +71,59 @@ class GpSampler(StageNode):
     def missing(self, config: Config) -> list[str]:
         """The topics that a request still waits for."""
         ends = ENDS if config.moves and config.pair_map else ()
-        return self._seen.missing() or [topic for topic in ends if topic not in self.messages()]
+        return self.inputs.missing() or [topic for topic in ends if topic not in self.messages()]
 
     def messages(self) -> dict[str, bytes]:
         """The template's messages; entries and exits only if the fit was made with them."""
-        messages = self._seen.complete() or {}
-        return {t: data for t, data in messages.items() if t not in ENDS or self._seen.named("fit/info", t)}
+        messages = self.inputs.complete() or {}
+        return {t: data for t, data in messages.items() if t not in ENDS or self.inputs.named("fit/info", t)}
 
     def _follow(self, tracks: bytes) -> None:
         """Listen to the routes of the vehicles in the tracks, and no longer to those of others."""
         wanted = {vehicle_topic(name, "route") for name in tokens(v.id for v in decode_tracks(tracks).vehicles)}
-        self._seen.forget(self._routes - wanted)
+        self.inputs.forget(self._routes - wanted)
         for topic in sorted(self._routes - wanted):
             self.ignore(topic)
-        self._seen.expect(wanted)
+        self.inputs.expect(wanted)
         self._routes = wanted
         for topic in sorted(wanted):
             self.listen(topic)
 
     def _generate_on_input(self, messages: Mapping[str, bytes], config: Config, cancelled: Cancelled) -> None:
-        if not cancelled():
-            self.generate(messages, self._requests.add(job="inputs", wanted=config.count), config, cancelled)
+        self.generate(messages, self._requests.add(job="inputs", wanted=config.count), config, cancelled)
 
-    def over(self, messages: Mapping[str, bytes], cancelled: Cancelled) -> str:
+    def given_up(self, messages: Mapping[str, bytes], cancelled: Cancelled) -> str:
         """Say why a request is to be given up; nothing if it is not."""
-        return "given up: its inputs were replaced" if self._seen.replaced(messages) else "cancelled" if cancelled() else ""
+        return "given up: its inputs were replaced" if self.inputs.replaced(messages) else "cancelled" if cancelled() else ""
 
     def generate(
         self, messages: Mapping[str, bytes], request: OpenRequest, config: Config, cancelled: Cancelled
     ) -> Answer | None:
-        """Sample, check and publish; the request's account closes `scenarios/info`. None if it was given up before its end."""
+        """Sample, check and publish; the request's summary closes `scenarios/info`. None if it was given up before its end."""
 
-        def given_up() -> bool:  # also amid a set: nothing of an old map is said beside the new one
-            return bool(self.over(messages, cancelled))
+        def stop() -> bool:  # also amid a set: nothing of an old map is said beside the new one
+            return bool(self.given_up(messages, cancelled))
 
         level, words, more = Level.WARN, "", dict[str, str]()
         try:
-            if given_up():
+            if stop():
                 return None
             self._requests.begin(request)
-            node, send = self.get_fully_qualified_name(), partial(self.voice.send_paced, stop=given_up)
-            with self.voice.paced(self.OUTPUTS[:2], config.patience, partial(self._unheard, request.name)):
-                answer = answer_request(messages, config, request.name, node, request.progress, given_up, send)
-            words = answer.closing.message
-            if "cancelled" in answer.closing.values:
-                words = f"{self.over(messages, cancelled)}: {words}"
+            node, send = self.get_fully_qualified_name(), partial(self.outputs.send_paced, stop=stop)
+            with self.outputs.paced(self.OUTPUTS[:2], config.patience, partial(self._report_pace, request.name)):
+                made, summary = answer_request(messages, config, request.name, node, request.progress, stop, send)
+            words = summary.status.message
+            if summary.cancelled:
+                words = f"{self.given_up(messages, cancelled)}: {words}"
                 return None
-            level = answer.closing.level
-            return answer
+            level = summary.status.level
+            return made, summary
         except Exception as error:
-            if not given_up():
+            if not stop():
                 level, words, more = Level.ERROR, str(error), {"error": type(error).__name__}
             raise
         finally:
-            self._requests.end(request, level, words or self.over(messages, cancelled) or "cancelled", **more)
+            self._requests.end(request, level, words or self.given_up(messages, cancelled) or "cancelled", **more)
 
-    def _unheard(self, request: str, topic: str, count: int) -> None:
-        self.status(Level.WARN, unheard(self, topic, count), f"pace of {topic}", request=request, count=str(count))
-
-
-def main() -> None:
-    """Run the node."""
-    sys.exit(run_nodes(GpSampler))
+    def _report_pace(self, request: str, topic: str, count: int) -> None:
+        self.status(Level.WARN, unacknowledged(self, topic, count), f"pace of {topic}", request=request, count=str(count))

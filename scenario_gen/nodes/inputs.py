@@ -18,22 +18,17 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from msg_conventions import trajectory
-from msg_conventions.belonging import decode_belonging, hash_of, INFOS
-from msg_conventions.cdr import CdrReader
+from msg_conventions.cdr import stamp_of
 from msg_conventions.fits import decode_fit
+from msg_conventions.hashes import decode_hashes, hash_of, INFOS
 from msg_conventions.paths import decode_path
 from msg_conventions.roads import decode_map, decode_poses
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
-from scenario_gen.size import MOST_SAMPLES, refuse_too_large
+from scenario_gen.template.size import MOST_SAMPLES, refuse_too_large
+from scenario_gen.types.encounter import Encounter
 
 MOST_BYTES = 200 * MOST_SAMPLES  # of tracks: a sample of a vehicle takes 176 at most, and an instant 36
-
-
-def stamp_of(data: bytes, topic: str) -> int:
-    """Return the header stamp [ns] of a CDR message that begins with a header."""
-    return CdrReader(data, topic).stamp()
 
 
 def take_tracks(data: bytes) -> Encounter:
@@ -61,7 +56,7 @@ DECODERS: dict[str, Callable[[bytes, str], object]] = {
     "changepoints": trajectory.decode,
     "fit": decode_fit,
     "route": decode_path,
-    **dict.fromkeys(INFOS, decode_belonging),
+    **dict.fromkeys(INFOS, decode_hashes),
 }
 
 
@@ -118,7 +113,7 @@ class Inputs:
         Raises:
             InputError: it is damaged; what was there stays.
         """
-        together = decode_belonging(data, topic) if topic in INFOS else {}
+        together = decode_hashes(data, topic) if topic in INFOS else {}
         self._newest[topic] = _Message(data, stamp_of(data, topic), hash_of(topic, data), together)
 
     def get(self, topic: str) -> bytes | None:
@@ -144,8 +139,8 @@ class Inputs:
         others = [
             f"{info} of this {topic}"
             for info in INFOS
-            for topic, told in (held[info].together.items() if info in held else ())
-            if topic in held and held[topic].hash != told
+            for topic, named in (held[info].together.items() if info in held else ())
+            if topic in held and held[topic].hash != named
         ]
         return silent + old + others
 

@@ -45,7 +45,7 @@ NAMESPACE = re.compile(r"/|/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 @dataclass(frozen=True)
 class Arguments:
-    """What the launch file may be told; parameters of nodes are declared as there."""
+    """The arguments of the launch file; parameters of nodes are declared as there."""
 
     log: str = parameter("", f"log to read: a file, a bag or a folder of files; {LIVE}: wait for what others publish")
     encounter: int = parameter(0, "which encounter of the log, from 0", low=0)
@@ -131,7 +131,7 @@ def read_arguments(texts: Mapping[str, str]) -> Launch:
     _check_places(launch)
     for end in ("starts", "goals"):
         if launch.value(end):
-            from scenario_gen.requests.request import read_states  # loads the stages, which takes seconds
+            from scenario_gen.types.request import read_states  # loads the stages, which takes seconds
 
             read_states(str(launch.value(end)), end)
     return launch

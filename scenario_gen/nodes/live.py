@@ -22,15 +22,15 @@ from typing import Any
 
 from rclpy.clock import Clock, ClockType
 
-from msg_conventions.names import token
 from msg_conventions.streams import decode_fix, decode_speed
 from msg_conventions.topics import FIX_TYPE, TWIST_TYPE, vehicle_topic
 from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, Sample, Streams
 from scenario_gen.logs.raw import RawLog
-from scenario_gen.nodes.offered import offered
+from scenario_gen.nodes.topics import adapted_quality
 from scenario_gen.parameters import check, parameter
-from scenario_gen.size import MOST_VEHICLES
+from scenario_gen.template.size import MOST_VEHICLES
+from scenario_gen.types.names import token
 
 LOOK = 0.2  # seconds between two looks for new streams, and for silence
 TYPES = {"fix": FIX_TYPE, "speed": TWIST_TYPE}
@@ -51,7 +51,7 @@ class LiveConfig:
 class LiveStreams:
     """Listens for a node: `sampled` gets every sample on the common clock, `ended` what was buffered, and how to read it.
 
-    That is when they are silent, when `log.longest` seconds are buffered, or when the clock was set.
+    That is when they are silent, when `log.max_duration` seconds are buffered, or when the clock was set.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class LiveStreams:
             self._left_out.discard(topic)
             self._topics.pop(topic)
             if not self._left_out:
-                self._node.health.settle("streams")
+                self._node.diagnostics.resolve("streams")
         try:
             self._subscribe()
         except InputError as error:
@@ -100,7 +100,7 @@ class LiveStreams:
                 if publishers[0].topic_type != kind_type:
                     raise InputError(f"{topic} is a {publishers[0].topic_type}; {kind_type} is needed, so it is left out")
                 self._left_out.discard(topic)
-                self._node.listen(topic, offered(topic, [publisher.qos_profile for publisher in publishers])[0])
+                self._node.listen(topic, adapted_quality(topic, [publisher.qos_profile for publisher in publishers])[0])
 
     def _vehicles(self) -> list[str]:
         """The vehicles of the parameter `log.vehicles`, or all that have a fix in the node's namespace."""
@@ -120,7 +120,7 @@ class LiveStreams:
         stamp_ns, *values = decode_fix(data, topic) if kind == "fix" else decode_speed(data, topic)
         stamp_ns = stamp_ns or self._node.get_clock().now().nanoseconds
         self._heard = monotonic()
-        if self._streams.breaks(stamp_ns) or self._streams.seconds > self._log.longest:
+        if self._streams.breaks(stamp_ns) or self._streams.seconds > self._log.max_duration:
             self.end()
         (self._streams.put_fix if kind == "fix" else self._streams.put_speed)(vehicle, stamp_ns, *values)
         for sample in self._streams.samples():
@@ -131,7 +131,7 @@ class LiveStreams:
         log = self._streams.take("live")
         if log is not None:
             for topic in self._topics:
-                self._node.health.settle(topic)  # whatever was wrong with its messages, no more of them are to come
+                self._node.diagnostics.resolve(topic)  # whatever was wrong with its messages, no more of them are to come
             self._ended(log, self._streams.config)
         return log is not None
 

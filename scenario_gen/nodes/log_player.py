@@ -20,7 +20,6 @@ With `stream`, the encounter comes as every vehicle's own `vehicle_<id>/fix` and
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-import sys
 import time
 
 from rosgraph_msgs.msg import Clock
@@ -28,16 +27,17 @@ from std_srvs.srv import Trigger
 
 from msg_conventions.cdr import CdrWriter
 from msg_conventions.diagnostics import Level
-from msg_conventions.names import tokens
-from msg_conventions.streams import encode_fix, encode_speed, geodetic
+from msg_conventions.streams import encode_fix, encode_speed
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.cancelling import stop_if_cancelled
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
+from scenario_gen.geodesy import latitude_longitude
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.nodes.base import run_nodes, StageNode
+from scenario_gen.nodes.base import StageNode
 from scenario_gen.parameters import check, parameter
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.names import tokens
 
 HEAD_START = 1.0  # seconds in which listeners find the streams, which are not latched
 
@@ -69,7 +69,7 @@ class LogPlayer(StageNode):
     def started(self) -> None:
         """Read the log, if one is named."""
         if self.config.log_path:
-            self.work("play", lambda cancelled: None if cancelled() else self._play(cancelled))
+            self.work("play", self._play)
 
     def _play(self, cancelled: Callable[[], bool]) -> None:
         config = self.config
@@ -93,11 +93,11 @@ class LogPlayer(StageNode):
 
     def _stream(self, encounter: Encounter, config: Config, cancelled: Callable[[], bool]) -> None:
         """Publish sample after sample, at the rate, until the end or until cancelled; the clock runs ahead of none."""
-        names, places = tokens(vehicle.id for vehicle in encounter.vehicles), geodetic(encounter)
+        names, places = tokens(vehicle.id for vehicle in encounter.vehicles), latitude_longitude(encounter)
         clock = self.create_publisher(Clock, "/clock", 10)
         topics = [vehicle_topic(name, kind) for name in names for kind in ("fix", "speed")]
         for topic in topics:
-            self.voice.announce(topic)
+            self.outputs.advertise(topic)
         while min(map(self.count_subscribers, topics)) < config.wait_matching_subscriptions and not cancelled():
             time.sleep(0.05)
         started = time.monotonic() + HEAD_START
@@ -107,7 +107,7 @@ class LogPlayer(StageNode):
             if cancelled() or not self.context.ok():
                 break
             stamp = encounter.start_ns + k * encounter.dt_ns
-            self.voice.publish(clock, CdrWriter().stamp(stamp).finish())
+            self.outputs.publish(clock, CdrWriter().stamp(stamp).finish())
             for i, name in enumerate(names):
                 self.send(
                     vehicle_topic(name, "fix"),
@@ -123,8 +123,3 @@ class LogPlayer(StageNode):
         response.message = "started" if response.success else "parameter log_path is empty, or the node is not active"
         self.started()
         return response
-
-
-def main() -> None:
-    """Run the node."""
-    sys.exit(run_nodes(LogPlayer))

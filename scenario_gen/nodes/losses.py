@@ -17,7 +17,7 @@
 - Where a topic has one publisher, by the numbers that it gives its messages: what is left out was lost, what came before the
   first one was published before the recording began.
 - Where it has several, by what DDS tells.
-- Scenarios, by their accounts on `scenarios/info`.
+- Scenarios, by their entries on `scenarios/info`.
 - Of a topic that keeps its newest message only (a map, a route) older ones that were overwritten are not missed.
 """
 
@@ -25,8 +25,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from time import monotonic
 
+from msg_conventions.scenario_info import INFO
 from msg_conventions.scenarios import digest
-from scenario_gen.bags.accounts import Accounts, INFO, take_info
+from scenario_gen.recordings.requests import RequestTracker
 
 SETTLED = 5.0  # seconds without news after which what a closed request lacks is missing
 LATE = "began late"
@@ -41,7 +42,7 @@ class Numbers:
     last: int = 0
     late: int = 0
     lost: int = 0
-    told: int = 0  # by DDS
+    by_dds: int = 0  # lost as DDS counts it
     several: bool = False
 
     def take(self, number: int) -> bool:
@@ -54,9 +55,9 @@ class Numbers:
         self.last = number
         return left_out > 0
 
-    def words(self) -> str:
+    def summary(self) -> str:
         """Say what was not recorded; "" if all was."""
-        lost = self.told if self.several else max(self.lost, self.told)
+        lost = self.by_dds if self.several else max(self.lost, self.by_dds)
         said = [f"{lost} lost"] if lost else []
         if self.late and not self.several:
             said.append(f"{self.late} not recorded: {LATE}")
@@ -70,7 +71,7 @@ class Losses:
         """Begin; `publishers` returns how many a topic has."""
         self._publishers = publishers
         self._numbers: dict[str, Numbers] = {}
-        self._accounts: dict[str, Accounts] = {}  # by namespace
+        self._requests: dict[str, RequestTracker] = {}  # by namespace
         self._of_newest: set[str] = set()
         self._news = monotonic()
 
@@ -88,31 +89,31 @@ class Losses:
             numbers.several = True
         if topic.endswith(("/scenarios", f"/{INFO}")):
             self._news = monotonic()
-            accounts = self._accounts.setdefault(topic.removesuffix("/info").removesuffix("scenarios"), Accounts())
+            requests = self._requests.setdefault(topic.removesuffix("/info").removesuffix("scenarios"), RequestTracker())
             if topic.endswith("/info"):
-                take_info(accounts, data)
+                requests.add_message(data)
             else:
-                accounts.scenario(digest(data))
+                requests.add_scenario(digest(data))
 
-    def told(self, topic: str, total: int) -> None:
+    def count_by_dds(self, topic: str, total: int) -> None:
         """Take what DDS says: so many messages of a topic have been lost up to now."""
         if topic not in self._of_newest:
-            self._numbers.setdefault(topic, Numbers()).told = total
+            self._numbers.setdefault(topic, Numbers()).by_dds = total
 
-    def words(self, *, ended: bool = False) -> Mapping[str, str]:
+    def summary(self, *, ended: bool = False) -> Mapping[str, str]:
         """Say by topic what is not recorded; at the end of the recording also of requests that are not closed."""
-        said = {topic: words for topic, numbers in self._numbers.items() if (words := numbers.words())}
-        for space, accounts in self._accounts.items():
-            accounts.settle()
+        said = {topic: text for topic, numbers in self._numbers.items() if (text := numbers.summary())}
+        for space, requests in self._requests.items():
+            requests.settle()
             if ended or monotonic() - self._news > SETTLED:
                 topic = f"{space}scenarios"
-                for account in accounts.incomplete(closed=not ended):
-                    said[topic] = "; ".join(filter(None, (said.get(topic), account.sentence())))
+                for request in requests.incomplete(closed=not ended):
+                    said[topic] = "; ".join(filter(None, (said.get(topic), request.sentence())))
                 if topic in said and said.get(f"{topic}/info", "").endswith(LATE):
                     said[topic] += f"; the recording {LATE}"
         return said
 
 
-def remedy(words: str) -> str:
+def remedy(losses: str) -> str:
     """Return what can be done about it."""
-    return BEGIN if LATE in words and " lost" not in words else LOST
+    return BEGIN if LATE in losses and " lost" not in losses else LOST

@@ -17,8 +17,8 @@
 Each topic is offered with the quality of service it was recorded with, or as `qos_overrides./topic.publisher.reliability` and the
 like say. With an offset, what latched topics had said before it is published first. With `clock`, the bag's time is published on
 /clock, so that nodes with `use_sim_time` follow it, in place of the bag's own /clock. A motion of the bag, its tracks or one of
-its scenarios, is told sample by sample as the frames of its vehicles (frames.py). When all is played and heard the player ends,
-unless it is to `loop`, or to `stay` for who comes late to latched topics.
+its scenarios, is published sample by sample as the frames of its vehicles (frames.py). When all is played and acknowledged the
+player ends, unless it is to `loop`, or to `stay` for who comes late to latched topics.
 """
 
 from collections import deque
@@ -30,7 +30,6 @@ from heapq import merge
 from operator import attrgetter
 from pathlib import Path
 import re
-import sys
 import threading
 from time import monotonic
 from typing import Any
@@ -45,18 +44,14 @@ from std_srvs.srv import Trigger
 
 from msg_conventions.cdr import CdrWriter
 from msg_conventions.diagnostics import Level
-from scenario_gen.bags import bag_topics, BagMessage, read_messages
 from scenario_gen.errors import InputError, ScenarioGenError
-from scenario_gen.nodes.base import run_nodes
+from scenario_gen.nodes.diagnostics import NodeDiagnostics
 from scenario_gen.nodes.frames import find_motion, Frames, Instant
-from scenario_gen.nodes.health import Health
-from scenario_gen.nodes.message_classes import message_class
-from scenario_gen.nodes.pacing import Pace, unheard
-from scenario_gen.nodes.publishing import publish
 from scenario_gen.nodes.ros_parameters import ConfigParameters
-from scenario_gen.nodes.voice import qos
+from scenario_gen.nodes.topics import message_class, Pace, publish, qos, unacknowledged
 from scenario_gen.parameters import check, parameter
-from scenario_gen.storage import BagConfig
+from scenario_gen.storage.config import BagConfig
+from scenario_gen.storage.messages import bag_topics, BagMessage, read_messages
 
 STREAMED = BagConfig(most_bytes=2**62)  # a message is published and forgotten, so a bag may be of any size
 PATIENCE = 5.0  # seconds in which listeners have to take the last messages
@@ -73,11 +68,11 @@ class Config:
     rate: float = parameter(1.0, "how many times as fast as it was recorded", low=0.01, high=1000.0)
     start_offset: float = parameter(0.0, "begin so far into the bag", unit="s", low=0.0)
     loop: bool = parameter(False, "begin again at the end")
-    stay: bool = parameter(False, "stay when all is played, so that latched topics are heard later, too")
+    stay: bool = parameter(False, "stay when all is played, so that latched topics reach who comes later, too")
     paused: bool = parameter(False, "wait for ~/resume before the first message")
     clock: bool = parameter(False, "publish /clock")
     frames: str = parameter(
-        "tracks", "topic whose motion is told on /tf, as vehicle_<id>: `tracks`, `scenarios`, or its full name; empty: none"
+        "tracks", "topic whose motion is published on /tf, as vehicle_<id>: `tracks`, `scenarios`, or its full name; empty: none"
     )
     scenario: int = parameter(0, "which message of that topic, from 0", low=0)
     patience: float = parameter(
@@ -95,7 +90,7 @@ class Player(Node):  # type: ignore[misc]
         super().__init__("player", namespace=namespace)
         self.parameters = ConfigParameters(self, Config())
         self.parameters.log()
-        self.health = Health(self, self._tell_progress)
+        self.diagnostics = NodeDiagnostics(self, self._report_progress)
         self._at: float | None = None  # seconds of the bag that have been played, while it is
         self.done = False
         self.exit_code = 0
@@ -127,10 +122,10 @@ class Player(Node):  # type: ignore[misc]
                 publisher = self.create_publisher(kind, name, quality, qos_overriding_options=QoSOverridingOptions(KINDS))
                 self._offered[topic.name] = (publisher, topic.quality.transient_local, topic.quality.depth)
                 self._paces[topic.name] = Pace(
-                    publisher, publisher.qos_profile.depth, config.patience, partial(self._unheard, name)
+                    publisher, publisher.qos_profile.depth, config.patience, partial(self._report_pace, name)
                 )
             except InputError as error:
-                self.health.say(Level.ERROR, f"{name} is not played: {error}", "topics", {"error": "InputError"})
+                self.diagnostics.status(Level.ERROR, f"{name} is not played: {error}", "topics", {"error": "InputError"})
         if not self._offered:
             raise InputError(f"{config.bag}: none of its topics can be played; see the messages above and the parameter topics")
         self._frames = self._frames_of(config)
@@ -140,7 +135,7 @@ class Player(Node):  # type: ignore[misc]
         self._player.start()
 
     def _frames_of(self, config: Config) -> Frames | None:
-        """What is told on /tf: nothing if the bag has a /tf of its own, or /tf is not among the topics to play.
+        """What is published on /tf: nothing if the bag has a /tf of its own, or /tf is not among the topics to play.
 
         Raises:
             InputError: one topic was chosen, and it has no such motion.
@@ -155,7 +150,7 @@ class Player(Node):  # type: ignore[misc]
         except InputError as error:
             if config.frames != Config.frames:
                 raise
-            self.get_logger().warning(f"no frames are told on /tf: {error}")
+            self.get_logger().warning(f"no frames are published on /tf: {error}")
             return None
 
     def _play(self, config: Config) -> None:
@@ -168,10 +163,10 @@ class Player(Node):  # type: ignore[misc]
             if self._ended.is_set():
                 return
             self._at = None
-            self.health.say(Level.OK, f"{config.bag}: played", "playing", {})
+            self.diagnostics.status(Level.OK, f"{config.bag}: played", "playing", {})
         except ScenarioGenError as error:
             self._at = None
-            self.health.say(Level.ERROR, str(error), "playing", {"error": type(error).__name__})
+            self.diagnostics.status(Level.ERROR, str(error), "playing", {"error": type(error).__name__})
             self.exit_code = error.exit_code
         if not config.stay and not self._ended.is_set():
             self._leave()
@@ -201,15 +196,15 @@ class Player(Node):  # type: ignore[misc]
             if isinstance(message, BagMessage):
                 self._publish(message.topic, message.data)
             elif self._frames is not None:
-                self._frames.tell(message, message.stamp_ns if config.clock else self.get_clock().now().nanoseconds)
+                self._frames.publish(message, message.stamp_ns if config.clock else self.get_clock().now().nanoseconds)
 
     def _publish(self, topic: str, data: bytes) -> None:
         """Publish, once it overwrites nothing that is on its way; a replay may take longer than the recording for that."""
         self._paces[topic].wait(self._ended.is_set)
         publish(self, self._offered[topic][0], data)
 
-    def _unheard(self, topic: str, count: int) -> None:
-        self.health.say(Level.WARN, unheard(self, topic, count), f"pace of {topic}", {"count": str(count)})
+    def _report_pace(self, topic: str, count: int) -> None:
+        self.diagnostics.status(Level.WARN, unacknowledged(self, topic, count), f"pace of {topic}", {"count": str(count)})
 
     def _from_offset(self, config: Config) -> Iterator[BagMessage | Instant]:
         """Yield the messages from the offset on; before the first, publish what latched topics hold by then."""
@@ -238,17 +233,17 @@ class Player(Node):  # type: ignore[misc]
             if self._running.is_set():
                 self._ended.wait(min(TICK, (due - elapsed) / config.rate))
                 elapsed += (monotonic() - started) * config.rate
-            self._tell_time(first_ns + round((min(elapsed, due) - config.start_offset) * 1e9))
+            self._publish_clock(first_ns + round((min(elapsed, due) - config.start_offset) * 1e9))
         self._running.wait()
         return max(elapsed, due) if elapsed < due + 1.0 else due
 
-    def _tell_progress(self) -> None:
+    def _report_progress(self) -> None:
         """Say how far into the bag it is, each second."""
         if (at := self._at) is not None:
-            words = f"{self.parameters.config.bag}: {at:.1f} s played" + ("" if self._running.is_set() else ", paused")
-            self.health.say(Level.OK, words, "playing", {"seconds": f"{at:.1f}"}, log=False)
+            message = f"{self.parameters.config.bag}: {at:.1f} s played" + ("" if self._running.is_set() else ", paused")
+            self.diagnostics.status(Level.OK, message, "playing", {"seconds": f"{at:.1f}"}, log=False)
 
-    def _tell_time(self, stamp_ns: int) -> None:
+    def _publish_clock(self, stamp_ns: int) -> None:
         if self._clock_publisher is not None:
             publish(self, self._clock_publisher, CdrWriter().stamp(stamp_ns).finish())
 
@@ -265,8 +260,3 @@ class Player(Node):  # type: ignore[misc]
         if self._player is not None:
             self._player.join(PATIENCE)  # what it still says needs the node
         super().destroy_node()
-
-
-def main() -> None:
-    """Run the node."""
-    sys.exit(run_nodes(Player))

@@ -36,17 +36,14 @@ from rclpy.time import Time
 from std_srvs.srv import Trigger
 
 from msg_conventions.diagnostics import Level
-from scenario_gen.bags import BagWriter, Split
-from scenario_gen.bags.metadata import qos_yaml
 from scenario_gen.errors import InputError, of_system
-from scenario_gen.nodes.base import run_nodes
-from scenario_gen.nodes.health import Health
+from scenario_gen.nodes.diagnostics import NodeDiagnostics
 from scenario_gen.nodes.losses import Losses, remedy
-from scenario_gen.nodes.message_classes import message_class
-from scenario_gen.nodes.offered import offered
 from scenario_gen.nodes.ros_parameters import ConfigParameters
-from scenario_gen.nodes.voice import qos
+from scenario_gen.nodes.topics import adapted_quality, message_class, qos
 from scenario_gen.parameters import check, parameter
+from scenario_gen.storage.metadata import qos_yaml
+from scenario_gen.storage.writer import BagWriter, Split
 
 REST = 30.0  # seconds that are taken at most, at the end, for what has arrived
 AT_ONCE = 50  # messages of a topic, before others have their turn
@@ -108,9 +105,9 @@ class Recorder(Node):  # type: ignore[misc]
         self.create_timer(0.1, self._look_around)
         self.create_timer(HELD, self._let_go)
         self._losses = Losses(self.count_publishers)
-        self._said: dict[str, str] = {}
-        self.health = Health(self, self._tell_counts)
-        self._say(Level.OK, "nothing is being recorded")
+        self._warned: dict[str, str] = {}
+        self.diagnostics = NodeDiagnostics(self, self._report_counts)
+        self._report(Level.OK, "nothing is being recorded")
 
     def autostart(self) -> None:
         """Begin the bag that the parameter names."""
@@ -121,10 +118,10 @@ class Recorder(Node):  # type: ignore[misc]
         config = self.parameters.config
         with _disk_errors():
             self._bag = BagWriter(folder, compress=config.compress, split=Split(config.split_bytes, config.split_seconds))
-        self._losses, self._said = Losses(self.count_publishers), {}
-        self._say(Level.OK, f"recording to {folder}")
+        self._losses, self._warned = Losses(self.count_publishers), {}
+        self._report(Level.OK, f"recording to {folder}")
         self._refused.clear()
-        self.health.settle("topics")
+        self.diagnostics.resolve("topics")
         self._look_around()
 
     def stop(self, *, rest: bool = True) -> str:
@@ -140,15 +137,15 @@ class Recorder(Node):  # type: ignore[misc]
         bag, self._bag = self._bag, None
         if bag is None:
             return ""
-        bag.info.lost = dict(self._losses.words(ended=True))
+        bag.info.lost = dict(self._losses.summary(ended=True))
         self._warn(bag.info.lost)
         with _disk_errors():
             bag.close()
-        self._say(Level.OK, f"{bag.folder} is closed")
+        self._report(Level.OK, f"{bag.folder} is closed")
         return str(bag.folder)
 
-    def _say(self, level: Level, words: str, subject: str = "recording", **values: str) -> None:
-        self.health.say(level, words, subject, values)
+    def _report(self, level: Level, message: str, subject: str = "recording", **values: str) -> None:
+        self.diagnostics.status(level, message, subject, values)
 
     def _take_rest(self) -> None:
         """Record what has arrived and waits to be taken; publishers believe that the recorder has it."""
@@ -186,27 +183,27 @@ class Recorder(Node):  # type: ignore[misc]
             if topic not in self._listening and topic not in self._refused and wanted.fullmatch(topic):
                 self._listen(topic, kinds[0])
 
-    def _tell_counts(self) -> None:
+    def _report_counts(self) -> None:
         """Say on /diagnostics how many messages of each topic are in the bag."""
         if self._bag is not None:
             counts = {topic.name: str(topic.count) for topic in self._bag.info.topics}
-            self.health.say(Level.OK, str(self._bag.folder), "recorded", counts, log=False)
-            lost = self._losses.words()
+            self.diagnostics.status(Level.OK, str(self._bag.folder), "recorded", counts, log=False)
+            lost = self._losses.summary()
             if lost:
-                words = "; ".join(f"{topic}: {said}" for topic, said in lost.items())
-                self.health.say(Level.WARN, f"{words}; {remedy(words)}", "losses", lost, log=False)
+                message = "; ".join(f"{topic}: {said}" for topic, said in lost.items())
+                self.diagnostics.status(Level.WARN, f"{message}; {remedy(message)}", "losses", lost, log=False)
             self._warn(lost)
 
     def _warn(self, lost: Mapping[str, str]) -> None:
         """Say on the terminal what is new of what is not recorded."""
         for topic in lost:
-            if lost[topic] != self._said.get(topic):
+            if lost[topic] != self._warned.get(topic):
                 said = f"{topic}: {lost[topic]}; {remedy(lost[topic])}"
                 if self.context.ok():
                     self.get_logger().warning(said)
                 else:  # ended by a signal; /rosout is gone
                     print(f"[WARN] [{self.get_name()}]: {said}", file=sys.stderr, flush=True)
-        self._said = dict(lost)
+        self._warned = dict(lost)
 
     def _let_go(self) -> None:
         """Write what came in the last seconds."""
@@ -218,23 +215,23 @@ class Recorder(Node):  # type: ignore[misc]
         publishers = self.get_publishers_info_by_topic(topic)
         if not publishers or self._bag is None:
             return
-        quality, recorded = offered(topic, [publisher.qos_profile for publisher in publishers])
+        quality, recorded = adapted_quality(topic, [publisher.qos_profile for publisher in publishers])
         try:
             message = message_class(kind)
             self._bag.add_topic(topic, kind, qos_yaml(recorded), str(publishers[0].topic_type_hash))
         except InputError as error:
             self._refused.add(topic)
-            self._say(Level.ERROR, f"{topic} is not recorded: {error}", "topics", error="InputError")
+            self._report(Level.ERROR, f"{topic} is not recorded: {error}", "topics", error="InputError")
             return
         take, losses = partial(self._write, topic), self._losses
         losses.begin(topic, only_newest=recorded.transient_local and recorded.depth == 1)
-        lost = SubscriptionEventCallbacks(message_lost=lambda event: losses.told(topic, event.total_count))
+        lost = SubscriptionEventCallbacks(message_lost=lambda event: losses.count_by_dds(topic, event.total_count))
 
-        def heard(data: bytes, about: dict[str, Any]) -> None:  # rclpy counts the arguments
+        def received(data: bytes, about: dict[str, Any]) -> None:  # rclpy counts the arguments
             take(data, about["publication_sequence_number"])
             self._take_more(topic)
 
-        self._listening[topic] = self.create_subscription(message, topic, heard, qos(quality), raw=True, event_callbacks=lost)
+        self._listening[topic] = self.create_subscription(message, topic, received, qos(quality), raw=True, event_callbacks=lost)
 
     def _write(self, topic: str, data: bytes, number: int | None) -> None:
         if self._bag is not None:
@@ -255,7 +252,7 @@ class Recorder(Node):  # type: ignore[misc]
     def _give_up(self, error: InputError) -> None:
         """Say what is wrong and record no more; the node, and others in its process, live on."""
         self.stop(rest=False)  # nothing more is written to such a bag
-        self._say(Level.ERROR, str(error), error="InputError")
+        self._report(Level.ERROR, str(error), error="InputError")
 
     def _start_service(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         now = self.get_clock().now().nanoseconds
@@ -276,8 +273,3 @@ class Recorder(Node):  # type: ignore[misc]
         except InputError as error:
             response.success, response.message = False, str(error)
         return response
-
-
-def main() -> None:
-    """Run the node."""
-    sys.exit(run_nodes(Recorder))

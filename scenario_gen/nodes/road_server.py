@@ -21,25 +21,24 @@ its stamp. Without tracks it publishes the road in its plain size, stamp 0 (`cor
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-import sys
+from typing import Any
 from urllib.parse import unquote, urlparse
 
 from ament_index_python.packages import get_package_share_directory, PackageNotFoundError
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, LoadMap
 from rclpy.serialization import deserialize_message
-from rclpy.task import Future
 
-from msg_conventions.belonging import encode_belonging, identity
+from msg_conventions.cdr import stamp_of
 from msg_conventions.diagnostics import Level
+from msg_conventions.hashes import encode_hashes, template_hashes
 from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import InputError, ScenarioGenError
-from scenario_gen.nodes.base import REQUESTS, run_nodes, StageNode
-from scenario_gen.nodes.inputs import stamp_of
+from scenario_gen.nodes.base import REQUESTS, StageNode
 from scenario_gen.parameters import check, parameter
-from scenario_gen.roads import build_road, Road, RoadConfig
+from scenario_gen.roads import build_road, RoadConfig
 
 
 @dataclass(frozen=True)
@@ -92,19 +91,17 @@ class RoadServer(StageNode):
     def started(self) -> None:
         """Publish the plain road until tracks come."""
         if not self.config.wait_for_tracks and self.config.road_name != "corridor":
-            self.work("road", lambda cancelled: None if cancelled() else self._publish(*self._build(self._name)))
+            self.work("road", lambda _: self._publish(self._name))
 
     def received(self, topic: str, data: bytes) -> None:
         """Size the road to the newest encounter."""
         self._tracks = data
-        self.work("road", lambda cancelled: None if cancelled() else self._publish(*self._build(self._name)))
+        self.work("road", lambda _: self._publish(self._name))
 
-    def _build(self, name: str) -> tuple[Road, bytes | None]:
+    def _publish(self, name: str) -> None:
+        """Build a road, sized to the tracks if there are any, and publish it."""
         tracks = self._tracks
-        return build_road(name, decode_tracks(tracks) if tracks else None, self.config.road), tracks
-
-    def _publish(self, road: Road, tracks: bytes | None) -> None:
-        """Publish a road sized to the tracks, if there are any."""
+        road = build_road(name, decode_tracks(tracks) if tracks else None, self.config.road)
         stamp_ns = stamp_of(tracks, "tracks") if tracks else 0
         messages = {
             "road/entries": encode_poses(road.entries, road.frame_id, stamp_ns),
@@ -115,47 +112,39 @@ class RoadServer(StageNode):
         for topic, data in messages.items():
             self.send(topic, data)
         template = {"tracks": tracks} if tracks else {}
-        self.send("road/info", encode_belonging("road", messages | template, stamp_ns))
+        self.send("road/info", encode_hashes("road", messages | template, stamp_ns))
         self._grid = messages["map"]
         height, width = road.drivable.shape
         message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, {len(road.entries)} entries"
-        self.status(Level.OK, message, "road", stamp_ns, **identity(messages | template))
+        self.status(Level.OK, message, "road", stamp_ns, **template_hashes(messages | template))
 
-    def _get_map(self, _request: GetMap.Request, response: GetMap.Response) -> GetMap.Response:
+    def _get_map(self, _request: Any, response: Any) -> Any:
         if self._grid is not None:
             response.map = deserialize_message(self._grid, OccupancyGrid)
         return response
 
     async def _load_map(self, request: LoadMap.Request, response: LoadMap.Response) -> LoadMap.Response:
         """Load another road, off the executor's thread; it stays until the next request or restart."""
-        answer, executor, codes = Future(), self.executor, LoadMap.Response
+        codes = LoadMap.Response
         self._asked += 1
 
-        def job(cancelled: Callable[[], bool]) -> None:
-            result = codes.RESULT_UNDEFINED_FAILURE
+        def job(cancelled: Callable[[], bool]) -> int:
+            if cancelled():
+                return int(codes.RESULT_UNDEFINED_FAILURE)
             try:
-                if not cancelled():
-                    name = road_of_url(request.map_url)
-                    self._publish(*self._build(name))
-                    self._name, result = name, codes.RESULT_SUCCESS
+                name = road_of_url(request.map_url)
+                self._publish(name)
+                self._name = name
+                return int(codes.RESULT_SUCCESS)
             except ScenarioGenError as reason:
+                message = f"load_map {request.map_url!r}: {reason}"
+                self.status(Level.ERROR, message, "load_map", error=type(reason).__name__)  # which is over when the job is done
                 missing = not Path(request.map_url.removeprefix("file://")).exists()
-                result = codes.RESULT_MAP_DOES_NOT_EXIST if missing else codes.RESULT_INVALID_MAP_METADATA
-                words = f"load_map {request.map_url!r}: {reason}"
-                self.status(Level.ERROR, words, "load_map", error=type(reason).__name__)  # which is over when the job is done
-            finally:
-                answer.set_result((result, self._grid))
-                executor.wake()
+                return int(codes.RESULT_MAP_DOES_NOT_EXIST if missing else codes.RESULT_INVALID_MAP_METADATA)
 
         response.result = codes.RESULT_UNDEFINED_FAILURE
         if self.active:
-            self.work(f"load_map {self._asked}", job)
-            response.result, grid = await answer
+            response.result = await self.result_of(f"load_map {self._asked}", job, lambda _: int(codes.RESULT_UNDEFINED_FAILURE))
             if response.result == codes.RESULT_SUCCESS:
-                response.map = deserialize_message(grid, OccupancyGrid)
+                self._get_map(request, response)
         return response
-
-
-def main() -> None:
-    """Run the node."""
-    sys.exit(run_nodes(RoadServer))

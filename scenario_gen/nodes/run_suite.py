@@ -60,9 +60,9 @@ class Job:
 
 @dataclass
 class _State:
-    """What has been heard of the jobs so far."""
+    """What is known of the jobs so far."""
 
-    heard: dict[str, set[str]]
+    published_topics: dict[str, set[str]]
     published: dict[str, int] = field(default_factory=dict)
     recorded: dict[str, int] = field(default_factory=dict)
 
@@ -72,12 +72,12 @@ class _State:
             namespace in self.published
             and self.recorded.get(f"{namespace}/scenarios", 0) >= self.published[namespace]
             and self.recorded.get(f"{namespace}/scenarios/info", 0) > self.published[namespace]
-            for namespace in self.heard
+            for namespace in self.published_topics
         )
 
     def waiting_for(self) -> str:
         """Return the first node of the chain that has not answered, and for which job."""
-        for namespace, topics in self.heard.items():
+        for namespace, topics in self.published_topics.items():
             for topic, node in CHAIN.items():
                 if topic not in topics:
                     return f"{namespace}/{node}"
@@ -152,17 +152,8 @@ def _run(
     parameter_file.write_text(yaml.safe_dump(body), encoding="utf-8")
     spaces = [word for job in jobs for word in ("--namespace", job.namespace)]
     ros = ["--ros-args", "--params-file", str(parameter_file)]
-    specification = [
-        {
-            "node": node,
-            "arguments": [] if node == "recorder" else spaces,
-            "log": str(scratch / f"{node}.log"),
-        }
-        for node in NODES
-    ]
-    for entry in specification:
-        if entry["node"] != "watcher":
-            entry["arguments"] = [*entry["arguments"], *ros]
+    arguments = {node: [*spaces, *ros] for node in NODES} | {"recorder": ros, "watcher": ["--namespace", "", *spaces]}
+    specification = [{"node": node, "arguments": arguments[node], "log": str(scratch / f"{node}.log")} for node in NODES]
     (scratch / "suite.json").write_text(json.dumps(specification), encoding="utf-8")
     environment = {
         **os.environ,
@@ -221,9 +212,9 @@ def _take(event: dict[str, Any], state: _State, scratch: Path, progress: Callabl
     """Take one event in."""
     kind = event["event"]
     if kind == "published":
-        state.heard[event["namespace"]].add(event["topic"])
+        state.published_topics[event["namespace"]].add(event["topic"])
     elif kind == "done":
-        state.heard[event["namespace"]].add("scenarios")
+        state.published_topics[event["namespace"]].add("scenarios")
         state.published[event["namespace"]] = event["published"]
         progress(f"{event['namespace']}: {event['text']}")
     elif kind == "recorded":

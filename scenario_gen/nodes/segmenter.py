@@ -21,18 +21,21 @@ this node as for all others.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-import sys
 
 from std_srvs.srv import Trigger
 
-from msg_conventions.changepoints import encode_changepoints, encode_live_changepoints, encode_posterior
+from msg_conventions.changepoints import (
+    encode_changepoints,
+    encode_live_changepoints,
+    encode_posterior,
+    segmentation_status,
+)
 from msg_conventions.diagnostics import Level
 from msg_conventions.tracks import decode_tracks, encode_tracks
-from scenario_gen.bags.run import segmentation_status
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.logs import encounters_of, LogConfig, Sample
 from scenario_gen.logs.raw import RawLog
-from scenario_gen.nodes.base import run_nodes, StageNode
+from scenario_gen.nodes.base import StageNode
 from scenario_gen.nodes.live import LiveConfig, LiveStreams
 from scenario_gen.parameters import check, parameter
 from scenario_gen.segmentation import LiveSegmenter, OnlineConfig, segment, SegmentationConfig
@@ -83,7 +86,7 @@ class Segmenter(StageNode):
         """Segment the newest encounter, or go on with the one that comes in."""
         if topic == "tracks":
             self._tracks = data
-            self.work("segment", lambda cancelled: None if cancelled() else self._segment(data))
+            self.work("segment", lambda _: self._segment(data))
         elif self._live is not None:
             self._live.received(topic, data)
 
@@ -105,9 +108,7 @@ class Segmenter(StageNode):
         """Read what the streams amount to, off the executor's thread."""
         self._encounters += 1
 
-        def job(cancelled: Callable[[], bool]) -> None:
-            if cancelled():
-                return
+        def job(_: Callable[[], bool]) -> None:
             result = encounters_of(log, config)
             encounter = max(result.encounters, key=lambda e: e.speed.size)
             notes = {f"note.{k}": note for k, note in enumerate(result.quality.lines())}
@@ -127,8 +128,3 @@ class Segmenter(StageNode):
         else:
             response.message = "no tracks yet, or the node is not active"
         return response
-
-
-def main() -> None:
-    """Run the node."""
-    sys.exit(run_nodes(Segmenter))

@@ -28,7 +28,7 @@ MOST_WAITING = 1000  # jobs, as many as requests of one service that ROS keeps
 _own = threading.local()  # whose thread this is
 
 
-def stop_if_left_behind() -> None:
+def stop_if_abandoned() -> None:
     """End the job of this thread here if its worker has been closed; nothing happens on other threads.
 
     Raises:
@@ -102,9 +102,9 @@ class Worker:
             }
 
     def close(self, timeout: float = 0.5) -> None:
-        """Cancel everything and end the thread; a job that does not listen is left behind after `timeout` seconds.
+        """Cancel everything and end the thread; a job that does not listen is abandoned after `timeout` seconds.
 
-        What is left behind goes unheard: see `stop_if_left_behind`.
+        What it still does has no effect: see `stop_if_abandoned`.
         """
         self.cancel()
         with self._changed:
@@ -134,5 +134,5 @@ class Worker:
             except CancelledError:
                 raise
             except Exception as error:
-                stop_if_left_behind()
+                stop_if_abandoned()
                 self._failed(name, error)

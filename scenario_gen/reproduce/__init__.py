@@ -16,7 +16,6 @@
 
 from scenario_gen.reproduce.claims import Claim, claims_of
 from scenario_gen.reproduce.measure import PaperCase, run_case
-from scenario_gen.reproduce.page import PAGE, refusals, write_page
-from scenario_gen.reproduce.run import reproduce
+from scenario_gen.reproduce.page import PAGE, refusals, reproduce, write_page
 
 __all__ = ["PAGE", "Claim", "PaperCase", "claims_of", "refusals", "reproduce", "run_case", "write_page"]

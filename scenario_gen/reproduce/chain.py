@@ -15,7 +15,7 @@
 """The paper's own chain, in cells: placed by given ends (eqs 7-9), RRT*-Connect with step 5, y as a function of x (eqs 11-15).
 
 What the paper leaves open is settled here: y is a function of x in the frame of the vehicle's own chord, since a turn has
-no y(x) along the grid's axes; and the time law has one interior knot per primitive (see docs/method.md).
+no y(x) along the grid's axes; and the speed profile has one interior knot per primitive (see docs/method.md).
 """
 
 from dataclasses import dataclass
@@ -25,21 +25,26 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, wrap_angle
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.fitting import Fit, fit_template, FittingConfig
-from scenario_gen.interaction import find_waits, Wait
-from scenario_gen.pipeline import without_changepoints
-from scenario_gen.planning import plan_routes, PlanningConfig, Route
-from scenario_gen.planning.rrt_star_connect import PAPER
-from scenario_gen.roads import build_road, Road, RoadConfig
+from scenario_gen.evaluation import without_changepoints
+from scenario_gen.fitting import fit_template, FittingConfig
+from scenario_gen.roads import build_road, RoadConfig
+from scenario_gen.routing import plan_routes, PlanningConfig
+from scenario_gen.routing.search.rrt_star_connect import PAPER
 from scenario_gen.sampling.candidates import knots_on
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.ordinate import ordinate_samples
-from scenario_gen.sampling.time_law import SpeedBounds, SpeedProfile, TimeLaw
-from scenario_gen.sampling.time_layout import layout
-from scenario_gen.segmentation import Segmentation
+from scenario_gen.sampling.gp import Features, Observations, Posterior, Regression
+from scenario_gen.sampling.speed_profile.knots import speed_knots
+from scenario_gen.sampling.speed_profile.qp import SpeedBounds, SpeedProfile, SpeedProfileQP
+from scenario_gen.template.interaction import find_waits, Wait
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.fit import Fit
+from scenario_gen.types.road import Road
+from scenario_gen.types.route import Route
+from scenario_gen.types.segmentation import Segmentation
 
+SIGMA, LENGTH, NOISE, DEGREE = 10.0, 100.0, 10.0, 3
+"""The paper's σ_f and l of eq 14 and σ_ω, the standard deviation at an interior anchor, in cells; degree of the mean."""
 ROADS = ("straight", "t_intersection")
 """The paper's roads (IV-B), in the order in which they are tried: a road along which, else a junction."""
 SIDE, HALF_ROAD, VERGE = 1000.0, 100.0, 20.0
@@ -48,7 +53,7 @@ TRAINING_PERIOD = 1.0
 """Seconds between the training points on the planned path."""
 ITERATIONS = 3000
 END_SPEEDS, KNOTS = (1.0, 0.75, 0.5, 0.25, 0.0), (0.5, None, 0.3, 0.7, 0.1, 0.9)
-"""Shares of the asked end speeds, and places of a primitive's knot, that are tried in this order until a time law exists."""
+"""Shares of the asked end speeds, and places of a primitive's knot, that are tried in this order until a speed profile exists."""
 FITTING = FittingConfig(scale_low=0.01, scale_high=1000.0, max_move=100.0, clearance=0.0)
 PLANNING = PlanningConfig(iterations=ITERATIONS, drivable=False, rrt_star_connect=PAPER)
 UNLIMITED = SamplingConfig(max_speed=1e6, max_acceleration=1e6, max_deceleration=1e6, max_lateral_acceleration=1e6)
@@ -189,7 +194,7 @@ def _on_lane(road: Road, pose: Floats, centre: Floats) -> tuple[bool, int, float
 def sample(
     encounter: Encounter, segmentation: Segmentation, road: Road, ends: tuple[Floats, Floats], *, count: int, seed: int
 ) -> Sampled:
-    """Fit, plan and sample with these changepoints.
+    """Fit, plan and sample with these changepoints; `ends` are start and end poses (N, 3) [m, m, rad] of all vehicles.
 
     Raises:
         RefusedError: it cannot be placed, planned or timed.
@@ -223,31 +228,29 @@ def _vehicle(
     profile, factor = _profile(encounter, fit, n, route, waits)
     clock = np.unique(np.concatenate([np.arange(0.0, times[-1], TRAINING_PERIOD), times]))
     training, wanted = (_along(route, profile.state(t)[0]) for t in (clock, encounter.time))
-    chord = training[-1] - training[0]
-    turn = exact.arctan2(chord[1], chord[0])
-    rotation = np.array([[exact.cos(turn), -exact.sin(turn)], [exact.sin(turn), exact.cos(turn)]])
-    x = (exact.matmul(wanted, rotation))[:, 0]
+    turn = rotation(training[-1] - training[0])
+    x = (exact.matmul(wanted, turn))[:, 0]
     there, back = np.unique(x, return_inverse=True)
-    y = ordinate_samples(exact.matmul(training, rotation), there, count, seed + 7919 * n)[:, back]
-    return exact.matmul(np.stack([np.broadcast_to(x, y.shape), y], axis=-1), rotation.T), factor
+    y = ordinate_samples(exact.matmul(training, turn), there, count, seed + 7919 * n)[:, back]
+    return exact.matmul(np.stack([np.broadcast_to(x, y.shape), y], axis=-1), turn.T), factor
 
 
 def _profile(encounter: Encounter, fit: Fit, n: int, route: Route, waits: tuple[Wait, ...]) -> tuple[SpeedProfile, float]:
-    """The time law along the planned path: piecewise constant acceleration (IV-B); the share of the end speeds it keeps."""
+    """The speed profile along the planned path: piecewise constant acceleration (IV-B); the share of the end speeds it keeps."""
     times = encounter.time[fit.anchor_index]
     own = [(wait.start, wait.end) for wait in waits if wait.vehicle == n]
     dwells = route.anchor[:-1] == route.anchor[1:]
     speeds = encounter.speed[n] * route.length[-1] / max(_driven(encounter, n), 1e-6)
     for factor, share in product(END_SPEEDS, KNOTS):
         asked = (factor * float(speeds[0]), factor * float(speeds[-1]))
-        plan = layout(times, dwells, own, encounter.time, speeds, asked, share)
-        law = TimeLaw(plan, UNLIMITED, SpeedBounds.none())
-        knot = knots_on(times[None], times, plan)
+        knots = speed_knots(times, dwells, own, encounter.time, speeds, asked, share)
+        qp = SpeedProfileQP(knots, UNLIMITED, SpeedBounds.none())
+        knot = knots_on(times[None], times, knots)
         reached = route.length[route.anchor]
-        lengths = (reached[plan.bounds[:, 1]] - reached[plan.bounds[:, 0]])[None]
-        speed, ok = law.solve(knot, lengths)
+        lengths = (reached[knots.bounds[:, 1]] - reached[knots.bounds[:, 0]])[None]
+        speed, ok = qp.solve(knot, lengths)
         if not ok[0]:
-            speed, ok, _ = law.slide(knot, lengths)
+            speed, ok, _ = qp.slide(knot, lengths)
         if ok[0]:
             return SpeedProfile(knot[0], speed[0]), factor
     raise RefusedError(
@@ -264,3 +267,39 @@ def _driven(encounter: Encounter, n: int) -> float:
 def _along(route: Route, station: Floats) -> Floats:
     """(m, 2) positions at arc lengths along the planned path."""
     return np.column_stack([np.interp(station, route.length, route.points[:, axis]) for axis in (0, 1)])
+
+
+def rotation(direction: Floats) -> Floats:
+    """Return the matrix (2, 2) whose product from the right turns `direction` (2,), of any unit, to the x axis."""
+    turn = exact.arctan2(direction[1], direction[0])
+    return np.array([[exact.cos(turn), -exact.sin(turn)], [exact.sin(turn), exact.cos(turn)]])
+
+
+def ordinate_posterior(anchors: Floats, x: Floats) -> Posterior:
+    """The posterior of y at x (m,) given one vehicle's anchors (A, 2) [m], with a cubic mean: the paper's sampler (III-C).
+
+    It is exact at the first and the last anchor; the degree of the mean is lowered where there are too few anchors for it. For
+    figures only: a function y(x) describes neither a vertical nor a time. What is published comes from `sample_scenarios`.
+
+    Raises:
+        InputError: fewer than two anchors, or all of them at the same x.
+    """
+    _, first = np.unique(anchors[:, 0], return_index=True)
+    ends = [0, len(anchors) - 1]
+    inner = [k for k in first.tolist() if anchors[k, 0] not in anchors[ends, 0]]
+    keep = np.unique(np.concatenate([ends, inner])).astype(np.int64)
+    seen_x, seen_y = anchors[keep].T
+    low, high = min(seen_x.min(), x.min()), max(seen_x.max(), x.max())
+    if len(keep) < 2 or seen_x[0] == seen_x[-1]:
+        raise InputError("y as a function of x needs anchors at two different x; use the parametric form")
+    noise = np.full(len(keep), NOISE)
+    noise[[0, -1]] = 0.0
+    features = Features(low, high, SIGMA, LENGTH, min(DEGREE, len(keep) - 1))
+    return Regression(features, Observations(seen_x, seen_y, noise)).predict(x)
+
+
+def ordinate_samples(anchors: Floats, x: Floats, count: int, seed: int = 0) -> Floats:
+    """Curves (count, m) of y at x (m,) through one vehicle's anchors (A, 2), all in metres."""
+    posterior = ordinate_posterior(anchors, x)
+    generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed])))
+    return posterior.sample(exact.standard_normal(generator, (count, posterior.factor.shape[1])))

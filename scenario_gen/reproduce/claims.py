@@ -20,9 +20,9 @@ import math
 
 import plotly.graph_objects as go
 
-from scenario_gen.evaluation import UNIFORM, WITH, WITHOUT
 from scenario_gen.reproduce.figures import figure_2, figure_3, figure_4, figure_5
 from scenario_gen.reproduce.measure import PaperCase
+from scenario_gen.types.generation import UNIFORM, WITH, WITHOUT
 
 WAITS, OFF_ROAD = 0.5, 0.005
 """Mean speed [m/s] below which a vehicle waits, as in docs/method.md; share of instants off the road that is too much."""
@@ -55,7 +55,7 @@ def claims_of(case: PaperCase) -> list[Claim]:
     makers: list[Callable[[PaperCase], Claim]] = [_trends]
     if case.regressions is not None:
         makers = [_priors, *makers, _generated]
-        if WITH in case.likeness:
+        if WITH in case.similarity:
             makers.append(_interaction)
     return [make(case) for make in makers]
 
@@ -118,18 +118,18 @@ def _interaction(case: PaperCase) -> Claim:
     for kind in ("position", "speed"):
         shown = []
         for name in (WITH, WITHOUT, UNIFORM):
-            if name in case.likeness:
-                error, correlation = (case.likeness[name].values[f"{what}_{kind}"] for what in ("e", "correlation"))
+            if name in case.similarity:
+                error, correlation = (case.similarity[name].values[f"{what}_{kind}"] for what in ("e", "correlation"))
                 shown.append(f"{name} {error.value:.3f} [{error.low:.3f}, {error.high:.3f}]")
                 for key, value in (("", error.value), (" low", error.low), (" high", error.high)):
                     values[f"e_{kind} {name}{key}"] = finite(value)
                 values[f"correlation_{kind} {name}"] = finite(correlation.value)
         said.append(f"{kind}: " + ", ".join(shown))
     errors = [
-        case.likeness[name].values[f"e_{kind}"].value
+        case.similarity[name].values[f"e_{kind}"].value
         for kind in ("position", "speed")
         for name in (WITH, WITHOUT)
-        if name in case.likeness
+        if name in case.similarity
     ]
     holds = errors[0] < errors[1] and errors[2] < errors[3] if len(errors) == 4 else None
     scales = ", ".join(f"{fitted.scale:.2f}" for fitted in case.arms[WITH].fit.fitted if not fitted.stands.all())

@@ -17,6 +17,7 @@
 from base64 import b64encode
 import io
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -24,10 +25,10 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from scenario_gen.arrays import Floats
-from scenario_gen.evaluation import WITH, WITHOUT
 from scenario_gen.evaluation.dtw import mean_feature
 from scenario_gen.reproduce.measure import PaperCase, Regressions
-from scenario_gen.roads import Road
+from scenario_gen.types.generation import WITH, WITHOUT
+from scenario_gen.types.road import Road
 
 VEHICLES = ("#2563eb", "#e2590c", "#0d9488", "#9333ea", "#c2185b", "#65780b")
 PRIMITIVES = ("#4e79a7", "#f28e2b", "#59a14f", "#e15759", "#b07aa1", "#edc948", "#76b7b2", "#ff9da7", "#9c755f", "#79706e")
@@ -45,30 +46,19 @@ def colour(n: int) -> str:
 
 def figure_2(found: Regressions) -> go.Figure:
     """Ground truth with training data, and ten samples under each prior."""
-    panels = make_subplots(
-        1, 4, subplot_titles=["(a) ground truth", *(f"({k}) {n}" for k, n in zip("bcd", found.priors, strict=True))]
-    )
-    low, high = float(found.truth.min()), float(found.truth.max())
-    for column, (_, prior) in enumerate([("", None), *found.priors.items()], start=1):
-        if prior is not None:
-            for curve in prior.samples:
-                panels.add_scatter(
-                    x=_few(found.x), y=_few(curve), mode="lines", line={"width": 1, "color": "#60a5fa"}, row=1, col=column
-                )
-        panels.add_scatter(x=_few(found.x), y=_few(found.truth), mode="lines", line={"color": "black"}, row=1, col=column)
-        panels.add_scatter(
-            x=found.training[:, 0].tolist(),
-            y=found.training[:, 1].tolist(),
-            mode="markers",
-            marker={"color": "red"},
-            row=1,
-            col=column,
-        )
+    titles = ["(a) ground truth", *(f"({k}) {n}" for k, n in zip("bcd", found.priors, strict=True))]
+    panels = make_subplots(1, 4, subplot_titles=titles)
     panels.update_xaxes(title_text="x [cells]")
     panels.update_yaxes(title_text="y [cells]", col=1)
+    low, high = float(found.truth.min()), float(found.truth.max())
     room = max(0.4 * (high - low), 40.0)
     for column, prior in enumerate([None, *found.priors.values()], start=1):
-        curves = [found.truth] if prior is None else [found.truth, *prior.samples]
+        samples = [] if prior is None else list(prior.samples)
+        for curve in samples:
+            _line(panels, found.x, curve, (1, column), width=1, color="#60a5fa")
+        _line(panels, found.x, found.truth, (1, column), color="black")
+        _marks(panels, found.training, (1, column), color="red")
+        curves = [found.truth, *samples]
         least, most = min(float(curve.min()) for curve in curves), max(float(curve.max()) for curve in curves)
         panels.update_yaxes(range=[min(low - room, least), max(high + room, most)], col=column)
     return _finished(panels, 320)
@@ -80,19 +70,14 @@ def figure_3(case: PaperCase) -> go.Figure:
     panels = make_subplots(1, 2, subplot_titles=["trajectory", "speed"])
     for n in range(len(encounter.vehicles)):
         for k, (a, b) in enumerate(pairwise(edges)):
-            paint = {"color": PRIMITIVES[int(case.segmentation.labels[a]) % len(PRIMITIVES)], "width": 3}
-            piece = slice(a, b + 1)
-            xy, t, v = encounter.position[n, piece], encounter.time[piece], encounter.speed[n, piece]
-            panels.add_scatter(x=_few(xy[:, 0]), y=_few(xy[:, 1]), mode="lines", line=paint, row=1, col=1)
-            panels.add_scatter(x=_few(t), y=_few(v), mode="lines", line=paint, row=1, col=2)
+            shade = PRIMITIVES[int(case.segmentation.labels[a]) % len(PRIMITIVES)]
+            xy, time, speed = (values[a : b + 1] for values in (encounter.position[n], encounter.time, encounter.speed[n]))
             symbol = "circle" if k == 0 else "triangle-up"
-            mark = {"symbol": symbol, "size": 8, "color": colour(n)}
-            panels.add_scatter(x=[xy[0, 0]], y=[xy[0, 1]], mode="markers", marker=mark, row=1, col=1)
-            panels.add_scatter(x=[t[0]], y=[v[0]], mode="markers", marker=mark, row=1, col=2)
-        end = {"symbol": "x", "size": 8, "color": colour(n)}
-        panels.add_scatter(
-            x=[encounter.position[n, -1, 0]], y=[encounter.position[n, -1, 1]], mode="markers", marker=end, row=1, col=1
-        )
+            _line(panels, xy[:, 0], xy[:, 1], (1, 1), color=shade, width=3)
+            _line(panels, time, speed, (1, 2), color=shade, width=3)
+            _marks(panels, xy[:1], (1, 1), symbol=symbol, size=8, color=colour(n))
+            _marks(panels, np.column_stack([time, speed])[:1], (1, 2), symbol=symbol, size=8, color=colour(n))
+        _marks(panels, encounter.position[n, -1:], (1, 1), symbol="x", size=8, color=colour(n))
     panels.update_xaxes(title_text="east [m]", col=1)
     panels.update_yaxes(title_text="north [m]", scaleanchor="x", col=1)
     panels.update_xaxes(title_text="time [s]", col=2)
@@ -106,24 +91,18 @@ def figure_4(case: PaperCase) -> go.Figure:
     panels = make_subplots(2, 1 + len(names), subplot_titles=["template", *names], vertical_spacing=0.12)
     encounter = case.encounter
     for n in range(len(encounter.vehicles)):
-        line = {"color": colour(n), "width": 2}
-        panels.add_scatter(
-            x=_few(encounter.position[n, :, 0]), y=_few(encounter.position[n, :, 1]), mode="lines", line=line, row=1, col=1
-        )
-        panels.add_scatter(x=_few(encounter.time), y=_few(encounter.speed[n]), mode="lines", line=line, row=2, col=1)
+        _line(panels, encounter.position[n, :, 0], encounter.position[n, :, 1], (1, 1), color=colour(n), width=2)
+        _line(panels, encounter.time, encounter.speed[n], (2, 1), color=colour(n), width=2)
     panels.update_yaxes(scaleanchor="x", row=1, col=1)
     for column, name in enumerate(names, start=2):
         arm = case.arms[name]
         if case.road is not None:
             _lay(panels, case.road, column)
         for n in range(len(encounter.vehicles)):
-            line = {"color": colour(n), "width": 1}
             paths, speeds = arm.position[:DRAWN, n], arm.speed[:DRAWN, n]
-            panels.add_scatter(
-                x=_strokes(paths[..., 0]), y=_strokes(paths[..., 1]), mode="lines", line=line, opacity=0.4, row=1, col=column
-            )
+            _line(panels, paths[..., 0], paths[..., 1], (1, column), opacity=0.4, color=colour(n), width=1)
             time = np.broadcast_to(encounter.time, speeds.shape)
-            panels.add_scatter(x=_strokes(time), y=_strokes(speeds), mode="lines", line=line, opacity=0.4, row=2, col=column)
+            _line(panels, time, speeds, (2, column), opacity=0.4, color=colour(n), width=1)
         panels.update_xaxes(range=[0, 1000], row=1, col=column)
         panels.update_yaxes(range=[0, 1000], scaleanchor=f"x{column}", row=1, col=column)
     panels.update_xaxes(title_text="time [s]", row=2)
@@ -169,12 +148,20 @@ def _lay(panels: go.Figure, road: Road, column: int) -> None:
     panels.add_layout_image(source=source, sizing="stretch", layer="below", **axis)
 
 
+def _line(panels: go.Figure, x: Floats, y: Floats, at: tuple[int, int], opacity: float | None = None, **line: Any) -> None:
+    """Draw a curve (T,), or curves (S, T) as one trace with gaps, in the panel at (row, column)."""
+    ends = [] if x.ndim == 1 else [None]
+    xs, ys = ([value for curve in np.atleast_2d(curves) for value in (*_few(curve), *ends)] for curves in (x, y))
+    panels.add_scatter(x=xs, y=ys, mode="lines", line=line, opacity=opacity, row=at[0], col=at[1])
+
+
+def _marks(panels: go.Figure, points: Floats, at: tuple[int, int], **marker: Any) -> None:
+    """Mark points (M, 2) in the panel at (row, column)."""
+    x, y = points.T.tolist()
+    panels.add_scatter(x=x, y=y, mode="markers", marker=marker, row=at[0], col=at[1])
+
+
 def _few(values: Floats) -> list[float]:
     """At most POINTS of the values, evenly spread, short."""
     keep = np.linspace(0, len(values) - 1, min(len(values), POINTS)).round().astype(np.int64)
     return [round(float(value), 2) for value in values[keep]]
-
-
-def _strokes(curves: Floats) -> list[float | None]:
-    """Curves (S, T) as one trace, with gaps."""
-    return [value for curve in curves for value in (*_few(curve), None)]

@@ -21,21 +21,21 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import RefusedError
-from scenario_gen.evaluation import linear_changepoints, UNIFORM, uniform_changepoints, WITH, WITHOUT
-from scenario_gen.evaluation.bootstrap import Bootstrap, Interval
-from scenario_gen.evaluation.likeness import likeness, mean_correlation, mean_error
-from scenario_gen.interaction import find_waits
-from scenario_gen.pipeline import without_changepoints
-from scenario_gen.planning import Route
-from scenario_gen.reproduce.chain import place, sample, Sampled
-from scenario_gen.roads import Road
+from scenario_gen.evaluation import linear_changepoints, uniform_changepoints, without_changepoints
+from scenario_gen.evaluation.bootstrap import Bootstrap
+from scenario_gen.evaluation.similarity import mean_correlation, mean_error, pair_similarities
+from scenario_gen.reproduce.chain import LENGTH, NOISE, place, rotation, sample, Sampled, SIGMA
 from scenario_gen.sampling.gp import Features, Observations, Regression
-from scenario_gen.segmentation import segment, Segmentation, SegmentationConfig
+from scenario_gen.segmentation import segment, SegmentationConfig
+from scenario_gen.template.interaction import find_waits
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.evaluation import Interval
+from scenario_gen.types.generation import UNIFORM, WITH, WITHOUT
+from scenario_gen.types.road import Road
+from scenario_gen.types.route import Route
+from scenario_gen.types.segmentation import Segmentation
 
-SIGMA, LENGTH, NOISE = 10.0, 100.0, 10.0
-"""σ_f, l and σ_ω of the paper, in cells."""
 PRIORS = {"zero mean": -1, "training data mean": 0, "cubic polynomial": 3}
 """The priors of figure 2, as degrees of the mean."""
 RESAMPLES, LEVEL = 1000, 0.95
@@ -51,7 +51,7 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Regressions:
-    """Figure 2: the planned path of one vehicle as y(x), five training points of it, and the posteriors."""
+    """Figure 2: the planned path (m, 2) of one vehicle as y(x), five training points (5, 2) of it, and the posteriors; metres."""
 
     x: Floats
     truth: Floats
@@ -60,7 +60,7 @@ class Regressions:
 
 
 @dataclass(frozen=True, eq=False)
-class Likeness:
+class Similarity:
     """Figure 5 of one arm: E and correlation, each with its interval."""
 
     values: dict[str, Interval]
@@ -78,7 +78,7 @@ class PaperCase:
         arms: figure 4, samples by arm.
         off_road, stop_speed: share of instants off the road; mean speed during the template's waits [m/s], NaN if there is none.
         regressions: figure 2.
-        likeness: figure 5 by arm.
+        similarity: figure 5 by arm.
         refused: why an arm, or the whole encounter (""), is missing.
     """
 
@@ -90,7 +90,7 @@ class PaperCase:
     off_road: dict[str, float] = field(default_factory=dict)
     stop_speed: dict[str, float] = field(default_factory=dict)
     regressions: Regressions | None = None
-    likeness: dict[str, Likeness] = field(default_factory=dict)
+    similarity: dict[str, Similarity] = field(default_factory=dict)
     refused: dict[str, str] = field(default_factory=dict)
 
 
@@ -119,7 +119,7 @@ def run_case(encounter: Encounter, *, count: int, seed: int) -> PaperCase:
         off_road={name: off_road(road, arm.position) for name, arm in arms.items()},
         stop_speed={name: stop_speed(encounter, arm) for name, arm in arms.items()},
         regressions=compare_priors(max(routes, key=_bend), seed) if routes else None,
-        likeness={name: like(encounter, arm, seed) for name, arm in arms.items()},
+        similarity={name: similarity_of(encounter, arm, seed) for name, arm in arms.items()},
         refused=refused,
     )
 
@@ -137,7 +137,7 @@ def trend_fits(encounter: Encounter, paper: Segmentation, driving: Segmentation)
 
 
 def line_error(speed: Floats, changepoints: Ints) -> float:
-    """RMS deviation of speeds (N, T) from one least-squares line per vehicle and primitive."""
+    """RMS deviation [m/s] of speeds (N, T) from one least-squares line per vehicle and primitive."""
     total = 0.0
     for a, b in pairwise([0, *changepoints.tolist(), speed.shape[1]]):
         basis = np.vander(np.arange(a, b) - 0.5 * (a + b), 2)
@@ -147,7 +147,7 @@ def line_error(speed: Floats, changepoints: Ints) -> float:
 
 
 def off_road(road: Road, position: Floats) -> float:
-    """Share of instants at which a vehicle's centre lies off the road."""
+    """Share of positions (..., 2) [m], centres of vehicles, that lie off the road."""
     cell = np.floor((position - road.origin) / road.resolution).astype(np.int64)
     height, width = road.drivable.shape
     inside = (cell >= 0).all(axis=-1) & (cell[..., 0] < width) & (cell[..., 1] < height)
@@ -174,10 +174,7 @@ def _bend(route: Route) -> tuple[float, float]:
 
 def compare_priors(route: Route, seed: int) -> Regressions:
     """Figure 2 on one planned path: the grid is turned so that the path's chord is along x, and y is far from zero."""
-    chord = (route.points[-1] - route.points[0])[:2]
-    turn = exact.arctan2(chord[1], chord[0])
-    rotation = np.array([[exact.cos(turn), -exact.sin(turn)], [exact.sin(turn), exact.cos(turn)]])
-    path = exact.matmul(route.points[:, :2], rotation)
+    path = exact.matmul(route.points[:, :2], rotation((route.points[-1] - route.points[0])[:2]))
     path = path[np.concatenate([[True], path[1:, 0] > np.maximum.accumulate(path[:, 0])[:-1]])]  # a function of x
     x = np.linspace(path[0, 0], path[-1, 0], 120)
     truth = np.interp(x, *path.T)
@@ -193,15 +190,15 @@ def compare_priors(route: Route, seed: int) -> Regressions:
     return Regressions(x, truth, training, priors)
 
 
-def like(encounter: Encounter, arm: Sampled, seed: int) -> Likeness:
+def similarity_of(encounter: Encounter, arm: Sampled, seed: int) -> Similarity:
     """Figure 5 as numbers: E and the correlation of the mean matrix, for position and speed."""
     bootstrap = Bootstrap.draw(np.arange(len(arm.position)), RESAMPLES, LEVEL, seed)
-    places = likeness(encounter.position, arm.position, "euclidean")
-    paces = likeness(encounter.speed[..., None], arm.speed[..., None], "manhattan")
+    places = pair_similarities(encounter.position, arm.position, "euclidean")
+    paces = pair_similarities(encounter.speed[..., None], arm.speed[..., None], "manhattan")
     values = {}
     for kind, pairs in (("position", places), ("speed", paces)):
         values[f"e_{kind}"] = bootstrap.interval(lambda weights, pairs=pairs: mean_error(pairs, weights))  # type: ignore[misc]
         values[f"correlation_{kind}"] = bootstrap.interval(
             lambda weights, pairs=pairs: mean_correlation(pairs, weights)  # type: ignore[misc]
         )
-    return Likeness(values)
+    return Similarity(values)

@@ -12,24 +12,26 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One page and one JSON file with the paper's figures, their claims and what is measured."""
+"""From logs to one page and one JSON file with the paper's figures, their claims and what is measured."""
 
-from collections.abc import Mapping, Sequence
-from importlib.resources import files
+from collections.abc import Callable, Mapping, Sequence
 import json
 from pathlib import Path
 from typing import Any
 
-import jinja2
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
-
-from scenario_gen.evaluation.policy import content_policy
-from scenario_gen.folders import Kind, write_text
+from scenario_gen.errors import RefusedError
+from scenario_gen.folders import Kind, replaced_folder, write_text
+from scenario_gen.logs import read_log
+from scenario_gen.parameters import flatten
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.report.html import render_page
+from scenario_gen.reproduce.chain import ROADS
 from scenario_gen.reproduce.claims import Claim, claims_of
-from scenario_gen.reproduce.measure import PaperCase
+from scenario_gen.reproduce.measure import PaperCase, run_case
+from scenario_gen.results import provenance_of
 
 PAGE, FIGURES = "reproduce.html", "reproduce.json"
+VERDICTS = {True: ", as claimed", False: ", not as claimed", None: ""}
 SETTINGS = (
     "a grid of 1000 × 1000 cells, straight lane and T-intersection, 200 sweeps of the sticky HDP-HMM on positions and speeds, "
     "RRT*-Connect with step 5, σ_ω = σ_f = 10 and l = 100 cells, a cubic mean."
@@ -82,10 +84,6 @@ def _figures(case: PaperCase, claims: Sequence[Claim]) -> dict[str, Any]:
 def _render(
     cases: Sequence[PaperCase], claims: Sequence[Sequence[Claim]], quality: Sequence[str], provenance: Mapping[str, str]
 ) -> str:
-    assets = files("scenario_gen.evaluation") / "assets"
-    template = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    ).from_string((assets / "reproduce.html.j2").read_text(encoding="utf-8"))
     views = [
         {
             "index": i,
@@ -101,14 +99,41 @@ def _render(
     }
     for drawing in drawings.values():
         drawing["layout"].pop("template", None)
-    scripts = [get_plotlyjs(), (assets / "reproduce.js").read_text(encoding="utf-8")]
-    return template.render(
-        cases=views,
-        quality=quality,
-        provenance=provenance,
-        settings=SETTINGS,
-        css=Markup((assets / "report.css").read_text(encoding="utf-8")),
-        policy=Markup(content_policy(scripts)),
-        scripts=[Markup(script) for script in scripts],
-        data=Markup(json.dumps(drawings, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")),
+    return render_page(
+        "reproduce.html.j2", ("reproduce.js",), drawings, cases=views, quality=quality, provenance=provenance, settings=SETTINGS
     )
+
+
+def reproduce(
+    logs: Sequence[Sequence[Path]], out: Path, *, count: int, seed: int, say: Callable[[str], None] = lambda line: None
+) -> None:
+    """Draw the paper's figures 2 to 5 for every encounter of `logs`, with what we measure for them, to one page and JSON.
+
+    Args:
+        logs: groups of files, each read as one log.
+        out: folder of the page.
+        count: scenarios per encounter and arm (the paper: 50).
+        seed: same seed, same bytes.
+        say: is told, line by line, what each encounter came to.
+
+    Raises:
+        InputError: a log cannot be read, or `out` holds something else.
+        RefusedError: not one encounter could be placed on a road of the paper; the page is written all the same.
+    """
+    config = PipelineConfig()
+    files = [path for group in logs for path in group]
+    with replaced_folder(out, REPRODUCED, files) as partial:
+        found = [read_log(list(group), config.log) for group in logs]
+        cases = [run_case(encounter, count=count, seed=seed) for one in found for encounter in one.encounters]
+        facts = provenance_of(files, seed, count, ROADS, config)
+        own = {name: value for name, value in facts.items() if name not in flatten(config)}  # the paper's parameters are fixed
+        write_page(partial, cases, quality=[line for one in found for line in one.quality.lines()], provenance=own)
+    for case in cases:
+        say(f"{case.encounter.name} on {case.road.name if case.road else 'no road'}")
+        for line in refusals(case):
+            say(f"  {line}")
+        for claim in claims_of(case):
+            say(f"  figure {claim.number}{VERDICTS[claim.holds]}: {claim.measured}")
+    say(f"page: {out / PAGE}")
+    if not any(case.arms for case in cases):
+        raise RefusedError("no encounter could be placed on a road of the paper; the page says why")

@@ -16,6 +16,6 @@
 
 from scenario_gen.roads.build import build_road
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.road import Road
+from scenario_gen.types.road import Road
 
 __all__ = ["Road", "RoadConfig", "build_road"]

@@ -16,19 +16,17 @@
 
 from pathlib import Path
 
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
-from scenario_gen.roads.builtin import BUILT_IN, draw, draw_paper
+from scenario_gen.roads.builtin import BUILT_IN, draw, draw_corridor, draw_paper, layout_for
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.corridor import draw_corridor
-from scenario_gen.roads.layout import layout_for
 from scenario_gen.roads.nav2 import read_map
-from scenario_gen.roads.own_paths import own_paths
-from scenario_gen.roads.road import Road
-from scenario_gen.roads.tracks import clean_tracks
+from scenario_gen.template.separation import own_paths
+from scenario_gen.template.tracks import clean_tracks
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.road import Road
 
 
-def build_road(name_or_path: str, encounter: Encounter | None, config: RoadConfig = RoadConfig()) -> Road:  # noqa: B008 - frozen
+def build_road(name_or_path: str, encounter: Encounter | None = None, config: RoadConfig = RoadConfig()) -> Road:
     """Return the road `name_or_path`.
 
     Args:

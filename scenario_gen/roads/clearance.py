@@ -12,15 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Clearance: how far it is to the nearest cell that is not drivable, and exact tests against that field.
-
-The field holds, at every cell's centre, the exact Euclidean distance to the nearest non-drivable *square* (not to its
-centre). It is computed in linear time by two separable passes, as in Felzenszwalb & Huttenlocher, "Distance Transforms of
-Sampled Functions" (Theory of Computing 8, 2012), with their parabola replaced by the profile of a unit square,
-phi(d) = max(|d| - 1/2, 0)^2, which is convex too, so that two shifted profiles still cross once.
-
-Inside kernels lengths are in cells and the lower-left corner of cell (0, 0) is the origin. Outside the grid nothing is drivable.
-"""
+"""Distance to the nearest obstacle, whether discs and footprints have room, and the nearest pose that has."""
 
 from weakref import WeakKeyDictionary
 
@@ -29,7 +21,7 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.kernels import B2, F, F2, kernel, OUT2, OUTB1
-from scenario_gen.roads.road import Road
+from scenario_gen.types.road import Road
 
 CONTACT = 1e-9  # [cells] what lies nearer than this touches
 
@@ -193,7 +185,7 @@ def _gap_squared(ax: float, ay: float, bx: float, by: float, left: float, low: f
 
 @kernel(inline=True)
 def near_squares_free(clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float) -> bool:
-    """Whether every non-drivable square is farther than `radius` from the (short) segment a-b; looks at each one."""
+    """Whether each non-drivable square of the field (H, W) is farther than `radius` from the (short) segment a-b; in cells."""
     height, width = clearance.shape
     reach = radius + CONTACT
     for i in range(int(np.floor(min(ay, by) - reach)), int(np.floor(max(ay, by) + reach)) + 1):
@@ -208,7 +200,7 @@ def near_squares_free(clearance: Floats, ax: float, ay: float, bx: float, by: fl
 def free_length(clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float) -> float:
     """How far a disc can surely move from a towards b; infinity if all the way, exactly; else what is verified, to a cell.
 
-    The field skips what is surely free, squares decide the rest.
+    The clearance field (H, W), all in cells, skips what is surely free, squares decide the rest.
     """
     height, width = clearance.shape
     dx, dy = bx - ax, by - ay
@@ -237,7 +229,7 @@ def free_length(clearance: Floats, ax: float, ay: float, bx: float, by: float, r
 
 @kernel(F2, F, F, F, F, F)
 def segment_free(clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float) -> bool:
-    """Whether a disc can move from a to b, exactly."""
+    """Whether a disc can move from a to b, exactly; all in cells, with the clearance field (H, W)."""
     return free_length(clearance, ax, ay, bx, by, radius) == np.inf
 
 
@@ -250,7 +242,7 @@ def check_segments(clearance: Floats, start: Floats, end: Floats, radius: float,
 
 @kernel(inline=True)
 def footprint_free(clearance: Floats, x: float, y: float, yaw: float, half_length: float, half_width: float) -> bool:
-    """Whether the rectangle at one pose (in cells) covers drivable cells only."""
+    """Whether the rectangle at one pose (in cells) covers drivable cells only, by the clearance field (H, W)."""
     height, width = clearance.shape
     i, j = int(np.floor(y)), int(np.floor(x))
     if i < 0 or j < 0 or i >= height or j >= width or clearance[i, j] == 0.0:
@@ -284,3 +276,49 @@ def check_footprints(clearance: Floats, poses: Floats, half_length: float, half_
     """`footprint_free` for M poses (M, 3), in cells and rad; writes fits (M,)."""
     for m in range(poses.shape[0]):
         fits[m] = footprint_free(clearance, poses[m, 0], poses[m, 1], poses[m, 2], half_length, half_width)
+
+
+BISECTIONS = 20
+
+
+def nearest_pose_with_room(
+    road: Road, pose: Floats, length: float, width: float, max_distance: float = 3.0
+) -> tuple[Floats, float] | None:
+    """Move a pose, keeping its yaw, as little as it takes for the footprint to cover drivable cells only.
+
+    Offsets on a lattice of the grid's resolution are tried outward, and the nearest that fits is drawn back towards the
+    pose as far as the footprint keeps its room: the answer is within about half a cell of the true nearest pose.
+
+    Args:
+        road: the grid.
+        pose: (3,) x [m], y [m], yaw [rad].
+        length: footprint length [m].
+        width: footprint width [m].
+        max_distance: how far to look [m].
+
+    Returns:
+        The pose (3,) and how far it was moved [m]; None if there is no room within `max_distance`.
+    """
+    pose = np.array(pose, dtype=np.float64)
+    if footprint_fits(road, pose[None], length, width)[0]:
+        return pose, 0.0
+    reach = int(max_distance / road.resolution)
+    steps = np.arange(-reach, reach + 1) * road.resolution
+    offset = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    distance = exact.hypot(offset[:, 0], offset[:, 1])
+    order = np.argsort(distance, kind="stable")
+    order = order[distance[order] <= max_distance]
+    candidates = pose + np.pad(offset[order], ((0, 0), (0, 1)))
+    fits = footprint_fits(road, candidates, length, width)
+    if not fits.any():
+        return None
+    shift = candidates[np.argmax(fits)] - pose
+    blocked, free = 0.0, 1.0
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (blocked + free)
+        if footprint_fits(road, (pose + middle * shift)[None], length, width)[0]:
+            free = middle
+        else:
+            blocked = middle
+    moved = pose + free * shift
+    return moved, float(exact.hypot(*(moved - pose)[:2]))

@@ -24,11 +24,10 @@ from PIL import Image
 
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.documents import read_yaml, shown
-from scenario_gen.errors import InputError
-from scenario_gen.guard import guarded
+from scenario_gen.errors import guarded, InputError
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.openings import find_openings
-from scenario_gen.roads.road import COARSEST, FARTHEST, FINEST, Road
+from scenario_gen.types.road import COARSEST, FARTHEST, FINEST, Road
 
 _MODES = ("trinary", "scale", "raw")
 _FORMATS = ("PPM", "PNG", "BMP", "JPEG")  # by Pillow's names; PPM is PGM, PBM and PPM

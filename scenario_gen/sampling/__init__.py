@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Time law and Gaussian process -> candidate scenarios (paper III-C)."""
+"""Speed profile and Gaussian process -> candidate scenarios (paper III-C)."""
 
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.sample import regenerate, sample_scenarios
+from scenario_gen.sampling.sample import Cancelled, OnValid, Progress, regenerate, sample_scenarios
 
-__all__ = ["SamplingConfig", "regenerate", "sample_scenarios"]
+__all__ = ["Cancelled", "OnValid", "Progress", "SamplingConfig", "regenerate", "sample_scenarios"]

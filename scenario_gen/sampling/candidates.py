@@ -15,8 +15,8 @@
 """Candidate scenarios, many at a time, from standard normal numbers.
 
 A candidate varies the planned encounter in three ways: across the routes (a Gaussian process per vehicle), along them
-(where a changepoint's anchor lies), and in time (the clock that all vehicles share). The time law is solved on the
-displaced paths' own lengths, so the published speed is the rate of arc length and the acceleration is the law's.
+(where a changepoint's anchor lies), and in time (the time warp that all vehicles share). The speed profile is solved on the
+displaced paths' own lengths, so the published speed is the rate of arc length and the acceleration is the profile's.
 """
 
 from collections.abc import Sequence
@@ -27,16 +27,15 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
-from scenario_gen.encounter import Vehicle
-from scenario_gen.sampling.along import displaced_anchors
-from scenario_gen.sampling.clock import Clock, DT
-from scenario_gen.sampling.lateral import kept_within
+from scenario_gen.sampling.deviations import displaced_anchors, soft_clipped
 from scenario_gen.sampling.path import arc_lengths, BasePath, states
-from scenario_gen.sampling.time_law import SpeedProfile, TimeLaw
-from scenario_gen.sampling.time_layout import TimeLayout
-from scenario_gen.scenario import Scenario
+from scenario_gen.sampling.speed_profile.knots import SpeedKnots
+from scenario_gen.sampling.speed_profile.qp import SpeedProfile, SpeedProfileQP
+from scenario_gen.sampling.time_warp import DT, TimeWarp
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.scenario import Scenario
 
-DAMPING = (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)  # of a candidate's clock, until a speed profile exists
+DAMPING = (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)  # of a candidate's time warp, until a speed profile exists
 
 
 @dataclass(frozen=True)
@@ -56,28 +55,28 @@ class VehicleModel:
         vehicle: identity and footprint.
         path: the route.
         anchor: (K + 2,) arc length [m] of each anchor on it.
-        factor: (G, r) square root of the covariance of the lateral deviation.
-        along: (D, r) the same of its distinct inner anchors' displacements along the route.
+        lateral_root: (G, r) square root of the covariance of the lateral deviation.
+        longitudinal_root: (D, r) the same of its distinct inner anchors' displacements along the route.
         room: (G,) metres that the road leaves to either side.
-        law: the time law on the vehicle's knots.
+        qp: the speed profile QP on the vehicle's knots.
     """
 
     vehicle: Vehicle
     path: BasePath
     anchor: Floats
-    factor: Floats
-    along: Floats
+    lateral_root: Floats
+    longitudinal_root: Floats
     room: Floats
-    law: TimeLaw
+    qp: SpeedProfileQP
 
     @property
     def size(self) -> int:
         """Standard normal numbers needed per candidate."""
-        return int(self.factor.shape[1] + self.along.shape[1])
+        return int(self.lateral_root.shape[1] + self.longitudinal_root.shape[1])
 
     def deviations(self, z: Floats) -> Floats:
         """Return how far each sample is to the side (S, G) [m]."""
-        return kept_within(exact.matmul(z, self.factor.T), self.room)
+        return soft_clipped(exact.matmul(z, self.lateral_root.T), self.room)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,15 +111,15 @@ class Batch:
 
     Attributes:
         vehicles: identities and footprints.
-        clock: (S, K + 2) seconds of start, changepoints and end.
+        warped: (S, K + 2) seconds of start, changepoints and end.
         curve, arc, knot, speed: per vehicle, (S, ...) arrays as in `VehicleMotion`.
         spacing: per vehicle, metres.
         feasible: (S,) False where no speed profile exists.
-        damping: (S,) factor that the clock's deviations were multiplied by to get one.
+        damping: (S,) factor that the warp's deviations were multiplied by to get one.
     """
 
     vehicles: tuple[Vehicle, ...]
-    clock: Floats
+    warped: Floats
     curve: tuple[Floats, ...]
     arc: tuple[Floats, ...]
     knot: tuple[Floats, ...]
@@ -137,7 +136,7 @@ class Batch:
     def scenarios(self, seed: int, index: Sequence[int], frame_id: str) -> list[Scenario | None]:
         """The candidates on the published grid; None where infeasible."""
         samples, n = self.feasible.shape[0], len(self.vehicles)
-        count = np.round(self.clock[:, -1] / DT).astype(np.int64) + 1
+        count = np.round(self.warped[:, -1] / DT).astype(np.int64) + 1
         time = np.round(np.arange(count.max()) * DT, 9)
         out = np.empty((n, samples, len(time), 5))
         times = np.broadcast_to(time, (samples, len(time))).copy()
@@ -157,47 +156,48 @@ def _scenario(vehicles: tuple[Vehicle, ...], time: Floats, state: Floats, seed: 
 class CandidateModel:
     """Draws candidates of one encounter on its routes."""
 
-    def __init__(self, vehicles: tuple[VehicleModel, ...], clock: Clock, most_slide: float) -> None:
-        self.vehicles, self.clock, self.most_slide = vehicles, clock, most_slide
+    def __init__(self, vehicles: tuple[VehicleModel, ...], warp: TimeWarp, max_slide: float) -> None:
+        self.vehicles, self.warp, self.max_slide = vehicles, warp, max_slide
 
     @property
     def size(self) -> int:
         """Standard normal numbers needed per candidate."""
-        return self.clock.size + sum(int(v.size) for v in self.vehicles)
+        return self.warp.size + sum(int(v.size) for v in self.vehicles)
 
     def _speeds(self, v: VehicleModel, knot: Floats, lengths: Floats) -> tuple[Floats, Bools]:
         """Speeds (S, M) and feasible (S,); where the drawn anchors cannot be reached in time, they slide a little."""
-        speed, ok = v.law.solve(knot, lengths)
+        speed, ok = v.qp.solve(knot, lengths)
         if not ok.all():
             bad = np.flatnonzero(~ok)
-            speed[bad], ok[bad], slid = v.law.slide(knot[bad], lengths[bad])
-            ok[bad] &= np.abs(slid).max(axis=1) <= self.most_slide
+            speed[bad], ok[bad], slid = v.qp.slide(knot[bad], lengths[bad])
+            ok[bad] &= np.abs(slid).max(axis=1) <= self.max_slide
         return speed, ok
 
     def draw(self, z: Floats, scale: Scale) -> Batch:
         """Candidates from numbers z (S, size), their standard deviations multiplied by `scale`."""
         samples = len(z)
-        parts = np.cumsum([self.clock.size] + [v.size for v in self.vehicles])
+        parts = np.cumsum([self.warp.size] + [v.size for v in self.vehicles])
         own = [z[:, a:b] for a, b in pairwise(parts)]
         paths = []
         for v, x in zip(self.vehicles, own, strict=True):
-            paths.append(v.path.displaced(v.deviations(scale.lateral * x[:, : v.factor.shape[1]])))
-        clock = np.zeros((samples, len(self.clock.times)))
-        knot = [np.zeros((samples, len(v.law.layout.knot))) for v in self.vehicles]
+            paths.append(v.path.displaced(v.deviations(scale.lateral * x[:, : v.lateral_root.shape[1]])))
+        warped = np.zeros((samples, len(self.warp.times)))
+        knot = [np.zeros((samples, len(v.qp.knots.knot))) for v in self.vehicles]
         speed = [np.zeros_like(k) for k in knot]
         damping = np.zeros(samples)
         open_ = np.arange(samples)
-        for damp in DAMPING:
-            clock[open_] = self.clock.sample(z[open_, : self.clock.size], np.full(len(open_), damp * scale.time))
+        for damping_factor in DAMPING:
+            warped[open_] = self.warp.sample(z[open_, : self.warp.size], np.full(len(open_), damping_factor * scale.time))
             feasible = np.ones(len(open_), dtype=np.bool_)
             for n, v in enumerate(self.vehicles):
-                u = displaced_anchors(v.anchor, v.along, scale.longitudinal * own[n][open_, v.factor.shape[1] :])
-                knot[n][open_] = knots_on(clock[open_], self.clock.times, v.law.layout)
+                longitudinal = scale.longitudinal * own[n][open_, v.lateral_root.shape[1] :]
+                u = displaced_anchors(v.anchor, v.longitudinal_root, longitudinal)
+                knot[n][open_] = knots_on(warped[open_], self.warp.times, v.qp.knots)
                 curve, arc = paths[n] if len(open_) == samples else (paths[n][0][open_], paths[n][1][open_])
-                lengths = piece_lengths(v.law.layout, curve, arc, v.path.spacing, u)
+                lengths = piece_lengths(v.qp.knots, curve, arc, v.path.spacing, u)
                 speed[n][open_], ok = self._speeds(v, knot[n][open_], lengths)
                 feasible &= ok
-            damping[open_] = damp
+            damping[open_] = damping_factor
             open_ = open_[~feasible]
             if len(open_) == 0:
                 break
@@ -205,7 +205,7 @@ class CandidateModel:
         feasible[open_] = False
         return Batch(
             tuple(v.vehicle for v in self.vehicles),
-            clock,
+            warped,
             tuple(curve for curve, _ in paths),
             tuple(arc for _, arc in paths),
             tuple(knot),
@@ -216,17 +216,17 @@ class CandidateModel:
         )
 
 
-def knots_on(clock: Floats, times: Floats, lay: TimeLayout) -> Floats:
-    """Knots (S, M) of a vehicle on the clocks (S, K + 2), linear within each primitive."""
-    piece = np.append(lay.piece, lay.piece[-1])
-    share = (lay.knot - times[piece]) / (times[piece + 1] - times[piece])
-    return np.asarray(clock[:, piece] + share * (clock[:, piece + 1] - clock[:, piece]))
+def knots_on(warped: Floats, times: Floats, knots: SpeedKnots) -> Floats:
+    """Knots (S, M) [s] of a vehicle at the warped times (S, K + 2) of `times` (K + 2,), linear within each primitive."""
+    piece = np.append(knots.piece, knots.piece[-1])
+    share = (knots.knot - times[piece]) / (times[piece + 1] - times[piece])
+    return np.asarray(warped[:, piece] + share * (warped[:, piece + 1] - warped[:, piece]))
 
 
-def piece_lengths(lay: TimeLayout, curve: Floats, arc: Floats, spacing: float, anchor: Floats) -> Floats:
-    """Lengths (S, G) [m] of the time law's constraints on each sample's own path, for anchors (S, K + 2) on the route."""
+def piece_lengths(knots: SpeedKnots, curve: Floats, arc: Floats, spacing: float, anchor: Floats) -> Floats:
+    """Lengths (S, G) [m] of the speed profile's constraints on each sample's own path, for anchors (S, K + 2) on the route."""
     if arc.shape[1] == 1:
-        return np.zeros((len(anchor), len(lay.bounds)))
+        return np.zeros((len(anchor), len(knots.bounds)))
     at = np.empty(anchor.shape)
     arc_lengths(np.ascontiguousarray(curve), np.ascontiguousarray(arc), spacing, np.ascontiguousarray(anchor), at)
-    return np.ascontiguousarray(at[:, lay.bounds[:, 1]] - at[:, lay.bounds[:, 0]])
+    return np.ascontiguousarray(at[:, knots.bounds[:, 1]] - at[:, knots.bounds[:, 0]])

@@ -18,31 +18,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from msg_conventions.names import tokens
 from scenario_gen import exact
-from scenario_gen.encounter import Encounter
-from scenario_gen.errors import InputError
-from scenario_gen.planning.route import Route
-from scenario_gen.scenario import BoundaryStates, Scenario
-from scenario_gen.segmentation.result import Segmentation
-
-
-def vehicle_index(encounter: Encounter, name: str, what: str) -> int:
-    """Return the index of the vehicle with the id `name`, written as in the log or as a ROS name.
-
-    Raises:
-        InputError: there is no such vehicle; the message names the parameter `what` and lists the ids that there are.
-    """
-    ids = [vehicle.id for vehicle in encounter.vehicles]
-    for known in (ids, list(tokens(ids))):
-        if name in known:
-            return known.index(name)
-    raise InputError(f"{what}: no vehicle {name!r} in {encounter.name}; there are: {', '.join(ids)}")
-
-
-def others(encounter: Encounter, ego: int | None) -> list[int]:
-    """Return the indices of the vehicles that are published."""
-    return [n for n in range(len(encounter.vehicles)) if n != ego]
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.route import Route
+from scenario_gen.types.scenario import BoundaryStates, Scenario
+from scenario_gen.types.segmentation import Segmentation
 
 
 def ego_track(

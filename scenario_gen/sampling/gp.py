@@ -35,7 +35,7 @@ from scenario_gen.errors import InputError
 
 
 def squared_exponential(a: Floats, b: Floats, sigma: float, length: float) -> Floats:
-    """Kernel matrix (len(a), len(b)) of eq 14: sigma² exp(-(a - b)² / (2 length²))."""
+    """Kernel matrix (n, m) of eq 14 for a (n,) and b (m,): sigma² exp(-(a - b)² / (2 length²))."""
     return np.asarray(np.square(sigma) * exact.exp(-0.5 * np.square((a[:, None] - b[None, :]) / length)))
 
 

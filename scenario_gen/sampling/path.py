@@ -27,7 +27,7 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen, Ints
 from scenario_gen.kernels import F, F2, F3, I1, kernel, OUT2, OUT3
-from scenario_gen.planning.route import Route
+from scenario_gen.types.route import Route
 
 NODE_SPACING = 1.0  # m; a cubic through nodes this far apart is within 0.1 mm of an arc of radius 5 m
 MIN_NODES = 5

@@ -24,21 +24,24 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
-from scenario_gen.encounter import Encounter
-from scenario_gen.errors import InputError
-from scenario_gen.interaction import Wait
-from scenario_gen.planning.route import Route
-from scenario_gen.roads.road import Road
+from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.sampling.candidates import Batch, CandidateModel, Scale
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.drawn import Drawn
 from scenario_gen.sampling.ego import ego_track
+from scenario_gen.sampling.lazy import LazyScenarios
 from scenario_gen.sampling.prepare import prepare
-from scenario_gen.scenario import BoundaryStates, Cause, Scenario, ScenarioSet, Verdict
-from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.template.interaction import Wait
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.request import Request
+from scenario_gen.types.road import Road
+from scenario_gen.types.route import Route
+from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, ScenarioSet, Verdict
+from scenario_gen.types.segmentation import Segmentation
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
-Found = Callable[[Scenario, BoundaryStates, Scenario | None], None]  # a valid one, the states asked, the ego's track
+Progress = Callable[[int, int, int], None]  # of scenarios so far, scenarios wanted, candidates so far
+Cancelled = Callable[[], bool]
+OnValid = Callable[[Scenario, BoundaryStates, Scenario | None], None]  # a valid one, the states asked, the ego's track
 
 LEVELS = (
     Scale(),
@@ -94,7 +97,7 @@ class Sampler:
         batch = self.model.draw(self._normal(level, number)[row : row + 1], LEVELS[level])
         return batch.scenarios(self.seed, [index], self.frame_id)[0]
 
-    def again(self, index: Sequence[int]) -> list[Scenario]:
+    def redraw(self, index: Sequence[int]) -> list[Scenario]:
         """The scenarios of indices that are of one block, bit for bit as in a whole set."""
         level, candidate = place_of(index[0])
         batch, own = self.block(level, candidate // BLOCK)
@@ -119,15 +122,15 @@ def sample_scenarios(
     routes: Sequence[Route],
     asked: BoundaryStates,
     check: Check,
-    config: SamplingConfig | None = None,
+    config: SamplingConfig = SamplingConfig(),
     *,
     count: int,
     seed: int = 0,
     waits: tuple[Wait, ...],
-    ego: int | None = None,
-    progress: Callable[[int, int, int], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-    found: Found | None = None,
+    request: Request = Request(),
+    progress: Progress | None = None,
+    cancelled: Cancelled | None = None,
+    found: OnValid | None = None,
 ) -> ScenarioSet:
     """Draw candidates until `count` are valid or the budget is spent.
 
@@ -142,7 +145,7 @@ def sample_scenarios(
         count: valid scenarios wanted.
         seed: of all randomness; with a scenario's index it gives that scenario again.
         waits: when a vehicle stands, on the template's clock.
-        ego: index of the vehicle that is left out of every scenario; its template track is given instead.
+        request: which vehicle is left out of every scenario, its template track given instead; whether states were asked for.
         progress: called with (valid so far, count, candidates so far).
         cancelled: asked before each candidate; if True, the set so far is returned.
         found: called with each valid scenario as it is drawn, in the set's order.
@@ -152,18 +155,25 @@ def sample_scenarios(
         only the indices are kept, so that memory hardly grows with their number.
 
     Raises:
-        InputError: routes, segmentation and encounter disagree.
+        InputError: routes, segmentation and encounter disagree, or the ego is none of the vehicles.
+        RefusedError: states were asked for, and not one candidate that meets them is valid.
     """
-    config = config or SamplingConfig()
+    ego = request.ego_of(encounter)
     prepared = prepare(encounter, segmentation, road, routes, asked, waits, config, ego)
     track = None if ego is None else ego_track(encounter, segmentation, routes[ego], asked, ego, road.frame_id)
     if prepared.model is None:
-        return ScenarioSet(count, (), 1, Counter({Cause.TIME_LAW: 1}), (prepared.refusal,), track)
-    take = None if found is None else lambda scenario: found(scenario, asked, track)
-    loop = _Loop(Sampler(prepared.model, seed, road.frame_id), check, count, progress, cancelled, take)
-    loop.run(config.attempts * count)
-    said = (*prepared.adaptations, *loop.adaptations)
-    return ScenarioSet(count, loop.scenarios(), loop.candidates, loop.refused, said, track)
+        made = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), track)
+    else:
+        take = None if found is None else lambda scenario: found(scenario, asked, track)
+        loop = _Loop(Sampler(prepared.model, seed, road.frame_id), check, count, progress, cancelled, take)
+        loop.run(config.attempts * count)
+        sentences = (*prepared.adaptations, *loop.adaptations)
+        made = ScenarioSet(count, loop.scenarios(), loop.candidates, loop.refused, sentences, track)
+    if request.moves and not made.scenarios and not (cancelled and cancelled()):
+        causes = ", ".join(f"{number} × {cause.value}" for cause, number in made.refused.most_common())
+        more = f"; {'; '.join(made.adaptations)}" if made.adaptations else ""
+        raise RefusedError(f"none of {made.candidates} candidate(s) with the asked states is valid ({causes}{more})")
+    return made
 
 
 def regenerate(
@@ -172,15 +182,15 @@ def regenerate(
     road: Road,
     routes: Sequence[Route],
     asked: BoundaryStates,
-    config: SamplingConfig | None = None,
+    config: SamplingConfig = SamplingConfig(),
     *,
     seed: int,
     index: int,
     waits: tuple[Wait, ...],
-    ego: int | None = None,
+    request: Request = Request(),
 ) -> Scenario | None:
     """The scenario with this seed and index again, bit for bit, without the others; arguments as in `sample_scenarios`."""
-    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config or SamplingConfig(), ego)
+    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config, request.ego_of(encounter))
     return None if prepared.model is None else Sampler(prepared.model, seed, road.frame_id).scenario(index)
 
 
@@ -217,13 +227,13 @@ class _Loop:
         best = int(np.argmax(share))
         while not self._done(budget) and self._spend(blocks[best], budget - self.candidates)[0]:
             pass
-        self._say(best, len(share))
+        self._describe(best, len(share))
 
     def scenarios(self) -> Sequence[Scenario]:
         """The valid candidates: themselves, or, where they are many, what draws them again."""
         if len(self.index) <= KEPT:
             return tuple(self.kept)
-        return Drawn(self.sampler.again, np.array(self.index, dtype=np.int64), BLOCK)
+        return LazyScenarios(self.sampler.redraw, np.array(self.index, dtype=np.int64), BLOCK)
 
     def _done(self, budget: int) -> bool:
         return len(self.index) >= self.count or self.candidates >= budget or self._cancelled()
@@ -256,13 +266,13 @@ class _Loop:
                     if self.found:
                         self.found(scenario)
                 else:
-                    self.refused[verdict.violations[0].cause if verdict else Cause.TIME_LAW] += 1
+                    self.refused[verdict.violations[0].cause if verdict else Cause.SPEED_PROFILE] += 1
             if self.progress:
                 self.progress(len(self.index), self.count, self.candidates + seen)
         self.candidates += seen
         return seen, good
 
-    def _say(self, best: int, tried: int) -> None:
+    def _describe(self, best: int, tried: int) -> None:
         """Put what was adapted into sentences."""
         if tried > 1 and best == 0:
             self.adaptations.append("few candidates were valid, and smaller standard deviations did not help")

@@ -14,13 +14,14 @@
 
 """Encounter -> primitives and changepoints, with their posterior (paper II-B)."""
 
+from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.segmentation.library import assign, Assignment, build_library, PrimitiveLibrary
-from scenario_gen.segmentation.live import LiveChangepoints, LiveSegmenter
+from scenario_gen.segmentation.live import LiveSegmenter
 from scenario_gen.segmentation.online import Changepoint, OnlineConfig, OnlineSegmenter
 from scenario_gen.segmentation.posterior import Posterior
-from scenario_gen.segmentation.result import Segmentation
 from scenario_gen.segmentation.segmenter import segment, SegmentationConfig
-from scenario_gen.segmentation.series import SamplerConfig, segment_series
+from scenario_gen.segmentation.series import segment_series
+from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
 
 __all__ = [
     "Assignment",

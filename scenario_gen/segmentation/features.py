@@ -29,8 +29,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
-from scenario_gen.encounter import Encounter
-from scenario_gen.segmentation._windows import moving_mean
+from scenario_gen.segmentation.hdp_hmm.problem import moving_mean
+from scenario_gen.types.encounter import Encounter
 
 STAND_SPEED = 0.5
 STAND_BLUR = 0.2

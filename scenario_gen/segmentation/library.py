@@ -26,15 +26,14 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints
 from scenario_gen.documents import check_shape, COUNT, NUMBER, read_json
-from scenario_gen.encounter import Encounter
-from scenario_gen.errors import InputError
-from scenario_gen.guard import guarded
+from scenario_gen.errors import guarded, InputError
 from scenario_gen.segmentation.descriptions import describe_accelerations, describe_segments
 from scenario_gen.segmentation.features import driving_features
 from scenario_gen.segmentation.posterior import in_order
-from scenario_gen.segmentation.result import Segmentation
 from scenario_gen.segmentation.segmenter import cut, DEFAULT, on_trends, relabel, SegmentationConfig
 from scenario_gen.segmentation.series import segment_series
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.segmentation import Segmentation
 
 FORMAT = "scenario_gen primitive library 1"
 _ROW = {"type": "array", "minItems": 1, "items": {**NUMBER, "minimum": -1e9, "maximum": 1e9}}  # of accelerations, speeds, seconds
@@ -150,7 +149,7 @@ class PrimitiveLibrary:
 
 @dataclass(frozen=True, eq=False)
 class Assignment:
-    """An encounter in terms of a library: its segmentation, and the library's primitive for each of its K + 1 segments."""
+    """An encounter in terms of a library: its segmentation, and the library's primitive (K + 1,) of each segment."""
 
     segmentation: Segmentation
     primitives: Ints

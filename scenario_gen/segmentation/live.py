@@ -16,45 +16,22 @@
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenario_gen.arrays import Floats, Ints
-from scenario_gen.encounter import Vehicle
 from scenario_gen.segmentation.online import OnlineConfig, OnlineSegmenter
 from scenario_gen.segmentation.trends import course
+from scenario_gen.types.segmentation import LiveChangepoints
 
 if TYPE_CHECKING:  # logs bring pandas and shapely, which a segmentation does not need
     from scenario_gen.logs.streams import Sample
 
 
-@dataclass(frozen=True, eq=False)
-class LiveChangepoints:
-    """Changepoints that one sample confirmed, with the vehicles' states there.
-
-    Attributes:
-        start_ns: stamp of the stretch's first sample: since then the same vehicles have been there at every tick.
-        vehicles: N identities and footprints.
-        time_ns: (K,) since `start_ns`, increasing.
-        position: (N, K, 2) m.
-        heading: (N, K) rad: the course over ground.
-        speed: (N, K) m/s.
-    """
-
-    start_ns: int
-    vehicles: tuple[Vehicle, ...]
-    time_ns: Ints
-    position: Floats
-    heading: Floats
-    speed: Floats
-
-
 class LiveSegmenter:
     """An `OnlineSegmenter` for vehicles that come and go: each change of who is there begins a new stretch."""
 
-    def __init__(self, dt_ns: int, config: OnlineConfig = OnlineConfig()) -> None:  # noqa: B008 - frozen
+    def __init__(self, dt_ns: int, config: OnlineConfig = OnlineConfig()) -> None:
         """Start with no samples; they will be `dt_ns` nanoseconds apart."""
         self._dt_ns = dt_ns
         self._config = config

@@ -38,7 +38,9 @@ class OnlineConfig:
     delay: float = parameter(1.0, "least age at which a changepoint is confirmed", unit="s", low=0.3, high=10.0)
     look_back: float = parameter(6.0, "age beyond which no changepoint is looked for any more", unit="s", low=1.0, high=60.0)
     every: int = parameter(2, "samples between two looks", low=1, high=100)
-    chance_alone: float = parameter(1e-6, "probability with which noise alone looks like a changepoint", low=1e-12, high=0.5)
+    significance_level: float = parameter(
+        1e-6, "probability with which noise alone looks like a changepoint", low=1e-12, high=0.5, was="chance_alone"
+    )
     min_segment: float = parameter(0.5, "least distance between changepoints", unit="s", low=0.2, high=10.0)
 
     def __post_init__(self) -> None:
@@ -92,7 +94,7 @@ class OnlineSegmenter:
         first = self._count - len(self._samples)
         stack = np.array(self._samples).transpose(1, 0, 2)
         trends = Trends.of(stack[:, :, :2], stack[:, :, 2], self._dt)
-        least = trends.threshold(config.chance_alone)
+        least = trends.threshold(config.significance_level)
         gap = max(2, round(config.min_segment / self._dt))
         fixed = [c - first for c in self._confirmed if c - first >= gap]
         start = max((fixed[-1] if fixed else 0) + gap, trends.samples - round(config.look_back / self._dt))

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.arrays import Bools, Floats, frozen, frozen_ints, Ints
-from scenario_gen.segmentation._labels import match_and_vote
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,29 +91,26 @@ class Posterior:
         used = np.array([len(np.unique(row)) for row in self.samples])
         return np.bincount(used) / len(used)
 
-    def r_hat(self) -> Floats:
-        """(5,) split R-hat (Gelman et al.) of each quantity in the trace, over the kept chains; 1 is converged."""
-        halves = [half for trace, kept in zip(self.trace, self.kept, strict=True) if kept for half in np.array_split(trace, 2)]
-        if not halves or min(len(h) for h in halves) < 2:
-            return np.ones(5)
-        n = min(len(h) for h in halves)
-        stack = np.array([h[-n:] for h in halves])
-        within = stack.var(axis=1, ddof=1).mean(axis=0)
-        between = stack.mean(axis=1).var(axis=0, ddof=1)
-        result: Floats = np.sqrt((n - 1) / n + np.divide(between, within, out=np.zeros(5), where=within > 0.0))
-        return result
-
 
 def changepoints_of(labels: Ints, ends: Ints) -> Ints:
-    """Return the samples whose label differs from the one before, within each sequence."""
+    """Return the samples (K,) whose label, of (T,), differs from the one before, within each sequence."""
     found = np.flatnonzero(np.diff(labels)) + 1
     return found[~np.isin(found, ends)].astype(np.int64)
 
 
 def in_order(labels: Ints) -> Ints:
-    """Renumber labels in order of first appearance."""
+    """Renumber labels (T,) in order of first appearance."""
     _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[inverse].astype(np.int64).reshape(-1)
+
+
+def matched_labels(samples: Ints, reference: Ints, size: int) -> Ints:
+    """Rename each row's labels (S, T), below `size`, to agree with `reference` (T,) in as many samples as possible."""
+    from scipy.optimize import linear_sum_assignment  # slow to import
+
+    overlaps = [np.bincount(row * size + reference, minlength=size * size).reshape(size, size) for row in samples]
+    partners = [linear_sum_assignment(overlap, maximize=True)[1] for overlap in overlaps]
+    return np.stack([partner[row] for partner, row in zip(partners, samples, strict=True)]).astype(np.int64)
 
 
 def pool(samples: list[Ints], traces: list[Floats], ends: Ints, lead: int) -> Posterior:
@@ -138,9 +134,9 @@ def pool(samples: list[Ints], traces: list[Floats], ends: Ints, lead: int) -> Po
     scores = np.concatenate([t[:, 0] for t, keep in zip(traces, kept, strict=True) if keep])
     estimate = stack[int(np.argmax(scores))]
     size = int(stack.max()) + 1
-    matched, votes = np.empty_like(stack), np.empty((size, stack.shape[1]), np.int64)
     for _ in range(3):
-        match_and_vote(stack, estimate, size, matched, votes)
+        matched = matched_labels(stack, estimate, size)
+        votes = np.stack([(matched == k).sum(axis=0) for k in range(size)])
         update = votes.argmax(axis=0).astype(np.int64)
         if np.array_equal(update, estimate):
             break

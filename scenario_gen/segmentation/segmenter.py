@@ -20,14 +20,15 @@ from itertools import pairwise
 import numpy as np
 
 from scenario_gen.arrays import Ints
-from scenario_gen.encounter import Encounter
 from scenario_gen.parameters import check, parameter
 from scenario_gen.segmentation.descriptions import describe_segments
 from scenario_gen.segmentation.features import driving_features, paper_features
+from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.segmentation.posterior import in_order, Posterior
-from scenario_gen.segmentation.result import Segmentation
-from scenario_gen.segmentation.series import SamplerConfig, segment_series
+from scenario_gen.segmentation.series import segment_series
 from scenario_gen.segmentation.trends import Trends
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.segmentation import Segmentation
 
 DRIVING_SAMPLER = SamplerConfig(weight=0.5)
 
@@ -46,10 +47,16 @@ class SegmentationConfig:
     settle: float = parameter(
         0.8, "a changepoint may move this far to where trends of speed or course change", unit="s", low=0.0, high=2.0
     )
-    chance_alone: float = parameter(
-        1e-4, "probability with which noise alone makes a changepoint look as useful as is asked of one", low=1e-12, high=0.5
+    significance_level: float = parameter(
+        1e-4,
+        "probability with which noise alone makes a changepoint look as useful as is asked of one",
+        low=1e-12,
+        high=0.5,
+        was="chance_alone",
     )
-    least_chance: float = parameter(0.05, "posterior probability above which a changepoint may be added", low=0.0, high=1.0)
+    min_probability: float = parameter(
+        0.05, "posterior probability above which a changepoint may be added", low=0.0, high=1.0, was="least_chance"
+    )
     speed_window: float = parameter(1.0, "window of the longitudinal acceleration", unit="s", low=0.3, high=5.0)
     turn_window: float = parameter(2.0, "window of the lateral acceleration", unit="s", low=0.4, high=10.0)
     speed_noise: float = parameter(
@@ -90,14 +97,14 @@ def segment(encounter: Encounter, config: SegmentationConfig = DEFAULT, seed: in
 
 
 def on_trends(encounter: Encounter, posterior: Posterior, points: Ints, config: SegmentationConfig) -> Ints:
-    """Put changepoints where trends change, see `trends`, and keep the most useful ones up to `max_rate`."""
+    """Put changepoints (K,) where trends change, see `trends`, and keep the most useful ones up to `max_rate`."""
     trends = Trends.of(encounter.position, encounter.speed, encounter.dt)
-    least = trends.threshold(config.chance_alone)
+    least = trends.threshold(config.significance_level)
     reach = round(config.settle / encounter.dt)
     gap = max(2, int(np.ceil(config.min_segment / encounter.dt - 1e-9)))
     most = int(encounter.duration * config.max_rate)
     everything = encounter.speed.shape[1]
-    candidates = np.flatnonzero(posterior.probability_within(round(0.5 / encounter.dt)) > config.least_chance)
+    candidates = np.flatnonzero(posterior.probability_within(round(0.5 / encounter.dt)) > config.min_probability)
     found = trends.settle([int(c) for c in points], reach, gap)
     found = trends.settle(trends.drop(found, least, everything), reach, gap)
     found = trends.settle(trends.add(found, candidates, least, gap), reach, gap)
@@ -106,7 +113,7 @@ def on_trends(encounter: Encounter, posterior: Posterior, points: Ints, config: 
 
 
 def cut(posterior: Posterior, config: SegmentationConfig, dt: float) -> Ints:
-    """Return the estimate's changepoints without segments below `min_segment` or states with fewer than 2 samples.
+    """Return the estimate's changepoints (K,) without segments below `min_segment` or states with fewer than 2 samples.
 
     Of the two changepoints around such a segment the less probable one goes (at either end, the inner one).
     """
@@ -126,7 +133,7 @@ def cut(posterior: Posterior, config: SegmentationConfig, dt: float) -> Ints:
 
 
 def relabel(labels: Ints, points: Ints, *, fresh: bool = True) -> Ints:
-    """Give every segment between `points` the label that most of its samples have, and neighbours different ones.
+    """Give every segment between `points` (K,) the label, of (T,), that most of its samples have, and neighbours different ones.
 
     Where a segment holds no other label than its left neighbour's, it gets a new one; or, if not `fresh`, the
     neighbour's after all, so that the changepoint between them is one no longer.

@@ -30,7 +30,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F2, I, I1, kernel, OUT1
-from scenario_gen.segmentation._windows import moving_mean
+from scenario_gen.segmentation.hdp_hmm.problem import moving_mean
 
 SPEED_NOISE = 0.1
 COURSE_NOISE = 0.3
@@ -183,7 +183,7 @@ class Trends:
         return points
 
     def add(self, points: list[int], candidates: Ints, least_gain: float, gap: int) -> list[int]:
-        """Add candidates, always the most useful one, while one gains `least_gain`."""
+        """Add candidates (C,), always the most useful one, while one gains `least_gain`."""
         points = list(points)
         while True:
             every = [0, *points, self.samples - 1]

@@ -13,9 +13,3 @@
 # limitations under the License.
 
 """Bags of rosbag2, MCAP and SQLite, whole and damaged, read with bounds; no message is decoded here."""
-
-from scenario_gen.storage.bag import open_bag, StoredBag, StoredMessage, StoredTopic
-from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.files import BagFiles, files_of, remark
-
-__all__ = ["BagConfig", "BagFiles", "StoredBag", "StoredMessage", "StoredTopic", "files_of", "open_bag", "remark"]

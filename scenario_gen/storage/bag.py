@@ -26,8 +26,7 @@ from typing import Any
 import zstandard
 
 from scenario_gen.documents import shown
-from scenario_gen.errors import InputError
-from scenario_gen.guard import guarded
+from scenario_gen.errors import guarded, InputError
 from scenario_gen.storage.config import Allowance, BagConfig
 from scenario_gen.storage.files import files_of, METADATA
 from scenario_gen.storage.mcap import McapFile, open_mcap
@@ -170,7 +169,7 @@ def _strictly(file: Path, logged: Iterator[Any]) -> Iterator[Any]:
 @contextmanager
 def open_bag(
     path: Path,
-    config: BagConfig = BagConfig(),  # noqa: B008 - frozen
+    config: BagConfig = BagConfig(),
     bound: str = "bag.most_bytes",
 ) -> Iterator[StoredBag]:
     """Open a bag for reading: its folder, or one of its files.

@@ -100,7 +100,7 @@ def remark(path: Path) -> str:
 def _lost(metadata: Path) -> dict[str, str]:
     """Return what a recorder wrote of what it did not record, by topic."""
     try:
-        told = read_yaml(metadata)["rosbag2_bagfile_information"]["custom_data"]
-        return {shown(key[len(LOST) :]): shown(text, 400) for key, text in told.items() if key.startswith(LOST)}
+        custom = read_yaml(metadata)["rosbag2_bagfile_information"]["custom_data"]
+        return {shown(key[len(LOST) :]): shown(text, 400) for key, text in custom.items() if key.startswith(LOST)}
     except (InputError, KeyError, TypeError, AttributeError):
         return {}

@@ -30,8 +30,7 @@ import lz4.frame
 from mcap.opcode import Opcode
 import zstandard
 
-from scenario_gen.errors import ScenarioGenError
-from scenario_gen.guard import guarded
+from scenario_gen.errors import guarded, ScenarioGenError
 from scenario_gen.storage.config import Allowance, FOUND_BYTES
 
 MAGIC = b"\x89MCAP0\r\n"

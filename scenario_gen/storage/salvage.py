@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is whole of an MCAP file that was cut off or damaged; what is not is passed over and told.
+"""What is whole of an MCAP file that was cut off or damaged; what is not is passed over and reported.
 
 A record is taken where its lengths agree with themselves and with what follows. After a damaged one the search goes on for the
 next place at which records follow one another; a chunk says its length twice, so one is believed by itself.

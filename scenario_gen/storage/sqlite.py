@@ -24,8 +24,7 @@ from typing import Any
 from urllib.parse import quote
 
 from scenario_gen.documents import shown
-from scenario_gen.errors import InputError
-from scenario_gen.guard import guarded
+from scenario_gen.errors import guarded, InputError
 from scenario_gen.storage.config import Allowance
 from scenario_gen.storage.records import LATEST
 

@@ -15,20 +15,24 @@
 """The checker: proves a scenario valid at every instant, or says what is wrong with it, when and by how much."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats
+from scenario_gen.arrays import Floats, runs
 from scenario_gen.errors import InputError
-from scenario_gen.interaction import Conflict, pair_conflict, runs, Wait
 from scenario_gen.roads.clearance import clearance_in_cells
-from scenario_gen.roads.road import Road
-from scenario_gen.scenario import BoundaryStates, Cause, Scenario, Verdict, Violation
-from scenario_gen.validity import apart, dynamics, inside
+from scenario_gen.template.interaction import Conflict, find_conflicts, pair_conflict, Wait
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, Verdict, Violation
+from scenario_gen.validity import collision as apart
+from scenario_gen.validity import containment as inside
+from scenario_gen.validity import dynamics
+from scenario_gen.validity.dynamics import control_points, is_motion
 from scenario_gen.validity.limits import Limits
-from scenario_gen.validity.motion import control_points, is_motion
 
 
 class Checker:
@@ -76,6 +80,32 @@ class Checker:
             self._clearance, self._blocked = clearance_in_cells(road), inside.blocked_before(road.drivable)
             self._grid = np.array((*road.origin, road.resolution))
 
+    @classmethod
+    def of_template(
+        cls,
+        encounter: Encounter,
+        road: Road,
+        asked: BoundaryStates,
+        waits: Sequence[Wait],
+        limits: Limits | None = None,
+        ego: int | None = None,
+    ) -> "Checker":
+        """Return the checker of scenarios of a template, one vehicle of which may be left out; that takes part in nothing.
+
+        Args:
+            encounter: the template, whose conflicts are kept.
+            road: the road they drive on.
+            asked: start and end states of all vehicles.
+            waits: the template's waits that are kept.
+            limits: the limits; the default ones if None.
+            ego: index of the vehicle that is left out.
+        """
+        kept = [n for n in range(len(encounter.vehicles)) if n != ego]
+        vehicles = tuple(encounter.vehicles[n] for n in kept)
+        conflicts = find_conflicts(vehicles, encounter.time, encounter.position[kept], encounter.heading[kept])
+        own = [replace(wait, vehicle=kept.index(wait.vehicle)) for wait in waits if wait.vehicle != ego]
+        return cls(road, BoundaryStates(asked.start[kept], asked.end[kept]), conflicts, own, limits)
+
     @property
     def not_applicable(self) -> tuple[str, ...]:
         """Sentences naming the checks that cannot be made, and why."""
@@ -83,7 +113,7 @@ class Checker:
             "off_road: no road is known": self.road,
             "boundary_state: it is not known what was asked": self.asked,
             "passing_order: no template's conflicts are known": self.conflicts,
-            "moving_wait: no template's waits are known": self.waits,
+            "stop_not_kept: no template's waits are known": self.waits,
         }
         return tuple(sentence for sentence, given in missing.items() if given is None)
 
@@ -217,7 +247,7 @@ class Checker:
                 if self._slow(scenario, i, self.limits.stand_speed) != [(0, scenario.time.size - 1)]:
                     k = int(np.argmax(scenario.speed[i]))
                     message = f"vehicle {i}: waits throughout in the template, but reaches {scenario.speed[i, k]:.3f} m/s"
-                    yield Violation(Cause.MOVING_WAIT, float(scenario.time[k]), (i,), message)
+                    yield Violation(Cause.STOP_NOT_KEPT, float(scenario.time[k]), (i,), message)
                 continue
             standing = [wait for wait in asked if not wait.creeps]
             for wanted, limit, verb in ((standing, self.limits.stand_speed, "stands"), (asked, self.limits.creep_speed, "waits")):
@@ -229,7 +259,7 @@ class Checker:
                         f"vehicle {i}: {verb} {len(wanted)} time(s) in the template; is below {limit:g} m/s for "
                         f"{', '.join(f'{length:.1f} s' for length in lengths) or 'less than two samples'}"
                     )
-                    yield Violation(Cause.MOVING_WAIT, wanted[min(served, len(wanted) - 1)].start, (i,), message)
+                    yield Violation(Cause.STOP_NOT_KEPT, wanted[min(served, len(wanted) - 1)].start, (i,), message)
                     break
 
     def _slow(self, scenario: Scenario, i: int, limit: float) -> list[tuple[int, int]]:
@@ -237,7 +267,7 @@ class Checker:
         slow = scenario.speed[i] < limit
         moved = exact.hypot(*np.diff(scenario.position[i], axis=0).T)
         still = slow[:-1] & slow[1:] & (moved < limit * np.diff(scenario.time))
-        return [(a, b + 1) for a, b in runs(still)]
+        return runs(still)  # of T - 1 steps: a step's end is a sample
 
     def _never_moves(self, i: int) -> bool:
         """Whether vehicle i, which waits from the very start, was asked to end where it starts."""

@@ -12,11 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Limits of the motion itself, and whether the published fields agree with each other.
-
-Speed, acceleration and heading are linear between samples, so an extreme of speed, of |acceleration| and of speed times
-yaw rate lies at a sample. The speed of the position's cubic is bounded by the control points of its derivative.
-"""
+"""Speed, acceleration and curvature of the motion between two instants, in closed form, and their limits."""
 
 from enum import IntEnum
 
@@ -24,8 +20,58 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
-from scenario_gen.kernels import F1, F2, F3, kernel, OUT3
-from scenario_gen.scenario import Cause
+from scenario_gen.kernels import F1, F2, F3, kernel, OUT3, OUT4
+from scenario_gen.types.scenario import Cause
+
+
+@kernel(F1, F3, F2, F2, F2)
+def is_motion(time: Floats, position: Floats, heading: Floats, speed: Floats, acceleration: Floats) -> bool:
+    """Whether all values are finite and time increases; one vehicle's (T,) arrays in SI units, position (T, 2) [m]."""
+    n, t = heading.shape
+    for k in range(t):
+        if not np.isfinite(time[k]) or (k > 0 and time[k] <= time[k - 1]):
+            return False
+    for i in range(n):
+        for k in range(t):
+            # a sum is finite only if all its terms are
+            if not np.isfinite(position[i, k, 0] + position[i, k, 1] + heading[i, k] + speed[i, k] + acceleration[i, k]):
+                return False
+    return True
+
+
+@kernel(F1, F3, F2, F2, OUT4)
+def control_points(time: Floats, position: Floats, heading: Floats, speed: Floats, out: Floats) -> None:
+    """Fill `out` (N, T - 1, 4, 2) with the control points [m] of every vehicle in every interval."""
+    n, t = heading.shape
+    for i in range(n):
+        vx, vy = speed[i, 0] * exact.cos(heading[i, 0]), speed[i, 0] * exact.sin(heading[i, 0])
+        for k in range(t - 1):
+            third = (time[k + 1] - time[k]) / 3.0
+            wx, wy = speed[i, k + 1] * exact.cos(heading[i, k + 1]), speed[i, k + 1] * exact.sin(heading[i, k + 1])
+            out[i, k, 0, 0], out[i, k, 0, 1] = position[i, k, 0], position[i, k, 1]
+            out[i, k, 1, 0], out[i, k, 1, 1] = position[i, k, 0] + third * vx, position[i, k, 1] + third * vy
+            out[i, k, 2, 0], out[i, k, 2, 1] = position[i, k + 1, 0] - third * wx, position[i, k + 1, 1] - third * wy
+            out[i, k, 3, 0], out[i, k, 3, 1] = position[i, k + 1, 0], position[i, k + 1, 1]
+            vx, vy = wx, wy
+
+
+@kernel(inline=True)
+def blossom(b: Floats, c: int, r: float, s: float, t: float) -> float:
+    """Blossom [m] of the cubic with control points b (4, 2), coordinate c, at (r, s, t): de Casteljau with three parameters."""
+    d0, d1, d2 = b[0, c] + (b[1, c] - b[0, c]) * r, b[1, c] + (b[2, c] - b[1, c]) * r, b[2, c] + (b[3, c] - b[2, c]) * r
+    e0, e1 = d0 + (d1 - d0) * s, d1 + (d2 - d1) * s
+    return float(e0 + (e1 - e0) * t)
+
+
+@kernel(inline=True)
+def stretch(b: Floats, u0: float, u1: float, out: Floats) -> None:
+    """Write the control points [m] of the part of `b` (4, 2) between u0 and u1 into `out` (4, 2)."""
+    for c in range(2):
+        out[0, c] = blossom(b, c, u0, u0, u0)
+        out[1, c] = blossom(b, c, u0, u0, u1)
+        out[2, c] = blossom(b, c, u0, u1, u1)
+        out[3, c] = blossom(b, c, u1, u1, u1)
+
 
 TURN_ROUNDING = 1e-4  # rad, change of heading that a vehicle may show without having moved
 SLACK = 1e-6  # rounding of a value that keeps exactly to its limit

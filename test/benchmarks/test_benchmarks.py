@@ -11,7 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""Every benchmark in its quick form: it runs, and its last line is one JSON object that says what was measured."""
+"""Benchmarks in their quick form, the cheapest or all: each runs, and its last line is one JSON object of what was measured."""
 
 import json
 import math
@@ -19,6 +19,7 @@ from pathlib import Path
 import subprocess
 import sys
 
+from lengths import LONG
 import numpy as np
 import pytest
 
@@ -27,6 +28,8 @@ from benchmarks.row import Row
 
 ROOT = Path(__file__).resolve().parents[2]
 WITH_ROS = "messages"
+CHEAP = ("evaluation", "planning")
+pytestmark = pytest.mark.spread
 
 
 def quickly(name):
@@ -37,7 +40,7 @@ def quickly(name):
     return run.stdout.splitlines()
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", names() if LONG else CHEAP)
 def test_the_last_line_is_one_json_object(name):
     if name == WITH_ROS:
         pytest.importorskip("rclpy", reason="rclpy is not in this environment")

@@ -19,13 +19,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.encounter import Encounter, Vehicle
-from scenario_gen.evaluation import Case, CheckCounts, evaluate, EvaluationConfig
-from scenario_gen.fitting.result import Fit, FittedVehicle
-from scenario_gen.planning.route import Route
-from scenario_gen.roads.road import Road
-from scenario_gen.scenario import BoundaryStates, Cause, Scenario, ScenarioSet
-from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.evaluation import CheckCounts
+from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.generation import GenerationResult, WITHOUT
+from scenario_gen.types.road import Road
+from scenario_gen.types.route import Route
+from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, ScenarioSet
+from scenario_gen.types.segmentation import Segmentation
 
 CARS = (Vehicle("west", 4.0, 2.0), Vehicle("south", 4.0, 2.0))
 
@@ -108,9 +110,16 @@ def report_case(count=12, name="crossing", without=True):
     if without:
         rows["without changepoints"] = far.scenarios
     checks = {"with changepoints": CheckCounts.of_set(near), "without changepoints": CheckCounts.of_set(far)}
-    evaluation = evaluate(encounter, segmentation, rows, checks=checks, road="cross", config=EvaluationConfig(resamples=50))
-    refused = "" if without else "no route exists"
-    return Case(encounter, segmentation, cross_road(), fit, routes, near, far if without else None, evaluation, oracle, refused)
+    evaluation = evaluate_scenarios(
+        encounter,
+        rows,
+        changepoints=len(segmentation.changepoints),
+        checks=checks,
+        road="cross",
+        config=EvaluationConfig(resamples=50),
+    )
+    references, refusals = ({WITHOUT: far}, {}) if without else ({}, {WITHOUT: "no route exists"})
+    return GenerationResult(encounter, segmentation, cross_road(), fit, routes, near, 0, evaluation, references, refusals, oracle)
 
 
 def ego_case(count=4):
@@ -121,8 +130,10 @@ def ego_case(count=4):
         fields = ("position", "heading", "speed", "acceleration")
         return replace(scenario, vehicles=(scenario.vehicles[n],), **{name: getattr(scenario, name)[[n]] for name in fields})
 
-    left = tuple(only(scenario, 1) for scenario in case.with_changepoints.scenarios)
-    made = replace(case.with_changepoints, scenarios=left, ego=only(case.oracle, 0))
+    left = tuple(only(scenario, 1) for scenario in case.generated.scenarios)
+    made = replace(case.generated, scenarios=left, ego=only(case.oracle, 0))
     rows = {"with changepoints": left, "oracle": [case.oracle]}
-    evaluation = evaluate(case.encounter, case.segmentation, rows, config=EvaluationConfig(resamples=50))
-    return replace(case, with_changepoints=made, evaluation=evaluation)
+    evaluation = evaluate_scenarios(
+        case.encounter, rows, changepoints=len(case.segmentation.changepoints), config=EvaluationConfig(resamples=50)
+    )
+    return replace(case, generated=made, evaluation=evaluation)

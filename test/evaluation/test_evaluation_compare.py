@@ -23,9 +23,9 @@ import numpy as np
 import pytest
 
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import evaluate, EvaluationConfig
+from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.evaluation.compare import compare, comparison_table, read_evaluations
-from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.types.segmentation import Segmentation
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,9 @@ def sets():
 
     def made(pace, seed):
         rows = {"with changepoints": samples(encounter, 50, seed, pace=pace)}
-        return evaluate(encounter, segmentation, rows, road="cross", config=EvaluationConfig(resamples=200))
+        return evaluate_scenarios(
+            encounter, rows, changepoints=len(segmentation.changepoints), road="cross", config=EvaluationConfig(resamples=200)
+        )
 
     return made(1.0, 1), made(1.0, 2), made(0.0, 3), made(1.0, 4), made(1.0, 5)
 

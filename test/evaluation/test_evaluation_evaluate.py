@@ -22,15 +22,15 @@ from evaluation_worlds import CARS, crossing, replayed, samples
 import numpy as np
 import pytest
 
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import CheckCounts, evaluate, Evaluation, EvaluationConfig, replay
-from scenario_gen.fitting.result import Fit, FittedVehicle
-from scenario_gen.scenario import BoundaryStates, Cause, ScenarioSet, Verdict, Violation
-from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig, replay
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.evaluation import CheckCounts, Evaluation
+from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.scenario import BoundaryStates, Cause, ScenarioSet, Verdict, Violation
 
 T = 121
-SEGMENTATION = Segmentation(np.repeat([0, 1, 2], [40, 40, 41]), np.array([40, 80]), np.zeros(T), ("a", "b", "c"))
+K = 2
 QUICK = EvaluationConfig(resamples=100)
 
 
@@ -41,7 +41,7 @@ def run(**extra):
         "without changepoints": samples(encounter, 12, seed=4, pace=0.0),
         "oracle": [replayed(encounter)],
     }
-    return evaluate(encounter, SEGMENTATION, rows, config=QUICK, **extra)
+    return evaluate_scenarios(encounter, rows, changepoints=K, config=QUICK, **extra)
 
 
 def test_rows_say_what_happened():
@@ -85,7 +85,7 @@ def test_json_round_trip_and_markdown():
 
 def test_missing_and_empty_rows():
     encounter = crossing()
-    found = evaluate(encounter, SEGMENTATION, {"with changepoints": []}, config=QUICK)
+    found = evaluate_scenarios(encounter, {"with changepoints": []}, changepoints=K, config=QUICK)
     assert found.row("with changepoints").notes == ("there is no scenario in this row",)
     assert math.isnan(found.value("with changepoints", "min_ade"))
     assert found.to_markdown()
@@ -103,12 +103,17 @@ def test_another_number_of_vehicles_is_refused():
         acceleration=scenario.acceleration[[0, 1, 1]],
     )
     with pytest.raises(InputError, match="3 vehicles"):
-        evaluate(encounter, SEGMENTATION, {"x": [trio]}, config=QUICK)
+        evaluate_scenarios(encounter, {"x": [trio]}, changepoints=K, config=QUICK)
 
 
 def test_a_long_template_is_resampled_and_says_so():
     encounter = crossing()
-    found = evaluate(encounter, SEGMENTATION, {"x": [replayed(encounter)]}, config=EvaluationConfig(max_steps=60))
+    found = evaluate_scenarios(
+        encounter,
+        {"x": [replayed(encounter)]},
+        changepoints=K,
+        config=EvaluationConfig(max_steps=60),
+    )
     assert "60 instants" in found.row("template").notes[0] and found.value("x", "e_position") < 1e-6
 
 
@@ -165,7 +170,7 @@ def alone(scenario, n):
 def test_a_vehicle_left_out_for_an_ego_is_left_out_of_every_row():
     encounter = crossing()
     ones = [alone(scenario, 1) for scenario in samples(encounter, 4)]
-    found = evaluate(encounter, SEGMENTATION, {"x": ones, "oracle": [replayed(encounter)]}, config=QUICK)
+    found = evaluate_scenarios(encounter, {"x": ones, "oracle": [replayed(encounter)]}, changepoints=K, config=QUICK)
     assert found.vehicles == (CARS[1].id,)
     for figure in ("e_position", "min_distance", "min_ttc", "pet", "js_gap", "order_kept"):
         assert np.isnan(found.value("x", figure)), figure
@@ -188,5 +193,5 @@ def test_the_order_of_the_vehicles_does_not_matter():
         )
         for s in made
     ]
-    one, other = (evaluate(encounter, SEGMENTATION, {"x": rows}, config=QUICK).row("x") for rows in (made, swapped))
+    one, other = (evaluate_scenarios(encounter, {"x": rows}, changepoints=K, config=QUICK).row("x") for rows in (made, swapped))
     assert one == other

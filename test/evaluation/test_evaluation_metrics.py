@@ -26,14 +26,14 @@ from scipy.spatial.distance import jensenshannon
 from shapely import affinity
 from shapely.geometry import box
 
-from scenario_gen.encounter import Vehicle
-from scenario_gen.evaluation import likeness, variety
+from scenario_gen.evaluation import diversity, similarity
 from scenario_gen.evaluation.bootstrap import Bootstrap, wilson
 from scenario_gen.evaluation.criticality import criticality
 from scenario_gen.evaluation.distributions import compare, jensen_shannon, QUANTITIES, values_of
 from scenario_gen.evaluation.dtw import feature_matrix
 from scenario_gen.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.evaluation.motion import at_count, at_period, Motion
+from scenario_gen.types.encounter import Vehicle
 
 ONCE = np.ones((1, 1))
 
@@ -149,35 +149,35 @@ def test_error_and_correlation_are_those_of_the_mean_matrix():
     template = at_count(crossing(), 60)
     motions = [at_count(scenario, 60) for scenario in samples(crossing(), 7)]
     position = np.stack([motion.position for motion in motions])
-    pairs = likeness.likeness(template.position, position, "euclidean")
+    pairs = similarity.pair_similarities(template.position, position, "euclidean")
     target = feature_matrix(*template.position)
     for weights in (np.ones(7), np.array([3.0, 0, 0, 1, 0, 2, 1])):
         mean = np.average([feature_matrix(*motion.position) for motion in motions], axis=0, weights=weights)
         expected = np.linalg.norm(mean - target) / np.linalg.norm(target)
-        assert likeness.mean_error(pairs, weights[None])[0] == pytest.approx(expected, rel=1e-9)
-        assert likeness.mean_correlation(pairs, weights[None])[0] == pytest.approx(
+        assert similarity.mean_error(pairs, weights[None])[0] == pytest.approx(expected, rel=1e-9)
+        assert similarity.mean_correlation(pairs, weights[None])[0] == pytest.approx(
             np.corrcoef(mean.ravel(), target.ravel())[0, 1]
         )
 
 
 def test_a_matrix_that_is_constant_is_left_out_of_the_mean():
     speed = np.stack([np.zeros(9), np.zeros(9), np.linspace(0, 5, 9)])[..., None]  # two stand, one drives off
-    pairs = likeness.likeness(speed, np.stack([speed * 1.1 + 0.1 * np.linspace(0, 1, 9)[:, None]]), "manhattan")
+    pairs = similarity.pair_similarities(speed, np.stack([speed * 1.1 + 0.1 * np.linspace(0, 1, 9)[:, None]]), "manhattan")
     errors = [pair.error(ONCE)[0] for pair in pairs]
     assert math.isnan(errors[0]) and np.isfinite(errors[1:]).all()
-    assert likeness.mean_error(pairs, ONCE)[0] == pytest.approx(np.mean(errors[1:]))
+    assert similarity.mean_error(pairs, ONCE)[0] == pytest.approx(np.mean(errors[1:]))
 
 
-def test_variety_by_hand():
+def test_diversity_by_hand():
     position = np.zeros((3, 1, 4, 2))
     position[1, ..., 0], position[2, ..., 1] = 3.0, 4.0  # samples at (0, 0), (3, 0), (0, 4)
-    table = variety.displacements(position)
-    assert variety.diversity(table, np.ones((1, 3)))[0] == pytest.approx((3.0 + 4.0 + 5.0) / 3.0)
-    assert variety.diversity(table, np.array([[2.0, 1.0, 0.0]]))[0] == pytest.approx(3.0)
-    assert math.isnan(variety.diversity(np.zeros((1, 1)), ONCE)[0])
-    error = variety.displacement_to(position, position[0])
+    table = diversity.displacements(position)
+    assert diversity.diversity(table, np.ones((1, 3)))[0] == pytest.approx((3.0 + 4.0 + 5.0) / 3.0)
+    assert diversity.diversity(table, np.array([[2.0, 1.0, 0.0]]))[0] == pytest.approx(3.0)
+    assert math.isnan(diversity.diversity(np.zeros((1, 1)), ONCE)[0])
+    error = diversity.displacement_to(position, position[0])
     assert error.tolist() == [0.0, 3.0, 4.0]
-    assert variety.least(error, np.array([[0.0, 1.0, 1.0]]))[0] == 3.0
+    assert diversity.weighted_min(error, np.array([[0.0, 1.0, 1.0]]))[0] == 3.0
 
 
 def test_interval_of_a_mean_agrees_with_scipy():
@@ -214,7 +214,7 @@ def test_samples_that_depend_on_each_other_are_drawn_together():
 
 def test_one_sample_has_no_interval_and_the_seed_decides():
     assert math.isnan(Bootstrap.draw(np.arange(1), 50, 0.95, 0).mean(np.array([2.0])).low)
-    assert math.isnan(Bootstrap.draw(np.zeros(2, dtype=int), 50, 0.95, 0).mean(np.array([2.0, 3.0])).low)  # a mirrored pair
+    assert math.isnan(Bootstrap.draw(np.zeros(2, dtype=int), 50, 0.95, 0).mean(np.array([2.0, 3.0])).low)  # a antithetic pair
     one, two, other = (Bootstrap.draw(np.arange(9), 50, 0.95, seed).weights for seed in (4, 4, 5))
     assert (one == two).all() and (one != other).any() and (one.sum(axis=1) == 9).all()
 

@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 import numpy as np
 
 from scenario_gen.evaluation.references import best_linear_pieces, linear_changepoints, uniform_changepoints
-from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.types.segmentation import Segmentation
 
 
 def cost_of(series, places):

@@ -29,6 +29,7 @@ SETTINGS = {
     "one thread": {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
     "four threads": {"OPENBLAS_NUM_THREADS": "4", "OMP_NUM_THREADS": "4"},
 }
+AT_ONCE = {"all that differs": {key: value for setting in SETTINGS.values() for key, value in setting.items()}}
 CODE = {"numba as on Haswell": {"NUMBA_CPU_NAME": "haswell"}}  # compiles every kernel anew: in the long form only
 
 

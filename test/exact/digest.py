@@ -26,9 +26,9 @@ import numpy as np
 
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.errors import RefusedError
-from scenario_gen.evaluation import Case
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.types.generation import GenerationResult
 
 
 def sha(*arrays: object) -> str:
@@ -39,9 +39,9 @@ def sha(*arrays: object) -> str:
     return digest.hexdigest()
 
 
-def digests(case: Case) -> dict[str, str]:
+def digests(case: GenerationResult) -> dict[str, str]:
     """The stages' results, in their order."""
-    encounter, segmentation, made = case.encounter, case.segmentation, case.with_changepoints
+    encounter, segmentation, made = case.encounter, case.segmentation, case.generated
     scenarios = b"".join(encode_scenario(scenario, encounter.start_ns) for scenario in made.scenarios)
     return {
         "encounter": sha(encounter.position, encounter.speed, encounter.heading),

@@ -24,8 +24,8 @@ from typing import Any
 
 import pytest
 
-from scenario_gen.bags import AtomicBag
 from scenario_gen.folders import Kind, replaced_folder, write_text
+from scenario_gen.storage.writer import AtomicBag
 
 KIND = Kind("test")
 TEXT = b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00"

@@ -36,21 +36,24 @@ from msg_conventions import trajectory
 from msg_conventions.roads import decode_map, encode_map, MAP_TYPE
 from msg_conventions.topics import topic_entry
 from msg_conventions.trajectory import TYPE as TRAJECTORY_TYPE
-from scenario_gen.bags import bag_topics, BagWriter, read_messages, read_scenario_set, reindex, write_run
-from scenario_gen.bags.evaluation import bag_cases
-from scenario_gen.bags.metadata import qos_yaml
-from scenario_gen.bags.regenerate import regenerate_scenario
-from scenario_gen.bags.told import told_provenance
-from scenario_gen.bags.validation import validate_bag
 from scenario_gen.errors import ScenarioGenError
 from scenario_gen.evaluation import compare, comparison_table, EvaluationConfig, read_evaluations
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.parameters import assigned, flatten, loaded
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.results import as_run, provenance_of
+from scenario_gen.recordings.read import read_recording, read_scenario_set
+from scenario_gen.recordings.write import write_recording
+from scenario_gen.results import provenance_of
+from scenario_gen.review.evaluation import bag_results
+from scenario_gen.review.regenerate import regenerate_scenario
+from scenario_gen.review.validation import validate_bag
 from scenario_gen.roads import build_road
 from scenario_gen.segmentation import assign, build_library, PrimitiveLibrary
+from scenario_gen.storage.messages import bag_topics, read_messages
+from scenario_gen.storage.metadata import qos_yaml
+from scenario_gen.storage.reindex import reindex
+from scenario_gen.storage.writer import BagWriter
 
 CONFIG = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False))
 PARTED = b"\n# ---- image ----\n"  # a map as one input: its YAML, this, and its image
@@ -62,7 +65,7 @@ def runs(folder: Path) -> list[bytes]:
     """Bags of the conventions, with chunks and without compression."""
     found = []
     for k, options in enumerate(({}, {"compress": False, "chunk_bytes": 3000})):
-        whole = write_run(folder / "whole", hand_made_run())
+        whole = write_recording(folder / "whole", hand_made_run())
         with BagWriter(folder / f"bag{k}", **options) as bag:
             for message in read_messages(whole):
                 bag.add_topic(message.topic, message.type, qos_yaml(topic_entry(message.topic)[1]))
@@ -75,7 +78,9 @@ def generated(folder: Path) -> list[bytes]:
     """A bag that a scenario can be made from again."""
     (encounter,) = read_log([bundled("b")]).encounters
     case = generate(encounter, "t_intersection", CONFIG, count=2, seed=7)
-    bag = write_run(folder / "bag", as_run(case, 7, "", provenance_of([bundled("b")], 7, 2, ["t_intersection"], CONFIG)))
+    bag = write_recording(
+        folder / "bag", replace(case, provenance=provenance_of([bundled("b")], 7, 2, ["t_intersection"], CONFIG))
+    )
     return [(bag / "bag_0.mcap").read_bytes()]
 
 
@@ -199,7 +204,7 @@ def in_file(name: str, read: Callable[[Path], object]) -> Callable[[bytes, Path]
 
 def read_bag(path: Path) -> None:
     """Read all that a bag has."""
-    for each in (lambda: bag_topics(path), lambda: list(read_messages(path)), lambda: told_provenance(path)):
+    for each in (lambda: bag_topics(path), lambda: list(read_messages(path)), lambda: read_recording(path).provenance):
         with_errors(each)
     read_scenario_set(path)
 
@@ -226,21 +231,21 @@ def save_and_read(path: Path) -> None:
 
 def measure(path: Path) -> None:
     """Evaluate a bag, down to the text."""
-    for case in bag_cases(path, CONFIG.evaluation):
+    for case in bag_results(path, CONFIG.evaluation):
         case.evaluation.to_markdown()
         case.evaluation.to_json()
 
 
 def metadata(folder: Path) -> list[bytes]:
     """metadata.yaml of a bag."""
-    return [(write_run(folder / "bag", hand_made_run()) / "metadata.yaml").read_bytes()]
+    return [(write_recording(folder / "bag", hand_made_run()) / "metadata.yaml").read_bytes()]
 
 
 @cache
 def one_file() -> bytes:
     """The file of a bag."""
     with tempfile.TemporaryDirectory() as folder:
-        return (write_run(Path(folder) / "bag", hand_made_run()) / "bag_0.mcap").read_bytes()
+        return (write_recording(Path(folder) / "bag", hand_made_run()) / "bag_0.mcap").read_bytes()
 
 
 def read_folder(path: Path) -> None:
@@ -332,7 +337,9 @@ def use_library(path: Path) -> None:
 
 def evaluations(folder: Path) -> list[bytes]:
     """evaluation.json of a run, and one evaluation alone."""
-    found = [case.evaluation.to_json() for case in bag_cases(write_run(folder / "bag", hand_made_run()), CONFIG.evaluation)]
+    found = [
+        case.evaluation.to_json() for case in bag_results(write_recording(folder / "bag", hand_made_run()), CONFIG.evaluation)
+    ]
     return [json.dumps({"provenance": {}, "cases": [json.loads(text) for text in found]}).encode(), found[0].encode()]
 
 

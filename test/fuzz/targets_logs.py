@@ -28,17 +28,18 @@ import numpy as np
 import pandas as pd
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
-from msg_conventions.odometry import encode_state
+from msg_conventions.ego import encode_state
 from msg_conventions.tracks import encode_tracks
 from msg_conventions.tracks import TYPE as TRACKS
 from scenario_gen.errors import ScenarioGenError
 from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams
-from scenario_gen.logs.bag import FIX, ODOMETRY, read_streams, read_tracks, STORES, Topic, TWIST, USED
-from scenario_gen.logs.files import COLUMNS
+from scenario_gen.logs.bag import read_streams, read_tracks, Topic, USED
 from scenario_gen.logs.synthetic import bundled
+from scenario_gen.logs.tables import COLUMNS
+from scenario_gen.recordings.samples import FIX, ODOMETRY, STORES, TWIST
 
 RECORD = "<BBqdd"  # vehicle, kind, stamp [ns], two values
-SHORT = LogConfig(shortest=1.0, travel=1.0)
+SHORT = LogConfig(min_duration=1.0, travel=1.0)
 
 
 def cars() -> pd.DataFrame:

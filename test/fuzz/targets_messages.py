@@ -25,7 +25,6 @@ from mutators import BYTES
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
-from msg_conventions.belonging import decode_belonging, hash_of
 from msg_conventions.changepoints import (
     decode_changepoints,
     decode_posterior,
@@ -33,27 +32,26 @@ from msg_conventions.changepoints import (
     encode_posterior,
     POSTERIOR_TYPE,
 )
-from msg_conventions.diagnostics import decode_diagnostics, read_request
+from msg_conventions.diagnostics import decode_diagnostics
 from msg_conventions.diagnostics import TYPE as DIAGNOSTICS_TYPE
-from msg_conventions.ego import ego_messages
+from msg_conventions.ego import decode_state, ego_messages
+from msg_conventions.ego import STATE_TYPE as ODOMETRY_TYPE
 from msg_conventions.fits import decode_fit
 from msg_conventions.frames import decode_frames, encode_frames
 from msg_conventions.frames import TYPE as TF_TYPE
-from msg_conventions.odometry import decode_state
-from msg_conventions.odometry import TYPE as ODOMETRY_TYPE
+from msg_conventions.hashes import decode_hashes, hash_of
 from msg_conventions.paths import decode_path, decode_route, encode_route
 from msg_conventions.paths import TYPE as PATH_TYPE
 from msg_conventions.pictures import decode_footprint, encode_footprint, FOOTPRINT_TYPE
 from msg_conventions.roads import decode_map, decode_poses, MAP_TYPE, POSES_TYPE
+from msg_conventions.scenario_info import decode_info, ScenarioEntry
 from msg_conventions.scenarios import decode_scenario, encode_scenario
 from msg_conventions.streams import decode_fix, decode_speed, encode_fix, encode_speed
 from msg_conventions.topics import FIX_TYPE, TWIST_TYPE
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from msg_conventions.trajectory import TYPE as TRAJECTORY_TYPE
-from scenario_gen.bags import run_messages
-from scenario_gen.bags.template import read_template
-from scenario_gen.bags.told import told_numbers, told_requests, told_values
-from scenario_gen.bags.validation import asked_by_digest
+from scenario_gen.recordings.template import decode_template
+from scenario_gen.recordings.write import result_messages
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 TEMPLATE = encounter(3)
@@ -68,7 +66,7 @@ def seeds(kind: str, examples: Callable[[], Sequence[bytes]], _folder: Path) -> 
 
 def of_run(*topics: str) -> list[bytes]:
     """The messages of some topics of a run."""
-    return [data for topic, data, _ in run_messages(hand_made_run()) if topic in topics]
+    return [data for topic, data, _ in result_messages(hand_made_run()) if topic in topics]
 
 
 def ego(topic: str) -> list[bytes]:
@@ -76,20 +74,20 @@ def ego(topic: str) -> list[bytes]:
     return [data for name, data in ego_messages(scenario(5, n=1), 7_000_000_000) if name == topic]
 
 
-def told(data: bytes) -> None:
+def diagnostics(data: bytes) -> None:
     """Decode diagnostics, and all that is read from their texts."""
-    stamp, statuses = decode_diagnostics(data)
-    told_values([data], stamp)
-    told_requests([data])
-    told_numbers([data])
-    asked_by_digest([("info", data)])
-    for status in statuses:
-        read_request(status)
+    decode_diagnostics(data)
+    for info in decode_info(data):
+        if isinstance(info, ScenarioEntry):
+            info.asked()
+        else:
+            info.sentence()
+            info.result()
 
 
 def template(messages: dict[str, bytes], topic: str, data: bytes) -> None:
     """Read a template of whose messages one is damaged."""
-    read_template(messages | {topic: data})
+    decode_template(messages | {topic: data})
 
 
 def decoder(name: str, kind: str, examples: Callable[[], Sequence[bytes]], decode: Callable[[bytes], object]) -> Target:
@@ -99,7 +97,7 @@ def decoder(name: str, kind: str, examples: Callable[[], Sequence[bytes]], decod
 
 def template_targets() -> tuple[Target, ...]:
     """Return one target per message of a template."""
-    messages = {topic: data for topic, data, _ in run_messages(hand_made_run())}
+    messages = {topic: data for topic, data, _ in result_messages(hand_made_run())}
     kinds = {"tracks": TRAJECTORY_TYPE, "changepoints": TRAJECTORY_TYPE, "fit": TRAJECTORY_TYPE, "map": MAP_TYPE}
     kinds |= {"vehicle_1/route": PATH_TYPE, "road/entries": POSES_TYPE}
     return tuple(
@@ -128,16 +126,14 @@ TARGETS = (
         lambda: [encode_scenario(scenario(k), 5) for k in (1, 2)] + ego("ego/track"),
         decode_scenario,
     ),
-    decoder("message_diagnostics", DIAGNOSTICS_TYPE, lambda: of_run("diagnostics", "scenarios/info"), told),
+    decoder("message_diagnostics", DIAGNOSTICS_TYPE, lambda: of_run("diagnostics", "scenarios/info"), diagnostics),
     decoder(
         "message_route",
         PATH_TYPE,
         lambda: [encode_route(route(k), STAMPS, "map") for k in (1, 2)],
         lambda data: (decode_path(data), decode_route(data, STAMPS)),
     ),
-    decoder(
-        "message_belonging", DIAGNOSTICS_TYPE, lambda: of_run("road/info", "fit/info"), lambda d: decode_belonging(d, "info")
-    ),
+    decoder("message_belonging", DIAGNOSTICS_TYPE, lambda: of_run("road/info", "fit/info"), lambda d: decode_hashes(d, "info")),
     decoder("message_map_hash", MAP_TYPE, lambda: of_run("map"), partial(hash_of, "map")),
     decoder("message_map", MAP_TYPE, lambda: of_run("map"), decode_map),
     decoder("message_poses", POSES_TYPE, lambda: of_run("road/entries", "road/exits"), decode_poses),

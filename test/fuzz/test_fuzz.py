@@ -12,17 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Every reader gets damaged inputs for two seconds, every decoder 200 of them; more of it: `make soak PART=fuzz`."""
+"""Every reader and every decoder gets its valid inputs and some damaged ones; more of it: `make soak PART=fuzz`."""
 
-from harness import fuzz, targets
+from harness import corpus, fuzz, targets
+from lengths import LONG
 import pytest
 
+pytestmark = pytest.mark.spread
 TARGETS = targets()
+DAMAGED = 400 if LONG else 20
 
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_nothing_but_errors_of_ours_comes_out(name, tmp_path):
-    executions, seconds = (200, 60.0) if name.startswith(("message_", "template_")) else (100_000, 2.0)
-    record = fuzz(TARGETS[name], tmp_path, executions=executions, seconds=seconds)
-    assert record.executions > 0
+    executions = len(corpus(TARGETS[name])) + DAMAGED
+    record = fuzz(TARGETS[name], tmp_path, executions, seconds=600.0)
+    assert record.executions == executions
     assert not record.failures, "\n".join(f"{f.signature}: {f.message} ({tmp_path / f.file})" for f in record.failures.values())

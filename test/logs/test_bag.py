@@ -20,13 +20,13 @@ from log_builders import crossing, geographic, save
 import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
+from synthetic_cases import fix_message, nanoseconds_to_time, twist_message
 
 from msg_conventions.tracks import encode_tracks
-from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.bag import FIX, ODOMETRY, STORES, TWIST
-from scenario_gen.logs.synthetic import fix_message, nanoseconds_to_time, twist_message
+from scenario_gen.recordings.samples import FIX, ODOMETRY, STORES, TWIST
+from scenario_gen.types.encounter import Encounter, Vehicle
 
 TRACKS = "trajectory_msgs/msg/MultiDOFJointTrajectory"
 STRING = "std_msgs/msg/String"

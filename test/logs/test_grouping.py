@@ -73,7 +73,9 @@ def test_a_long_standstill_ends_an_encounter(tmp_path):
 
 
 def test_long_meetings_are_cut(tmp_path):
-    found, _ = groups(tmp_path, car("1", 0, 100, 0, 0, 8), car("2", 0, 100, 0, 4, 8), car("3", 0, 100, 0, 8, 8), longest=30.0)
+    found, _ = groups(
+        tmp_path, car("1", 0, 100, 0, 0, 8), car("2", 0, 100, 0, 4, 8), car("3", 0, 100, 0, 8, 8), max_duration=30.0
+    )
     assert {name for name, _ in found} == {"1,2,3"}
     assert all(seconds <= 30.0 for _, seconds in found)
     assert sum(seconds for _, seconds in found) > 95.0
@@ -95,9 +97,9 @@ def test_in_a_busy_log_only_those_who_interact_meet(tmp_path):
 
 def test_the_largest_group_is_a_parameter(tmp_path):
     cars = [car(str(k), 0, 10, 12 * k, 0, 10) for k in range(7)]
-    found, _ = groups(tmp_path, *cars, most_vehicles=7)
+    found, _ = groups(tmp_path, *cars, max_vehicles=7)
     assert found == [("0,1,2,3,4,5,6", 10.0)]
-    found, _ = groups(tmp_path, *cars, most_vehicles=2)
+    found, _ = groups(tmp_path, *cars, max_vehicles=2)
     assert all(len(name.split(",")) == 2 for name, _ in found)
     assert {"0,1", "1,2", "2,3", "3,4", "4,5", "5,6"} <= {name for name, _ in found}
 

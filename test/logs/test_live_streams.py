@@ -19,8 +19,8 @@ import math
 import numpy as np
 import pytest
 
-from msg_conventions.streams import geodetic
 from scenario_gen.errors import InputError
+from scenario_gen.geodesy import latitude_longitude
 from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams
 from scenario_gen.logs.streams import FAR_NS
 from scenario_gen.logs.synthetic import bundled
@@ -35,7 +35,7 @@ def encounter():
 
 def messages_of(encounter):
     """(kind, vehicle, stamp, values…) of every sample, in order of time."""
-    places = geodetic(encounter)
+    places = latitude_longitude(encounter)
     found = []
     for k in range(encounter.speed.shape[1]):
         stamp = encounter.start_ns + k * encounter.dt_ns
@@ -158,7 +158,7 @@ def test_a_slower_source_is_waited_for(encounter):
 
 
 def test_memory_is_bounded(encounter):
-    config = LogConfig(longest=2.0)
+    config = LogConfig(max_duration=2.0)
     streams = Streams(config)
     for k in range(3000):
         streams.put_fix("1", k * TICK // 50, 42.0, -83.0)

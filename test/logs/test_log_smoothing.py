@@ -22,9 +22,7 @@ from scipy.optimize import minimize
 
 from scenario_gen.logs import LogConfig
 from scenario_gen.logs.cleaning import Track
-from scenario_gen.logs.motion import Motion
-from scenario_gen.logs.path import fit_path, straight_path
-from scenario_gen.logs.smoothing import smooth_piece, standing, white_equivalent
+from scenario_gen.logs.smoothing import fit_path, Motion, smooth_piece, standing, straight_path, white_equivalent
 
 CONFIG = LogConfig()
 

@@ -17,8 +17,8 @@
 import numpy as np
 import pytest
 
-from scenario_gen.interaction import find_waits
 from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.template.interaction import find_waits
 
 VEHICLES = {
     "cats_av_lane_change/encounter_3plus_lane_change_four_vehicles_utc36110.csv": 4,
@@ -114,12 +114,12 @@ def test_jittering_vehicles_have_steady_headings(data):
 )
 def test_long_logs_give_sensible_encounters(data, pattern):
     (path,) = data.glob(f"trajectories/{pattern}")
-    config = LogConfig(most_vehicles=3, longest=40.0)
+    config = LogConfig(max_vehicles=3, max_duration=40.0)
     result = read_log(path, config)
     assert len(result.encounters) >= 3
     for encounter in result.encounters:
         assert 2 <= len(encounter.vehicles) <= 3
-        assert config.shortest - 0.05 <= encounter.duration <= config.longest + 1e-6
+        assert config.min_duration - 0.05 <= encounter.duration <= config.max_duration + 1e-6
         assert_drivable(encounter, config)
         gaps = np.linalg.norm(encounter.position[:, None] - encounter.position[None], axis=3)
         gaps[np.arange(len(gaps)), np.arange(len(gaps))] = np.inf

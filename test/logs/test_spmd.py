@@ -20,8 +20,7 @@ import pytest
 
 from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.files import COLUMNS
-from scenario_gen.logs.spmd import EPOCH_NS
+from scenario_gen.logs.tables import COLUMNS, EPOCH_NS
 
 FIRST = 270_000_000_000_000  # Gentime: microseconds since 2004-01-01, in July 2012
 

@@ -22,10 +22,11 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 import shapely
+from synthetic_cases import main, make_case, ORIGIN, START_NS
 
-from scenario_gen.interaction import find_waits
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.synthetic import bundled, CASES, main, make_case, ORIGIN, START_NS
+from scenario_gen.logs.synthetic import bundled, CASES
+from scenario_gen.template.interaction import find_waits
 
 FINE = 0.02
 

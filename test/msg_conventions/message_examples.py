@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 import numpy as np
 
 from msg_conventions.paths import chord_length
-from scenario_gen.encounter import Encounter, Vehicle
-from scenario_gen.planning.route import Route
-from scenario_gen.scenario import Scenario
-from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.route import Route
+from scenario_gen.types.scenario import Scenario
+from scenario_gen.types.segmentation import Segmentation
 
 NASTY_HEADINGS = (0.0, np.pi, -np.pi, np.pi - 1e-10, -np.pi + 4e-10, 3.0 * np.pi, -5.0 * np.pi, 0.5 * np.pi, 1e-10)
 

@@ -18,16 +18,16 @@ import numpy as np
 import pytest
 
 from msg_conventions import trajectory
-from msg_conventions.odometry import decode_state, encode_state
+from msg_conventions.ego import decode_state, encode_state
 from msg_conventions.paths import decode_path, decode_route, encode_path
 from msg_conventions.roads import decode_map, decode_poses, encode_map, encode_poses
 from msg_conventions.scenarios import decode_scenario
 from msg_conventions.tracks import decode_tracks
 from msg_conventions.trajectory import Trajectory
 from scenario_gen.arrays import canonical_heading
-from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
 from scenario_gen.roads import build_road
+from scenario_gen.types.encounter import Vehicle
 
 UNTURNED = np.array([0.0, 0.0, 0.0, 1.0]).tobytes()
 

@@ -15,6 +15,7 @@
 """Every convention gives back what went in, bit for bit, and refuses what is damaged with a reason."""
 
 from collections import Counter
+from dataclasses import replace
 import json
 import math
 
@@ -29,22 +30,22 @@ from msg_conventions import (
     diagnostics,
     ego,
     fits,
-    names,
-    odometry,
     paths,
     pictures,
     roads,
+    scenario_info,
     scenarios,
     tracks,
     trajectory,
 )
 from scenario_gen.arrays import canonical_angle
-from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
-from scenario_gen.fitting.result import Fit, FittedVehicle
-from scenario_gen.planning.route import Route
-from scenario_gen.roads.road import Road
-from scenario_gen.scenario import BoundaryStates, Cause, ScenarioSet
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.names import token, tokens
+from scenario_gen.types.road import Road
+from scenario_gen.types.route import Route
+from scenario_gen.types.scenario import BoundaryStates, Cause, ScenarioSet
 
 
 @given(seeds, st.integers(2, 5), st.integers(2, 60))
@@ -160,41 +161,53 @@ def test_fit():
 def test_reports():
     sent = ScenarioSet(50, (scenario(1),), 70, Counter({Cause.OVERLAP: 15, Cause.OFF_ROAD: 5}), ("clock stretched by 5 %",))
     template = encounter(3)
-    statuses = (
-        diagnostics.scenario_status(sent.scenarios[0], b"bytes", "r1", "/gp_sampler", road="straight"),
-        *diagnostics.fit_statuses(_fit(template, np.array([0, 7, 20, 39])), "/planner"),
-        diagnostics.request_status(sent, "r1", "/gp_sampler", 7),
-    )
-    stamp, got = diagnostics.decode_diagnostics(diagnostics.encode_diagnostics(statuses, 5))
-    assert stamp == 5
-    assert got == statuses
-    account = diagnostics.read_request(got[-1], sent.scenarios)
-    assert account == sent
-    assert got[-1].level is diagnostics.Level.WARN
-    with pytest.raises(InputError, match="no account"):
-        diagnostics.read_request(got[0])
+    fit = _fit(template, np.array([0, 7, 20, 39]))
+    asked = BoundaryStates(np.ones((2, 4)), np.zeros((2, 4)))
+    entry = _entry(sent.scenarios[0], b"bytes", asked=asked, about={"road": "straight"})
+    summary = scenario_info.request_summary(sent, "r1", "/gp_sampler", 7)
+    statuses = (entry.status, *fits.fit_statuses(fit, "/planner"), summary.status)
+    data = diagnostics.encode_diagnostics(statuses, 5)
+    assert diagnostics.decode_diagnostics(data) == (5, statuses)
+    assert scenario_info.decode_info(data) == (entry, summary)
+    assert entry.road == "straight" and entry.sha256 == scenarios.digest(b"bytes")
+    assert_same(entry.asked(), asked, "start", "end")
+    assert summary.result(sent.scenarios) == sent
+    assert summary.status.level is diagnostics.Level.WARN
+    former = {**summary.values, "refused.time_law": "1", "refused.moving_wait": "2"}  # as 0.2 wrote it
+    refused = replace(summary, status=replace(summary.status, values=former)).result().refused
+    assert refused[Cause.SPEED_PROFILE] == 1 and refused[Cause.STOP_NOT_KEPT] == 2
+    by_subject = {status.name.partition(": ")[2]: status.values for status in statuses}
+    assert_same(fits.decode_fitted(fit.fitted[0].anchors, by_subject, fit.vehicles[0].id), fit.fitted[0], "moved", "stands")
+    with pytest.raises(InputError, match="fit of nobody"):
+        fits.decode_fitted(fit.fitted[0].anchors, by_subject, "nobody")
 
 
-@given(st.lists(st.integers(0, 9), min_size=1, unique=True), st.lists(st.integers(0, 9), min_size=1, unique=True), st.data())
-def test_a_request_that_was_begun_and_comes_again_is_taken_once(indices, others, data):
-    """Whatever the killed sampler had published: a part of the same set, or of that of another seed."""
-    again = [{"index": str(k), "seed": "7", "sha256": f"7/{k}"} for k in indices]
-    begun = data.draw(st.sampled_from([again, [{"index": str(k), "seed": "8", "sha256": f"8/{k}"} for k in others]]))
-    entries = {}
-    for entry in [*begun[: data.draw(st.integers(0, len(begun)))], *again]:
-        diagnostics.take_entry(entries, entry)
-    assert list(entries.values()) == again
+def _entry(sent, data, **values):
+    return scenario_info.scenario_entry(sent, data, "r1", "/gp_sampler", template=sent.vehicles, **values)
+
+
+@pytest.mark.parametrize("key", ["request", "index", "seed", "published", "candidates"])
+def test_entries_and_summaries_that_lack_something_say_what(key):
+    sent = scenario(1)
+    entry = _entry(sent, b"", asked=BoundaryStates(np.zeros((2, 4)), np.zeros((2, 4))))
+    summary = scenario_info.request_summary(ScenarioSet(1, (sent,), 1), "r1", "/n", 7)
+    status = (entry if key in ("index", "seed") else summary).status
+    values = {name: text for name, text in status.values.items() if name != key} | ({key: "?"} if key == "published" else {})
+    data = diagnostics.encode_diagnostics([replace(status, values=values)], 5)
+    with pytest.raises(InputError, match=f"scenarios/info.*{key} is"):
+        for info in scenario_info.decode_info(data):
+            info.result()
 
 
 @given(seeds)
 def test_states(seed):
     sent = np.array([*generator(seed).normal(0, 100, 2), generator(seed).choice(NASTY_HEADINGS), 8.5])
-    stamp, frame, child, got = odometry.decode_state(odometry.encode_state(sent, "vehicle_7", "map", 5))
+    stamp, frame, child, got = ego.decode_state(ego.encode_state(sent, "vehicle_7", "map", 5))
     assert (stamp, frame, child) == (5, "map", "vehicle_7")
     assert got[[0, 1, 3]].tobytes() == sent[[0, 1, 3]].tobytes()
     assert canonical_angle(got[2]) == canonical_angle(sent[2])
     with pytest.raises(InputError, match="not finite"):
-        odometry.encode_state(sent * np.nan, "vehicle_7", "map", 5)
+        ego.encode_state(sent * np.nan, "vehicle_7", "map", 5)
 
 
 def test_ego_slot():
@@ -202,21 +215,21 @@ def test_ego_slot():
     sent = dict(ego.ego_messages(track, 17))
     assert list(sent) == ["ego/start", "ego/goal", "ego/track"]
     for topic, k in (("ego/start", 0), ("ego/goal", -1)):
-        stamp, frame, child, state = odometry.decode_state(sent[topic])
+        stamp, frame, child, state = ego.decode_state(sent[topic])
         assert (stamp, frame, child) == (17, track.frame_id, "vehicle_v0")
         assert state[[0, 1, 3]].tolist() == [*track.position[0, k], track.speed[0, k]]
     assert_same(scenarios.decode_scenario(sent["ego/track"])[1], track, "vehicles", "time", "position", "speed", "frame_id")
-    told = diagnostics.request_status(ScenarioSet(1, (), 1, ego=track), "r", "/n", 7, {"count": "1", "ego": "v0"}).values
-    assert told["ego"] == "v0" and told["count"] == "1"
-    assert json.loads(told["ego_goal"])[3] == track.speed[0, -1]
+    said = scenario_info.request_summary(ScenarioSet(1, (), 1, ego=track), "r", "/n", 7, {"count": "1", "ego": "v0"}).values
+    assert said["ego"] == "v0" and said["count"] == "1"
+    assert json.loads(said["ego_goal"])[3] == track.speed[0, -1]
     assert ego.ego_values(None) == {}
 
 
 def test_asked_states_are_in_the_order_of_the_scenario():
     vehicles = tuple(Vehicle(f"v{k}") for k in range(3))
     asked = BoundaryStates(np.arange(12.0).reshape(3, 4) / 10.0, np.zeros((3, 4)))
-    told = diagnostics.asked_values(asked, vehicles, scenario(1, n=2))
-    assert json.loads(told["asked_start"]) == asked.start[:2].tolist()
+    entry = scenario_info.scenario_entry(scenario(1, n=2), b"", "r", "/n", template=vehicles, asked=asked)
+    assert entry.asked().start.tolist() == asked.start[:2].tolist()
 
 
 def test_footprint():
@@ -225,27 +238,27 @@ def test_footprint():
 
 
 def test_ids_become_ros_tokens_and_collisions_are_refused():
-    assert names.tokens(["7", "car 1", "Ü-bus", "a__b"]) == ("7", "car_1", "bus", "a_b")
+    assert tokens(["7", "car 1", "Ü-bus", "a__b"]) == ("7", "car_1", "bus", "a_b")
     with pytest.raises(InputError, match=r"'car 1' and 'car_1'"):
-        names.tokens(["car 1", "car_1"])
+        tokens(["car 1", "car_1"])
     with pytest.raises(InputError, match="no letter"):
-        names.token("--")
+        token("--")
 
 
 @given(st.floats(0.1, 50.0), st.floats(0.1, 10.0))
 def test_footprints_travel_in_joint_names(length, width):
     vehicle = Vehicle("car_1", length, width)
-    assert names.vehicle_of(names.joint_names([vehicle])[0]) == vehicle
+    assert trajectory.vehicle_of(trajectory.joint_names([vehicle])[0]) == vehicle
 
 
 @pytest.mark.parametrize("name", ["a:4.8", "a:0x1", "a:nanx1", "a:4.8x-1", "a:1e999x1", "a:--x1"])
 def test_a_bad_footprint_is_refused(name):
     with pytest.raises(InputError, match=r"length.*width"):
-        names.vehicle_of(name)
+        trajectory.vehicle_of(name)
 
 
 def test_a_bare_joint_name_is_a_default_car():
-    assert names.vehicle_of("car") == Vehicle("car")
+    assert trajectory.vehicle_of("car") == Vehicle("car")
 
 
 @given(st.data())
@@ -279,8 +292,6 @@ def test_damaged_messages_are_refused_with_a_reason(data):
 
 def test_what_is_not_finite_is_neither_sent_nor_read():
     sent = trajectory.decode(tracks.encode_tracks(encounter(1, 2, 5)), "tracks")
-    from dataclasses import replace
-
     bad = np.array(sent.speed)
     bad[0, 0] = np.nan
     with pytest.raises(InputError, match="not finite"):
@@ -293,8 +304,6 @@ def test_what_is_not_finite_is_neither_sent_nor_read():
 
 def test_uneven_tracks_are_refused():
     sent = trajectory.decode(tracks.encode_tracks(encounter(1, 2, 5)), "tracks")
-    from dataclasses import replace
-
     uneven = np.array(sent.time_ns)
     uneven[2] += 1
     with pytest.raises(InputError, match=r"sample 2 comes .* even steps"):

@@ -26,9 +26,10 @@ import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
-from msg_conventions import changepoints, diagnostics, odometry, paths, pictures, roads, scenarios, tracks
-from scenario_gen.encounter import Vehicle
-from scenario_gen.roads.road import Road
+from msg_conventions import changepoints, diagnostics, ego, paths, pictures, roads, scenario_info, scenarios, tracks
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import BoundaryStates
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 ANCHORS = [5_000_000_000, 6_100_000_000, 7_000_000_000, 7_000_000_001, 9_000_000_000]
@@ -43,15 +44,17 @@ def _messages():
         yield changepoints.POSTERIOR_TYPE, changepoints.encode_posterior(template, parts)
         yield scenarios.TYPE, scenarios.encode_scenario(scenario(seed, n), 17)
         state = np.array([1.5, -2.5, 3.0, 8.25])
-        yield odometry.TYPE, odometry.encode_state(state, f"vehicle_{'x' * seed}", frame, 17)
+        yield ego.STATE_TYPE, ego.encode_state(state, f"vehicle_{'x' * seed}", frame, 17)
         yield paths.TYPE, paths.encode_route(route(seed), ANCHORS, frame)
         yield paths.TYPE, paths.encode_path(np.zeros((seed - 1, 3)), np.arange(seed - 1), frame, 3)
         ends = np.array([[1.0, 2.0, 3.0]] * (seed - 1)).reshape(-1, 3)
         road = Road("r", np.eye(seed, dtype=bool), 0.1, np.ones(2), ends, ends, frame)
         yield roads.MAP_TYPE, roads.encode_map(road, 5)
         yield roads.POSES_TYPE, roads.encode_poses(road.entries, frame, 5)
-        status = diagnostics.scenario_status(scenario(seed), b"", frame, "/n" * seed)
-        yield diagnostics.TYPE, diagnostics.encode_diagnostics([status] * (seed - 1), 1)
+        sent = scenario(seed)
+        asked = BoundaryStates(np.zeros((2, 4)), np.ones((2, 4)))
+        entry = scenario_info.scenario_entry(sent, b"", frame, "/n" * seed, template=sent.vehicles, asked=asked)
+        yield diagnostics.TYPE, diagnostics.encode_diagnostics([entry.status] * (seed - 1), 1)
         yield pictures.FOOTPRINT_TYPE, pictures.encode_footprint(Vehicle("a"), 3, frame)
         yield pictures.MARKERS_TYPE, pictures.scenario_markers(scenario(seed), 3)
 
@@ -96,7 +99,7 @@ def test_a_consumer_reads_what_the_convention_says():
 
 def test_the_conventions_need_no_ros():
     code = (
-        "import sys, msg_conventions.topics, scenario_gen.bags; "
+        "import sys, msg_conventions.topics, scenario_gen.recordings.write; "
         "found = [m for m in sys.modules if m.split('.')[0] in ('rclpy', 'nav_msgs', 'trajectory_msgs')]; "
         "sys.exit(str(found) if found else 0)"
     )

@@ -110,8 +110,7 @@ class Client:
     @staticmethod
     def _kind_of(topic: str):
         from msg_conventions.topics import topic_entry
-        from scenario_gen.nodes.message_classes import message_class
-        from scenario_gen.nodes.voice import qos
+        from scenario_gen.nodes.topics import message_class, qos
 
         kind, quality = topic_entry(topic)
         return message_class(kind), qos(quality)

@@ -25,8 +25,8 @@ from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.fits import decode_fit
 from msg_conventions.streams import encode_fix, encode_speed
 from msg_conventions.tracks import encode_tracks
-from scenario_gen.encounter import Encounter
 from scenario_gen.logs import read_log
+from scenario_gen.types.encounter import Encounter
 
 pytestmark = pytest.mark.dds
 NODES = {

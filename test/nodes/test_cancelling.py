@@ -23,21 +23,24 @@ from scenario_gen.errors import ScenarioGenError
 from scenario_gen.fitting import fit_template
 from scenario_gen.logs import read_log
 from scenario_gen.nodes.worker import Worker
-from scenario_gen.planning import plan_routes
 from scenario_gen.roads import build_road
+from scenario_gen.routing import plan_routes
 from scenario_gen.segmentation import segment
 
 CASE = "scenario_gen/resources/synthetic_c"
 
 
 def test_every_stage_of_a_node_can_be_cancelled(request):
-    (encounter,) = read_log(request.config.rootpath / CASE).encounters
+    def read():  # anew: what is derived of an encounter is derived once
+        return read_log(request.config.rootpath / CASE).encounters[0]
+
+    encounter = read()
     segmentation, road = segment(encounter), build_road("straight", encounter)
     fit = fit_template(encounter, segmentation, road)
     for work in (
         lambda: segment(encounter),
-        lambda: build_road("straight", encounter),
-        lambda: fit_template(encounter, segmentation, road),
+        lambda fresh=read(): build_road("straight", fresh),
+        lambda fresh=read(): fit_template(fresh, segmentation, road),
         lambda: plan_routes(road, fit),
     ):
         with cancellable(lambda: True), pytest.raises(CancelledError):

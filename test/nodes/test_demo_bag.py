@@ -19,16 +19,15 @@ import threading
 import pytest
 from suite_processes import Processes, RESOURCES
 
-from msg_conventions.belonging import decode_belonging, identity, INFOS
 from msg_conventions.diagnostics import decode_diagnostics
+from msg_conventions.hashes import decode_hashes, INFOS, template_hashes
 from msg_conventions.scenarios import encode_scenario
-from scenario_gen.bags import read_messages
-from scenario_gen.bags.run import run_messages
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.logs import read_log
 from scenario_gen.nodes.run_suite import Job, run_suite
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.results import as_run
+from scenario_gen.recordings.write import result_messages
+from scenario_gen.storage.messages import read_messages
 
 pytestmark = [pytest.mark.dds, pytest.mark.slow]
 JOBS = (
@@ -48,15 +47,15 @@ def test_the_suite_records_several_jobs_in_their_namespaces(demo):
     for job in JOBS:
         encounter = read_log(job.log).encounters[0]
         case = generate(encounter, job.road, PipelineConfig(), count=3, seed=7)
-        expected = [encode_scenario(s, encounter.start_ns) for s in case.with_changepoints.scenarios]
+        expected = [encode_scenario(s, encounter.start_ns) for s in case.generated.scenarios]
         assert [m.data for m in read_messages(demo) if m.topic == f"{job.namespace}/scenarios"] == expected
-        written = list(run_messages(as_run(case, 7, job.namespace)))
+        written = list(result_messages(case))
         for topic in INFOS:
-            own = [decode_belonging(data, topic) for name, data, _ in written if name == topic]
-            assert [decode_belonging(m.data, topic) for m in read_messages(demo) if m.topic == f"{job.namespace}/{topic}"] == own
+            own = [decode_hashes(data, topic) for name, data, _ in written if name == topic]
+            assert [decode_hashes(m.data, topic) for m in read_messages(demo) if m.topic == f"{job.namespace}/{topic}"] == own
         messages = {topic: data for topic, data, _ in written}
         infos = [m.data for m in read_messages(demo) if m.topic == f"{job.namespace}/scenarios/info"]
-        assert all(identity(messages).items() <= decode_diagnostics(data)[1][0].values.items() for data in infos)
+        assert all(template_hashes(messages).items() <= decode_diagnostics(data)[1][0].values.items() for data in infos)
     assert [path.name for path in demo.parent.iterdir()] == ["bag"]
 
 

@@ -22,7 +22,7 @@ import time
 
 import pytest
 
-from scenario_gen.nodes.doctor import ERROR, examine, meeting, OK, packages, python, variables, WARNING
+from scenario_gen.nodes.doctor import discovery, ERROR, examine, OK, packages, python, variables, WARNING
 
 ROOT = Path(__file__).resolve().parents[2]
 MISFITS = """
@@ -71,7 +71,7 @@ def test_a_sound_environment_is_sound_and_a_misfit_on_the_domain_is_found(domain
     try:
         assert misfit.stdout.readline() == "ready\n"
         for _ in range(20):  # discovery takes its time on a busy machine
-            (fault,) = [finding for finding in meeting(environment) if finding.subject == "QoS"]
+            (fault,) = [finding for finding in discovery(environment) if finding.subject == "QoS"]
             if fault.level != OK:
                 break
             time.sleep(0.5)
@@ -84,7 +84,7 @@ def test_a_sound_environment_is_sound_and_a_misfit_on_the_domain_is_found(domain
 
 @pytest.mark.dds
 def test_an_rmw_that_is_not_there_is_an_error(domain):
-    (found,) = meeting(os.environ | {"ROS_DOMAIN_ID": str(domain), "RMW_IMPLEMENTATION": "rmw_no_such_cpp"})
+    (found,) = discovery(os.environ | {"ROS_DOMAIN_ID": str(domain), "RMW_IMPLEMENTATION": "rmw_no_such_cpp"})
     assert (found.level, found.subject) == (ERROR, "DDS")
     assert "rmw" in found.message.lower()
 

@@ -25,7 +25,8 @@ from msg_conventions.frames import decode_frames, encode_frames, TYPE
 from msg_conventions.scenarios import encode_scenario
 from msg_conventions.tracks import encode_tracks
 from msg_conventions.trajectory import decode
-from scenario_gen.bags import bag_topics, write_run
+from scenario_gen.recordings.write import write_recording
+from scenario_gen.storage.messages import bag_topics
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 
@@ -37,7 +38,7 @@ def run():
 
 @pytest.fixture(scope="module")
 def bag(run, tmp_path_factory):
-    return write_run(tmp_path_factory.mktemp("frames") / "bag", run)
+    return write_recording(tmp_path_factory.mktemp("frames") / "bag", run)
 
 
 def test_bytes_are_those_of_rosbags_and_are_read_back():
@@ -57,7 +58,7 @@ def test_a_type_that_is_not_installed_has_the_name_and_hash_of_the_real_one(clie
 
 
 @pytest.mark.dds
-@pytest.mark.parametrize("topic", ["tracks", "scenarios"])
+@pytest.mark.parametrize("topic", [pytest.param("tracks", marks=pytest.mark.long), "scenarios"])
 def test_a_motion_is_told_sample_by_sample(start, client, run, bag, tmp_path, topic):
     """Poses are the trajectory's, stamps the clock's, and every footprint's frame hangs on the map."""
     from std_srvs.srv import Trigger
@@ -78,7 +79,7 @@ def test_a_motion_is_told_sample_by_sample(start, client, run, bag, tmp_path, to
     recorder.terminate()
     assert recorder.wait(180.0) == 0
 
-    sent = encode_tracks(run.encounter) if topic == "tracks" else encode_scenario(run.result.scenarios[3], 0)
+    sent = encode_tracks(run.encounter) if topic == "tracks" else encode_scenario(run.generated.scenarios[3], 0)
     told = decode(sent, topic)
     begin = run.encounter.start_ns if topic == "tracks" else _logged(bag, 3)
     messages = [STORE.deserialize_cdr(data, TYPE) for data in client.heard["/tf"]]
@@ -116,10 +117,10 @@ def test_of_two_players_the_later_tells_no_frames(start, client, bag):
     client.wait("/tf", 30)
     second = start("player", "-r", "__ns:=/other", bag=bag, loop=True)
     assert second.stdout is not None
-    while "another publisher of /tf tells vehicle_1, vehicle_bus_2" not in (line := second.stdout.readline()):
+    while "another publisher of /tf publishes vehicle_1, vehicle_bus_2" not in (line := second.stdout.readline()):
         assert line, "it ended"
     count = len(client.heard["/tf"])
-    client.wait("/tf", count + 200)  # the first goes on
+    client.wait("/tf", count + 50)  # the first goes on
     first.terminate()
     output, _ = first.communicate(timeout=180.0)
     assert first.returncode == 0 and "another publisher" not in output, output
@@ -148,6 +149,6 @@ def _counted(client, topic):
 
 
 def _logged(bag, number):
-    from scenario_gen.bags import read_messages
+    from scenario_gen.storage.messages import read_messages
 
     return [message.stamp_ns for message in read_messages(bag, lambda name: name.endswith("scenarios"))][number]

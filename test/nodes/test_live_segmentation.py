@@ -23,8 +23,9 @@ from suite_processes import Client, Processes, RESOURCES
 from msg_conventions import trajectory
 from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.diagnostics import decode_diagnostics, Level
-from msg_conventions.streams import encode_fix, encode_speed, geodetic
+from msg_conventions.streams import encode_fix, encode_speed
 from msg_conventions.tracks import decode_tracks
+from scenario_gen.geodesy import latitude_longitude
 from scenario_gen.logs import read_log
 
 pytestmark = pytest.mark.dds
@@ -78,7 +79,7 @@ def test_changepoints_come_while_the_vehicles_drive_and_scenarios_afterwards(sui
 def test_a_changepoint_does_not_wait_for_what_follows(suite, client):
     """Twelve seconds of sixteen are said, and no more: the changepoint at four seconds comes, and then what they amount to."""
     (encounter,) = read_log(LOG).encounters
-    places = geodetic(encounter)
+    places = latitude_longitude(encounter)
     start, order = 10**18, []
 
     def note(data: bytes) -> None:

@@ -16,18 +16,20 @@
 
 import json
 
+from lengths import LONG
 from nav_msgs.srv import LoadMap
 import pytest
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 from suite_processes import Client, whole_chain
 
-from msg_conventions.belonging import decode_belonging, hash_of
 from msg_conventions.diagnostics import decode_diagnostics, Level
-from scenario_gen.bags import read_messages
-from scenario_gen.bags.validation import validate_bag
+from msg_conventions.hashes import decode_hashes, hash_of
+from scenario_gen.review.validation import validate_bag
+from scenario_gen.storage.messages import read_messages
 
 pytestmark = pytest.mark.dds
+LOADS = 10 if LONG else 2
 NODES = ("log_player", "road_server", "segmenter", "planner", "gp_sampler", "recorder")
 TINY = "image: tiny.pgm\nresolution: 0.5\norigin: [0.0, 0.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
 
@@ -59,16 +61,16 @@ def _another_road(client: Client, width: float) -> str:
 def test_nothing_of_an_old_map_is_said_beside_the_new_one(suite, client):
     client.hear("/scenarios/info", "/map", "/fit/info")
     hashes = [hash_of("map", client.wait("/map")[0])]
-    for k in range(10):
+    for k in range(LOADS):
         if k % 3 == 0:  # amid its publication; else while the planner or the sampler is at work, or before
             client.until(lambda: any(v.get("map_hash") == hashes[-1] for v in _infos(client)), "a scenario on this map")
         hashes.append(_another_road(client, 3.5 + 0.05 * (k + 1)))
     client.until(lambda: _closed(client, hashes[-1]), "the set on the last map")
-    assert len(set(hashes)) == 11
+    assert len(set(hashes)) == LOADS + 1
     order = [hashes.index(values["map_hash"]) for values in _infos(client)]
     assert order == sorted(order), "a scenario on an older map came after one on a newer"
     assert len({values["template_hash"] for values in _infos(client)}) == 1
-    assert decode_belonging(client.heard["/fit/info"][-1], "fit/info")["map"] == hashes[-1]
+    assert decode_hashes(client.heard["/fit/info"][-1], "fit/info")["map"] == hashes[-1]
 
 
 def test_routes_of_an_old_map_are_not_driven_on_one_that_the_planner_refuses(suite, client, tmp_path):
@@ -101,4 +103,4 @@ def test_the_bag_is_valid_with_each_scenario_on_its_own_map(suite):
     (found,) = validate_bag(bag)
     assert (found.invalid, found.unaccounted, found.found) == (0, 0, {}), json.dumps(found.left_out)
     assert not any("off_road" in sentence for sentence in found.left_out)
-    assert len({hash_of("map", m.data) for m in read_messages(bag) if m.topic == "/map"}) == 12
+    assert len({hash_of("map", m.data) for m in read_messages(bag) if m.topic == "/map"}) == LOADS + 2

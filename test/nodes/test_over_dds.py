@@ -24,9 +24,9 @@ from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.fits import decode_fit
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest, encode_scenario
-from scenario_gen.bags import read_messages
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.storage.messages import read_messages
 
 pytestmark = pytest.mark.dds
 LOG = RESOURCES / "synthetic_c"
@@ -79,7 +79,7 @@ def test_in_process_gives_the_same_bytes(suite, client):
     heard = client.wait("/scenarios", 4)
     (encounter,) = read_log(LOG).encounters
     case = generate(encounter, "straight", PipelineConfig(), count=4, seed=7)
-    assert [digest(encode_scenario(s, encounter.start_ns)) for s in case.with_changepoints.scenarios] == [
+    assert [digest(encode_scenario(s, encounter.start_ns)) for s in case.generated.scenarios] == [
         digest(data) for data in heard[:4]
     ]
 

@@ -26,8 +26,8 @@ from suite_processes import Client, RESOURCES
 from typer.testing import CliRunner
 import yaml
 
-from scenario_gen.bags import bag_topics, read_messages
 from scenario_gen.cli import app
+from scenario_gen.storage.messages import bag_topics, read_messages
 
 pytestmark = pytest.mark.dds
 
@@ -171,7 +171,7 @@ def test_a_full_disk_ends_the_recording_and_says_so(start, client, tmp_path):
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+@pytest.mark.parametrize("storage", [pytest.param("mcap", marks=pytest.mark.long), "sqlite3"])
 def test_a_bag_of_genuine_rosbag2_is_played_and_recorded_again(start, client, data, tmp_path, storage):
     """What `ros2 bag record` wrote goes through the player and the recorder unchanged, and is split by size."""
     from std_srvs.srv import Trigger

@@ -20,16 +20,15 @@ import pytest
 from suite_processes import Processes, RESOURCES
 
 from msg_conventions.diagnostics import decode_diagnostics
-from msg_conventions.ego import ego_messages
-from msg_conventions.odometry import decode_state
+from msg_conventions.ego import decode_state, ego_messages
 from msg_conventions.scenarios import digest, encode_scenario
-from scenario_gen.bags.regenerate import regenerate_scenario
-from scenario_gen.bags.validation import validate_bag
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import EvaluationConfig
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.requests import Request
+from scenario_gen.review.regenerate import regenerate_scenario
+from scenario_gen.review.validation import validate_bag
+from scenario_gen.types.request import Request
 
 pytestmark = pytest.mark.dds
 LOG, ROAD, SEED = RESOURCES / "synthetic_b", "t_intersection", 7
@@ -68,7 +67,7 @@ def in_process(count, **asked):
     (encounter,) = read_log(LOG).encounters
     config = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False))
     case = generate(encounter, ROAD, config, count=count, seed=SEED, request=Request(**asked))
-    return encounter, case.with_changepoints
+    return encounter, case.generated
 
 
 def published(client, result):

@@ -23,7 +23,7 @@ import time
 import pytest
 from suite_processes import RESOURCES
 
-from scenario_gen.bags import read_messages
+from scenario_gen.storage.messages import read_messages
 
 pytestmark = pytest.mark.dds
 
@@ -38,28 +38,38 @@ def _started(node: str, domain: int, *arguments: str) -> "subprocess.Popen[str]"
     )
 
 
-@pytest.mark.parametrize("signals", [(signal.SIGINT,), (signal.SIGINT, signal.SIGINT), (signal.SIGTERM,)], ids=str)
-def test_a_recorder_closes_its_bag(signals, domain, tmp_path):
-    player = _started("player", domain, "-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "rate:=1000.0", "-p", "loop:=true")
-    process = _started("recorder", domain, "-p", f"bag:={tmp_path / 'bag'}", "-p", "topics:=.*", "-p", "compress:=false")
+ENDS = {"once": (signal.SIGINT,), "twice": (signal.SIGINT, signal.SIGINT), "terminated": (signal.SIGTERM,)}
+
+
+def test_a_recorder_closes_its_bag(domain, tmp_path):
+    """Three recorders of one player, each ended in its own way."""
+    player = _started("player", domain, "-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "rate:=50.0", "-p", "loop:=true")
+    recording = ("-p", "topics:=/?vehicle_.*", "-p", "compress:=false")
+    recorders = {
+        name: _started("recorder", domain, "-r", f"__node:={name}", "-p", f"bag:={tmp_path / name}", *recording) for name in ENDS
+    }
     try:
         deadline = time.monotonic() + 180.0
-        files = tmp_path / "bag" / "bag_0.mcap"
-        while not (files.is_file() and files.stat().st_size > 100_000):
+        files = [tmp_path / name / f"{name}_0.mcap" for name in ENDS]
+        while not all(file.is_file() and file.stat().st_size > 100_000 for file in files):
             assert time.monotonic() < deadline, "nothing was recorded"
             time.sleep(0.1)
-        for number in signals:
-            process.send_signal(number)
-            time.sleep(0.05)
-        output, _ = process.communicate(timeout=120.0)
-        assert "Traceback" not in output, output
-        assert process.returncode == 0
+        for name, signals in ENDS.items():
+            for number in signals:
+                recorders[name].send_signal(number)
+                time.sleep(0.05)
+        for process in recorders.values():
+            output, _ = process.communicate(timeout=120.0)
+            assert "Traceback" not in output, output
+            assert process.returncode == 0
     finally:
         player.send_signal(signal.SIGTERM)
         output, _ = player.communicate(timeout=120.0)
-        process.kill()
+        for process in recorders.values():
+            process.kill()
     assert "Traceback" not in output, output
-    assert len(list(read_messages(tmp_path / "bag"))) > 100
+    for name in ENDS:
+        assert len(list(read_messages(tmp_path / name))) > 100
 
 
 def test_ctrl_c_while_the_libraries_load(domain):

@@ -146,9 +146,9 @@ def test_the_evaluator_gives_up_requests_whose_scenarios_never_come_and_says_so(
             node.received("scenarios/info", encode_diagnostics([Status("scenario", Level.OK, "", entry)], 0))
             closing = {"request": str(k), "published": "1", "requested": "1"}
             node.received("scenarios/info", encode_diagnostics([Status("request", Level.OK, "", closing)], 0))
-        accounts = node._accounts.open
+        accounts = node._requests.open
         assert len(accounts) == wait
-        node.health._again()  # a second has gone by
+        node.diagnostics._tick()  # a second has gone by
         for k in range(2 * node.config.measured):  # of one request that is never closed
             data = f"{k}".encode()
             entry = {"request": "endless", "index": str(k), "seed": "0", "sha256": digest(data)}

@@ -26,7 +26,7 @@ from suite_processes import Client, RESOURCES
 from msg_conventions.scenarios import digest, encode_scenario
 from scenario_gen.logs import read_log
 from scenario_gen.nodes.domain import free_domain
-from scenario_gen.nodes.suite import chosen, CLASSES
+from scenario_gen.nodes.start import chosen, NODES
 from scenario_gen.pipeline import generate, PipelineConfig
 
 # name -> namespace, domain (by number), log, road, seed, the signals that end it
@@ -81,14 +81,14 @@ def test_each_suite_makes_its_own_scenarios_and_none_meets_another(suites, domai
             heard = clients[domain].wait(f"{namespace}/scenarios", COUNT)
             (encounter,) = read_log(RESOURCES / log).encounters
             case = generate(encounter, road, PipelineConfig(), count=COUNT, seed=seed)
-            expected = [digest(encode_scenario(s, encounter.start_ns)) for s in case.with_changepoints.scenarios]
+            expected = [digest(encode_scenario(s, encounter.start_ns)) for s in case.generated.scenarios]
             assert [digest(data) for data in heard] == expected, "one process must give the bytes that the stages give"
         assert len(clients[0].heard["/a/scenarios"]) == len(clients[0].heard["/b/scenarios"]) == COUNT
         assert not clients[1].heard["/b/scenarios"]
         spaces = [{space for _, space in client.node.get_node_names_and_namespaces()} for client in clients]
         assert spaces == [{"/", "/a", "/b"}, {"/", "/a"}]
         names = [name for name, space in clients[0].node.get_node_names_and_namespaces() if space == "/a"]
-        assert sorted(names) == sorted(set(CLASSES) - {"player"})
+        assert sorted(names) == sorted(set(NODES) - {"player"})
     finally:
         for client in clients:
             client.close()

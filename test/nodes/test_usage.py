@@ -21,8 +21,9 @@ import sys
 
 import pytest
 
-from scenario_gen.nodes.suite import CLASSES
-from scenario_gen.nodes.usage import asks_for_help, help_of
+from scenario_gen.nodes.process import asks_for_help
+from scenario_gen.nodes.ros_parameters import help_of
+from scenario_gen.nodes.start import node_class, NODES
 
 
 @pytest.mark.dds
@@ -43,10 +44,10 @@ def test_help_may_be_read_in_part():
     assert done.stderr == "" and "suite: all nodes in one process" in done.stdout
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", NODES)
 def test_every_node_lists_all_of_its_parameters(name):
     module = importlib.import_module(f"scenario_gen.nodes.{name}")
-    text = help_of(name, (getattr(module, CLASSES[name]),))
+    text = help_of(name, (node_class(name),))
     for entry in fields(module.Config):
         assert f"  {entry.name} := " in text or f"  {entry.name}." in text
 

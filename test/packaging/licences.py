@@ -13,8 +13,9 @@
 # limitations under the License.
 """Licences of every locked package, from the metadata of what is installed: `make licences` writes docs/licences.md."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import Distribution, distributions, PackageNotFoundError
+from itertools import chain
 from pathlib import Path
 import re
 import xml.etree.ElementTree as ET
@@ -56,11 +57,11 @@ INTRO = """# Licences
 The project itself is under Apache-2.0. It ships no other's code but one: the HTML pages that it writes contain plotly.js (MIT).
 What it needs is installed from wheels; this table lists every package of `requirements.lock` and of `requirements-ros.lock` with
 the licence that its metadata states (`make licences` writes it; a test holds it against the locks). *Run time* is what `setup.py`
-asks for, the extra `ros` included, and all that follows from it; the rest builds and tests. Under the GPL are two linters and one
+asks for, all extras included, and all that follows from it; the rest builds and tests. Under the GPL are two linters and one
 file of docutils, which no user needs; nothing is under the AGPL.
 
-Not in the table: the peers of `requirements-bench.lock` and the tools of `requirements-audit.lock`, which are installed by
-`make bench` and `make audit` alone and with which nothing is built or shipped.
+Not in the table: the peers of `requirements-bench.lock` and the tools of `requirements-audit.lock` and `requirements-docs.lock`,
+which `make bench`, `make audit` and `make docs` alone install, and of which nothing is shipped.
 
 | package | version | licence | needed |
 |---|---|---|---|
@@ -103,16 +104,26 @@ def _of_manifests(found: Distribution) -> Iterator[str]:
         yield "Apache-2.0"
 
 
+def extras() -> dict[str, list[Requirement]]:
+    """Return what requirements.in asks for at run time, by the extra that it is for, or "core"."""
+    found: dict[str, list[Requirement]] = {}
+    for line in (ROOT / "requirements.in").read_text(encoding="utf-8").partition("# to build and to test")[0].splitlines():
+        if line.startswith("#"):
+            heading = line.removeprefix("# ").removeprefix("extra ")
+        else:
+            found.setdefault(heading, []).append(Requirement(line))
+    return found
+
+
 def run_time() -> list[Requirement]:
-    """Return what setup.py asks for, the extra `ros` included."""
-    listed = [(ROOT / name).read_text(encoding="utf-8") for name in ("requirements.in", "requirements-ros.in")]
-    lines = [line for text in listed for line in text.partition("# to build and to test")[0].splitlines()]
-    return [Requirement(line) for line in lines if line and not line.startswith("#")]
+    """Return what setup.py asks for, all extras included."""
+    ros = (ROOT / "requirements-ros.in").read_text(encoding="utf-8").partition("# to build and to test")[0].splitlines()
+    return [*chain.from_iterable(extras().values()), *(Requirement(line) for line in ros if not line.startswith("#"))]
 
 
-def needed_at_run_time(known: Mapping[str, Distribution]) -> set[str]:
-    """Return the names of all that the requirements of setup.py lead to on this platform, the extra `ros` included."""
-    open_ = run_time()
+def needed_at_run_time(known: Mapping[str, Distribution], wanted: Sequence[Requirement] | None = None) -> set[str]:
+    """Return the names of all that requirements (all of setup.py's) lead to on this platform."""
+    open_ = run_time() if wanted is None else list(wanted)
     found: set[str] = set()
     seen: set[tuple[str, str]] = set()
     while open_:

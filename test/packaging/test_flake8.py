@@ -19,6 +19,7 @@ from source_files import ROOT, SOURCES
 
 
 @pytest.mark.flake8
+@pytest.mark.long  # `ruff check` has the same rules in a second
 @pytest.mark.linter
 def test_flake8():
     linter = pytest.importorskip("ament_flake8.main")

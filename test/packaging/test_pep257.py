@@ -21,6 +21,7 @@ LEFT_OUT = [f"D10{digit}" for digit in range(8)]  # whether there must be a docs
 
 
 @pytest.mark.pep257
+@pytest.mark.long  # `ruff check` has the same rules in a second
 @pytest.mark.linter
 def test_pep257(capsys):
     linter = pytest.importorskip("ament_pep257.main")

@@ -15,14 +15,23 @@
 
 import json
 import re
+import subprocess
+import sys
 
 from audit import CLEAN, judge, NOT_MADE, VULNERABLE
-from licences import COPYLEFT, installed, licence, locked, needed_at_run_time, PAGE, run_time
+from licences import COPYLEFT, extras, installed, licence, locked, needed_at_run_time, PAGE, run_time
+from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 import pytest
 from source_files import ROOT
 
-LOCKS = ("requirements.lock", "requirements-ros.lock", "requirements-bench.lock", "requirements-audit.lock")
+LOCKS = (
+    "requirements.lock",
+    "requirements-ros.lock",
+    "requirements-bench.lock",
+    "requirements-audit.lock",
+    "requirements-docs.lock",
+)
 
 
 @pytest.mark.parametrize("wanted", run_time(), ids=str)
@@ -32,10 +41,22 @@ def test_what_is_needed_at_run_time_has_a_lower_bound_that_the_lock_meets(wanted
     assert all(wanted.specifier.contains(version) for version in versions)
 
 
-def test_setup_py_asks_for_the_same():
+def test_setup_py_asks_for_the_same(tmp_path):
     setup = (ROOT / "setup.py").read_text()
     assert 'python_requires=">=3.11,<3.14"' in setup
     assert 'needed("requirements.in")' in setup and 'needed("requirements-ros.in")' in setup
+    out = subprocess.run([sys.executable, "setup.py", "--quiet", "egg_info", "--egg-base", tmp_path], cwd=ROOT, check=False)
+    assert out.returncode == 0
+    asked = {"core": set()}
+    for line in (tmp_path / "scenario_gen.egg-info" / "requires.txt").read_text().split():
+        if line.startswith("["):
+            asked[line.strip("[]")] = names = set()
+        else:
+            (names if len(asked) > 1 else asked["core"]).add(Requirement(line).name)
+    listed = {name: {one.name for one in wanted} for name, wanted in extras().items()}
+    everything = set().union(*listed.values()) - listed["core"]
+    assert asked["core"] == listed["core"] and asked["all"] == everything and asked["cli"] == everything - {"ompl"}
+    assert asked["ros"] - everything == {"ros-jazzy-rclpy", "ros-jazzy-common-interfaces"}
 
 
 def test_what_a_sourced_jazzy_has_itself_is_locked_apart():

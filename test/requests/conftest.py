@@ -14,21 +14,22 @@
 
 """The synthetic turning case on a T-intersection: what every request here starts from."""
 
+from given import answer, Given
 import numpy as np
 import pytest
 
-from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.requests import Chain, Request, run_request
 from scenario_gen.roads import build_road
 from scenario_gen.segmentation import segment
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.request import Request
 
 
 @pytest.fixture(scope="session")
 def chain():
     encounter = read_log([bundled("b")]).encounters[0]
-    return Chain(encounter, segment(encounter, seed=7), build_road("t_intersection", encounter), 7)
+    return Given(encounter, segment(encounter, seed=7), build_road("t_intersection", encounter), 7)
 
 
 @pytest.fixture(scope="session")
@@ -39,10 +40,10 @@ def following():
     vehicles = (Vehicle("1"), Vehicle("2"))
     flat = np.zeros((2, 201))
     encounter = Encounter("following", vehicles, 0, 100_000_000, position, flat, flat + 8.0)
-    return Chain(encounter, segment(encounter, seed=7), build_road("straight", encounter), 7)
+    return Given(encounter, segment(encounter, seed=7), build_road("straight", encounter), 7)
 
 
 @pytest.fixture(scope="session")
 def plain(chain):
     """What comes of it when nothing is asked."""
-    return run_request(chain, Request(), count=5)
+    return answer(chain, Request(), count=5)

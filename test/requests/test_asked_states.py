@@ -17,14 +17,18 @@
 from dataclasses import replace
 import re
 
+from given import answer
+from lengths import LONG
 import numpy as np
 import pytest
 
 from scenario_gen.arrays import wrap_angle
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.requests import ImpossibleError, Request, run_request
+from scenario_gen.nearest import ImpossibleError
+from scenario_gen.types.request import Request
 
-COUNT = 5
+COUNT = 5 if LONG else 2
+pytestmark = pytest.mark.spread
 
 
 def achieved(outcome):
@@ -32,7 +36,7 @@ def achieved(outcome):
     asked = outcome.fit.asked
     far = [
         (np.hypot(*(s.position[:, k] - states[:, :2]).T).max(), np.abs(s.speed[:, k] - states[:, 3]).max())
-        for s in outcome.scenarios.scenarios
+        for s in outcome.generated.scenarios
         for k, states in ((0, asked.start), (-1, asked.end))
     ]
     return np.max(far, axis=0)
@@ -59,8 +63,8 @@ def test_what_is_asked_is_met(chain, plain, change):
     ends = {"starts": "start", "goals": "end"}
     texts = {name: state(plain, ends[name], *values) for name, values in change.items()}
     request = Request(**texts)
-    outcome = run_request(chain, request, count=COUNT)
-    assert len(outcome.scenarios.scenarios) == COUNT
+    outcome = answer(chain, request, count=COUNT)
+    assert len(outcome.generated.scenarios) == COUNT
     assert (achieved(outcome) <= (0.1, 0.1)).all()
     for name, own in ends.items():
         rows, met = request.rows(name, chain.encounter), getattr(outcome.fit.asked, own)
@@ -76,7 +80,7 @@ def test_what_is_asked_is_met(chain, plain, change):
 def refused(chain, **texts):
     """The error of an impossible request; every suggestion in it has been taken, from its text alone, and works."""
     with pytest.raises(ImpossibleError) as caught:
-        run_request(chain, Request(**texts), count=COUNT)
+        answer(chain, Request(**texts), count=COUNT)
     error = caught.value
     assert error.suggestions, str(error)
     offers = str(error).partition("Nearest possible: ")[2].split("; or ")
@@ -85,8 +89,8 @@ def refused(chain, **texts):
         taken = dict(re.findall(r"(starts|goals):='([^']*)'", offer))
         longer = re.search(r"max_stretch:=([0-9.]+)", offer)
         own = chain if longer is None else replace(chain, sampling=replace(chain.sampling, max_stretch=float(longer[1])))
-        outcome = run_request(own, Request(**(texts | taken)), count=COUNT)
-        assert len(outcome.scenarios.scenarios) == COUNT
+        outcome = answer(own, Request(**(texts | taken)), count=COUNT)
+        assert len(outcome.generated.scenarios) == COUNT
         assert (achieved(outcome) <= (0.1, 0.1)).all()
     return error
 
@@ -106,7 +110,7 @@ def test_a_goal_off_the_road(chain, plain):
 
 def test_a_start_on_top_of_another_vehicle(following):
     """Two cars drive the same way: the nearest start without overlap lies behind or in front."""
-    made = run_request(following, Request(), count=1)
+    made = answer(following, Request(), count=1)
     x, y, yaw, speed = made.fit.asked.start[0]
     texts = {"starts": f"2: {x + 1.0:.2f} {y:.2f} {yaw:.4f} {speed:.2f}"}
     error = refused(following, **texts)
@@ -130,6 +134,7 @@ def test_a_goal_too_far_for_the_time(chain, plain):
     assert any(one.max_stretch is None for one in error.suggestions), "and another state"
 
 
+@pytest.mark.long
 def test_a_start_too_fast_to_stop(chain, plain):
     weak = replace(chain, sampling=replace(chain.sampling, max_deceleration=4.0))
     texts = {"starts": state(plain, "start", 0, speed=38.0), "goals": state(plain, "end", 0, speed=0.0)}
@@ -147,11 +152,11 @@ def test_a_speed_above_the_limit(chain, plain):
 
 def test_errors_of_the_caller_are_no_impossible_requests(chain):
     with pytest.raises(InputError, match="there are: 1, 2"):
-        run_request(chain, Request(goals="9: 0 0 0"), count=1)
+        answer(chain, Request(goals="9: 0 0 0"), count=1)
     assert issubclass(ImpossibleError, RefusedError)
 
 
 def test_a_cancelled_search_suggests_nothing(chain, plain):
     with pytest.raises(ImpossibleError) as caught:
-        run_request(chain, Request(goals=state(plain, "end", 1, left=-4.0)), count=COUNT, cancelled=lambda: True)
+        answer(chain, Request(goals=state(plain, "end", 1, left=-4.0)), count=COUNT, cancelled=lambda: True)
     assert caught.value.suggestions == ()

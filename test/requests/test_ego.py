@@ -16,22 +16,23 @@
 
 from dataclasses import replace
 
+from given import answer, Given
 import numpy as np
 import pytest
 
-from scenario_gen.interaction import find_conflicts
 from scenario_gen.logs import read_log
-from scenario_gen.requests import Chain, Request, run_request
 from scenario_gen.roads import build_road
 from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.scenario import BoundaryStates
 from scenario_gen.segmentation import segment
+from scenario_gen.template.interaction import find_conflicts, waits_to_keep
+from scenario_gen.types.request import Request
+from scenario_gen.types.scenario import BoundaryStates
 from scenario_gen.validity import Checker
 
 
 @pytest.mark.parametrize("ego", ["1", "2"])
 def test_of_two_vehicles_one_is_left(chain, plain, ego):
-    made = run_request(chain, Request(ego=ego), count=5).scenarios
+    made = answer(chain, Request(ego=ego), count=5).generated
     index = int(ego) - 1
     assert [v.id for s in made.scenarios for v in s.vehicles] == ["2" if ego == "1" else "1"] * 5
     asked = plain.fit.asked
@@ -48,7 +49,7 @@ def test_of_two_vehicles_one_is_left(chain, plain, ego):
 
 
 def test_the_track_is_drivable_in_shape_and_on_the_road(chain):
-    track = run_request(chain, Request(ego="2"), count=1).scenarios.ego
+    track = answer(chain, Request(ego="2"), count=1).generated.ego
     poses = np.column_stack([track.position[0], track.heading[0]])
     vehicle = track.vehicles[0]
     assert footprint_fits(chain.road, poses, vehicle.length, vehicle.width).all()
@@ -62,8 +63,8 @@ def test_leaving_one_out_does_not_wait_for_its_limits(chain):
     """An ego that nobody could drive does not stand in the way of the others."""
     slow = replace(chain, encounter=chain.encounter, sampling=replace(chain.sampling, max_speed=11.0, max_stretch=0.0))
     fast = Request(ego="1", goals="1: 199.0 51.75 0.0 40.0")
-    assert run_request(replace(slow, sampling=replace(slow.sampling, max_speed=40.0)), fast, count=2).scenarios.scenarios
-    assert len(run_request(slow, Request(ego="1"), count=2).scenarios.scenarios) == 2
+    assert answer(replace(slow, sampling=replace(slow.sampling, max_speed=40.0)), fast, count=2).generated.scenarios
+    assert len(answer(slow, Request(ego="1"), count=2).generated.scenarios) == 2
 
 
 @pytest.mark.data
@@ -71,14 +72,15 @@ def test_leaving_one_out_does_not_wait_for_its_limits(chain):
 def test_the_others_stay_valid_among_themselves(data, ego):
     (log,) = (data / "trajectories" / "ngsim_commonroad").glob("encounter_3plus_*.csv")
     encounter = read_log(log).encounters[0]
-    chain = Chain(encounter, segment(encounter), build_road("t_intersection", encounter), 0)
-    outcome = run_request(chain, Request(ego=encounter.vehicles[ego].id), count=3)
+    chain = Given(encounter, segment(encounter), build_road("t_intersection", encounter), 0)
+    outcome = answer(chain, Request(ego=encounter.vehicles[ego].id), count=3)
     kept = [n for n in range(len(encounter.vehicles)) if n != ego]
-    assert len(outcome.scenarios.scenarios) == 3
+    assert len(outcome.generated.scenarios) == 3
     vehicles = tuple(encounter.vehicles[n] for n in kept)
     conflicts = find_conflicts(vehicles, encounter.time, encounter.position[kept], encounter.heading[kept])
-    waits = [replace(wait, vehicle=kept.index(wait.vehicle)) for wait in chain.waits() if wait.vehicle != ego]
+    kept_waits = waits_to_keep(chain.encounter, chain.segmentation)
+    waits = [replace(wait, vehicle=kept.index(wait.vehicle)) for wait in kept_waits if wait.vehicle != ego]
     asked = BoundaryStates(outcome.fit.asked.start[kept], outcome.fit.asked.end[kept])
     checker = Checker(chain.road, asked, conflicts, waits)
-    assert all(verdict.valid for verdict in checker.check(outcome.scenarios.scenarios))
-    assert [v.id for v in outcome.scenarios.scenarios[0].vehicles] == [v.id for v in vehicles]
+    assert all(verdict.valid for verdict in checker.check(outcome.generated.scenarios))
+    assert [v.id for v in outcome.generated.scenarios[0].vehicles] == [v.id for v in vehicles]

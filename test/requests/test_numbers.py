@@ -16,17 +16,18 @@
 
 from dataclasses import replace
 
+from given import answer, Given
 import numpy as np
 import pytest
 
-from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.logs import read_log
-from scenario_gen.requests import Chain, Request, run_request
 from scenario_gen.roads import build_road
 from scenario_gen.sampling import SamplingConfig
 from scenario_gen.sampling.sample import LEVEL_SIZE
-from scenario_gen.scenario import Cause
 from scenario_gen.segmentation import segment
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.request import Request
+from scenario_gen.types.scenario import Cause
 from scenario_gen.validity import Limits
 
 
@@ -48,11 +49,11 @@ def platoons(count):
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 6, 7, 8])
 def test_two_to_eight_vehicles(count):
     encounter = platoons(count)
-    chain = Chain(encounter, segment(encounter, seed=1), build_road("corridor", encounter), 1)
-    outcome = run_request(chain, Request(), count=5)
-    assert len(outcome.scenarios.scenarios) == 5
-    assert {len(s.vehicles) for s in outcome.scenarios.scenarios} == {count}
-    left = run_request(chain, Request(ego=f"car_{count - 1}"), count=2).scenarios
+    chain = Given(encounter, segment(encounter, seed=1), build_road("corridor", encounter), 1)
+    outcome = answer(chain, Request(), count=5)
+    assert len(outcome.generated.scenarios) == 5
+    assert {len(s.vehicles) for s in outcome.generated.scenarios} == {count}
+    left = answer(chain, Request(ego=f"car_{count - 1}"), count=2).generated
     assert {len(s.vehicles) for s in left.scenarios} == {count - 1}
 
 
@@ -62,7 +63,7 @@ def tight(data):
     (log,) = (data / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn_*.csv")
     encounter = read_log(log).encounters[0]
     config = SamplingConfig(lateral_sigma=0.3, observation_sigma=0.3, longitudinal_sigma=0.5, time_sigma=1.0)
-    return Chain(encounter, segment(encounter), build_road("t_intersection", encounter), 0, sampling=config)
+    return Given(encounter, segment(encounter), build_road("t_intersection", encounter), 0, sampling=config)
 
 
 def limited(chain, lateral, **sampling):
@@ -73,7 +74,7 @@ def limited(chain, lateral, **sampling):
 @pytest.mark.data
 def test_variance_adapts_where_validity_is_hard(tight):
     """Few candidates at full variance keep to the limit; with smaller deviations the set is had, and it is said."""
-    made = run_request(limited(tight, 4.5), Request(), count=30).scenarios
+    made = answer(limited(tight, 4.5), Request(), count=30).generated
     assert len(made.scenarios) == 30
     (said,) = (line for line in made.adaptations if "few candidates were valid" in line)
     assert "standard deviations multiplied by 0" in said
@@ -83,11 +84,11 @@ def test_variance_adapts_where_validity_is_hard(tight):
 
 @pytest.mark.data
 def test_a_short_set_says_how_many_and_why(tight):
-    made = run_request(limited(tight, 4.5, attempts=3), Request(), count=80).scenarios
+    made = answer(limited(tight, 4.5, attempts=3), Request(), count=80).generated
     assert 0 < len(made.scenarios) < made.requested == 80
     assert made.candidates == 240 == len(made.scenarios) + made.refused.total()
     assert set(made.refused) == {Cause.LATERAL_ACCELERATION}
-    impossible = run_request(limited(tight, 2.0), Request(), count=10).scenarios
+    impossible = answer(limited(tight, 2.0), Request(), count=10).generated
     assert impossible.scenarios == ()
     assert impossible.refused.total() == impossible.candidates == 200
     assert "few candidates were valid, and smaller standard deviations did not help" in impossible.adaptations

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from scenario_gen.errors import InputError
-from scenario_gen.requests import Request
+from scenario_gen.types.request import Request
 
 
 def test_states_are_read_by_vehicle_and_written_back():

@@ -21,8 +21,7 @@ from scenario_gen.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.roads.own_paths import own_paths
-from scenario_gen.roads.separation import smallest_gaps
+from scenario_gen.template.separation import own_paths, smallest_gaps
 
 ARMS = {"straight": 2, "t_intersection": 3, "four_way": 4}
 

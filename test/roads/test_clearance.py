@@ -22,10 +22,16 @@ from shapely import affinity
 from shapely.geometry import box, LineString, Point
 from shapely.ops import unary_union
 
-from scenario_gen.roads.clearance import clearance_field, clearance_in_cells, footprint_fits, free_length, segments_free
-from scenario_gen.roads.flood import common_component, component_at, components, connected
-from scenario_gen.roads.repair import nearest_pose_with_room
-from scenario_gen.roads.road import Road
+from scenario_gen.roads.clearance import (
+    clearance_field,
+    clearance_in_cells,
+    footprint_fits,
+    free_length,
+    nearest_pose_with_room,
+    segments_free,
+)
+from scenario_gen.roads.connectivity import common_component, component_at, components, connected
+from scenario_gen.types.road import Road
 
 
 def road_of(drivable, resolution=1.0, origin=(0.0, 0.0)):

@@ -21,8 +21,8 @@ import pytest
 import scipy.linalg
 
 from scenario_gen.errors import InputError
+from scenario_gen.reproduce.chain import ordinate_posterior, ordinate_samples
 from scenario_gen.sampling.gp import Features, Observations, Regression, squared_exponential
-from scenario_gen.sampling.ordinate import ordinate_posterior, ordinate_samples, OrdinateConfig
 
 
 def dense(x, y, noise, at, sigma, length, degree):
@@ -135,7 +135,7 @@ def test_ordinate_form_refuses_a_vertical():
 
 def test_ordinate_form_is_exact_at_its_ends_and_lowers_the_degree():
     anchors = np.array([[10.0, 3.0], [60.0, 9.0]])
-    posterior = ordinate_posterior(anchors, np.array([10.0, 35.0, 60.0]), OrdinateConfig())
+    posterior = ordinate_posterior(anchors, np.array([10.0, 35.0, 60.0]))
     assert posterior.mean[[0, 2]] == pytest.approx([3.0, 9.0])
     assert np.diag(posterior.covariance)[[0, 2]] == pytest.approx([0.0, 0.0], abs=1e-18)
     assert posterior.covariance[1, 1] > 0.1

@@ -20,12 +20,12 @@ import numpy as np
 import pytest
 
 from scenario_gen.fitting import fit_template
-from scenario_gen.interaction import find_conflicts, find_waits
 from scenario_gen.logs import read_log
-from scenario_gen.planning import plan_routes
 from scenario_gen.roads import build_road
+from scenario_gen.routing import plan_routes
 from scenario_gen.sampling import regenerate, sample_scenarios, SamplingConfig
 from scenario_gen.segmentation import segment
+from scenario_gen.template.interaction import find_conflicts, find_waits
 from scenario_gen.validity import Checker
 
 CASES = (

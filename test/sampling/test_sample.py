@@ -21,18 +21,18 @@ import numpy as np
 import pytest
 
 from scenario_gen.arrays import wrap_angle
-from scenario_gen.encounter import Encounter, Vehicle
 from scenario_gen.errors import InputError
-from scenario_gen.interaction import find_waits, Wait
-from scenario_gen.planning.route import Route
-from scenario_gen.roads.road import Road
 from scenario_gen.sampling import regenerate, sample_scenarios, SamplingConfig
 from scenario_gen.sampling.candidates import Scale
 from scenario_gen.sampling.prepare import prepare
 from scenario_gen.sampling.sample import LEVEL_SIZE
-from scenario_gen.sampling.time_law import SpeedProfile
-from scenario_gen.scenario import BoundaryStates, Cause, Verdict, Violation
-from scenario_gen.segmentation.result import Segmentation
+from scenario_gen.sampling.speed_profile.qp import SpeedProfile
+from scenario_gen.template.interaction import find_waits, Wait
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.road import Road
+from scenario_gen.types.route import Route
+from scenario_gen.types.scenario import BoundaryStates, Cause, Verdict, Violation
+from scenario_gen.types.segmentation import Segmentation
 from scenario_gen.validity import Checker
 
 TIME = np.arange(201) * 0.1
@@ -203,8 +203,8 @@ def roughness(b):
         ("lateral_sigma", (0.1, 0.2, 0.4, 0.8), spread_across, 1),
         ("observation_sigma", (0.05, 0.2, 0.6), spread_across, 1),
         ("lateral_length", (8.0, 15.0, 30.0, 60.0), roughness, -1),
-        ("time_sigma", (0.1, 0.3, 0.6, 1.0), lambda b: float(b.clock[:, 2].std()), 1),
-        ("time_sigma", (0.1, 0.3, 0.6, 1.0), lambda b: float(b.clock[:, -1].std()), 1),
+        ("time_sigma", (0.1, 0.3, 0.6, 1.0), lambda b: float(b.warped[:, 2].std()), 1),
+        ("time_sigma", (0.1, 0.3, 0.6, 1.0), lambda b: float(b.warped[:, -1].std()), 1),
         ("longitudinal_sigma", (0.0, 0.5, 1.0, 2.0), lambda b: float(stops(b).std()), 1),
     ],
 )
@@ -215,22 +215,23 @@ def test_each_parameter_has_its_monotone_effect(name, values, measure, sign):
 
 def stops(b):
     """Where vehicle 1 stands [m]."""
-    return np.array([b.motion(k, 1).state(np.array([0.5 * (b.clock[k, 2] + b.clock[k, 3])]))[0, 1] for k in range(len(b.clock))])
+    middle = 0.5 * (b.warped[:, 2] + b.warped[:, 3])
+    return np.array([b.motion(k, 1).state(middle[[k]])[0, 1] for k in range(len(b.warped))])
 
 
 def test_deviations_have_the_stated_standard_deviation():
     model, some = batch(4000, lateral_sigma=0.4, observation_sigma=10.0)
     middle = len(model.vehicles[0].path.node) // 2
     assert some.curve[0][:, middle, 1].std() == pytest.approx(0.4, rel=0.05)
-    assert some.clock[:, 2].std() == pytest.approx(np.sqrt(1.0 - np.exp(-((9.0 / 30.0) ** 2))), rel=0.1)
+    assert some.warped[:, 2].std() == pytest.approx(np.sqrt(1.0 - np.exp(-((9.0 / 30.0) ** 2))), rel=0.1)
 
 
 def test_clocks_are_monotone_and_shared():
     _, some = batch(500, time_sigma=3.0)
-    rate = np.diff(some.clock, axis=1) / np.diff(CLOCK)
+    rate = np.diff(some.warped, axis=1) / np.diff(CLOCK)
     assert rate.min() > 0.7
     assert rate.max() < 1.4
-    assert np.abs(some.clock[:, -1] / 0.1 - np.round(some.clock[:, -1] / 0.1)).max() < 1e-9
+    assert np.abs(some.warped[:, -1] / 0.1 - np.round(some.warped[:, -1] / 0.1)).max() < 1e-9
 
 
 def test_lateral_deviation_leaves_room_on_a_narrow_road():
@@ -292,9 +293,9 @@ def test_nothing_is_given_out_after_a_cancellation():
 
 def test_a_wait_stands_where_the_vehicle_does_not_where_it_creeps():
     *head, _ = scene()
-    law = prepare(*head, (Wait(1, 6.8, 13.2),), SamplingConfig()).model.vehicles[1].law
-    still = np.flatnonzero(law.layout.still)
-    assert law.layout.knot[[still[0], still[-1] + 1]] == pytest.approx([7.0, 13.0])
+    qp = prepare(*head, (Wait(1, 6.8, 13.2),), SamplingConfig()).model.vehicles[1].qp
+    still = np.flatnonzero(qp.knots.still)
+    assert qp.knots.knot[[still[0], still[-1] + 1]] == pytest.approx([7.0, 13.0])
 
 
 def test_a_creeping_wait_stays_slow_and_does_not_stand():
@@ -310,7 +311,7 @@ def test_a_creeping_wait_stays_slow_and_does_not_stand():
     given = (creeping, segmentation, road, (routes[0], own, routes[2]), BoundaryStates(asked.start, ends))
     made = sample_scenarios(*given, all_valid, count=20, seed=1, waits=waits).scenarios
     verdicts = Checker(None, None, None, waits).check(made)
-    assert not any(violation.cause is Cause.MOVING_WAIT for verdict in verdicts for violation in verdict.violations)
+    assert not any(violation.cause is Cause.STOP_NOT_KEPT for verdict in verdicts for violation in verdict.violations)
     assert all((s.speed[1] > 0.0).all() for s in made)
     stood = sample_scenarios(*given, all_valid, count=20, seed=1, waits=(replace(waits[0], creeps=False),)).scenarios
     assert all((s.speed[1] == 0.0).sum() > 30 for s in stood)
@@ -325,7 +326,7 @@ def test_stretched_clock_is_said():
     impossible = sample_scenarios(
         encounter, segmentation, road, routes, asked, all_valid, SamplingConfig(max_speed=3.0), count=5, waits=waits
     )
-    assert impossible.refused[Cause.TIME_LAW] == 1
+    assert impossible.refused[Cause.SPEED_PROFILE] == 1
     assert "cannot drive" in impossible.adaptations[0]
 
 

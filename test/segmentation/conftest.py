@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from scenario_gen.encounter import Encounter, Vehicle
+from scenario_gen.types.encounter import Encounter, Vehicle
 
 
 def straight_encounter(speeds: np.ndarray, noise: float = 0.0, seed: int = 0) -> Encounter:

@@ -19,9 +19,9 @@ import pytest
 
 from msg_conventions import trajectory
 from msg_conventions.changepoints import encode_live_changepoints
-from scenario_gen.encounter import Vehicle
 from scenario_gen.logs import Sample
 from scenario_gen.segmentation import LiveSegmenter
+from scenario_gen.types.encounter import Vehicle
 
 TICK = 100_000_000
 START = 10**18

@@ -14,11 +14,12 @@
 
 """The sampler samples what it says: Geweke's joint-distribution test, and calibration on sequences from the model's own prior."""
 
+from lengths import LONG
 import numpy as np
 import pytest
 
-from scenario_gen.segmentation._chain import run_chain
-from scenario_gen.segmentation._emission import joint_prior
+from scenario_gen.segmentation.hdp_hmm.chain import run_chain
+from scenario_gen.segmentation.hdp_hmm.emission import joint_prior
 
 HYPER = np.array([3.0, 1.0, 6.0, 0.5, 4.0, 2.0])
 NU = 8.0
@@ -105,7 +106,7 @@ def statistics(labels, v, top, d):
 @pytest.mark.parametrize("order", [0, 1])
 def test_geweke(order):
     """Prior draws and the chain (labels, parameters | series) <-> (series | labels, parameters) have the same moments."""
-    d, samples, draws = 2, 12, 2500
+    d, samples, draws = 2, 12, 2500 if LONG else 800
     rng = np.random.default_rng([11, order])
     forward = []
     for _ in range(draws):

@@ -21,9 +21,9 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from scenario_gen.encounter import Encounter
 from scenario_gen.errors import InputError
 from scenario_gen.segmentation import segment, SegmentationConfig
+from scenario_gen.types.encounter import Encounter
 
 
 def wait_and_brake(encounter_of) -> Encounter:

@@ -23,8 +23,9 @@ from figures import Figure
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
-from scenario_gen.bags import read_messages, reindex
 from scenario_gen.errors import InputError
+from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.reindex import reindex
 
 
 def run(state: Path) -> Iterator[Figure]:

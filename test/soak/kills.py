@@ -93,8 +93,8 @@ class Target:
 
     def settle(self) -> None:
         """Do what the next run does first."""
-        from scenario_gen.bags.regenerate import REGENERATED
         from scenario_gen.results import EVALUATED, GENERATED
+        from scenario_gen.review.regenerate import REGENERATED
 
         kind = next(kind for kind in (GENERATED, EVALUATED, REGENERATED) if kind.name == KINDS[self.command])
         try:

@@ -80,8 +80,8 @@ def run(state: Path) -> Iterable[Figure]:
     many = platoon(state / "many.csv", 30, 40.0)
     sizes = ("--set", "log.proximity=400", "--set")
     for name, asked, arguments in (
-        ("long", "an encounter of 1,000 s", (str(longest), *sizes, "log.longest=1000")),
-        ("many", "an encounter of 30 vehicles, 40 s", (str(many), *sizes, "log.most_vehicles=30")),
+        ("long", "an encounter of 1,000 s", (str(longest), *sizes, "log.max_duration=1000")),
+        ("many", "an encounter of 30 vehicles, 40 s", (str(many), *sizes, "log.max_vehicles=30")),
     ):
         found = peak(state, name, *arguments, "--road", "straight", "--count", "10")
         seen = "failed" if found is None else f"finished, {found:.2f} GB"

@@ -27,9 +27,10 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import get_typestore, Stores
 
-from scenario_gen.bags import bag_topics, read_messages, write_run
 from scenario_gen.errors import InputError
-from scenario_gen.storage import BagConfig
+from scenario_gen.recordings.write import write_recording
+from scenario_gen.storage.config import BagConfig
+from scenario_gen.storage.messages import bag_topics, read_messages
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 
@@ -86,7 +87,7 @@ def test_a_changed_database_is_an_error(tmp_path, statement):
 
 
 def test_damaged_bytes_are_an_error_or_change_nothing_else(tmp_path):
-    bag = write_run(tmp_path / "bag", hand_made_run())
+    bag = write_recording(tmp_path / "bag", hand_made_run())
     whole = (bag / "bag_0.mcap").read_bytes()
     rng = random.Random(2)
     refused = 0
@@ -119,7 +120,7 @@ def test_other_encodings_are_refused_by_name(tmp_path, encoding, profile, said):
 
 
 def test_a_file_that_metadata_lists_but_is_not_there(tmp_path):
-    bag = write_run(tmp_path / "bag", hand_made_run())
+    bag = write_recording(tmp_path / "bag", hand_made_run())
     shutil.move(bag / "bag_0.mcap", bag / "other.mcap")
     with pytest.raises(InputError, match=r"lists bag_0\.mcap, which is not there; .*reindex"):
         list(read_messages(bag))

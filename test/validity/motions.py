@@ -16,9 +16,9 @@
 
 import numpy as np
 
-from scenario_gen.encounter import Vehicle
-from scenario_gen.roads.road import Road
-from scenario_gen.scenario import Scenario
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import Scenario
 from scenario_gen.validity import Limits
 
 FREE = Limits(

@@ -26,9 +26,9 @@ from scipy.interpolate import CubicHermiteSpline
 import shapely
 
 from scenario_gen.arrays import Floats
-from scenario_gen.interaction import Conflict, Wait
-from scenario_gen.roads.road import Road
-from scenario_gen.scenario import BoundaryStates, Scenario
+from scenario_gen.template.interaction import Conflict, Wait
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import BoundaryStates, Scenario
 from scenario_gen.validity import Limits
 
 EDGE = 1e-6  # m, a footprint is shrunk by this before it is compared with the road
@@ -202,7 +202,7 @@ def _stands(scenario, instants, velocity, asked, waits, limits):
             edges = np.flatnonzero(np.diff(np.concatenate(([False], slow, [False]))))
             lengths = [instants[end - 1] - instants[begin] for begin, end in zip(edges[::2], edges[1::2], strict=True)]
             if sum(int((length + 0.011) / limits.stand_duration) for length in lengths) < wanted:
-                yield f"moving_wait: vehicle {i} is slow {len(lengths)} time(s), {sum(lengths):.2f} s in all; {wanted} asked"
+                yield f"stop_not_kept: vehicle {i} is slow {len(lengths)} time(s), {sum(lengths):.2f} s in all; {wanted} asked"
         throughout = any(wait.vehicle == i and wait.start == 0 for wait in waits)
         if throughout and asked is not None and np.linalg.norm(asked.end[i, :2] - asked.start[i, :2]) < 1e-3 and not slow.all():
-            yield f"moving_wait: vehicle {i} waits throughout but moves"
+            yield f"stop_not_kept: vehicle {i} waits throughout but moves"

@@ -23,8 +23,8 @@ import pytest
 import shapely
 
 from benchmarks._recheck import Account, Recheck
-from scenario_gen.encounter import Encounter, Vehicle
-from scenario_gen.scenario import BoundaryStates
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.scenario import BoundaryStates
 
 TIME = np.arange(101) * 0.1
 LENGTH = 100.0
@@ -96,7 +96,7 @@ def test_a_wait_that_moves_and_ends_that_are_missed_are_found():
     assert found(recheck, scenario).found == {}
     creeping = scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), straight(5.0, 20.0, 0.0, 0.3, TIME)), TIME)
     account = found(recheck, creeping)
-    assert account.found["moving_wait"] == 1
+    assert account.found["stop_not_kept"] == 1
     assert account.found["boundary_state"] >= 1
 
 

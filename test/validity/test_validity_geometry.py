@@ -22,8 +22,8 @@ from oracle import boxes_at, drivable_area, footprints, oracle_violations
 import pytest
 import shapely
 
-from scenario_gen.encounter import Vehicle
-from scenario_gen.scenario import Cause
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.scenario import Cause
 from scenario_gen.validity import Checker, Limits
 
 COARSE = np.arange(5) * 1.0

@@ -21,10 +21,10 @@ import numpy as np
 from oracle import oracle_violations
 import pytest
 
-from scenario_gen.encounter import Vehicle
 from scenario_gen.errors import InputError
-from scenario_gen.interaction import Conflict, find_conflicts, Wait
-from scenario_gen.scenario import BoundaryStates, Cause
+from scenario_gen.template.interaction import Conflict, find_conflicts, Wait
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.scenario import BoundaryStates, Cause
 from scenario_gen.validity import Checker, Limits
 
 TIME = np.arange(201) * 0.1
@@ -192,8 +192,8 @@ def stopping(stop, crawl=0.0):
 def test_a_wait_must_stand_for_a_second():
     waits = (Wait(0, 7.0, 10.0),)
     assert causes(stopping(1.2), waits=waits) == []
-    assert causes(stopping(0.5), waits=waits) == [Cause.MOVING_WAIT]
-    assert causes(stopping(3.0, crawl=0.15), waits=waits) == [Cause.MOVING_WAIT]
+    assert causes(stopping(0.5), waits=waits) == [Cause.STOP_NOT_KEPT]
+    assert causes(stopping(3.0, crawl=0.15), waits=waits) == [Cause.STOP_NOT_KEPT]
     assert causes(stopping(3.0, crawl=0.05), waits=waits) == []
 
 
@@ -201,15 +201,15 @@ def test_a_creeping_wait_must_be_slow_for_a_second():
     waits = (Wait(0, 7.0, 10.0, creeps=True),)
     assert causes(stopping(3.0, crawl=0.4), waits=waits) == []
     assert causes(stopping(1.2), waits=waits) == []
-    assert causes(stopping(3.0, crawl=0.6), waits=waits) == [Cause.MOVING_WAIT]
+    assert causes(stopping(3.0, crawl=0.6), waits=waits) == [Cause.STOP_NOT_KEPT]
     both = (Wait(0, 2.0, 3.5), Wait(0, 7.0, 10.0, creeps=True))
-    assert causes(stopping(3.0, crawl=0.4), waits=both) == [Cause.MOVING_WAIT]
+    assert causes(stopping(3.0, crawl=0.4), waits=both) == [Cause.STOP_NOT_KEPT]
     assert causes(stopping(3.0), waits=both) == []
 
 
 def test_two_waits_need_two_stands_or_one_as_long():
     waits = (Wait(0, 2.0, 3.5), Wait(0, 5.0, 6.2))
-    assert causes(stopping(1.2), waits=waits) == [Cause.MOVING_WAIT]
+    assert causes(stopping(1.2), waits=waits) == [Cause.STOP_NOT_KEPT]
     assert causes(stopping(2.4), waits=waits) == []
     twice = speed_profile(-90, 0, 0, [0, 3, 4.5, 7, 10, 11.5, 15, 20], [6, 0, 0, 5, 0, 0, 6, 6])
     assert causes(good(twice), waits=waits) == []
@@ -220,7 +220,7 @@ def test_creeping_under_a_published_standstill_is_no_stand():
     position = np.array(scenario.position)
     position[0, 80:93, 0] += 0.015 * np.arange(13)  # 0.15 m/s, while the speed says 0
     position[0, 93:, 0] += 0.18
-    assert causes(replace(scenario, position=position), waits=(Wait(0, 7.0, 8.2),)) == [Cause.MOVING_WAIT]
+    assert causes(replace(scenario, position=position), waits=(Wait(0, 7.0, 8.2),)) == [Cause.STOP_NOT_KEPT]
 
 
 def test_a_vehicle_that_waits_throughout_never_moves():
@@ -232,7 +232,7 @@ def test_a_vehicle_that_waits_throughout_never_moves():
     twitch = np.interp(TIME, [0, 15, 15.2, 15.6, 15.8, 20], [0, 0, 0.2, -0.2, 0, 0])
     position = standing[0] + np.stack((np.cumsum(twitch) * 0.1, 0 * TIME), axis=-1)
     moving = scenario_of([(position, standing[1], np.abs(twitch)), other], TIME)
-    assert Cause.MOVING_WAIT in causes(moving, asked=asked, waits=waits)
+    assert Cause.STOP_NOT_KEPT in causes(moving, asked=asked, waits=waits)
 
 
 def test_what_is_not_given_is_not_checked_and_said():
@@ -241,7 +241,7 @@ def test_what_is_not_given_is_not_checked_and_said():
         "off_road",
         "boundary_state",
         "passing_order",
-        "moving_wait",
+        "stop_not_kept",
     ]
     assert Checker(ROAD, asked_of(good()), (), ()).not_applicable == ()
     far = scenario_of([straight(1e5, 0, 0, 5, TIME)], TIME)

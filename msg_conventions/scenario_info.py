@@ -1,0 +1,265 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`scenarios/info` (diagnostic_msgs/DiagnosticArray): an entry for each scenario, then a summary of its request.
+
+Every key of both stands in this file alone; docs/interfaces.md lists them. Stamp: the template's. Entries are joined with their
+scenarios by the SHA-256 of the scenario's CDR bytes. QoS: reliable, transient_local, depth 1000.
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+import json
+
+import numpy as np
+
+from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status
+from msg_conventions.ego import ego_values
+from msg_conventions.hashes import MAP_HASH, TEMPLATE_HASH
+from msg_conventions.scenarios import digest
+from scenario_gen.arrays import Floats
+from scenario_gen.errors import guarded, InputError
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, ScenarioSet
+
+INFO = "scenarios/info"
+REFUSED, ADAPTATION = "refused.", "adaptation."
+Values = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class ScenarioEntry:
+    """What `scenarios/info` says of one scenario.
+
+    Attributes:
+        request: id of its request; index, seed: which sample of it.
+        sha256: of the scenario's CDR bytes.
+        status: all of it: `asked_start`, `asked_end`, `achieved_start`, `achieved_end`, `template`, `road`, `ego…`, hashes.
+    """
+
+    request: str
+    index: int
+    seed: int
+    sha256: str
+    status: Status
+
+    @property
+    def road(self) -> str:
+        """Name of the road; "" if it is not said, as by the nodes."""
+        return self.status.values.get("road", "")
+
+    @property
+    def template_hash(self) -> str | None:
+        """Hash of the `tracks` that it was made from (hashes.py); None where it is not said (before version 0.2)."""
+        return self.status.values.get(TEMPLATE_HASH)
+
+    @property
+    def map_hash(self) -> str | None:
+        """Hash of the `map` that it was made for, likewise."""
+        return self.status.values.get(MAP_HASH)
+
+    def asked(self, what: str = INFO) -> BoundaryStates | None:
+        """Return the start and end states (N, 4) that were asked of it, None where they are not said.
+
+        Raises:
+            InputError: naming `what`, they are damaged.
+        """
+        texts = [self.status.values.get(key) for key in ("asked_start", "asked_end")]
+        where = f"{what}: the asked states of {self.status.message}"
+        return None if None in texts else BoundaryStates(*(_states(text or "", where) for text in texts))
+
+
+@dataclass(frozen=True)
+class RequestSummary:
+    """What `scenarios/info` says of a request once it is closed.
+
+    Attributes:
+        request: its id.
+        published: how many scenarios of it were published.
+        status: all of it: counts, adaptations, `ego…`, and what is needed to make it again (parameters, versions, logs).
+    """
+
+    request: str
+    published: int
+    status: Status
+
+    @property
+    def values(self) -> Values:
+        """All key-values."""
+        return self.status.values
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether it was ended early."""
+        return "cancelled" in self.values
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """What is needed to make it again, and its seed: what is neither its identity nor its outcome."""
+        known = {"request", "requested", "published", "candidates", MAP_HASH, TEMPLATE_HASH}
+        return {
+            key: value
+            for key, value in self.values.items()
+            if key not in known and not key.startswith((REFUSED, ADAPTATION, "ego"))
+        }
+
+    def result(self, scenarios: tuple[Scenario, ...] = ()) -> ScenarioSet:
+        """Return the counts as a set of these scenarios.
+
+        Raises:
+            InputError: a count is missing or no number.
+        """
+        what = f"{INFO}: {self.status.name!r} is no summary of a request"
+        causes = [key.removeprefix(REFUSED) for key in self.values if key.startswith(REFUSED)]
+        try:
+            refused = {Cause(cause): _count(self.values, REFUSED + cause, what) for cause in causes}
+        except ValueError as error:
+            raise InputError(f"{what} ({error})") from None
+        return ScenarioSet(
+            requested=_count(self.values, "requested", what),
+            scenarios=scenarios,
+            candidates=_count(self.values, "candidates", what),
+            refused=Counter(refused),
+            adaptations=tuple(text for key, text in self.values.items() if key.startswith(ADAPTATION)),
+        )
+
+    def sentence(self) -> str:
+        """Say what the request came to."""
+        words = (self.values.get(key, "?") for key in ("request", "published", "requested", "candidates"))
+        said = "by its own summary request {} published {} of {} from {} candidates".format(*words)
+        refused = [f"{key.removeprefix(REFUSED)} {n}" for key, n in self.values.items() if key.startswith(REFUSED) and n != "0"]
+        return f"{said}, refused: {', '.join(refused).replace('_', ' ')}" if refused else said
+
+    def of_one_scenario(self) -> "RequestSummary":
+        """Return the summary as it stands in a bag of one of its scenarios."""
+        values = {**self.values, "published": "1", "requested": "1"}
+        return replace(self, published=1, status=replace(self.status, values=values))
+
+
+Info = ScenarioEntry | RequestSummary
+
+
+def encode_info(info: Info, stamp_ns: int) -> bytes:
+    """Return an entry or a summary as CDR bytes."""
+    return encode_diagnostics([info.status], stamp_ns)
+
+
+def decode_info(data: bytes, what: str = INFO) -> tuple[Info, ...]:
+    """Return the entries and summaries of a message; statuses that are neither are left out.
+
+    Raises:
+        InputError: naming `what`, the message is damaged, or a key that every entry or summary has is missing.
+    """
+    found: list[Info] = []
+    for status in decode_diagnostics(data, what)[1]:
+        values, where = status.values, f"{what}: {status.name!r}"
+        if "published" in values:
+            found.append(RequestSummary(_text(values, "request", where), _count(values, "published", where), status))
+        elif "sha256" in values:
+            index, seed = (_count(values, key, where) for key in ("index", "seed"))
+            found.append(ScenarioEntry(_text(values, "request", where), index, seed, values["sha256"], status))
+    return tuple(found)
+
+
+def scenario_entry(
+    scenario: Scenario,
+    data: bytes,
+    request: str,
+    node: str,
+    *,
+    template: Sequence[Vehicle],
+    asked: BoundaryStates,
+    ego: Scenario | None = None,
+    about: Values | None = None,
+) -> ScenarioEntry:
+    """Return the entry of a scenario.
+
+    Args:
+        scenario: the scenario.
+        data: its CDR bytes.
+        request: the request's id.
+        node: full name of the publishing node.
+        template: the template's vehicles, of which the scenario may have fewer.
+        asked: their states.
+        ego: track of the vehicle that was left out.
+        about: what else there is to say of all scenarios of the request (names of template and road, hashes).
+    """
+    ids = [vehicle.id for vehicle in template]
+    rows = [ids.index(vehicle.id) for vehicle in scenario.vehicles]
+    sha256 = digest(data)
+    values = {
+        "request": request,
+        "index": str(scenario.index),
+        "seed": str(scenario.seed),
+        "sha256": sha256,
+        "achieved_start": _states_text(scenario, 0),
+        "achieved_end": _states_text(scenario, -1),
+        **(about or {}),
+        **ego_values(ego),
+        "asked_start": json.dumps(asked.start[rows].tolist()),
+        "asked_end": json.dumps(asked.end[rows].tolist()),
+    }
+    status = Status(f"{node}: scenario", Level.OK, f"scenario {scenario.index} of request {request}", values)
+    return ScenarioEntry(request, scenario.index, scenario.seed, sha256, status)
+
+
+def request_summary(
+    result: ScenarioSet, request: str, node: str, seed: int, provenance: Values | None = None, *, cancelled: bool = False
+) -> RequestSummary:
+    """Return the summary of a request; `provenance` is what is needed to make it again."""
+    values = {
+        **(provenance or {}),
+        **({"cancelled": "true"} if cancelled else {}),
+        **ego_values(result.ego),
+        "request": request,
+        "seed": str(seed),
+        "requested": str(result.requested),
+        "published": str(len(result.scenarios)),
+        "candidates": str(result.candidates),
+        **{f"{REFUSED}{cause.value}": str(count) for cause, count in sorted(result.refused.items())},
+        **{f"{ADAPTATION}{k}": text for k, text in enumerate(result.adaptations)},
+    }
+    level = Level.OK if len(result.scenarios) == result.requested else Level.WARN
+    message = f"{len(result.scenarios)} of {result.requested} scenarios from {result.candidates} candidates"
+    return RequestSummary(request, len(result.scenarios), Status(f"{node}: request", level, message, values))
+
+
+def _states_text(scenario: Scenario, at: int) -> str:
+    """Return the vehicles' x, y, yaw, speed at sample `at` as a JSON list, exact to the bit."""
+    rows = zip(scenario.position[:, at], scenario.heading[:, at], scenario.speed[:, at], strict=True)
+    return json.dumps([[*map(float, position), float(heading), float(speed)] for position, heading, speed in rows])
+
+
+def _states(text: str, what: str) -> Floats:
+    """Return the (N, 4) x, y, yaw, speed that such a list says."""
+    with guarded(f"{what}: no rows of numbers"):
+        rows = np.array(json.loads(text), dtype=np.float64)
+    if rows.ndim != 2 or rows.shape[1] != 4 or not np.isfinite(rows).all():
+        raise InputError(f"{what}: {len(text)} characters that are no rows of four finite numbers")
+    return rows
+
+
+def _count(values: Values, key: str, what: str) -> int:
+    """Return a whole number of at most 63 bits."""
+    text = values.get(key, "")
+    if not (text.isascii() and text.isdecimal() and len(text) < 20 and int(text) < 2**63):
+        raise InputError(f"{what}: {key} is {text!r}; a whole number is needed")
+    return int(text)
+
+
+def _text(values: Values, key: str, what: str) -> str:
+    if key not in values:
+        raise InputError(f"{what}: {key} is missing")
+    return values[key]

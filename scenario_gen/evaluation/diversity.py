@@ -1,0 +1,56 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How much the samples of a set differ from each other, and how near the nearest comes to the fitted template."""
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats
+
+
+def displacements(position: Floats) -> Floats:
+    """Return (S, S): mean distance in metres between samples r and s, over vehicles and instants.
+
+    Args:
+        position: (S, N, T, 2) metres, at the same share of each sample's duration.
+    """
+    samples = position.shape[0]
+    table = np.zeros((samples, samples))
+    for s in range(samples - 1):
+        step = position[s + 1 :] - position[s]
+        table[s, s + 1 :] = exact.hypot(step[..., 0], step[..., 1]).mean(axis=(1, 2))
+    return table + table.T
+
+
+def diversity(table: Floats, weights: Floats) -> Floats:
+    """Return the mean displacement (B,) of two different samples under weights (B, S); NaN for one sample.
+
+    A sample drawn twice makes no pair with itself, or resampling would shrink the diversity.
+    """
+    total = (exact.matmul(weights, table) * weights).sum(axis=1)
+    pairs = np.square(weights.sum(axis=1)) - np.square(weights).sum(axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(total / pairs)
+
+
+def displacement_to(position: Floats, target: Floats) -> Floats:
+    """Return (S,): mean distance in metres of samples (S, N, T, 2) to a target (N, T, 2), over vehicles and instants (ADE)."""
+    step = position - target
+    return np.asarray(exact.hypot(step[..., 0], step[..., 1]).mean(axis=(1, 2)))
+
+
+def weighted_min(values: Floats, weights: Floats) -> Floats:
+    """Return the least value (B,) among the samples (S,) that weights (B, S) contain."""
+    return np.asarray(np.where(weights > 0.0, values, np.inf).min(axis=1))

@@ -1,0 +1,240 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Tables: CSV or Parquet with named columns, and the headerless files of the Safety Pilot Model Deployment (SPMD)."""
+
+from collections.abc import Sequence
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.errors import guarded, InputError, needs
+from scenario_gen.logs.columns import Column, find_columns
+from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
+
+LONGEST = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
+LONGEST_NUMBER = 300  # characters
+LARGEST = 100.0  # m: what is longer is no vehicle
+EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime of SPMD counts microseconds from there
+COLUMNS = (  # of a basic safety message in the files of the Safety Pilot Model Deployment
+    *("RxDevice", "FileId", "TxDevice", "Gentime", "TxRandom", "MsgCount", "DSecond", "Latitude", "Longitude", "Elevation"),
+    *("Speed", "Heading", "Ax", "Ay", "Az", "Yawrate", "PathCount", "RadiusOfCurve", "Confidence"),
+)
+
+
+def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> RawLog:
+    """Read tables that share a clock as one log: CSV (also with tabs or semicolons) or Parquet.
+
+    Args:
+        paths: one or more files.
+        config: names columns, and bounds sizes.
+        spmd: they are SPMD files, without a header; otherwise the header, or `config`, names the columns.
+
+    Raises:
+        InputError: a file is damaged or too large, or a column is missing or of no kind that its quantity can have.
+    """
+    frames, segments, row, size = [], [], 0, 0
+    for path in paths:
+        size += path.stat().st_size
+        check_size(str(path), size, row, config)
+        unit, first = "line", 1 if spmd else 2
+        if spmd:
+            frames.append(read_messages(path, row, config))
+        elif path.suffix.lower() in (".parquet", ".pq"):
+            needs("parquet", "pyarrow")
+            from scenario_gen.logs.parquet import read_columns
+
+            frames.append(to_numbers(*read_columns(path, row, config), path))
+            unit, first = "row", 1
+        else:
+            frame = read_text(path, row, config)
+            frames.append(to_numbers(frame, find_columns([str(name) for name in frame.columns], path, config.columns), path))
+        segments.append(Segment(row, str(path), unit, first))
+        row += len(frames[-1])
+    if len({"lat" in frame for frame in frames}) > 1:
+        raise InputError(f"{paths[0]} and the files beside it mix latitude/longitude and x/y; read them one by one")
+    return from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
+
+
+def read_text(path: Path, before: int, config: LogConfig, **options: Any) -> pd.DataFrame:
+    """Read a table in text with pandas; `before` rows were read from other files.
+
+    Raises:
+        InputError: it is no table, or too large.
+    """
+    with guarded(f"{path} cannot be read as a table"):
+        if not options:
+            with path.open(encoding="utf-8-sig") as file:
+                header = file.readline()
+            options = {"sep": max(",;\t", key=header.count)}
+        frame = pd.read_csv(
+            path,
+            skipinitialspace=True,
+            encoding="utf-8-sig",
+            skip_blank_lines=False,
+            compression=None,
+            nrows=config.row_limit - before + 1,
+            **options,
+        )
+    check_size(str(path), 0, before + len(frame), config)
+    if frame.empty:
+        raise InputError(f"{path} has a header but no rows")
+    if not isinstance(frame.index, pd.RangeIndex):
+        raise InputError(f"{path}: the rows have more fields than the header; name every column")
+    return frame
+
+
+def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> pd.DataFrame:
+    """Return the needed columns in our units; what is not a number becomes NaN. Stamps become integer nanoseconds.
+
+    Raises:
+        InputError: a column is of no kind that the quantity can have.
+    """
+    out = pd.DataFrame(index=frame.index)
+    for quantity, column in columns.items():
+        values = frame[column.name]
+        if isinstance(values, pd.DataFrame):
+            raise InputError(f"{path} has more than one column {column.name!r}; rename all but one")
+        if quantity == "vehicle":
+            out["vehicle"] = values.map(vehicle_name).astype(object)
+        elif pd.api.types.is_bool_dtype(values):
+            raise InputError(f"{path}, column {column.name!r} ({quantity}): true or false is no {quantity}; name another column")
+        elif quantity == "time":
+            out["time"], out["time_ok"] = nanoseconds(values, column.factor)
+        else:
+            numbers = reals(values) * column.factor
+            out[quantity] = (math.pi / 2.0 - numbers) if column.clockwise else numbers
+    if "vehicle" not in out:
+        out["vehicle"] = "0"
+    return out
+
+
+def reals(values: "pd.Series[Any]") -> "pd.Series[float]":
+    """Numbers, or texts that are numbers, as float64; NaN where they are none."""
+    if not pd.api.types.is_numeric_dtype(values):
+        values = values.where(values.astype(str).str.len() < LONGEST_NUMBER)  # pandas fails on a number beyond float64
+    return pd.to_numeric(values, errors="coerce").astype(float)
+
+
+def vehicle_name(value: Any) -> str:
+    """A vehicle's name as text: 17, 17.0 and "17" are the same vehicle."""
+    if pd.isna(value):
+        return ""
+    if isinstance(value, float) and value.is_integer():
+        return str(int(value))
+    return str(value).strip()
+
+
+def nanoseconds(values: "pd.Series[Any]", factor: float) -> tuple["pd.Series[int]", "pd.Series[bool]"]:
+    """Stamps as integer nanoseconds, `LONGEST` where they are beyond it, and which of them are numbers (or dates) at all.
+
+    Args:
+        values: numbers, or texts that are numbers or dates.
+        factor: of their unit to seconds.
+    """
+    if pd.api.types.is_integer_dtype(values):
+        inside = (values.astype(float).abs() * factor < LONGEST).astype(bool)
+        return values.where(inside, int(LONGEST / factor)).astype(np.int64) * round(factor * 1e9), values.notna().astype(bool)
+    numbers = reals(values)
+    if numbers.isna().all():
+        dates = pd.to_datetime(values, errors="coerce", utc=True, format="ISO8601")
+        ticks = dates.fillna(pd.Timestamp(0, tz="UTC")).astype(np.int64)
+        return nanoseconds(ticks, {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[dates.dt.unit])[0], dates.notna()
+    inside = numbers.abs() * factor < LONGEST
+    return (numbers.where(inside, LONGEST / factor) * (factor * 1e9)).round().astype(np.int64), numbers.notna()
+
+
+def from_frame(frame: pd.DataFrame, paths: Sequence[Path], segments: tuple[Segment, ...], config: LogConfig) -> RawLog:
+    """Group a table in our units by vehicle.
+
+    Raises:
+        InputError: there are too many vehicles.
+    """
+    check_vehicles(str(paths[0]), frame["vehicle"].nunique(), config)
+    geographic = "lat" in frame
+    usable = frame["time_ok"].to_numpy() & (frame["vehicle"] != "").to_numpy()
+    rows = np.arange(len(frame))
+    reason = np.where(frame["time_ok"].to_numpy(), "no vehicle", "stamp is not a number")
+    dropped = tuple((str(why), int(row)) for why, row in zip(reason[~usable], rows[~usable], strict=True))
+    position = ("lat", "lon") if geographic else ("x", "y")
+    vehicles = []
+    frame = frame.assign(row=rows)[usable]
+    for name, group in frame.groupby("vehicle", sort=False):
+        vehicles.append(observations(str(name), group, position))
+    name = paths[0].stem if len(paths) == 1 else paths[0].parent.name
+    return RawLog(name, geographic, tuple(vehicles), len(rows), segments, dropped=dropped)
+
+
+def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> Observations:
+    """One vehicle's rows as observations; a row is both a fix and a speed."""
+
+    def column(quantity: str) -> Floats:
+        return group[quantity].to_numpy(float) if quantity in group else np.full(len(group), np.nan)
+
+    def median(quantity: str) -> float:
+        values = column(quantity)
+        values = values[np.isfinite(values) & (values > 0.0) & (values < LARGEST)]
+        return float(np.median(values)) if len(values) else math.nan
+
+    stamps: Ints = group["time"].to_numpy(np.int64)
+    rows: Ints = group["row"].to_numpy(np.int64)
+    measured = slice(None) if "speed" in group else slice(0, 0)
+    return Observations(
+        id=name,
+        fix_ns=stamps,
+        fix=np.column_stack([column(position[0]), column(position[1])]),
+        fix_row=rows,
+        heading=column("heading"),
+        speed_ns=stamps[measured],
+        speed=column("speed")[measured],
+        speed_row=rows[measured],
+        length=median("length"),
+        width=median("width"),
+    )
+
+
+def read_messages(path: Path, before: int, config: LogConfig) -> pd.DataFrame:
+    """Read one file into the columns of the table reader: time [ns], vehicle, lat, lon, speed, heading (ours).
+
+    Raises:
+        InputError: the file is empty or a line has not 19 fields.
+    """
+    raw = read_text(path, before, config, sep=",", header=None, dtype=str)
+    if raw.shape[1] != len(COLUMNS):
+        raise InputError(
+            f"{path} has {raw.shape[1]} columns on line 1; basic safety messages have {len(COLUMNS)}: {', '.join(COLUMNS)}"
+        )
+    raw.columns = pd.Index(COLUMNS)
+
+    def numbers(name: str) -> "pd.Series[float]":
+        return reals(raw[name])
+
+    stamps = numbers("Gentime")  # microseconds stay exact in float64 until the year 2289
+    known = stamps.notna() & (stamps.abs() < 8e15)
+    return pd.DataFrame(
+        {
+            "time": stamps.where(known, 0.0).round().astype(np.int64) * 1000 + EPOCH_NS,
+            "time_ok": known,
+            "vehicle": numbers("TxDevice").map(vehicle_name),
+            "lat": numbers("Latitude"),
+            "lon": numbers("Longitude"),
+            "speed": numbers("Speed"),
+            "heading": math.pi / 2.0 - np.radians(numbers("Heading")),
+        }
+    )

@@ -1,0 +1,162 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One request as gp_sampler answers it: a template's messages and the caller's values in, scenarios and a summary out."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+from msg_conventions.ego import ego_messages
+from msg_conventions.hashes import template_hashes
+from msg_conventions.pictures import encode_footprint, scenario_markers
+from msg_conventions.scenario_info import encode_info, INFO, request_summary, RequestSummary, scenario_entry
+from msg_conventions.scenarios import encode_scenario
+from msg_conventions.topics import vehicle_topic
+from scenario_gen.fitting import FittingConfig
+from scenario_gen.parameters import check, parameter
+from scenario_gen.recordings.provenance import parameter_texts, versions
+from scenario_gen.recordings.template import decode_template
+from scenario_gen.routing import PlanningConfig
+from scenario_gen.sampling import sample_scenarios, SamplingConfig
+from scenario_gen.template.interaction import waits_to_keep
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types.names import tokens
+from scenario_gen.types.request import Request
+from scenario_gen.types.scenario import BoundaryStates, Scenario, ScenarioSet
+from scenario_gen.validity import Checker, Limits
+
+Answer = tuple[GenerationResult, RequestSummary]  # what a request came to; its scenarios are published by then
+Send = Callable[[str, bytes], None]  # of topic and CDR bytes
+
+
+@dataclass(frozen=True)
+class Config(Request):
+    """The sampler's parameters; `fitting` and `planning` are used where start or end states are asked for."""
+
+    count: int = parameter(50, "scenarios to generate", low=1, high=100_000)
+    seed: int = parameter(0, "seed of the samples, and of the planner where states are asked for", low=0)
+    generate_on_input: bool = parameter(True, "generate whenever the inputs are complete or change; false: on ~/generate only")
+    patience: float = parameter(
+        60.0,
+        "wait so long for subscribers of scenarios that acknowledge none, then go on and warn; 0: for ever",
+        unit="s",
+        low=0.0,
+    )
+    pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
+    fitting: FittingConfig = field(default_factory=FittingConfig)
+    planning: PlanningConfig = field(default_factory=PlanningConfig)
+    sampling: SamplingConfig = field(default_factory=SamplingConfig)
+    limits: Limits = field(default_factory=Limits)
+
+    def __post_init__(self) -> None:
+        check(self)
+        super().__post_init__()
+
+
+class _Messages:
+    """Sends a request's messages in order, each scenario as it comes, so that a set need never be in memory."""
+
+    def __init__(self, encounter: Encounter, request: str, node: str, about: Mapping[str, str], send: Send) -> None:
+        """Take the template, the request's id, the node's full name, what every entry says, and what sends a message."""
+        self._encounter, self._request, self._node, self._about, self._send = encounter, request, node, about, send
+        self._begun = False
+
+    def _begin(self, ego: Scenario | None) -> None:
+        """Send what stands before the first scenario, once."""
+        if self._begun:
+            return
+        self._begun = True
+        stamp, vehicles = self._encounter.start_ns, self._encounter.vehicles
+        for vehicle, name in zip(vehicles, tokens(vehicle.id for vehicle in vehicles), strict=True):
+            self._send(vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}"))
+        for topic, data in () if ego is None else ego_messages(ego, stamp):
+            self._send(topic, data)
+
+    def scenario(self, scenario: Scenario, asked: BoundaryStates, ego: Scenario | None) -> None:
+        """Send a scenario and its entry."""
+        self._begin(ego)
+        stamp = self._encounter.start_ns
+        data = encode_scenario(scenario, stamp)
+        self._send("scenarios", data)
+        entry = scenario_entry(
+            scenario, data, self._request, self._node, template=self._encounter.vehicles, asked=asked, ego=ego, about=self._about
+        )
+        self._send(INFO, encode_info(entry, stamp))
+
+    def close(self, result: ScenarioSet, summary: RequestSummary) -> None:
+        """Send the picture of the first scenario and the request's summary."""
+        self._begin(result.ego)
+        stamp = self._encounter.start_ns
+        if result.scenarios:
+            self._send("markers", scenario_markers(result.scenarios[0], stamp))
+        self._send(INFO, encode_info(summary, stamp))
+
+
+def answer_request(
+    messages: Mapping[str, bytes],
+    config: Config,
+    request: str,
+    node: str,
+    progress: Callable[[int, int, int], None],
+    cancelled: Callable[[], bool],
+    send: Send,
+) -> Answer:
+    """Sample, check and publish; fit and plan anew if start or end states are asked for.
+
+    Args:
+        messages: of the template, by topic.
+        config: the values of this request.
+        request: its id.
+        node: the node's full name.
+        progress: called with the scenarios and candidates so far, and the template's stamp [ns].
+        cancelled: whether to stop early; what was published by then stays, and the summary says so.
+        send: called with topic and CDR bytes of every message, scenarios as they are drawn.
+
+    Raises:
+        InputError: a message is damaged, or a vehicle that is named does not exist.
+        RefusedError: what is asked cannot be had; the message says why, and what nearby can.
+    """
+    template = decode_template(messages)
+    encounter, segmentation, (road, fit) = template.encounter, template.segmentation, template.placed()
+
+    def advance(done: int, _total: int, candidates: int) -> None:
+        progress(done, candidates, encounter.start_ns)
+
+    hashes = template_hashes(messages)
+    out = _Messages(encounter, request, node, hashes, send)
+    if config.moves:
+        from scenario_gen.config import PipelineConfig  # these load all stages, and few requests need them
+        from scenario_gen.nearest import attempt, nearest_if_impossible
+
+        stages = PipelineConfig(fitting=config.fitting, planning=config.planning, sampling=config.sampling, limits=config.limits)
+        given = (encounter, segmentation, road, stages, config)
+        with nearest_if_impossible(*given, count=config.count, seed=config.seed, cancelled=cancelled):
+            made = attempt(
+                *given, count=config.count, seed=config.seed, progress=advance, cancelled=cancelled, found=out.scenario
+            )
+    else:
+        waits, ego = waits_to_keep(encounter, segmentation), config.ego_of(encounter)
+        check = Checker.of_template(encounter, road, fit.asked, waits, config.limits, ego).check
+        generated = sample_scenarios(
+            encounter, segmentation, road, template.routes, fit.asked, check, config.sampling, count=config.count,
+            seed=config.seed, waits=waits, request=config, progress=advance, cancelled=cancelled, found=out.scenario,
+        )  # fmt: skip
+        made = replace(template, generated=generated, seed=config.seed)
+    result = made.generated
+    provenance = parameter_texts(config) | versions() | hashes
+    stopped = cancelled() and len(result.scenarios) < result.requested
+    summary = request_summary(result, request, node, config.seed, provenance, cancelled=stopped)
+    out.close(result, summary)
+    return made, summary

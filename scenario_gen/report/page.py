@@ -1,0 +1,142 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The report: one HTML page that holds everything, opens offline and is a pleasure to look at."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from scenario_gen.folders import write_text
+from scenario_gen.report.data import case_data
+from scenario_gen.report.html import render_page
+from scenario_gen.types.evaluation import Evaluation, Interval
+from scenario_gen.types.generation import GenerationResult, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.scenario import ScenarioSet
+
+SIGNIFICANT = 0.03
+"""Below this, E without changepoints leaves nothing to gain and the case is not counted."""
+MAX_SAMPLES = 50
+"""Scenarios of each arm that a page draws; the figures count all."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReportInput:
+    """A page.
+
+    Attributes:
+        cases: at least one.
+        title: heading and window title.
+        quality: the log's data quality, in lines.
+        provenance: log, its hash, seed, versions, parameters, by name.
+    """
+
+    cases: Sequence[GenerationResult]
+    title: str = "Generated encounters"
+    quality: Sequence[str] = ()
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+
+def write_report(path: Path, report: ReportInput) -> None:
+    """Write the page to `path`; the same input gives the same bytes."""
+    write_text(path, render(report))
+
+
+def render(report: ReportInput) -> str:
+    """Return the page as text."""
+    views = [_view(index, case) for index, case in enumerate(report.cases)]
+    return render_page(
+        "report.html.j2",
+        ("scene.js", "charts.js", "page.js"),
+        [case_data(case, MAX_SAMPLES) for case in report.cases],
+        report=report,
+        views=views,
+        verdict=_verdict(views),
+        significant=SIGNIFICANT,
+        facts=[fact for fact in report.provenance.items() if not _is_parameter(fact[0])],
+        parameters=[fact for fact in report.provenance.items() if _is_parameter(fact[0])],
+    )
+
+
+def _is_parameter(name: str) -> bool:
+    """Parameters have dotted names ("sampling.sigma_f"); they are many, and folded away."""
+    return "." in name and " " not in name
+
+
+def _view(index: int, case: GenerationResult) -> dict[str, Any]:
+    """Return what the page's tables say about one case."""
+    arms = [(case.row, case.generated), *((name, case.references.get(name)) for name in (WITHOUT, UNIFORM))]
+    evaluation = case.evaluation
+    duration = case.encounter.duration
+    bounds = [*(float(case.encounter.time[i]) for i in (0, *case.segmentation.changepoints)), duration]
+    vehicles = zip(case.encounter.vehicles, case.fit.fitted, strict=True) if case.fit else ()
+    return {
+        "index": index,
+        "case": case,
+        "title": case.title,
+        "without": case.references.get(WITHOUT),
+        "refused": [case.refusals.get(name, "") for name in (WITHOUT, UNIFORM)],
+        "arms": [(name, made, _causes(made)) for name, made in arms if made is not None],
+        "rows": [*evaluation.rows[1:], evaluation.rows[0]],
+        "metrics": evaluation.metrics,
+        "ego": case.generated.ego.vehicles[0].id if case.generated.ego else "",
+        "k": len(case.segmentation.changepoints),
+        "rate": len(case.segmentation.changepoints) / duration,
+        "errors": {
+            (arm, key): _found(evaluation, case.row if arm == WITH else arm, key)
+            for arm in (WITH, WITHOUT, UNIFORM, ORACLE)
+            for key in ("e_position", "e_speed")
+        },
+        "segments": [
+            {"from": bounds[k], "to": bounds[k + 1], "label": int(case.segmentation.labels[start]), "text": text}
+            for k, (start, text) in enumerate(
+                zip((0, *case.segmentation.changepoints), case.segmentation.descriptions, strict=True)
+            )
+        ],
+        "vehicles": [
+            {"id": v.id, "manoeuvre": f.manoeuvre, "scale": f.scale, "moved": float(f.moved.max()), "dwells": int(sum(f.stands))}
+            for v, f in vehicles
+        ],
+    }
+
+
+def _found(evaluation: Evaluation, row: str, metric: str) -> Interval | None:
+    found = evaluation.row(row)
+    return found.values.get(metric) if found else None
+
+
+def _causes(made: ScenarioSet) -> list[tuple[str, int]]:
+    """Return the causes of refusal, the most frequent first."""
+    return sorted(
+        ((cause.value.replace("_", " "), count) for cause, count in made.refused.items() if count), key=lambda c: (-c[1], c[0])
+    )
+
+
+def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the page's first sentence in figures: how many were accepted, and where changepoints brought E down."""
+    better: dict[str, list[bool]] = {"e_position": [], "e_speed": []}
+    for view in views:
+        for key, found in better.items():
+            one, other = view["errors"][WITH, key], view["errors"][WITHOUT, key]
+            if one is not None and other is not None and other.value >= SIGNIFICANT:
+                found.append(one.value < other.value)
+    sets = [view["case"].generated for view in views]
+    return {
+        "published": sum(view["case"].published for view in views),
+        "requested": sum(made.requested for made in sets),
+        "candidates": sum(made.candidates for made in sets),
+        "position": (sum(better["e_position"]), len(better["e_position"])),
+        "speed": (sum(better["e_speed"]), len(better["e_speed"])),
+    }

@@ -1,0 +1,68 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The end of a run on one screen of the terminal."""
+
+from collections import Counter
+from collections.abc import Sequence
+import math
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from scenario_gen.errors import printable
+from scenario_gen.types.evaluation import formatted
+from scenario_gen.types.generation import GenerationResult, WITH, WITHOUT
+from scenario_gen.types.scenario import Cause
+
+
+def summary(cases: Sequence[GenerationResult]) -> RenderableType:
+    """Return two lines per case and what was refused, for rich to print; names are long, so no table."""
+    lines = [line for case in cases for line in _case(case)]
+    refused: Counter[Cause] = sum((case.generated.refused for case in cases), Counter())
+    causes = ", ".join(
+        f"{count} {cause.value.replace('_', ' ')}" for cause, count in sorted(refused.items(), key=lambda c: (-c[1], c[0]))
+    )
+    return Group(
+        *lines,
+        Text(f"refused candidates: {causes}" if causes else "no candidate was refused"),
+        Text("K: changepoints. E: distance to the template with | without changepoints, lower is nearer.", style="dim"),
+    )
+
+
+def _case(case: GenerationResult) -> tuple[Text, Text]:
+    """The name of a case, and its figures."""
+    made, found = case.generated, case.evaluation.row(WITH)
+    order = formatted(found.values.get("order_kept"), "%", bounds=False) if found else "–"
+    title = Text(printable(case.title), style="bold")
+    title.append(f"  {len(case.encounter.vehicles)} vehicles, {case.encounter.duration:.1f} s", style="dim")
+    complete = len(made.scenarios) >= made.requested
+    measured = f" (of {found.samples:,}, evenly spaced)" if found and found.samples < len(made.scenarios) else ""
+    figures = Text.assemble(
+        "  ",
+        (f"{len(made.scenarios)}/{made.requested} valid", "green" if complete else "red"),
+        f" of {made.candidates}   K {len(case.segmentation.changepoints)}   E position ",
+        _errors(case, "e_position"),
+        "   speed ",
+        _errors(case, "e_speed"),
+        f"   order {order if order == '–' else order + ' %'}{measured}",
+    )
+    return title, figures
+
+
+def _errors(case: GenerationResult, metric: str) -> Text:
+    """E with and without changepoints; green where changepoints bring it down."""
+    values = [case.evaluation.value(row, metric) for row in (WITH, WITHOUT)]
+    one, other = (f"{value:.3f}" if math.isfinite(value) else "–" for value in values)
+    return Text(f"{one} | {other}", style="green" if values[0] < values[1] else "")

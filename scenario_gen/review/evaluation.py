@@ -1,0 +1,126 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The evaluation of any bag that keeps the conventions of the suite, ours or not."""
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+from scenario_gen.errors import InputError
+from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
+from scenario_gen.recordings.read import Namespace, NO_ENTRY, read_recording, SCENARIOS
+from scenario_gen.review.validation import Reference
+from scenario_gen.storage.config import BagConfig
+from scenario_gen.storage.messages import DEFAULT, within
+from scenario_gen.template.interaction import find_conflicts, find_waits
+from scenario_gen.types.evaluation import CheckCounts, Evaluation
+from scenario_gen.types.generation import GenerationResult, WITHOUT
+from scenario_gen.types.scenario import Scenario, ScenarioSet, Verdict
+from scenario_gen.validity import Checker, Limits
+
+
+def evaluate_bag(
+    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0, bag: BagConfig = DEFAULT
+) -> tuple[Evaluation, ...]:
+    """Evaluate every namespace of a bag, as `bag_results` does, and return the figures alone."""
+    return tuple(result.evaluation for result in bag_results(path, config, limits, seed, bag))
+
+
+def bag_results(
+    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0, bag: BagConfig = DEFAULT
+) -> tuple[GenerationResult, ...]:
+    """Evaluate every namespace of a bag that holds both `tracks` and `scenarios`, ready for the report.
+
+    The scenarios are checked anew, on the bag's map if it has one; start and end states are not asked. What the bag does not say
+    is left out: without `changepoints` K counts as 0; fit and routes are shown if both are there, with what the fitting decided.
+
+    Raises:
+        InputError: the bag is missing or damaged, or no namespace has both topics.
+    """
+    namespaces = read_recording(path, bag).namespaces.values()
+    whole = [one for one in namespaces if {"tracks", SCENARIOS} <= one.messages.keys()]
+    if not whole:
+        raise InputError(f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare")
+    with within(path):
+        return tuple(_result(one, config or EvaluationConfig(), limits, seed) for one in whole)
+
+
+def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | None, seed: int) -> GenerationResult:
+    encounter, segmentation, road = namespace.encounter, namespace.segmentation, namespace.road
+    fit, routes = namespace.fit
+    scenarios = tuple(namespace.scenario(k)[1] for k in range(len(namespace.hashes)))
+    counts = CheckCounts.of_verdicts(_verdicts(namespace, scenarios, limits))
+    evaluation = evaluate_scenarios(
+        encounter,
+        {SCENARIOS: scenarios},
+        changepoints=len(segmentation.changepoints),
+        checks={SCENARIOS: counts},
+        road=road.name if road else "",
+        config=config,
+        seed=seed,
+    )
+    notes = list(namespace.missing)
+    lost = sum(entry is None for entry in namespace.unknown.values())
+    if lost:
+        notes.append(f"{lost} of {len(scenarios)} scenarios are unaccounted: {NO_ENTRY}")
+    rows = [replace(row, notes=(*row.notes, *notes)) if row.name == SCENARIOS else row for row in evaluation.rows]
+    evaluation = replace(evaluation, rows=tuple(rows))
+    ego = namespace.ego_track
+    if ego is not None and ego.vehicles[0].id in evaluation.vehicles:
+        ego = None  # of another request than these scenarios
+    generated = ScenarioSet(len(scenarios), scenarios, counts.candidates, Counter(counts.refused), _left_out(namespace), ego)
+    return GenerationResult(
+        encounter,
+        segmentation,
+        road,
+        fit=fit,
+        routes=routes,
+        generated=generated,
+        evaluation=evaluation,
+        refusals={WITHOUT: "the bag holds one set of scenarios"},
+        row=SCENARIOS,
+        valid=counts.candidates - sum(counts.refused.values()),
+    )
+
+
+def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Limits | None) -> list[Verdict]:
+    """Check every scenario; an ego may have been left out of one, and its map be another than the newest."""
+    encounter = namespace.encounter
+    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
+    waits = find_waits(encounter) if namespace.segmentation.changepoints.size else ()
+    names = tuple(vehicle.id for vehicle in encounter.vehicles)
+    checkers: dict[tuple[str, ...], Checker] = {}
+    verdicts: list[Verdict] = []
+    for k, scenario in enumerate(scenarios):
+        entry = namespace.entry(k)
+        map_hash = entry.map_hash if entry else None
+        key = (map_hash or "", *(vehicle.id for vehicle in scenario.vehicles))
+        if key not in checkers:
+            road = namespace.road
+            if namespace.roads_differ:
+                road = namespace.road_of(entry, encounter.start_ns) if map_hash else None
+            checkers[key] = Reference(road, None, names, tuple(conflicts), waits).checker(scenario, limits)
+        verdicts += checkers[key].check([scenario])
+    return verdicts
+
+
+def _left_out(namespace: Namespace) -> tuple[str, ...]:
+    """Say what the bag has not, and what follows from it; and what its requests say they came to."""
+    said = ["all scenarios of the bag are shown and measured, valid or not; start and end states were not asked"]
+    if "map" not in namespace.messages:
+        said.append("the bag has no map: whether vehicles leave the road was not checked")
+    if "changepoints" not in namespace.messages:
+        said.append("the bag has no changepoints: the template counts as one primitive, and its waits were not asked")
+    return (*said, *(summary.sentence() for summary in namespace.summaries))

@@ -1,0 +1,182 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Is every scenario of a bag valid? For any bag of the conventions, ours or not.
+
+A scenario is checked against what bears its stamp in its own namespace: the states asked of it (its own in `scenarios/info`,
+else `fit`), the conflicts and waits of its template (`tracks`; waits if there are `changepoints`), and the road: the `map` that
+its entry on `scenarios/info` names by hash, else the newest one of the stamp, or of all. What is not there is not checked,
+and said. Vehicles are matched by id, so one may be left out for an ego. Where there are entries, a scenario is not to stand
+in the place of another that was published; one without any entry is counted, and checked as far as that goes.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.errors import InputError
+from scenario_gen.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS
+from scenario_gen.storage.config import BagConfig
+from scenario_gen.storage.messages import DEFAULT, within
+from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, Wait
+from scenario_gen.types.names import tokens
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import BoundaryStates, Scenario
+from scenario_gen.validity import Checker, Limits
+
+UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
+ALTERED = "altered_message"  # not the bytes that scenarios/info has an entry for
+
+
+@dataclass
+class Found:
+    """How many scenarios have violations of one cause, and the first of them."""
+
+    count: int
+    scenario: int
+    message: str
+
+
+@dataclass
+class Validation:
+    """What was found in one namespace: `found` by cause; `left_out` says what could not be checked, and of how many scenarios.
+
+    `unaccounted` scenarios have no entry on `scenarios/info`, though others have; they are valid if nothing else is wrong.
+    `missing` says which requests are not there whole.
+    """
+
+    namespace: str
+    scenarios: int = 0
+    invalid: int = 0
+    unaccounted: int = 0
+    found: dict[str, Found] = field(default_factory=dict)
+    left_out: dict[str, int] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()
+
+    def add(self, index: int, violations: Sequence[tuple[str, str]], left_out: Collection[str]) -> None:
+        """Count one scenario with its violations (cause, sentence)."""
+        self.scenarios += 1
+        self.invalid += bool(violations)
+        for cause in dict.fromkeys(cause for cause, _ in violations):
+            first = next(message for other, message in violations if other == cause)
+            self.found.setdefault(cause, Found(0, index, first)).count += 1
+        for sentence in left_out:
+            self.left_out[sentence] = self.left_out.get(sentence, 0) + 1
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """What the scenarios of one stamp are held against; vehicles by id, states (4,) x, y, yaw, speed."""
+
+    road: Road | None
+    asked: dict[str, tuple[Floats, Floats]] | None
+    template: tuple[str, ...] | None
+    conflicts: tuple[Conflict, ...]
+    waits: tuple[Wait, ...] | None
+
+    def checker(self, scenario: Scenario, limits: Limits | None, asked: BoundaryStates | None = None) -> Checker:
+        """Return the checker of scenarios with this one's vehicles; `asked` is in place of the template's states."""
+        ids = tokens(vehicle.id for vehicle in scenario.vehicles)
+        if asked is None and self.asked is not None and all(name in self.asked for name in ids):
+            start, end = zip(*(self.asked[name] for name in ids), strict=True)
+            asked = BoundaryStates(np.array(start), np.array(end))
+        if self.template is None or not set(ids) <= set(self.template):
+            return Checker(self.road, asked, None, None, limits)
+        at = {self.template.index(name): k for k, name in enumerate(ids)}
+        conflicts = [replace(c, first=at[c.first], second=at[c.second]) for c in self.conflicts if {c.first, c.second} <= set(at)]
+        waits = None if self.waits is None else [replace(w, vehicle=at[w.vehicle]) for w in self.waits if w.vehicle in at]
+        return Checker(self.road, asked, conflicts, waits, limits)
+
+
+def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = DEFAULT) -> tuple[Validation, ...]:
+    """Check every scenario of every namespace that holds any; `config` says how much is read at most.
+
+    Raises:
+        InputError: the bag is missing or damaged, holds no scenarios, or one of its tracks, maps, … cannot be read.
+    """
+    namespaces = read_recording(path, config, ("tracks", "changepoints", "map", "fit", SCENARIOS, INFO)).namespaces.values()
+    found = [namespace for namespace in namespaces if SCENARIOS in namespace.messages]
+    if not found:
+        raise InputError(f"{path}: no topic `scenarios` in any namespace; there is nothing to check")
+    with within(path):
+        return tuple(_validate(namespace, limits) for namespace in found)
+
+
+def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
+    namespace.check_infos()
+    result = Validation(namespace.name, missing=namespace.missing)
+    silent = () if namespace.entries else (f"sha256: there is no entry on {INFO}",)
+    references: dict[tuple[object, ...], Reference] = {}
+    checkers: dict[tuple[object, ...], Checker] = {}
+    asked = {entry.sha256: entry.asked(namespace.where(INFO)) for entry in namespace.entries}
+    for k, sha256 in enumerate(namespace.hashes):
+        wrong, entry = [], namespace.unknown.get(k)
+        if entry is not None:
+            wrong = [(ALTERED, _altered(k, sha256, entry))]
+        elif k in namespace.unknown:
+            result.unaccounted += 1
+        entry, states = namespace.entry(k) or entry, asked.get(sha256)
+        try:
+            stamp, scenario = namespace.scenario(k)
+        except InputError as error:
+            result.add(k, [*wrong, (UNUSABLE, str(error))], ())
+            continue
+        is_lost = k in namespace.unknown and entry is None
+        place = (stamp, is_lost, entry and entry.template_hash, entry and entry.map_hash)
+        if place not in references:
+            references[place] = _reference(namespace, stamp, entry, is_lost)
+        of_these = b"" if states is None else states.start.tobytes() + states.end.tobytes()
+        key = (place, tuple(vehicle.id for vehicle in scenario.vehicles), of_these)
+        try:
+            if key not in checkers:
+                checkers[key] = references[place].checker(scenario, limits, states)
+            (verdict,) = checkers[key].check([scenario])
+        except InputError as error:
+            result.add(k, [*wrong, (UNUSABLE, str(error))], ())
+            continue
+        wrong += [(violation.cause.value, violation.message) for violation in verdict.violations]
+        result.add(k, wrong, (*silent, *checkers[key].not_applicable))
+    return result
+
+
+def _altered(k: int, sha256: str, entry: ScenarioEntry) -> str:
+    """Return the sentence for a message that stands where another one was published."""
+    published = f"index {entry.index} of request {entry.request} was published as {entry.sha256[:12]}…"
+    return f"message {k} has SHA-256 {sha256[:12]}…, which {INFO} does not know; {published}"
+
+
+def _reference(namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is_lost: bool) -> Reference:
+    """Return what a scenario of the stamp and entry is held against; if its entry is lost, only what is beyond doubt.
+
+    Raises:
+        InputError: a message of it is damaged.
+    """
+    asked = namespace.asked_at(stamp)
+    road = namespace.road_of(entry, stamp)
+    if is_lost:
+        asked = None
+        if namespace.roads_differ:
+            road = None
+    encounter = namespace.tracks_of(entry, stamp)
+    if encounter is None:
+        return Reference(road, asked, None, (), None)
+    segmentation = namespace.segmentation_of(encounter)
+    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
+    waits = None  # without changepoints there is no dwell to hold: waits are not asked for
+    if segmentation is not None:
+        waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()
+    return Reference(road, asked, tokens(vehicle.id for vehicle in encounter.vehicles), tuple(conflicts), waits)

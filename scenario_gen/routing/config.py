@@ -1,0 +1,45 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Settings of the planning stage."""
+
+from dataclasses import dataclass, field
+
+from scenario_gen.parameters import check, parameter
+from scenario_gen.routing.search.ompl.planners import OmplConfig
+from scenario_gen.routing.search.rrt_star_connect import RrtStarConnectConfig
+
+
+@dataclass(frozen=True)
+class PlanningConfig:
+    """How routes are planned."""
+
+    planner: str = parameter(
+        "rrt_star_connect",
+        "geometric planner",
+        choices=("rrt_star_connect", "ompl_rrt_connect", "ompl_rrt_star", "ompl_informed_rrt_star", "ompl_bit_star"),
+    )
+    iterations: int = parameter(1000, "iterations of the planner between two anchors", low=1, high=10_000_000)
+    margin: float = parameter(0.3, "room to keep beside the footprint where the road has it", unit="m", low=0.0, high=5.0)
+    drivable: bool = parameter(True, "smooth routes that can be driven; false: the planner's bare polylines")
+    # A car's turning circle of 10.5 to 11 m between kerbs is one of 4.4 m radius for its centre; the checker allows 0.25.
+    max_curvature: float = parameter(0.225, "largest curvature of a route", unit="1/m", low=0.01, high=2.0)
+    spacing: float = parameter(0.5, "largest distance between two points of a route", unit="m", low=0.05, high=0.5)
+    traffic_side: str = parameter("right", "the side of the road to keep to", choices=("right", "left"))
+
+    rrt_star_connect: RrtStarConnectConfig = field(default_factory=RrtStarConnectConfig)
+    ompl: OmplConfig = field(default_factory=OmplConfig)
+
+    def __post_init__(self) -> None:
+        check(self)

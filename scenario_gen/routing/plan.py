@@ -1,0 +1,286 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The planning stage: one route per vehicle through its fitted anchors."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import itertools
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Bools, Floats
+from scenario_gen.cancelling import stop_if_cancelled
+from scenario_gen.errors import RefusedError
+from scenario_gen.roads.clearance import clearance_field, footprint_fits
+from scenario_gen.routing.config import PlanningConfig
+from scenario_gen.routing.guess import direct, keep_to_side
+from scenario_gen.routing.search.planner import BlockedError, plan_with_retry, Planner, Query
+from scenario_gen.routing.search.rrt_star_connect import RrtStarConnect
+from scenario_gen.routing.smooth import Curve, Guess, monotone_matching, smooth, Targets
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.road import Road
+from scenario_gen.types.route import Route
+
+STANDS = 0.05  # [m] a vehicle whose start and end are nearer than this has no path
+CLOSE = 0.3  # [m] anchors nearer to each other than this are one waypoint
+SHORTEST = 0.1  # [m] what a moving primitive covers at least, else it is a dwell
+SHARP = np.deg2rad(100.0)  # a waypoint farther off the heading than this lies behind
+SOFT_WEIGHT = 0.1  # weight of an anchor that is no waypoint
+SLACK = 1.5  # how much more curvature than allowed a waypoint may ask for before it is softened
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """One vehicle's share: everything that its route depends on."""
+
+    road: Road
+    vehicle: Vehicle
+    fitted: FittedVehicle
+    config: PlanningConfig
+    planner: Planner
+    seed: int
+
+    @property
+    def anchors(self) -> Floats:
+        """(A, 3) poses."""
+        return self.fitted.anchors
+
+    def name(self, k: int) -> str:
+        """Anchor k in words."""
+        last = len(self.anchors) - 1
+        which = "start" if k == 0 else "end" if k == last else f"changepoint {k}"
+        x, y = self.anchors[k, :2]
+        return f"the {which} of vehicle {self.vehicle.id} (anchor {k}, at {x:.2f}, {y:.2f} m)"
+
+
+def plan_routes(road: Road, fit: Fit, config: PlanningConfig = PlanningConfig(), seed: int = 0) -> tuple[Route, ...]:
+    """Plan one route per vehicle through its anchors.
+
+    Start and end are met exactly, with their headings; interior anchors are strong but soft targets (see `deviations`).
+    In drivable mode the footprint stays on the road along the whole route and the curvature within the limit.
+
+    Args:
+        road: the target road.
+        fit: where every vehicle's anchors stand on it.
+        config: see `PlanningConfig`.
+        seed: same seed, same routes.
+
+    Returns:
+        N routes, geometry only.
+
+    Raises:
+        RefusedError: a start or end is blocked, no way leads from anchor to anchor, the planner's budget is spent, or no
+            drivable curve was found; the message names the vehicle and the anchor.
+    """
+    planner = make_planner(config)
+    tasks = (
+        _Task(road, vehicle, fitted, config, planner, seed + 7919 * n)
+        for n, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True))
+    )
+    return tuple(_route(task) for task in tasks)
+
+
+def deviations(route: Route, fitted: FittedVehicle) -> Floats:
+    """How far [m] the route passes from each anchor: (K + 2,)."""
+    return np.asarray(exact.hypot(*(route.points[route.anchor, :2] - fitted.anchors[:, :2]).T))
+
+
+def make_planner(config: PlanningConfig) -> Planner:
+    """The geometric planner that `config` names."""
+    if config.planner == "rrt_star_connect":
+        return RrtStarConnect(config.rrt_star_connect)
+    from scenario_gen.routing.search.ompl.planners import OmplPlanner
+
+    return OmplPlanner(config.planner, config.ompl)
+
+
+def _route(task: _Task) -> Route:
+    anchors = task.anchors
+    for k in (0, len(anchors) - 1):
+        if not footprint_fits(task.road, anchors[k][None], task.vehicle.length, task.vehicle.width)[0]:
+            raise RefusedError(
+                f"{task.name(k)} is blocked: its footprint, {task.vehicle.length:.2f} m by {task.vehicle.width:.2f} m, "
+                f"has no room there on road {task.road.name!r}"
+            )
+    if task.fitted.stands.all() or exact.hypot(*(anchors[-1] - anchors[0])[:2]) < STANDS:
+        return Route(anchors[:1], np.zeros(len(anchors), dtype=np.int64), np.zeros(1))
+    waypoints = _waypoints(anchors, task.fitted.stands, task.config.max_curvature)
+    if not task.config.drivable:
+        return _polyline(task, waypoints)
+    weights = _weights(anchors, waypoints)
+    targets = Targets(anchors[weights > 0.0, :2], weights[weights > 0.0])
+    curve: Curve | None = None
+    for direct_allowed in (True, False):
+        stop_if_cancelled()
+        guess = _joined([_leg(task, a, b, direct_allowed) for a, b in itertools.pairwise(waypoints)])
+        curve = smooth(task.road, task.vehicle, anchors[0], anchors[-1], targets, guess, task.config)
+        if curve.curvature <= task.config.max_curvature and not len(curve.off_road):
+            return _sampled(task, curve.poses, curve.length)
+    assert curve is not None
+    raise RefusedError(_reason(task, curve))
+
+
+def _waypoints(anchors: Floats, stands: Bools, limit: float) -> list[int]:
+    """The anchors that the first guess goes through: start, end, and those between that can be driven in their order."""
+    kept = [0]
+    last = len(anchors) - 1
+    for k in range(1, last):
+        if not stands[k - 1] and _leads(anchors[kept[-1]], anchors[k], limit):
+            kept.append(k)
+    while len(kept) > 1 and not _leads(anchors[kept[-1]], anchors[last], limit):
+        kept.pop()
+    return [*kept, last]
+
+
+def _leads(start: Floats, end: Floats, limit: float) -> bool:
+    """Whether `end` lies ahead of `start`, both seen from their headings, without a turn much sharper than `limit`."""
+    dx, dy = (end - start)[:2]
+    chord = float(exact.hypot(dx, dy))
+    if chord < CLOSE:
+        return False
+    for yaw in (start[2], end[2]):
+        off = abs(float((exact.arctan2(dy, dx) - yaw + np.pi) % (2.0 * np.pi) - np.pi))
+        if off > SHARP or 2.0 * exact.sin(min(off, 0.5 * np.pi)) / chord > SLACK * limit:
+            return False
+    return True
+
+
+def _weights(anchors: Floats, waypoints: list[int]) -> Floats:
+    """How strongly each anchor (A,) draws the route: waypoints fully, others weakly if they lie between their neighbours."""
+    weight = np.zeros(len(anchors))
+    weight[waypoints[1:-1]] = 1.0
+    for a, b in itertools.pairwise(waypoints):
+        chord = (anchors[b] - anchors[a])[:2]
+        for k in range(a + 1, b):
+            from_a, to_b = (anchors[k] - anchors[a])[:2], (anchors[b] - anchors[k])[:2]
+            between = exact.matmul(from_a, chord) > 0.0 and exact.matmul(to_b, chord) > 0.0
+            if between and min(exact.hypot(*from_a), exact.hypot(*to_b)) > CLOSE:
+                weight[k] = SOFT_WEIGHT
+    return weight
+
+
+def _leg(task: _Task, a: int, b: int, direct_allowed: bool) -> Guess:
+    """The first guess from anchor a to anchor b."""
+    start, end, config = task.anchors[a], task.anchors[b], task.config
+    radius = _radius(task, start, end)
+    if direct_allowed and (curve := direct(task.road, start, end, radius, config.max_curvature)) is not None:
+        return curve
+    path = _searched(task, a, b, radius)
+    return keep_to_side(task.road, path, radius + config.margin, config.traffic_side)
+
+
+def _radius(task: _Task, start: Floats, end: Floats) -> float:
+    """Half the width and the margin, or what room there is at the ends of the leg if that is less."""
+    ends = np.stack((start, end))[:, :2]
+    cell = np.floor((ends - task.road.origin) / task.road.resolution).astype(int)
+    field = clearance_field(task.road)
+    height, width = field.shape
+    cell = np.clip(cell, 0, (width - 1, height - 1))
+    room = float(field[cell[:, 1], cell[:, 0]].min()) - task.road.resolution
+    return max(min(0.5 * task.vehicle.width + task.config.margin, room), 0.0)
+
+
+def _searched(task: _Task, a: int, b: int, radius: float) -> Floats:
+    """The planner's path (P, 2) from anchor a to anchor b."""
+    query = Query(task.anchors[a, :2], task.anchors[b, :2], radius)
+    try:
+        return plan_with_retry(task.planner, task.road, query, task.config.iterations, task.seed + a).path
+    except BlockedError as error:
+        raise RefusedError(f"{task.name(a if error.end == 'start' else b)} is blocked: {error}") from error
+    except RefusedError as error:
+        raise RefusedError(f"between {task.name(a)} and {task.name(b)}: {error}") from error
+
+
+def _joined(legs: list[Guess]) -> Guess:
+    """Legs end to end."""
+    points = [legs[0].points] + [leg.points[1:] for leg in legs[1:]]
+    hold = [legs[0].hold] + [leg.hold[1:] for leg in legs[1:]]
+    return Guess(np.concatenate(points), np.concatenate(hold))
+
+
+def _sampled(task: _Task, poses_at: Callable[[Floats], Floats], total: float) -> Route:
+    """A curve of length `total` at points at most `spacing` apart, one of them beside every anchor."""
+    dense = np.linspace(0.0, total, int(np.ceil(total / 0.05)) + 1)
+    stops = _stops(task, dense, poses_at(dense))
+    for k in range(1, len(stops)):  # what hardly moves is a dwell
+        if stops[k] - stops[k - 1] < SHORTEST:
+            stops[k] = stops[k - 1]
+    stops[stops > total - SHORTEST] = total
+    places, anchor = [np.zeros(1)], [0]
+    for before, after in itertools.pairwise(stops):
+        pieces = int(np.ceil((after - before) / task.config.spacing * 1.001))
+        places.append(np.linspace(before, after, pieces + 1)[1:])
+        anchor.append(anchor[-1] + pieces)
+    length = np.concatenate(places)
+    points = poses_at(length)
+    points[0], points[-1] = task.anchors[0], task.anchors[-1]
+    return Route(points, np.array(anchor), length)
+
+
+def _stops(task: _Task, length: Floats, poses: Floats) -> Floats:
+    """Arc length (A,) at which the curve passes each anchor, never going back; a dwell has one for both its ends.
+
+    Args:
+        task: the vehicle.
+        length: (M,) arc lengths of a dense curve.
+        poses: (M, 3) the curve there.
+    """
+    group = np.concatenate(([0], np.cumsum(~task.fitted.stands)))
+    square = (np.square(poses[None, :, :2] - task.anchors[:, None, :2])).sum(axis=-1)
+    per_group = np.zeros((group[-1] + 1, len(poses)))
+    np.add.at(per_group, group, square)
+    per_group[0, 1:] = np.inf
+    per_group[-1, :-1] = np.inf
+    nearest = monotone_matching(per_group)
+    offset = task.anchors[:, :2] - poses[nearest[group], :2]
+    yaw = poses[nearest[group], 2]
+    ahead = np.bincount(group, offset[:, 0] * exact.cos(yaw) + offset[:, 1] * exact.sin(yaw)) / np.bincount(group)
+    step = length[1] if len(length) > 1 else 0.0
+    refined = length[nearest] + np.clip(ahead, -step, step)  # between the dense points
+    refined[0], refined[-1] = 0.0, length[-1]
+    return np.maximum.accumulate(np.clip(refined, 0.0, length[-1]))[group]
+
+
+def _polyline(task: _Task, waypoints: list[int]) -> Route:
+    """The planner's bare path through the waypoints: shortest, with corners; only its ends have the asked headings."""
+    legs = [_searched(task, a, b, _radius(task, task.anchors[a], task.anchors[b])) for a, b in itertools.pairwise(waypoints)]
+    path = np.concatenate([legs[0]] + [leg[1:] for leg in legs[1:]])
+    edge = np.diff(path, axis=0)
+    at = np.concatenate(([0.0], np.cumsum(exact.hypot(*edge.T))))
+    yaw = np.unwrap(exact.arctan2(edge[:, 1], edge[:, 0]))
+
+    def poses_at(length: Floats) -> Floats:
+        which = np.clip(np.searchsorted(at, length, side="right") - 1, 0, len(yaw) - 1)
+        return np.column_stack((np.interp(length, at, path[:, 0]), np.interp(length, at, path[:, 1]), yaw[which]))
+
+    return _sampled(task, poses_at, float(at[-1]))
+
+
+def _reason(task: _Task, curve: Curve) -> str:
+    """Why a curve cannot be driven, and next to which anchor."""
+    reasons = []
+    where = curve.sharpest
+    if curve.curvature > task.config.max_curvature:
+        reasons.append(
+            f"its curvature reaches {curve.curvature:.3f} 1/m at ({where[0]:.2f}, {where[1]:.2f}) m, "
+            f"the limit is {task.config.max_curvature:.3f}"
+        )
+    if len(curve.off_road):
+        where = curve.off_road[len(curve.off_road) // 2, :2]
+        reasons.append(f"its footprint leaves the road at ({where[0]:.2f}, {where[1]:.2f}) m")
+    nearest = task.name(int(np.argmin(exact.hypot(*(task.anchors[:, :2] - where).T))))
+    return f"no drivable route for vehicle {task.vehicle.id} on road {task.road.name!r} near {nearest}: " + "; ".join(reasons)

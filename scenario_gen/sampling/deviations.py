@@ -1,0 +1,133 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How far samples lie to the side of the route and along it: the square roots of both covariances."""
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Bools, Floats
+from scenario_gen.sampling.config import SamplingConfig
+from scenario_gen.sampling.gp import Features, Observations, Regression
+from scenario_gen.sampling.path import BasePath
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.road import Road
+
+MAX_GAP_SHARE = 0.3  # an anchor moves by at most this share of the way to its neighbours
+
+
+def longitudinal_covariance_root(times: Floats, anchor: Floats, config: SamplingConfig) -> Floats:
+    """Square root (D, r) of the covariance of the displacements [m] of the route's D distinct inner anchors.
+
+    Independent displacements of anchors a second apart would jerk the speed; those of neighbours in time go together.
+
+    Args:
+        times: (K + 2,) seconds on the template's clock.
+        anchor: (K + 2,) arc lengths [m]; the anchors of a dwell are one and the same.
+        config: σ_s and the time over which displacements vary.
+    """
+    distinct, which = np.unique(anchor, return_inverse=True)
+    if config.longitudinal_sigma == 0.0 or len(distinct) < 3:
+        return np.zeros((max(len(distinct) - 2, 0), 0))
+    middle = np.bincount(which, times) / np.bincount(which)
+    ends = times[[0, -1]]
+    features = Features(ends[0], ends[1], config.longitudinal_sigma, config.longitudinal_time)
+    factor = Regression(features, Observations(ends, np.zeros(2), np.zeros(2))).predict(middle[1:-1]).factor
+    return exact.compact(factor)
+
+
+def displaced_anchors(anchor: Floats, factor: Floats, z: Floats) -> Floats:
+    """Arc lengths (S, K + 2) of the anchors (K + 2,), displaced by factor·z for z (S, r); a dwell's move together."""
+    distinct, which = np.unique(anchor, return_inverse=True)
+    moved = np.broadcast_to(distinct, (len(z), len(distinct))).copy()
+    if factor.size:
+        gap = np.diff(distinct)
+        most = MAX_GAP_SHARE * np.minimum(gap[:-1], gap[1:])
+        moved[:, 1:-1] += np.clip(exact.matmul(z, factor.T), -most, most)
+    return np.asarray(moved[:, which])
+
+
+SHORTEST_ROUTE = 3.0  # m; a shorter one is driven as planned
+ROOM_SIGMAS = 2.0  # a deviation of so many standard deviations still leaves the footprint on the road
+MAX_ROOM_SIGMAS = 5.0  # more room than so many standard deviations is not looked for
+BEND_FROM_SHARE = 0.6  # share of the room from which on a deviation is bent back
+_FLANK_STEP = 0.5  # m
+_ROOM_STEP = 0.1  # m
+_SMOOTHING = 4.0  # m along the route, each of two passes
+
+
+def lateral_covariance_root(path: BasePath, room: Floats, config: SamplingConfig) -> Floats:
+    """Square root (G, r) of the covariance of the deviation [m] at the route's nodes.
+
+    Given are deviation and slope 0 at both ends (the asked poses), and 0 with noise σ_ω at every interior anchor.
+    Where the road leaves less than `ROOM_SIGMAS`·σ_f of room the process is scaled down to it.
+
+    Args:
+        path: the route.
+        room: (G,) metres to either side, see `lateral_room`.
+        config: σ_f, l, σ_ω.
+    """
+    nodes, sigma = len(path.node), config.lateral_sigma
+    if sigma == 0.0 or path.length < SHORTEST_ROUTE:
+        return np.zeros((nodes, 0))
+    inside = np.unique(path.anchor)
+    inside = inside[(inside > 1.0) & (inside < path.length - 1.0)]
+    ends = np.array([0.0, path.length])
+    x = np.concatenate([ends, ends, inside])
+    noise = np.concatenate([np.zeros(4), np.full(len(inside), config.observation_sigma)])
+    seen = Observations(x, np.zeros(len(x)), noise, (0, 0, 1, 1, *(0 for _ in inside)))
+    factor = Regression(Features(0.0, path.length, sigma, config.lateral_length), seen).predict(path.arc).factor
+    return np.minimum(room / (ROOM_SIGMAS * sigma), 1.0)[:, None] * exact.compact(factor, 1e-6 * sigma)
+
+
+def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> Floats:
+    """Metres (G,), at most `most`, by which the vehicle may leave its route to either side, smooth along the route.
+
+    Both flanks of the footprint are moved outwards step by step until a point of them leaves drivable space; what lies
+    ahead and behind, such as the edge of the map where a vehicle enters, does not count.
+    """
+    from scipy.ndimage import minimum_filter1d, uniform_filter1d  # slow to import
+
+    flank = np.linspace(-0.5, 0.5, int(np.ceil(vehicle.length / _FLANK_STEP)) + 1) * vehicle.length
+    ahead = np.stack([exact.cos(path.node[:, 2]), exact.sin(path.node[:, 2])], axis=-1)[:, None, :]
+    left = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
+    axis = path.node[:, None, :2] + flank[:, None] * ahead
+    room, free = np.zeros(len(path.node)), np.ones(len(path.node), dtype=np.bool_)
+    for step in np.arange(1, int(np.ceil(most / _ROOM_STEP)) + 1) * _ROOM_STEP:
+        for side in (0.5 * vehicle.width + step, -0.5 * vehicle.width - step):
+            free &= _drivable(road, axis + side * left).all(axis=1)
+        room[free] = min(step, most)
+    reach = int(np.ceil(_SMOOTHING / max(path.spacing, 1e-9))) if len(room) > 1 else 0
+    smooth = minimum_filter1d(room, 4 * reach + 1, mode="nearest")
+    for _ in range(2):
+        smooth = uniform_filter1d(smooth, 2 * reach + 1, mode="nearest")
+    return np.asarray(smooth)
+
+
+def _drivable(road: Road, points: Floats) -> Bools:
+    """Whether points (..., 2) lie in drivable cells."""
+    cell = np.floor((points - road.origin) / road.resolution).astype(np.int64)
+    height, width = road.drivable.shape
+    inside = (cell[..., 0] >= 0) & (cell[..., 0] < width) & (cell[..., 1] >= 0) & (cell[..., 1] < height)
+    found = road.drivable[np.clip(cell[..., 1], 0, height - 1), np.clip(cell[..., 0], 0, width - 1)]
+    return np.asarray(inside & found)
+
+
+def soft_clipped(deviation: Floats, room: Floats) -> Floats:
+    """Deviations (S, G) [m], unchanged up to `BEND_FROM_SHARE` of the room (G,), bent smoothly (C2) to stay inside it beyond."""
+    share = np.abs(deviation) / np.maximum(room, 1e-9)
+    if (share <= BEND_FROM_SHARE).all():
+        return deviation
+    bent = BEND_FROM_SHARE + (1.0 - BEND_FROM_SHARE) * exact.tanh((share - BEND_FROM_SHARE) / (1.0 - BEND_FROM_SHARE))
+    return np.asarray(np.where(share <= BEND_FROM_SHARE, deviation, np.sign(deviation) * bent * room))

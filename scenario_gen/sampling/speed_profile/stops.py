@@ -1,0 +1,70 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Waits on a sample's clock: which part stands, which creeps, and how short they may become."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.sampling.speed_profile.knots import SpeedKnots
+from scenario_gen.sampling.speed_profile.qp import SpeedBounds
+from scenario_gen.sampling.time_warp import SHORTEST_SHARE
+from scenario_gen.template.interaction import STAND_SPEED, Wait, WAIT_SPEED
+from scenario_gen.types.encounter import Encounter
+
+_CREEPS = 0.9 * WAIT_SPEED  # m/s, fastest in a creeping wait
+_SHORTEST_WAIT = 1.25  # s; shorter waits are lengthened to it, so that they are still waits on the published grid
+_LEAST_WAIT = 1.15  # s, to which a fast clock may shorten one
+
+
+def standing_part(encounter: Encounter, wait: Wait) -> Wait:
+    """The part of a wait in which the vehicle stands, not yet or no longer creeps; a creeping wait as it is.
+
+    A wait begins below 0.5 m/s, so a vehicle that brakes gently still rolls for a while.
+    """
+    inside = (encounter.time >= wait.start) & (encounter.time <= wait.end)
+    stands = encounter.time[inside & (encounter.speed[wait.vehicle] <= STAND_SPEED)]
+    if wait.creeps or len(stands) == 0:
+        return wait
+    start = wait.start if wait.start <= encounter.time[0] else float(stands[0])
+    end = wait.end if wait.end >= encounter.time[-1] else float(stands[-1])
+    return replace(wait, start=start, end=end)
+
+
+def shortest_shares(times: Floats, waits: Sequence[Wait]) -> Floats:
+    """(K + 1,) the shortest each primitive may become, as a share of its duration, so that every wait remains one."""
+    shares = np.full(len(times) - 1, SHORTEST_SHARE)
+    for wait in waits:
+        inside = (times[1:] > wait.start) & (times[:-1] < wait.end)
+        least = _LEAST_WAIT / max(wait.end - wait.start, _SHORTEST_WAIT)
+        shares[inside] = np.maximum(shares[inside], least)
+    return shares
+
+
+def lengthened(n: int, waits: Sequence[Wait], *, creeping: bool) -> list[tuple[float, float]]:
+    """Begin and end [s] of vehicle n's waits of one kind, short ones lengthened."""
+    own = [wait for wait in waits if wait.vehicle == n and wait.creeps == creeping]
+    pads = [max(0.0, 0.5 * (_SHORTEST_WAIT - (wait.end - wait.start))) for wait in own]
+    return [(wait.start - pad, wait.end + pad) for wait, pad in zip(own, pads, strict=True)]
+
+
+def creep_bounds(knots: SpeedKnots) -> SpeedBounds:
+    """Speed bounds at both ends of every interval within a creeping wait, where the speed there is not given."""
+    inside = np.flatnonzero(knots.creeping)
+    interval, at = np.concatenate([inside, inside]), np.repeat([0.0, 1.0], len(inside))
+    known = knots.unknown[interval + at.astype(np.int64)] < 0
+    return SpeedBounds(interval[~known], at[~known], np.full(int((~known).sum()), _CREEPS))

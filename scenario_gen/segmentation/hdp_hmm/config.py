@@ -1,0 +1,58 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parameters of the sticky HDP-HMM."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.parameters import check, parameter
+
+
+@dataclass(frozen=True)
+class SamplerConfig:
+    """The sticky HDP-HMM and its sampler; the defaults suit any series from D = 1 to D = 24."""
+
+    emission: str = parameter("gaussian", "what a state emits", choices=("gaussian", "autoregressive"))
+    order: int = parameter(1, "past samples an autoregressive emission looks at", low=1, high=5)
+    states: int = parameter(20, "weak-limit truncation L: states that exist, used or not", low=2, high=100)
+    chains: int = parameter(3, "independent chains, each from a start of its own", low=1, high=16)
+    sweeps: int = parameter(100, "Gibbs sweeps of each chain, those of its start included", low=10, high=100_000)
+    mean_weight: float = parameter(
+        0.05,
+        "prior samples that the mean (or the regression) of a state is worth; a mean more where the states found lie close",
+        low=1e-6,
+        high=100.0,
+    )
+    weight: float = parameter(
+        0.0, "what one sample counts for, below 1 where neighbours repeat each other; 0: from the data", low=0.0, high=1.0
+    )
+    gamma_shape: float = parameter(1.0, "shape of γ's Gamma prior", low=1e-3)
+    gamma_rate: float = parameter(0.1, "rate of γ's Gamma prior", low=1e-6)
+    alpha_kappa_shape: float = parameter(1.0, "shape of the Gamma prior of α+κ", low=1e-3)
+    alpha_kappa_rate: float = parameter(0.01, "rate of the Gamma prior of α+κ", low=1e-6)
+    rho_a: float = parameter(10.0, "first parameter of ρ's Beta prior, ρ = κ/(α+κ)", low=1e-3)
+    rho_b: float = parameter(1.0, "second parameter of ρ's Beta prior", low=1e-3)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+    @property
+    def hyper(self) -> Floats:
+        """(6,) hyperpriors in the kernels' order."""
+        return np.array(
+            [self.gamma_shape, self.gamma_rate, self.alpha_kappa_shape, self.alpha_kappa_rate, self.rho_a, self.rho_b]
+        )

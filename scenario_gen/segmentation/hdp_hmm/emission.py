@@ -1,0 +1,234 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Emissions of all states at once: y = A z + noise, (A, Σ) ~ MNIW(M, K, ν0, S0), in one form for Gaussian and AR.
+
+With the regressor z = 1 this is the Gaussian-NIW emission (A is the mean, K its κ0); with z = (1, past samples) it is
+the autoregressive one. A sample is v = (z, y), P + D numbers. All that a state knows is G = G0 + Σ v vᵀ with
+G0 = [[K, K Mᵀ], [M K, S0 + M K Mᵀ]]; its Cholesky factor [[Lz, 0], [Lyz, Ly]] holds the whole posterior:
+K' = Lz Lzᵀ, A' = Lyz Lz⁻¹, S' = Ly Lyᵀ. Plain loops: they compile fast, and vectorise over the last axis.
+"""
+
+import math
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.kernels import kernel
+from scenario_gen.segmentation.hdp_hmm.random import log_gamma_draw, normal, State
+
+BLOCK = 64
+LEAST_LOG = -300.0
+LOG2_E = 1.4426950408889634
+LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
+TO_INTEGER = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer, which its lowest bits then hold
+ONE_BITS = 1023 << 52  # the bits of 1.0
+
+
+@kernel(inline=True)
+def cholesky(matrix: Floats) -> bool:
+    """Overwrite the lower triangle of `matrix` (n, n) with its Cholesky factor; False if it is not positive definite."""
+    n = matrix.shape[0]
+    for j in range(n):
+        for k in range(j):
+            c = matrix[j, k]
+            for i in range(j, n):
+                matrix[i, j] -= matrix[i, k] * c
+        if not matrix[j, j] > 0.0:
+            return False
+        pivot = math.sqrt(matrix[j, j])
+        for i in range(j, n):
+            matrix[i, j] /= pivot
+    return True
+
+
+@kernel(inline=True)
+def accumulate(v: Floats, labels: Ints, g0: Floats, weight: float, blur: Floats, g: Floats, counts: Ints) -> None:
+    """Fill g (L, M, M; lower triangles) and counts (L,) from samples v (T, M) and labels (T,).
+
+    `weight` is what a sample counts for (1: all of it; less where neighbouring samples repeat each other); `blur`
+    (D,) the variance to which a sample's channels are known at all.
+    """
+    outer = np.zeros(g.shape)
+    for k in range(len(counts)):
+        counts[k] = 0
+    for t in range(v.shape[0]):
+        add_sample(v[t], 1.0, outer[labels[t]])
+        counts[labels[t]] += 1
+    posterior(outer, counts, g0, weight, blur, g)
+
+
+@kernel(inline=True)
+def add_sample(v: Floats, sign: float, outer: Floats) -> None:
+    """Add sign × v vᵀ to `outer` (M, M; lower triangle)."""
+    for i in range(len(v)):
+        c = sign * v[i]
+        for j in range(i + 1):
+            outer[i, j] += c * v[j]
+
+
+@kernel(inline=True)
+def posterior(outer: Floats, counts: Ints, g0: Floats, weight: float, blur: Floats, g: Floats) -> None:
+    """Fill g (L, M, M; lower triangles) from the states' Σ v vᵀ, `outer`, and counts; see `accumulate`."""
+    m = g0.shape[0]
+    d = len(blur)
+    for k in range(g.shape[0]):
+        for i in range(m):
+            for j in range(i + 1):
+                g[k, i, j] = g0[i, j] + weight * outer[k, i, j]
+            if i >= m - d:
+                g[k, i, i] += weight * counts[k] * blur[i - (m - d)]
+
+
+@kernel(inline=True)
+def log_marginal(factor: Floats, n: float, p: int, nu: float) -> float:
+    """Part of log p(samples) that depends on them, from the Cholesky factor (M, M) of G; `nu` is the prior's ν0.
+
+    log p = c(factor, n) - c(prior factor, 0) with c = -nD/2 log π + log Γ_D(ν'/2) - ν'/2 log|S'| - D/2 log|K'|.
+    """
+    m = factor.shape[0]
+    d = m - p
+    value: float = -0.5 * n * d * exact.log(math.pi)
+    for i in range(p):
+        value -= d * exact.log(factor[i, i])
+    for i in range(d):
+        value += exact.lgamma(0.5 * (nu + n - i)) - (nu + n) * exact.log(factor[p + i, p + i])
+    return value
+
+
+@kernel(inline=True)
+def draw_emission(state: State, factor: Floats, n: float, p: int, nu: float, blur: Floats, coef: Floats) -> float:
+    """Draw (A, Σ) from the posterior; returns log|Σ|^(-1/2) - tr(Σ⁻¹ blur)/2.
+
+    `coef` (D, M) becomes the map of v to its whitened residual: W y - B z with WᵀW = Σ⁻¹ (W lower) and B = W A.
+    Σ⁻¹ = Ly⁻ᵀ U Uᵀ Ly⁻¹ with U upper triangular (Bartlett), so W = Uᵀ Ly⁻¹; A = (Lyz + W⁻¹ E) Lz⁻¹, E standard normal.
+    """
+    m = factor.shape[0]
+    d = m - p
+    logdet = 0.0
+    for i in range(d):
+        for j in range(i):
+            coef[i, p + j] = normal(state)
+        shape = 0.5 * (nu + n - (d - 1 - i))
+        coef[i, p + i] = exact.exp(0.5 * (log_gamma_draw(state, shape) + exact.log(2.0)))
+        for j in range(i + 1, d):
+            coef[i, p + j] = 0.0
+        for j in range(i, -1, -1):
+            c = coef[i, p + j] / factor[p + j, p + j]
+            coef[i, p + j] = c
+            for q in range(j):
+                coef[i, p + q] -= c * factor[p + j, p + q]
+        logdet += exact.log(coef[i, p + i])
+        for j in range(i + 1):
+            logdet -= 0.5 * coef[i, p + j] ** 2 * blur[j]
+        for q in range(p):
+            coef[i, q] = -normal(state)
+        for j in range(i + 1):
+            c = coef[i, p + j]
+            for q in range(p):
+                coef[i, q] -= c * factor[p + j, q]
+        for j in range(p - 1, -1, -1):
+            c = coef[i, j] / factor[j, j]
+            coef[i, j] = c
+            for q in range(j):
+                coef[i, q] -= c * factor[j, q]
+    return logdet
+
+
+@kernel(inline=True)
+def block_log_likelihood(
+    vt: Floats, start: int, stop: int, coef: Floats, logdet: Floats, weight: float, out: Floats, row: Floats
+) -> None:
+    """Fill out (L, BLOCK) with log p(y_t | z_t, state) up to a constant, t in start..stop; vt is (M, T), row (BLOCK,)."""
+    states, d, m = coef.shape
+    n = stop - start
+    for k in range(states):
+        total = out[k]
+        for t in range(n):
+            total[t] = 0.0
+        for i in range(d):
+            used = m - d + i + 1
+            c = coef[k, i]
+            x = vt[0, start:stop]
+            for t in range(n):
+                row[t] = c[0] * x[t]
+            j = 1
+            while j + 3 < used:  # four at a time: a partial sum is fetched and stored a quarter as often
+                c0, c1, c2, c3 = c[j], c[j + 1], c[j + 2], c[j + 3]
+                x0, x1, x2, x3 = vt[j, start:stop], vt[j + 1, start:stop], vt[j + 2, start:stop], vt[j + 3, start:stop]
+                for t in range(n):
+                    row[t] += (c0 * x0[t] + c1 * x1[t]) + (c2 * x2[t] + c3 * x3[t])
+                j += 4
+            for rest in range(j, used):
+                c0 = c[rest]
+                x = vt[rest, start:stop]
+                for t in range(n):
+                    row[t] += c0 * x[t]
+            for t in range(n):
+                total[t] += row[t] * row[t]
+        for t in range(n):
+            total[t] = weight * (logdet[k] - 0.5 * total[t])
+
+
+@kernel(inline=True)
+def block_likelihood(logs: Floats, n: int, best: Floats, work: Floats, out: Floats) -> None:
+    """Fill out (n, L) with exp(logs - best of all states), logs (L, BLOCK); below e^-300 it is 0. Work (2, BLOCK).
+
+    The exponential is a polynomial (Cody & Waite), which is vectorised, unlike a call per number; it is right to 3e-13,
+    as exact as a log-likelihood of a thousand is.
+    """
+    states = logs.shape[0]
+    for t in range(n):
+        best[t] = logs[0, t]
+    for k in range(1, states):
+        x = logs[k]
+        for t in range(n):
+            best[t] = x[t] if x[t] > best[t] else best[t]
+    power, value = work[0], work[1]
+    bits = power.view(np.int64)
+    for k in range(states):
+        x = logs[k]
+        for t in range(n):
+            y = x[t] - best[t]
+            y = y if y > LEAST_LOG else LEAST_LOG
+            shifted = y * LOG2_E + TO_INTEGER
+            power[t] = shifted
+            turns = shifted - TO_INTEGER
+            r = (y - turns * LN2_HIGH) - turns * LN2_LOW
+            p = 1.0 / 3628800.0
+            p = p * r + 1.0 / 362880.0
+            p = p * r + 1.0 / 40320.0
+            p = p * r + 1.0 / 5040.0
+            p = p * r + 1.0 / 720.0
+            p = p * r + 1.0 / 120.0
+            p = p * r + 1.0 / 24.0
+            p = p * r + 1.0 / 6.0
+            p = p * r + 0.5
+            p = p * r + 1.0
+            value[t] = (p * r + 1.0) if y > LEAST_LOG else 0.0
+        for t in range(n):
+            bits[t] = (bits[t] << 52) + ONE_BITS
+        for t in range(n):
+            out[t, k] = value[t] * power[t]
+
+
+def joint_prior(mean: Floats, precision: Floats, scale: Floats) -> Floats:
+    """Return G0 (P + D, P + D) of an MNIW prior with mean M (D, P), K (P, P) and S0 (D, D)."""
+    return np.block(
+        [
+            [precision, exact.matmul(precision, mean.T)],
+            [exact.matmul(mean, precision), scale + exact.matmul(exact.matmul(mean, precision), mean.T)],
+        ]
+    )

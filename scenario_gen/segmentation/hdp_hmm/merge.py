@@ -1,0 +1,137 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Greedy merging of states by marginal likelihood: what Gibbs sampling alone does with difficulty."""
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.kernels import F, F1, F2, I, I1, kernel, OUT1, OUTI1
+from scenario_gen.segmentation.hdp_hmm.chain import count_transitions
+from scenario_gen.segmentation.hdp_hmm.emission import accumulate, cholesky, log_marginal
+
+
+@kernel(inline=True)
+def merge_gain(n: Ints, i: int, j: int, stay: float, move: float) -> float:
+    """Gain in log p(labels) from making states i and j one, by counts n (L + 1, L).
+
+    Rows are Dirichlet with `stay` at home and `move` elsewhere.
+    """
+    states = n.shape[1]
+    gain: float = 0.0
+    joint_row = 0
+    row_i, row_j = 0, 0
+    for k in range(states):
+        row_i += n[i, k]
+        row_j += n[j, k]
+        if k not in (i, j):
+            joint = n[i, k] + n[j, k]
+            joint_row += joint
+            gain += exact.lgamma(move + joint) - exact.lgamma(move + n[i, k]) - exact.lgamma(move + n[j, k]) + exact.lgamma(move)
+            joint = n[k, i] + n[k, j]
+            gain += exact.lgamma(move + joint) - exact.lgamma(move + n[k, i]) - exact.lgamma(move + n[k, j]) + exact.lgamma(move)
+    home = n[i, i] + n[i, j] + n[j, i] + n[j, j]
+    joint_row += home
+    gain += exact.lgamma(stay + home) - exact.lgamma(stay)
+    gain -= exact.lgamma(stay + n[i, i]) - exact.lgamma(stay) + exact.lgamma(stay + n[j, j]) - exact.lgamma(stay)
+    gain -= exact.lgamma(move + n[i, j]) - exact.lgamma(move) + exact.lgamma(move + n[j, i]) - exact.lgamma(move)
+    total = stay + states * move
+    gain += exact.lgamma(total) - exact.lgamma(total + joint_row)
+    gain += -2.0 * exact.lgamma(total) + exact.lgamma(total + row_i) + exact.lgamma(total + row_j)
+    return gain
+
+
+@kernel(inline=True)
+def join(a: Floats, b: Floats, g0: Floats, out: Floats) -> None:
+    """Fill `out` (M, M) with a + b - g0, lower triangles: what two states together know."""
+    for i in range(len(g0)):
+        for j in range(i + 1):
+            out[i, j] = a[i, j] + b[i, j] - g0[i, j]
+
+
+@kernel(inline=True)
+def best_merge(data: Floats, own: Floats, counts: Ints, n: Ints, stay: float, move: float) -> tuple[int, int]:
+    """Return the pair of states (i > j), of data (L, M, M), whose merge gains most, or (-1, -1) if none gains anything."""
+    best, best_i, best_j = 0.0, -1, -1
+    for i in range(len(own)):
+        for j in range(i):
+            if counts[i] > 0 and counts[j] > 0:
+                gain = data[i, j] - own[i] - own[j] + merge_gain(n, i, j, stay, move)
+                if gain > best:
+                    best, best_i, best_j = gain, i, j
+    return best_i, best_j
+
+
+@kernel(F2, I1, F2, F1, I, F, F, OUT1, OUTI1)
+def merge_states(
+    v: Floats, ends: Ints, g0: Floats, hyper: Floats, regressors: int, stay: float, move: float, score: Floats, labels: Ints
+) -> None:
+    """Merge states greedily while the probability of the labels, emissions and transitions integrated out, grows.
+
+    Gibbs sampling alone splits easily and merges with difficulty; this is run on the labels that a chain starts from.
+
+    Args:
+        v: (T, M) samples.
+        ends: index one past the last sample of each sequence.
+        g0: (M, M) joint prior of the emissions.
+        hyper: as `run_chain` has it.
+        regressors: P.
+        stay: prior weight of the own state in a transition row.
+        move: prior weight of every other one.
+        score: (1,) output, log p(samples | labels).
+        labels: (T,) updated; `labels.max() + 1` states.
+    """
+    m = v.shape[1]
+    nu, weight, blur = hyper[6], hyper[7], hyper[8:]
+    states = 0
+    for t in range(len(labels)):
+        states = max(states, labels[t] + 1)
+    g = np.empty((states, m, m))
+    counts = np.empty(states, np.int64)
+    n = np.empty((states + 1, states), np.int64)
+    factor = g0.copy()
+    cholesky(factor)
+    base = log_marginal(factor, 0, regressors, nu)
+    own = np.zeros(states)
+    data = np.full((states, states), np.nan)
+    accumulate(v, labels, g0, weight, blur, g, counts)
+    for k in range(states):
+        join(g[k], g0, g0, factor)
+        cholesky(factor)
+        own[k] = log_marginal(factor, weight * counts[k], regressors, nu) - base
+    while True:
+        count_transitions(labels, ends, n)
+        for i in range(states):
+            for j in range(i):
+                if counts[i] > 0 and counts[j] > 0 and np.isnan(data[i, j]):
+                    join(g[i], g[j], g0, factor)
+                    cholesky(factor)
+                    data[i, j] = log_marginal(factor, weight * (counts[i] + counts[j]), regressors, nu) - base
+        i, j = best_merge(data, own, counts, n, stay, move)
+        if i < 0:
+            break
+        own[j], own[i] = data[i, j], 0.0
+        join(g[i], g[j], g0, g[j])
+        counts[j] += counts[i]
+        counts[i] = 0
+        for t in range(len(labels)):
+            if labels[t] == i:
+                labels[t] = j
+        for k in range(states):
+            data[j, k] = np.nan
+            data[k, j] = np.nan
+    score[0] = 0.0
+    for k in range(states):
+        score[0] += own[k]

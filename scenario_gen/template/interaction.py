@@ -1,0 +1,320 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What drivers do to each other: waits, conflicts, and who goes first.
+
+A *wait* is a smoothed speed below 0.5 m/s for at least 1 s. A *conflict* is where the swept footprints of two vehicles'
+paths intersect; its order is that of first entry into the shared area, in following the order along the route.
+
+The shared area of vehicles a and b is the intersection of their swept footprints. A footprint of a lies in a's own sweep,
+so a is inside the shared area exactly while its footprint meets the sweep of b: two box tests replace polygon clipping.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, runs
+from scenario_gen.kernels import F1, F2, kernel, OUT1
+from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
+from scenario_gen.types.segmentation import Segmentation
+
+WAIT_SPEED = 0.5  # m/s
+WAIT_DURATION = 1.0  # s
+WAIT_SMOOTHING = 0.5  # s, width of the centred moving mean
+STAND_SPEED = 0.1  # m/s; a wait in which the vehicle is never so slow for `WAIT_DURATION` is a creeping one
+
+POSE_STEP = 1.0  # m, longest distance between two neighbouring poses of a sweep
+POSE_TURN = 0.1  # rad, largest turn between them
+STAND_STEP = 0.01  # m, a sample that moves less than this from its neighbours adds nothing to the sweep
+BLOCK = 16  # poses that share one bounding circle
+DEPTH = 1e-6  # m, footprints that meet less deeply only touch
+
+Size = tuple[float, float]  # half length, half width [m] of a footprint
+
+FOLLOWING_ANGLE = 0.5  # rad, largest difference of heading of two vehicles on the same path
+FOLLOWING_LENGTHS = 3.0  # a shared path longer than this many vehicle lengths is following
+
+
+@dataclass(frozen=True)
+class Wait:
+    """Vehicle `vehicle` waits from `start` to `end` [s]: smoothed speed below 0.5 m/s for at least 1 s.
+
+    It `creeps` if it does not stand (at most 0.1 m/s) for 1 s of that.
+    """
+
+    vehicle: int
+    start: float
+    end: float
+    creeps: bool = False
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """The swept footprints of two vehicles' paths intersect (crossing, merging, following).
+
+    `first` and `second` are vehicle indices in order of entry into the shared area (in following: leader, follower);
+    `entry_first`, `entry_second` the times [s] of entry, `exit_first` when the first one has left it.
+    """
+
+    first: int
+    second: int
+    following: bool
+    entry_first: float
+    exit_first: float
+    entry_second: float
+
+
+@once_per_encounter
+def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
+    """Return the waits of every vehicle, in order of vehicle and time.
+
+    The speed is smoothed by a centred moving mean over 0.5 s (an odd number of samples; the end samples are repeated).
+    """
+    from scipy.ndimage import uniform_filter1d  # slow to import
+
+    width = 2 * round(0.5 * WAIT_SMOOTHING / encounter.dt) + 1
+    smooth = uniform_filter1d(encounter.speed, width, axis=1, mode="nearest")
+    time = encounter.time
+    return tuple(
+        Wait(vehicle, float(time[a]), float(time[b - 1]), _creeps(encounter.speed[vehicle, a:b], time[a:b]))
+        for vehicle, speed in enumerate(smooth)
+        for a, b in runs(speed < WAIT_SPEED)
+        if time[b - 1] - time[a] >= WAIT_DURATION - 1e-9
+    )
+
+
+def waits_to_keep(encounter: Encounter, segmentation: Segmentation) -> tuple[Wait, ...]:
+    """Return the template's waits that every scenario keeps; without changepoints there is no dwell to hold (paper V-B)."""
+    return find_waits(encounter) if segmentation.changepoints.size else ()
+
+
+def _creeps(speed: Floats, time: Floats) -> bool:
+    """Whether the vehicle does not stand for long enough between the first and the last sample in which it does."""
+    stands = time[speed <= STAND_SPEED]
+    return len(stands) == 0 or bool(stands[-1] - stands[0] < WAIT_DURATION - 1e-9)
+
+
+def find_conflicts(vehicles: tuple[Vehicle, ...], time: Floats, position: Floats, heading: Floats) -> tuple[Conflict, ...]:
+    """Return one conflict per pair of vehicles whose swept footprints intersect, ordered by pair.
+
+    Between samples both position and heading are linear. Two vehicles that enter at the same instant (both are inside
+    the shared area from the start) are ordered by index, unless one follows the other.
+
+    Args:
+        vehicles: N footprints.
+        time: (T,) seconds.
+        position: (N, T, 2) metres.
+        heading: (N, T) rad.
+    """
+    time, position, heading = (np.ascontiguousarray(array, dtype=np.float64) for array in (time, position, heading))
+    found = []
+    for a, b in combinations(range(len(vehicles)), 2):
+        answer = pair_conflict(vehicles, time, position, heading, a, b)
+        if answer is not None:
+            found.append(answer)
+    return tuple(found)
+
+
+def pair_conflict(
+    vehicles: tuple[Vehicle, ...], time: Floats, position: Floats, heading: Floats, a: int, b: int
+) -> Conflict | None:
+    """Return the conflict of `a` < `b`, or None if their swept footprints are apart; arrays as in `find_conflicts`, in metres."""
+    out = np.empty(7)
+    size_a = np.array((vehicles[a].length, vehicles[a].width))
+    size_b = np.array((vehicles[b].length, vehicles[b].width))
+    _conflict(time, position[a], heading[a], size_a, position[b], heading[b], size_b, out)
+    exists, a_first, following, *times = out.tolist()
+    if not exists:
+        return None
+    entry_a, exit_a, entry_b, exit_b = times
+    if a_first:
+        return Conflict(a, b, bool(following), entry_a, exit_a, entry_b)
+    return Conflict(b, a, bool(following), entry_b, exit_b, entry_a)
+
+
+@kernel(inline=True)
+def _sweep(time: Floats, position: Floats, heading: Floats) -> Floats:
+    """Poses (M, 5) t, x, y, cos, sin of a sweep: samples in which a vehicle stands dropped, long steps divided."""
+    t = time.shape[0]
+    keep = np.ones(t, dtype=np.int64)  # number of steps from the last kept sample to this one; 0: not kept
+    total, last = 1, 0
+    for k in range(1, t):
+        if k < t - 1:
+            here = exact.hypot(position[k, 0] - position[last, 0], position[k, 1] - position[last, 1])
+            there = exact.hypot(position[k + 1, 0] - position[last, 0], position[k + 1, 1] - position[last, 1])
+            turn = max(abs(heading[k] - heading[last]), abs(heading[k + 1] - heading[last]))
+            if max(here, there) < STAND_STEP and turn < STAND_STEP:
+                keep[k] = 0
+                continue
+        moved = exact.hypot(position[k, 0] - position[last, 0], position[k, 1] - position[last, 1])
+        keep[k] = max(1, int(np.ceil(max(moved / POSE_STEP, abs(heading[k] - heading[last]) / POSE_TURN))))
+        total += keep[k]
+        last = k
+    poses = np.empty((total, 5))
+    m, last = 0, 0
+    for k in range(t):
+        steps = keep[k]
+        for s in range(1, steps + 1):
+            w = s / steps
+            yaw = (1.0 - w) * heading[last] + w * heading[k]
+            poses[m, 0] = (1.0 - w) * time[last] + w * time[k]
+            poses[m, 1] = (1.0 - w) * position[last, 0] + w * position[k, 0]
+            poses[m, 2] = (1.0 - w) * position[last, 1] + w * position[k, 1]
+            poses[m, 3], poses[m, 4] = exact.cos(yaw), exact.sin(yaw)
+            m += 1
+        if steps:
+            last = k
+    return poses
+
+
+@kernel(inline=True)
+def _block_circles(poses: Floats) -> Floats:
+    """Circles (B, 3) x, y, r around the centres of each BLOCK of poses."""
+    m = poses.shape[0]
+    n = (m + BLOCK - 1) // BLOCK
+    circles = np.empty((n, 3))
+    for b in range(n):
+        lo, hi = b * BLOCK, min(m, (b + 1) * BLOCK)
+        x, y, radius = 0.5 * (poses[lo, 1] + poses[hi - 1, 1]), 0.5 * (poses[lo, 2] + poses[hi - 1, 2]), 0.0
+        for i in range(lo, hi):
+            radius = max(radius, exact.hypot(poses[i, 1] - x, poses[i, 2] - y))
+        circles[b, 0], circles[b, 1], circles[b, 2] = x, y, radius
+    return circles
+
+
+@kernel(inline=True)
+def _boxes_meet(dx: float, dy: float, ca: float, sa: float, half_a: Size, cb: float, sb: float, half_b: Size) -> bool:
+    """True if two boxes of half length and width `half_*`, centres (dx, dy) apart, overlap (separating axes)."""
+    (la, wa), (lb, wb) = half_a, half_b
+    cos, sin = abs(ca * cb + sa * sb), abs(ca * sb - sa * cb)
+    return (
+        abs(dx * ca + dy * sa) < la + lb * cos + wb * sin - DEPTH
+        and abs(dy * ca - dx * sa) < wa + lb * sin + wb * cos - DEPTH
+        and abs(dx * cb + dy * sb) < lb + la * cos + wa * sin - DEPTH
+        and abs(dy * cb - dx * sb) < wb + la * sin + wa * cos - DEPTH
+    )
+
+
+@kernel(inline=True)
+def _meets_sweep(pose: Floats, half: Size, poses: Floats, circles: Floats, other: Size) -> bool:
+    """True if the box at `pose` (t, x, y, cos, sin) meets any box of the sweep `poses`."""
+    x, y = pose[1], pose[2]
+    reach = exact.hypot(half[0], half[1]) + exact.hypot(other[0], other[1])
+    for b in range(circles.shape[0]):
+        dx, dy, r = circles[b, 0] - x, circles[b, 1] - y, circles[b, 2] + reach
+        if dx * dx + dy * dy >= r * r:
+            continue
+        for i in range(b * BLOCK, min(poses.shape[0], (b + 1) * BLOCK)):
+            dx, dy = poses[i, 1] - x, poses[i, 2] - y
+            if dx * dx + dy * dy < reach * reach and _boxes_meet(dx, dy, pose[3], pose[4], half, poses[i, 3], poses[i, 4], other):
+                return True
+    return False
+
+
+@kernel(inline=True)
+def _crossing_time(out_pose: Floats, in_pose: Floats, half: Size, poses: Floats, circles: Floats, other: Size) -> float:
+    """Time between two neighbouring poses at which the box begins (or ends) to meet the sweep, by bisection."""
+    outside, inside, pose = 0.0, 1.0, np.empty(5)
+    for _ in range(10):
+        w = 0.5 * (outside + inside)
+        for i in range(5):
+            pose[i] = (1.0 - w) * out_pose[i] + w * in_pose[i]
+        norm = exact.hypot(pose[3], pose[4])
+        pose[3], pose[4] = pose[3] / norm, pose[4] / norm
+        if _meets_sweep(pose, half, poses, circles, other):
+            inside = w
+        else:
+            outside = w
+    return float((1.0 - inside) * out_pose[0] + inside * in_pose[0])
+
+
+@kernel(inline=True)
+def _occupancy(mine: Floats, half: Size, poses: Floats, circles: Floats, other: Size) -> tuple[float, float]:
+    """(first entry, last exit) [s] of a vehicle's poses `mine` into the sweep `poses`; entry is inf if they never meet."""
+    m = mine.shape[0]
+    first = 0
+    while first < m and not _meets_sweep(mine[first], half, poses, circles, other):
+        first += 1
+    if first == m:
+        return np.inf, -np.inf
+    last = m - 1
+    while not _meets_sweep(mine[last], half, poses, circles, other):
+        last -= 1
+    entry, leave = mine[first, 0], mine[last, 0]
+    if first > 0:
+        entry = _crossing_time(mine[first - 1], mine[first], half, poses, circles, other)
+    if last < m - 1:
+        leave = _crossing_time(mine[last + 1], mine[last], half, poses, circles, other)
+    return entry, leave
+
+
+@kernel(inline=True)
+def _shared_path(a: Floats, b: Floats, circles_b: Floats, half_a: Size, half_b: Size) -> tuple[float, float]:
+    """(metres of a's path shared with b in the same direction, metres of it on which a came first minus second)."""
+    shared, lead, last = 0.0, 0.0, 0
+    reach = exact.hypot(half_a[0] + half_b[0], half_a[1] + half_b[1])
+    for i in range(1, a.shape[0]):
+        step = exact.hypot(a[i, 1] - a[i - 1, 1], a[i, 2] - a[i - 1, 2])
+        if step == 0.0:
+            continue
+        near, nearest = -1, reach * reach
+        distance = (b[last, 1] - a[i, 1]) ** 2 + (b[last, 2] - a[i, 2]) ** 2  # a good first guess leaves few to look at
+        if distance < nearest:
+            near, nearest = last, distance
+        for c in range(circles_b.shape[0]):
+            dx, dy = circles_b[c, 0] - a[i, 1], circles_b[c, 1] - a[i, 2]
+            if dx * dx + dy * dy >= (circles_b[c, 2] + np.sqrt(nearest)) ** 2:
+                continue
+            for j in range(c * BLOCK, min(b.shape[0], (c + 1) * BLOCK)):
+                distance = (b[j, 1] - a[i, 1]) ** 2 + (b[j, 2] - a[i, 2]) ** 2
+                if distance < nearest:
+                    near, nearest = j, distance
+        last = max(near, 0)
+        if near < 0 or a[i, 3] * b[near, 3] + a[i, 4] * b[near, 4] < exact.cos(FOLLOWING_ANGLE):
+            continue
+        dx, dy = b[near, 1] - a[i, 1], b[near, 2] - a[i, 2]
+        if _boxes_meet(dx, dy, a[i, 3], a[i, 4], half_a, b[near, 3], b[near, 4], half_b):
+            shared += step
+            lead += step * np.sign(b[near, 0] - a[i, 0])
+    return shared, lead
+
+
+@kernel(F1, F2, F1, F1, F2, F1, F1, OUT1)
+def _conflict(
+    time: Floats,
+    position_a: Floats,
+    heading_a: Floats,
+    size_a: Floats,
+    position_b: Floats,
+    heading_b: Floats,
+    size_b: Floats,
+    out: Floats,
+) -> None:
+    """Fill `out`: exists, a first, following, entry and exit of a, entry and exit of b (7,)."""
+    out[0] = 0.0
+    half_a, half_b = (0.5 * size_a[0], 0.5 * size_a[1]), (0.5 * size_b[0], 0.5 * size_b[1])
+    a, b = _sweep(time, position_a, heading_a), _sweep(time, position_b, heading_b)
+    circles_a, circles_b = _block_circles(a), _block_circles(b)
+    entry_a, exit_a = _occupancy(a, half_a, b, circles_b, half_b)
+    entry_b, exit_b = _occupancy(b, half_b, a, circles_a, half_a)
+    if not (np.isfinite(entry_a) and np.isfinite(entry_b)):
+        return
+    shared, lead = _shared_path(a, b, circles_b, half_a, half_b)
+    following = shared >= FOLLOWING_LENGTHS * max(size_a[0], size_b[0])
+    a_first = lead > 0.0 if following and lead != 0.0 else entry_a <= entry_b
+    out[0], out[1], out[2] = 1.0, 1.0 if a_first else 0.0, 1.0 if following else 0.0
+    out[3], out[4], out[5], out[6] = entry_a, exit_a, entry_b, exit_b

@@ -1,0 +1,194 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The template on its own ground, pulled apart where a record (or a road) has vehicles too close."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, frozen
+from scenario_gen.curve import Curve
+from scenario_gen.errors import RefusedError
+from scenario_gen.template.tracks import clean_tracks, Track
+from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
+
+_ROUNDS = 400
+_ALONG = 0.3  # how readily a vehicle is set forward or back on its path
+
+
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """Tracks that keep their distance.
+
+    Attributes:
+        tracks: N tracks.
+        moved: (N,) metres each was shifted, 0 where it was left alone.
+        notes: one sentence per shifted vehicle, with figures.
+    """
+
+    tracks: tuple[Track, ...]
+    moved: Floats
+    notes: tuple[str, ...]
+
+
+def _reach(vehicle: Vehicle, turned: Floats) -> Floats:
+    """(T,) half the width of a footprint, turned by these angles, along an axis."""
+    return vehicle.length / 2.0 * np.abs(exact.cos(turned)) + vehicle.width / 2.0 * np.abs(exact.sin(turned))
+
+
+def footprint_gap(a: Vehicle, poses_a: Floats, b: Vehicle, poses_b: Floats) -> tuple[Floats, Floats]:
+    """Signed gap of two oriented footprints by the separating-axis theorem.
+
+    Args:
+        a: first footprint.
+        poses_a: (T, 3).
+        b: second footprint.
+        poses_b: (T, 3).
+
+    Returns:
+        (T,) metres: the largest separation over the four axes, negative by how deep they overlap (between corners the true
+        distance is larger, so this is the safe side); and (T, 2) the axis, from b to a.
+    """
+    between = poses_a[:, :2] - poses_b[:, :2]
+    gap = np.full(len(between), -np.inf)
+    axis = np.zeros((len(between), 2))
+    for yaw in (poses_a[:, 2], poses_a[:, 2] + np.pi / 2.0, poses_b[:, 2], poses_b[:, 2] + np.pi / 2.0):
+        n = np.column_stack((exact.cos(yaw), exact.sin(yaw)))
+        along = (between * n).sum(axis=1)
+        reach = _reach(a, poses_a[:, 2] - yaw) + _reach(b, poses_b[:, 2] - yaw)
+        separation = np.abs(along) - reach
+        better = separation > gap
+        gap = np.where(better, separation, gap)
+        axis = np.where(better[:, None], np.where(along >= 0.0, 1.0, -1.0)[:, None] * n, axis)
+    return gap, axis
+
+
+def smallest_gaps(tracks: Sequence[Track]) -> Floats:
+    """(N, N) smallest gap [m] of each pair over the whole time; infinite on the diagonal."""
+    gaps = np.full((len(tracks), len(tracks)), np.inf)
+    poses = [track.poses for track in tracks]
+    for i in range(len(tracks)):
+        for j in range(i):
+            gap, _ = footprint_gap(tracks[i].vehicle, poses[i], tracks[j].vehicle, poses[j])
+            gaps[i, j] = gaps[j, i] = gap.min()
+    return gaps
+
+
+def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sideways: float = 1.0) -> Separation:
+    """Shift whole paths so that footprints stay `clearance` [m] apart at all times.
+
+    Pairs that are too close are corrected in turn at their worst instant, along the axis on which they overlap least, shared
+    between both vehicles; one shift per vehicle serves the whole time.
+
+    Args:
+        tracks: N tracks on one clock.
+        clearance: metres.
+        max_shift: metres beyond which it is refused.
+        sideways: how readily a path is shifted across itself (0: never), where setting forward or back counts `_ALONG`.
+
+    Raises:
+        RefusedError: no shift up to `max_shift` does it.
+    """
+    n = len(tracks)
+    shift = np.zeros((n, 2))  # along, sideways
+    base = [track.poses for track in tracks]
+    poses = list(base)
+    ease = np.array([_ALONG, sideways])
+    for _ in range(_ROUNDS):
+        worst = (clearance - 1e-3, -1, -1, 0, np.zeros(2))
+        for i in range(n):
+            for j in range(i):
+                gap, axis = footprint_gap(tracks[i].vehicle, poses[i], tracks[j].vehicle, poses[j])
+                at = int(np.argmin(gap))
+                if gap[at] < worst[0]:
+                    worst = (float(gap[at]), i, j, at, axis[at])
+        gap_now, i, j, at, normal = worst
+        if i < 0:
+            break
+        levers = np.array([_lever(poses[i][at, 2], normal), -_lever(poses[j][at, 2], normal)])
+        power = (ease * np.square(levers)).sum()
+        if power < 1e-6:
+            raise RefusedError(_too_close(tracks[i], tracks[j], gap_now, clearance, max_shift))
+        push = (clearance - gap_now) / power * ease * levers
+        shift[i] += push[0]
+        shift[j] += push[1]
+        if exact.hypot(*shift.T).max() > max_shift:
+            raise RefusedError(_too_close(tracks[i], tracks[j], gap_now, clearance, max_shift))
+        for k in (i, j):
+            poses[k] = _place(tracks[k], shift[k]).poses
+    else:
+        raise RefusedError(_too_close(tracks[i], tracks[j], gap_now, clearance, max_shift))
+    moved = exact.hypot(*shift.T)
+    before = smallest_gaps(tracks).min(axis=1)
+    notes = tuple(
+        f"vehicle {tracks[k].vehicle.id} came within {before[k]:.2f} m of another{' (overlap)' if before[k] < 0 else ''}: "
+        f"its path is set {abs(shift[k, 1]):.2f} m to the {'left' if shift[k, 1] > 0 else 'right'} and "
+        f"{abs(shift[k, 0]):.2f} m {'forward' if shift[k, 0] > 0 else 'back'} throughout"
+        for k in range(n)
+        if moved[k] > 1e-3
+    )
+    return Separation(tuple(_place(tracks[k], shift[k]) for k in range(n)), frozen(moved), notes)
+
+
+def _lever(yaw: float, normal: Floats) -> Floats:
+    """How far a unit shift along and to the left moves a vehicle along `normal`."""
+    return np.array(
+        [exact.cos(yaw) * normal[0] + exact.sin(yaw) * normal[1], -exact.sin(yaw) * normal[0] + exact.cos(yaw) * normal[1]]
+    )
+
+
+def _place(track: Track, shift: Floats) -> Track:
+    """`track` set forward by shift[0] and to the left by shift[1] metres."""
+    if not shift.any():
+        return track
+    curve, progress = track.curve, track.progress
+    if abs(shift[0]) > 0.0:
+        step = 1.0 if track.still else 0.5
+        curve = curve.cut(shift[0], shift[0] + max(curve.length, step), step)
+    if abs(shift[1]) > 0.0:
+        beside = Curve(curve.beside(curve.station, np.full(len(curve.station), shift[1])))
+        progress = np.interp(progress, curve.station, beside.station)
+        curve = beside
+    return replace(track, curve=curve, progress=frozen(progress))
+
+
+def _too_close(a: Track, b: Track, gap: float, clearance: float, max_shift: float) -> str:
+    return (
+        f"vehicles {a.vehicle.id} and {b.vehicle.id} come within {gap:.2f} m of each other and cannot be kept {clearance:.2f} m "
+        f"apart by shifting their paths up to {max_shift:.1f} m"
+    )
+
+
+OWN_CLEARANCE = 0.5  # metres between footprints
+OWN_MAX_SHIFT = 3.0
+
+
+@once_per_encounter
+def own_paths(encounter: Encounter) -> Separation:
+    """Clean the template's paths and separate its vehicles.
+
+    Raises:
+        RefusedError: they overlap so far that shifts of up to 3 m do not separate them.
+    """
+    tracks = clean_tracks(encounter)
+    separation = separate(tracks, OWN_CLEARANCE, OWN_MAX_SHIFT)
+    notes = [
+        f"vehicle {track.vehicle.id}: the record was smoothed by up to {track.deviation:.2f} m into a path that can be driven"
+        for track in tracks
+        if track.deviation > 1.0
+    ]
+    return replace(separation, notes=(*notes, *separation.notes))

@@ -1,0 +1,209 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The template's own motion, cleaned: one smooth, drivable path per vehicle, and the progress along it.
+
+Positions carry noise (GPS staircases of a metre, kinks of a video tracker), speeds far less of it. So the position is
+smoothed as a function of the distance u = ∫ v dt that the speed claims: a penalised spline f(u) that minimises
+∫ |f(u) − p|² du + λ ∫ |f''|² du (Eilers & Marx 1996). The least λ is taken at which the path can be driven, or the one
+that weighs a path hard to drive least badly against one far from the record. Standing
+phases collapse to a point, time enters only through u(t), and no sample turns back.
+"""
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, frozen, wrap_angle
+from scenario_gen.cancelling import stop_if_cancelled
+from scenario_gen.curve import Curve
+from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
+
+_WAVELENGTHS = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)  # metres at which the filter halves an oscillation
+_MAX_CURVATURE = 0.17  # 1/m
+_MAX_LATERAL = 4.0  # m/s²
+_MAX_DEVIATION = 0.6  # metres from the record
+_WEIGHT = (10.0, 1.0, 1.0)  # how bad it is to exceed each; what no vehicle can steer is worst
+_TURN = math.radians(45.0)
+_U_TURN = math.radians(140.0)
+_STILL = 0.5  # metres: less path than this in a whole log is no path
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One vehicle's cleaned motion.
+
+    Attributes:
+        vehicle: identity and footprint.
+        curve: its path; for a vehicle that stands throughout a metre of it, through its place.
+        progress: (T,) arc length [m] on the path at each of the template's samples, non-decreasing.
+        speed: (T,) m/s, as recorded.
+        still: True if it stands throughout.
+        deviation: largest distance [m] from a recorded position to the cleaned one.
+    """
+
+    vehicle: Vehicle
+    curve: Curve
+    progress: Floats
+    speed: Floats
+    still: bool
+    deviation: float
+
+    @property
+    def travelled(self) -> float:
+        """Metres driven in all."""
+        return float(self.progress[-1])
+
+    @property
+    def poses(self) -> Floats:
+        """(T, 3) cleaned poses at the template's samples."""
+        return self.curve.at(self.progress)
+
+    def turning(self, window: float) -> float:
+        """The largest change of heading [rad, signed] over `window` metres of path."""
+        s = np.arange(0.0, max(self.curve.length - 1.0, 0.0) + 1e-9, 0.5)
+        yaw = self.curve.at(s)[:, 2]
+        reach = int(window / 0.5)
+        best = 0.0
+        for lag in range(2, min(reach, len(s) - 1) + 1, 2):
+            change = yaw[lag:] - yaw[:-lag]
+            peak = float(change[np.argmax(np.abs(change))])
+            best = peak if abs(peak) > abs(best) else best
+        return best
+
+    @property
+    def makes_u_turn(self) -> bool:
+        """True if it turns round within 45 m of path."""
+        return abs(self.turning(45.0)) > _U_TURN
+
+    @property
+    def turns(self) -> bool:
+        """True if it turns as at a junction: by more than 45° within 30 m (a bend of the road is gentler)."""
+        return abs(self.turning(30.0)) > _TURN
+
+
+@once_per_encounter
+def clean_tracks(encounter: Encounter) -> tuple[Track, ...]:
+    """Return one cleaned track per vehicle."""
+    return tuple(_clean(encounter, i) for i in range(len(encounter.vehicles)))
+
+
+def _clean(encounter: Encounter, i: int) -> Track:
+    position, speed = encounter.position[i], encounter.speed[i]
+    claimed = np.concatenate(([0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 * encounter.dt)))
+    spread = float(exact.hypot(*np.ptp(position, axis=0)))
+    if claimed[-1] < _STILL or spread < _STILL:
+        centre = position.mean(axis=0)
+        yaw = float(exact.arctan2(exact.sin(encounter.heading[i]).mean(), exact.cos(encounter.heading[i]).mean()))
+        curve = Curve(np.array([[*centre, yaw], [centre[0] + exact.cos(yaw), centre[1] + exact.sin(yaw), yaw]]))
+        deviation = float(exact.hypot(*(position - centre).T).max())
+        return Track(encounter.vehicles[i], curve, frozen(np.zeros(len(speed))), speed, True, deviation)
+    best: tuple[float, Curve, Floats, float] | None = None
+    for wavelength in _WAVELENGTHS:
+        stop_if_cancelled()
+        grid, smooth = smoothing_spline(claimed, position, wavelength)
+        curve = Curve.through(smooth)
+        progress = np.interp(claimed, grid, curve.station)
+        deviation = float(exact.hypot(*(curve.at(progress)[:, :2] - position).T).max())
+        curvature = np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)
+        lateral = curvature * np.square(np.interp((grid[1:] + grid[:-1]) / 2.0, *_increasing(claimed, speed)))
+        excess = (curvature.max() / _MAX_CURVATURE, lateral.max() / _MAX_LATERAL, deviation / _MAX_DEVIATION)
+        badness = math.fsum(w * max(float(e) - 1.0, 0.0) for w, e in zip(_WEIGHT, excess, strict=True))
+        if best is None or badness < best[0]:
+            best = (badness, curve, progress, deviation)
+        if badness == 0.0:
+            break
+    assert best is not None
+    _, curve, progress, deviation = best
+    if (np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)).max() > _MAX_CURVATURE:
+        share = progress / curve.length
+        curve = _eased(curve)
+        progress = share * curve.length
+        deviation = float(exact.hypot(*(curve.at(progress)[:, :2] - position).T).max())
+    return Track(
+        encounter.vehicles[i], _aligned(curve, encounter.heading[i], speed, progress), frozen(progress), speed, False, deviation
+    )
+
+
+def _eased(curve: Curve) -> Curve:
+    """The curve with its sharpest bends spread out until no curvature is above the limit.
+
+    What a bend has too much is handed on to its neighbours, so it turns as far as before, over a longer way; the path is
+    then integrated anew and put where it is nearest to the old one on average.
+    """
+    count = max(round(curve.length / 0.5), 1)
+    step = curve.length / count
+    even = curve.at(np.linspace(0.0, curve.length, count + 1))
+    bend = np.diff(even[:, 2])
+    most = 0.95 * _MAX_CURVATURE * step
+    for _ in range(2000):
+        excess = np.sign(bend) * np.maximum(np.abs(bend) - most, 0.0)
+        if not excess.any():
+            break
+        bend = bend - excess
+        bend[1:] += excess[:-1] / 2.0
+        bend[:-1] += excess[1:] / 2.0
+    yaw = even[0, 2] + np.concatenate(([0.0], np.cumsum(bend)))
+    middle = (yaw[1:] + yaw[:-1]) / 2.0
+    xy = np.vstack(([0.0, 0.0], np.cumsum(step * np.column_stack((exact.cos(middle), exact.sin(middle))), axis=0)))
+    xy += (even[:, :2] - xy).mean(axis=0)
+    return Curve(np.column_stack((xy, yaw)))
+
+
+def _aligned(curve: Curve, heading: Floats, speed: Floats, progress: Floats) -> Curve:
+    """Shift the yaw by whole turns so that it is near the recorded heading where the vehicle is fastest."""
+    fastest = int(np.argmax(speed))
+    off = float(heading[fastest] - curve.at(progress[fastest])[2])
+    turns = np.round((off - float(wrap_angle(np.array(off)))) / (2.0 * np.pi))
+    return Curve(curve.points + np.array([0.0, 0.0, 2.0 * np.pi * turns]))
+
+
+def _increasing(u: Floats, values: Floats) -> tuple[Floats, Floats]:
+    keep = np.concatenate(([True], np.diff(u) > 1e-9))
+    return u[keep], values[keep]
+
+
+def smoothing_spline(u: Floats, values: Floats, wavelength: float) -> tuple[Floats, Floats]:
+    """The penalised spline f at equal steps of u.
+
+    Args:
+        u: (T,) metres, non-decreasing from 0.
+        values: (T, D).
+        wavelength: metres of an oscillation that is halved.
+
+    Returns:
+        The grid (G,) and f on it (G, D).
+    """
+    count = max(int(np.ceil(u[-1] / 0.5)), 6) + 1
+    grid = np.linspace(0.0, u[-1], count)
+    step = grid[1]
+    weight = np.gradient(u) + 1e-3 * step
+    cell = np.minimum((u / step).astype(np.int64), count - 2)
+    right = u / step - cell
+    left = 1.0 - right
+    bands = np.zeros((3, count))  # diagonals 0, 1, 2 below and on the normal matrix's
+    rhs = np.zeros((count, values.shape[1]))
+    np.add.at(bands[0], cell, weight * np.square(left))
+    np.add.at(bands[0], cell + 1, weight * np.square(right))
+    np.add.at(bands[1], cell, weight * left * right)
+    np.add.at(rhs, cell, (weight * left)[:, None] * values)
+    np.add.at(rhs, cell + 1, (weight * right)[:, None] * values)
+    penalty = exact.power(wavelength / (2.0 * np.pi), 4) / exact.power(step, 3)
+    for k, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))):
+        factor = penalty * (1.0, 4.0, 1.0, -2.0, -2.0, 1.0)[k]
+        columns = np.arange(count - 2) + a
+        bands[b - a, columns] += factor
+    return grid, exact.solve_banded(bands, rhs)

@@ -1,0 +1,107 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An encounter: N vehicles near each other on one clock (paper II-A, eqs 1-2)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, wraps
+from typing import TypeVar
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from scenario_gen.arrays import canonical_heading, Floats, frozen
+from scenario_gen.errors import InputError
+
+Derived = TypeVar("Derived")
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """A vehicle's identity and footprint; length and width in metres."""
+
+    id: str
+    length: float = 4.8
+    width: float = 1.9
+
+
+@dataclass(frozen=True, eq=False)
+class Encounter:
+    """N >= 2 vehicles on one clock. No NaN is ever inside.
+
+    Attributes:
+        name: where it comes from, for people.
+        vehicles: N identities and footprints; positions are those of the footprint's centre.
+        start_ns: stamp of the first sample, nanoseconds on the log's clock.
+        dt_ns: sampling period in nanoseconds (100_000_000 for 10 Hz).
+        position: (N, T, 2) metres in a local east-north frame.
+        heading: (N, T) rad, counter-clockwise from east, continuous in time (unwrapped).
+        speed: (N, T) m/s, >= 0.
+        origin: (latitude, longitude) in degrees of the frame's origin, or None if the log came in metres.
+    """
+
+    name: str
+    vehicles: tuple[Vehicle, ...]
+    start_ns: int
+    dt_ns: int
+    position: Floats
+    heading: Floats
+    speed: Floats
+    origin: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position", frozen(self.position))
+        object.__setattr__(self, "speed", frozen(self.speed))
+        n, t = self.speed.shape
+        if n < 2 or t < 2:
+            raise InputError(f"encounter {self.name!r} has {n} vehicle(s) and {t} sample(s); at least 2 of each are needed")
+        if self.position.shape != (n, t, 2) or self.heading.shape != (n, t) or len(self.vehicles) != n:
+            raise InputError(f"encounter {self.name!r}: arrays disagree in shape")
+        if not all(np.isfinite(a).all() for a in (self.position, self.heading, self.speed)):
+            raise InputError(f"encounter {self.name!r} holds a value that is not finite")
+        object.__setattr__(self, "heading", canonical_heading(self.heading))
+        if (self.speed < 0.0).any():
+            raise InputError(f"encounter {self.name!r} holds a negative speed")
+        ids = [vehicle.id for vehicle in self.vehicles]
+        if len(set(ids)) != n:
+            raise InputError(f"encounter {self.name!r}: vehicle ids are not unique: {', '.join(ids)}")
+
+    @property
+    def dt(self) -> float:
+        """Sampling period in seconds."""
+        return self.dt_ns * 1e-9
+
+    @cached_property
+    def time(self) -> Floats:
+        """(T,) seconds since the first sample."""
+        return frozen(np.arange(self.speed.shape[1]) * self.dt)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first to the last sample."""
+        return float(self.time[-1])
+
+
+def once_per_encounter(function: "Callable[[Encounter], Derived]") -> "Callable[[Encounter], Derived]":
+    """Keep what a function derives from an encounter as long as the encounter is there; a refusal is not kept."""
+    kept: WeakKeyDictionary[Encounter, Derived] = WeakKeyDictionary()
+
+    @wraps(function)
+    def derived(encounter: Encounter) -> Derived:
+        if encounter not in kept:
+            kept[encounter] = function(encounter)
+        return kept[encounter]
+
+    return derived

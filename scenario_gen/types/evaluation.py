@@ -1,0 +1,303 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the evaluation answers: rows of metrics with intervals, as JSON and as Markdown."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+import json
+import math
+import re
+from typing import Any, Literal
+
+from scenario_gen.documents import COUNT, NUMBER, parse_json
+from scenario_gen.errors import printable
+from scenario_gen.types.scenario import Cause, ScenarioSet, Verdict
+
+Better = Literal["lower", "higher", ""]
+TEXT = {"type": "string", "maxLength": 10_000}
+METRIC_KEYS = ("id", "label", "unit", "better", "group", "meaning")
+NUMBER_OR_NULL = {"anyOf": [NUMBER, {"type": "null"}]}
+SCHEMA = {
+    "type": "object",
+    "required": [
+        *("encounter", "road", "vehicles", "duration_s", "changepoints"),
+        *("confidence_level", "resamples", "seed", "metrics", "rows"),
+    ],
+    "properties": {
+        "encounter": TEXT,
+        "road": TEXT,
+        "vehicles": {"type": "array", "items": TEXT},
+        "duration_s": {**NUMBER, "minimum": 0.0},
+        "changepoints": COUNT,
+        "confidence_level": {**NUMBER, "exclusiveMinimum": 0.0, "exclusiveMaximum": 1.0},
+        "resamples": COUNT,
+        "seed": COUNT,
+        "metrics": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "required": list(METRIC_KEYS),
+                "properties": {
+                    **dict.fromkeys(("id", "label", "unit", "group", "meaning"), TEXT),
+                    "better": {"enum": ["lower", "higher", ""]},
+                },
+            },
+        },
+        "rows": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "required": ["name", "samples", "notes", "values"],
+                "properties": {
+                    "name": TEXT,
+                    "samples": COUNT,
+                    "notes": {"type": "array", "items": TEXT},
+                    "values": {
+                        "type": "object",
+                        "additionalProperties": {
+                            "type": "object",
+                            "required": ["value", "low", "high"],
+                            "properties": dict.fromkeys(("value", "low", "high"), NUMBER_OR_NULL),
+                        },
+                    },
+                },
+            },
+        },
+    },
+}
+"""Of the JSON that `to_json` writes."""
+TEMPLATE = "template"
+"""Name of the row that `evaluate` adds: the recorded encounter itself."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An estimate and its confidence interval; NaN bounds mean that there is none (a single sample)."""
+
+    value: float
+    low: float = float("nan")
+    high: float = float("nan")
+
+
+@dataclass(frozen=True)
+class CheckCounts:
+    """What the checker said about the candidates of one row: how many there were, and how many fell by their first cause."""
+
+    candidates: int
+    refused: Mapping[Cause, int] = field(default_factory=dict)
+
+    @classmethod
+    def of_set(cls, made: ScenarioSet) -> "CheckCounts":
+        """Take the account of a request."""
+        return cls(made.candidates, dict(made.refused))
+
+    @classmethod
+    def of_verdicts(cls, verdicts: Iterable[Verdict]) -> "CheckCounts":
+        """Count verdicts, one per scenario."""
+        verdicts = list(verdicts)
+        return cls(len(verdicts), Counter(verdict.violations[0].cause for verdict in verdicts if not verdict.valid))
+
+    def share_of(self, causes: Sequence[Cause]) -> tuple[int, int]:
+        """Return how many candidates fell by one of `causes`, and the number of candidates."""
+        return sum(self.refused.get(cause, 0) for cause in causes), self.candidates
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A kind of figure.
+
+    Attributes:
+        id: its key in JSON.
+        label: for people.
+        unit: of its values, "" for a plain number, "%" for shares (stored as 0 to 1).
+        better: which direction is better, "" where neither is.
+        group: heading under which it stands.
+        meaning: one sentence.
+    """
+
+    id: str
+    label: str
+    unit: str
+    better: Better
+    group: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Row:
+    """All figures of one set of scenarios.
+
+    Attributes:
+        name: e.g. "with changepoints".
+        samples: number of scenarios.
+        values: estimates by metric id; what could not be had is absent or NaN.
+        notes: what a reader must know, in sentences.
+    """
+
+    name: str
+    samples: int
+    values: Mapping[str, Interval]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Rows of metrics for one encounter on one road.
+
+    Attributes:
+        encounter: its name; road: its name.
+        vehicles: ids.
+        duration: of the template [s].
+        changepoints: K, which always stands beside E.
+        level: confidence level of the intervals; resamples: of the bootstrap; seed: of its draws.
+        metrics: what the rows hold, in order.
+        rows: the recorded template first, then in the order given.
+    """
+
+    encounter: str
+    road: str
+    vehicles: tuple[str, ...]
+    duration: float
+    changepoints: int
+    level: float
+    resamples: int
+    seed: int
+    metrics: tuple[Metric, ...]
+    rows: tuple[Row, ...]
+
+    @classmethod
+    def empty(cls) -> "Evaluation":
+        """Return one of nothing."""
+        return cls("", "", (), 0.0, 0, 0.0, 0, 0, (), ())
+
+    def row(self, name: str) -> Row | None:
+        """Return the row of that name, or None."""
+        return next((row for row in self.rows if row.name == name), None)
+
+    def value(self, row: str, metric: str) -> float:
+        """Return one figure; NaN if there is none."""
+        found = self.row(row)
+        return found.values[metric].value if found and metric in found.values else math.nan
+
+    def to_json(self, indent: int | None = 2) -> str:
+        """Return JSON; what is not a number is null, figures have six significant digits."""
+        document = {
+            "encounter": self.encounter,
+            "road": self.road,
+            "vehicles": list(self.vehicles),
+            "duration_s": _number(self.duration),
+            "changepoints": self.changepoints,
+            "confidence_level": self.level,
+            "resamples": self.resamples,
+            "seed": self.seed,
+            "metrics": [vars(metric) for metric in self.metrics],
+            "rows": [
+                {
+                    "name": row.name,
+                    "samples": row.samples,
+                    "notes": list(row.notes),
+                    "values": {
+                        key: {"value": _number(e.value), "low": _number(e.low), "high": _number(e.high)}
+                        for key, e in row.values.items()
+                    },
+                }
+                for row in self.rows
+            ],
+        }
+        return json.dumps(document, indent=indent, ensure_ascii=False, allow_nan=False)
+
+    @classmethod
+    def from_json(cls, text: str, what: str = "not an evaluation") -> "Evaluation":
+        """Read what `to_json` wrote.
+
+        Raises:
+            InputError: the text is not such a document; the message names `what` and the path inside it.
+        """
+        return cls.from_document(parse_json(text, what, SCHEMA))
+
+    @classmethod
+    def from_document(cls, document: Mapping[str, Any]) -> "Evaluation":
+        """Return the evaluation that a document says, which keeps `SCHEMA`."""
+        return cls(
+            encounter=document["encounter"],
+            road=document["road"],
+            vehicles=tuple(document["vehicles"]),
+            duration=document["duration_s"],
+            changepoints=document["changepoints"],
+            level=document["confidence_level"],
+            resamples=document["resamples"],
+            seed=document["seed"],
+            metrics=tuple(Metric(**{key: metric[key] for key in METRIC_KEYS}) for metric in document["metrics"]),
+            rows=tuple(_row(row) for row in document["rows"]),
+        )
+
+    def to_markdown(self) -> str:
+        """Return a table: metrics down, rows across, each figure with its interval."""
+        lines = [
+            f"# {as_markdown(self.encounter)} on {as_markdown(self.road)}",
+            "",
+            f"{len(self.vehicles)} vehicles, {self.duration:.1f} s, K = {self.changepoints} changepoints; "
+            f"{self.level:.0%} bootstrap intervals in brackets ({self.resamples} resamples, seed {self.seed}).",
+            "",
+            "| metric | better | " + " | ".join(f"{row.name} ({row.samples})" for row in self.rows) + " |",
+            "|---|---|" + "---|" * len(self.rows),
+        ]
+        group = ""
+        for metric in self.metrics:
+            if metric.group != group:
+                group = metric.group
+                lines.append(f"| **{group}** | |" + " |" * len(self.rows))
+            unit = f" [{metric.unit}]" if metric.unit else ""
+            cells = [formatted(row.values.get(metric.id), metric.unit) for row in self.rows]
+            lines.append(f"| {metric.label}{unit} | {metric.better} | " + " | ".join(cells) + " |")
+        notes = [f"- {row.name}: {note}" for row in self.rows for note in row.notes]
+        return "\n".join([*lines, "", *notes]).rstrip() + "\n"
+
+
+def as_markdown(name: str) -> str:
+    """Return a name so that Markdown shows it letter by letter."""
+    return re.sub(r"([\\`*\[\]<>|]|^[_#]|_$)", r"\\\1", printable(name).replace("\n", " "))
+
+
+def formatted(estimate: Interval | None, unit: str, *, bounds: bool = True) -> str:
+    """Lay out an estimate for people: three significant digits, the interval in brackets, a dash if there is none."""
+    if estimate is None or not math.isfinite(estimate.value):
+        return "–"
+    factor = 100.0 if unit == "%" else 1.0
+
+    def figure(value: float) -> str:
+        value *= factor
+        return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+    text = figure(estimate.value)
+    if bounds and math.isfinite(estimate.low) and math.isfinite(estimate.high):
+        text += f" [{figure(estimate.low)}, {figure(estimate.high)}]"
+    return text
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.6g}") if math.isfinite(value) else None
+
+
+def _row(document: Mapping[str, Any]) -> Row:
+    def number(value: float | None) -> float:
+        return math.nan if value is None else value
+
+    values = {
+        key: Interval(number(entry["value"]), number(entry["low"]), number(entry["high"]))
+        for key, entry in document["values"].items()
+    }
+    return Row(document["name"], document["samples"], values, tuple(document["notes"]))

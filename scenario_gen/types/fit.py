@@ -1,0 +1,63 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the fitting answers: where every changepoint stands on the road."""
+
+from dataclasses import dataclass
+
+from scenario_gen.arrays import Bools, canonical_poses, Floats, frozen, Ints
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.scenario import BoundaryStates
+
+
+@dataclass(frozen=True, eq=False)
+class FittedVehicle:
+    """One vehicle's anchors on the road: its start, every changepoint, its end (K + 2 in all).
+
+    Attributes:
+        anchors: (K + 2, 3) x [m], y [m], yaw [rad] on the road, after repair.
+        moved: (K + 2,) metres that repair moved each anchor.
+        stands: (K + 1,) True for the primitives during which the vehicle stands: a dwell, no path.
+        scale: factor s of eq 9, template lengths -> road lengths.
+        manoeuvre: "straight", "left", "right", "wait" (or "own path" where the template's own path is kept).
+    """
+
+    anchors: Floats
+    moved: Floats
+    stands: Bools
+    scale: float
+    manoeuvre: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "anchors", canonical_poses(self.anchors))
+        object.__setattr__(self, "moved", frozen(self.moved))
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A template placed on a road.
+
+    Attributes:
+        vehicles: N identities and footprints.
+        fitted: N fitted vehicles; none where only the states asked are known.
+        anchor_index: (K + 2,) sample index in the template of each anchor (0, changepoints, T - 1).
+        asked: start and end states asked of every scenario (after repair).
+        notes: what was decided, in sentences (an entry chosen and why, an anchor moved by how much).
+    """
+
+    vehicles: tuple[Vehicle, ...]
+    fitted: tuple[FittedVehicle, ...]
+    anchor_index: Ints
+    asked: BoundaryStates
+    notes: tuple[str, ...]

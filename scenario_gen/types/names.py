@@ -1,0 +1,60 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Vehicle ids: as in the log, and as ROS names."""
+
+from collections.abc import Iterable
+import re
+
+from scenario_gen.errors import InputError
+from scenario_gen.types.encounter import Encounter
+
+
+def token(vehicle_id: str) -> str:
+    """Return `vehicle_id` as a ROS name token: whatever is not a letter, digit or underscore becomes one underscore.
+
+    Raises:
+        InputError: nothing is left of the id.
+    """
+    escaped = re.sub(r"_+", "_", re.sub(r"[^0-9A-Za-z_]", "_", vehicle_id)).strip("_")
+    if not escaped:
+        raise InputError(f"vehicle id {vehicle_id!r} holds no letter or digit, so no ROS name can be made of it")
+    return escaped
+
+
+def tokens(vehicle_ids: Iterable[str]) -> tuple[str, ...]:
+    """Return the tokens of several ids.
+
+    Raises:
+        InputError: two ids become the same token.
+    """
+    owner: dict[str, str] = {}
+    for vehicle_id in vehicle_ids:
+        other = owner.setdefault(token(vehicle_id), vehicle_id)
+        if other != vehicle_id:
+            raise InputError(f"vehicle ids {other!r} and {vehicle_id!r} are both {token(vehicle_id)!r} as ROS names; rename one")
+    return tuple(owner)
+
+
+def vehicle_index(encounter: Encounter, name: str, what: str) -> int:
+    """Return the index of the vehicle with the id `name`, written as in the log or as a ROS name.
+
+    Raises:
+        InputError: there is no such vehicle; the message names the parameter `what` and lists the ids that there are.
+    """
+    ids = [vehicle.id for vehicle in encounter.vehicles]
+    for known in (ids, list(tokens(ids))):
+        if name in known:
+            return known.index(name)
+    raise InputError(f"{what}: no vehicle {name!r} in {encounter.name}; there are: {', '.join(ids)}")

@@ -1,0 +1,108 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How an ego slot and start and end states are asked for: as text, the same on the command line and as ROS parameters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+import math
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.errors import InputError
+from scenario_gen.parameters import check, parameter
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.names import vehicle_index
+
+State = tuple[float, ...]  # x [m], y [m], yaw [rad] and, unless it is the template's, speed [m/s]
+ENDS = ("starts", "goals")
+_FORM = "id: x y yaw [speed]"
+
+
+@dataclass(frozen=True)
+class Request:
+    """What one request asks for."""
+
+    ego: str = parameter("", "id of the vehicle that is left out for a planner under test; its track is given instead")
+    starts: str = parameter(
+        "", f"start states on the road, `{_FORM}`, vehicles parted by `;`; others are the fitting's", unit="m, rad, m/s"
+    )
+    goals: str = parameter("", f"end states, likewise `{_FORM}`", unit="m, rad, m/s")
+
+    def __post_init__(self) -> None:
+        check(self)
+        for name in ENDS:
+            self.states(name)
+
+    @property
+    def moves(self) -> bool:
+        """Whether start or end states are asked for, so that the template must be fitted and planned anew."""
+        return bool(self.starts or self.goals)
+
+    def states(self, end: str) -> dict[str, State]:
+        """Return the states asked for at one end ("starts" or "goals"), by vehicle id.
+
+        Raises:
+            InputError: the text is not of the form; the message names the parameter and the piece.
+        """
+        return read_states(getattr(self, end), end)
+
+    def with_states(self, end: str, states: Mapping[str, State]) -> "Request":
+        """Return the request with other states at one end."""
+        text = "; ".join(f"{name}: {' '.join(f'{value:.10g}' for value in state)}" for name, state in states.items())
+        return replace(self, starts=text) if end == "starts" else replace(self, goals=text)
+
+    def rows(self, end: str, encounter: Encounter) -> Floats:
+        """Return the states at one end as the fitting takes them: (N, 4), NaN where nothing is asked.
+
+        Raises:
+            InputError: a vehicle is not the encounter's; the message lists those that are.
+        """
+        rows = np.full((len(encounter.vehicles), 4), np.nan)
+        for name, state in self.states(end).items():
+            rows[vehicle_index(encounter, name, end), : len(state)] = state
+        return rows
+
+    def ego_of(self, encounter: Encounter) -> int | None:
+        """Return the index of the vehicle that is left out, None if none is.
+
+        Raises:
+            InputError: there is no such vehicle.
+        """
+        return vehicle_index(encounter, self.ego, "ego") if self.ego else None
+
+
+def read_states(text: str, what: str) -> dict[str, State]:
+    """Return {vehicle id: state} of a text such as `1: 10.5 -1.75 0.0 8.0; 2: 3 4 1.57`.
+
+    Raises:
+        InputError: it is not of that form, a value is not finite, a speed is negative, or a vehicle comes twice.
+    """
+    found: dict[str, State] = {}
+    for piece in filter(None, (part.strip() for part in text.split(";"))):
+        name, colon, numbers = piece.rpartition(":")
+        name = name.strip()
+        try:
+            state = tuple(float(word) for word in numbers.replace(",", " ").split())
+        except ValueError:
+            state = ()
+        if not (colon and name and len(state) in (3, 4) and all(map(math.isfinite, state))):
+            raise InputError(f"{what}: {piece!r} is not of the form `{_FORM}` with finite numbers, e.g. `1: 10.5 -1.75 0.0 8.0`")
+        if len(state) == 4 and state[3] < 0.0:
+            raise InputError(f"{what}: {piece!r} asks for a negative speed")
+        if name in found:
+            raise InputError(f"{what}: vehicle {name!r} comes twice")
+        found[name] = state
+    return found

@@ -1,0 +1,142 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A scenario: what is generated, checked and published."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from scenario_gen.arrays import canonical_heading, canonical_poses, Floats, frozen
+from scenario_gen.types.encounter import Vehicle
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """N vehicles over T instants on a target road.
+
+    Between two instants the motion is defined: position is the cubic Hermite interpolant of the two positions and
+    velocity vectors (speed along heading), heading is interpolated linearly. The checker proves validity of that motion.
+
+    Attributes:
+        vehicles: N identities and footprints.
+        time: (T,) seconds from the scenario's start, strictly increasing, time[0] = 0.
+        position: (N, T, 2) metres in the road's frame, of the footprint's centre.
+        heading: (N, T) rad, unwrapped.
+        speed: (N, T) m/s in the body frame, >= 0.
+        acceleration: (N, T) m/s², longitudinal.
+        seed: the request's seed; index: the sample's number within the request.
+        frame_id: the road's frame.
+    """
+
+    vehicles: tuple[Vehicle, ...]
+    time: Floats
+    position: Floats
+    heading: Floats
+    speed: Floats
+    acceleration: Floats
+    seed: int = 0
+    index: int = 0
+    frame_id: str = "map"
+
+    def __post_init__(self) -> None:
+        for name in ("position", "speed", "acceleration"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        object.__setattr__(self, "time", frozen(np.round(self.time, 9)))  # whole nanoseconds, as on the wire
+        object.__setattr__(self, "heading", canonical_heading(self.heading))
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryStates:
+    """What was asked of the start and the end: (N, 4) each, columns x [m], y [m], yaw [rad], speed [m/s]."""
+
+    start: Floats
+    end: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", canonical_poses(self.start))
+        object.__setattr__(self, "end", canonical_poses(self.end))
+
+
+class Cause(StrEnum):
+    """Why a candidate scenario was refused."""
+
+    SPEED_PROFILE = "speed_profile"  # no speed profile meets lengths, end speeds and limits
+    OVERLAP = "overlap"  # two footprints touch at some instant
+    OFF_ROAD = "off_road"  # a footprint leaves drivable space
+    BOUNDARY_STATE = "boundary_state"  # start or end differs from what was asked
+    SPEED = "speed"  # negative or above the limit
+    LONGITUDINAL_ACCELERATION = "longitudinal_acceleration"
+    LATERAL_ACCELERATION = "lateral_acceleration"
+    CURVATURE = "curvature"
+    PASSING_ORDER = "passing_order"  # not the template's order at a conflict
+    STOP_NOT_KEPT = "stop_not_kept"  # a vehicle does not keep a stop of the template
+    NOT_FINITE = "not_finite"
+
+    @classmethod
+    def _missing_(cls, value: object) -> "Cause | None":
+        """The cause by its name in recordings of versions up to 0.2."""
+        return {"time_law": cls.SPEED_PROFILE, "moving_wait": cls.STOP_NOT_KEPT}.get(str(value))
+
+
+@dataclass(frozen=True)
+class Violation:
+    """One thing wrong with a scenario: its cause, when [s], which vehicles (indices), and a sentence with the figures."""
+
+    cause: Cause
+    time: float
+    vehicles: tuple[int, ...]
+    message: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The checker's answer for one scenario; valid if there is no violation.
+
+    `conflicts` counts the template's conflicts that also exist in the scenario, `not_applicable` those that do not.
+    """
+
+    violations: tuple[Violation, ...] = ()
+    conflicts: int = 0
+    not_applicable: int = 0
+
+    @property
+    def valid(self) -> bool:
+        """True if nothing is violated."""
+        return not self.violations
+
+
+@dataclass(frozen=True)
+class ScenarioSet:
+    """What a request got: valid scenarios, and an account of every candidate.
+
+    `refused` counts refused candidates by their first cause; `adaptations` names what was changed to get there. `ego` is the
+    template track of the vehicle that was left out for a planner under test, if one was: a scenario of that vehicle alone.
+    The scenarios of a large set are not in memory but drawn again whenever they are looked at.
+    """
+
+    requested: int
+    scenarios: Sequence[Scenario]
+    candidates: int
+    refused: Counter[Cause] = field(default_factory=Counter)
+    adaptations: Sequence[str] = ()
+    ego: Scenario | None = None
+
+    @property
+    def acceptance(self) -> float:
+        """Share of candidates that were valid."""
+        return len(self.scenarios) / self.candidates if self.candidates else 0.0

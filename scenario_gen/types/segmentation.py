@@ -1,0 +1,68 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the segmenter answers."""
+
+from dataclasses import dataclass
+
+from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints
+from scenario_gen.types.encounter import Vehicle
+
+
+@dataclass(frozen=True, eq=False)
+class Segmentation:
+    """Joint primitives of one encounter of T samples.
+
+    Attributes:
+        labels: (T,) primitive of each sample, 0 .. n_primitives - 1 in order of first appearance.
+        changepoints: (K,) sample indices, each the first sample whose primitive differs (0 is none); labels change exactly there.
+        changepoint_probability: (T,) posterior probability that a changepoint sits at each sample.
+        descriptions: K + 1 sentences, one per segment ("vehicle 0 brakes, vehicle 1 stands").
+    """
+
+    labels: Ints
+    changepoints: Ints
+    changepoint_probability: Floats
+    descriptions: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "labels", frozen_ints(self.labels))
+        object.__setattr__(self, "changepoints", frozen_ints(self.changepoints))
+        object.__setattr__(self, "changepoint_probability", frozen(self.changepoint_probability))
+
+    @property
+    def n_primitives(self) -> int:
+        """Number of distinct primitives."""
+        return int(self.labels.max()) + 1
+
+
+@dataclass(frozen=True, eq=False)
+class LiveChangepoints:
+    """Changepoints that one sample confirmed, with the vehicles' states there.
+
+    Attributes:
+        start_ns: stamp of the stretch's first sample: since then the same vehicles have been there at every tick.
+        vehicles: N identities and footprints.
+        time_ns: (K,) since `start_ns`, increasing.
+        position: (N, K, 2) m.
+        heading: (N, K) rad: the course over ground.
+        speed: (N, K) m/s.
+    """
+
+    start_ns: int
+    vehicles: tuple[Vehicle, ...]
+    time_ns: Ints
+    position: Floats
+    heading: Floats
+    speed: Floats

@@ -1,0 +1,48 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The examples that use the library without ROS run, and the notebook shows what it was when it ran."""
+
+import json
+from pathlib import Path
+import subprocess
+import sys
+
+import matplotlib
+from matplotlib import pyplot
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def test_the_script_generates_from_the_bundled_log_without_ros():
+    script = f"runpy.run_path({str(EXAMPLES / 'generate.py')!r}, run_name='__main__')"
+    command = f"import runpy, sys; sys.modules['rclpy'] = None; sys.argv = ['generate.py', '--count', '4']; {script}"
+    ran = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr
+    assert "synthetic_a on t_intersection: 4 of 4 candidates are valid" in ran.stdout
+    assert "without vehicle 1: 2; its own track is there" in ran.stdout
+
+
+def test_the_notebook_was_executed_and_runs(capsys):
+    matplotlib.use("agg")
+    cells = [cell for cell in json.loads((EXAMPLES / "tour.ipynb").read_text())["cells"] if cell["cell_type"] == "code"]
+    assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
+    namespace = {}
+    for cell in cells:
+        shown = "".join("".join(output["text"]) for output in cell["outputs"] if output["output_type"] == "stream")
+        assert not [output for output in cell["outputs"] if output["output_type"] == "error"]
+        exec(compile("".join(cell["source"]), "tour.ipynb", "exec"), namespace)
+        assert capsys.readouterr().out == shown, "execute the notebook again"
+    pyplot.close("all")
+    assert sum("image/png" in output.get("data", {}) for cell in cells for output in cell["outputs"]) == 2

@@ -1,0 +1,330 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The bundled log: the paper's three cases (V-A, Fig. 3), made up and named synthetic everywhere.
+
+Each case is a drive on roads with lanes of 3.5 m, right-hand traffic, with constant acceleration between known changepoints:
+
+- a: one vehicle waits at the side road throughout; the other brakes for 7 s to a stop, both stand for 3 s, then it turns right.
+- b: opposite directions; one accelerates, the other slows down, lets it pass and turns left, speeding up.
+- c: opposite directions on a straight road, with changes of speed.
+
+What is recorded of it is what a receiver of basic safety messages records: NavSatFix and TwistStamped per vehicle, with
+coloured GPS noise, a speed sensor off by a percent, jittered stamps, lost and repeated messages.
+
+    python test/logs/synthetic_cases.py [FOLDER]    # writes the three bags, the same bytes every time
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+import sys
+
+import numpy as np
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from scenario_gen.arrays import Floats
+from scenario_gen.geodesy import geodetic
+from scenario_gen.logs.synthetic import CASES, RESOURCES
+from scenario_gen.recordings.samples import FIX, STORES, TWIST
+from scenario_gen.types.encounter import Vehicle
+
+ORIGIN = (42.3, -83.7)  # degrees; the roads are invented, nothing was recorded there
+START_NS = 1_767_225_600 * 10**9  # 2026-01-01 00:00:00 UTC
+PERIOD = 0.1  # s between messages
+LANE = 3.5  # m
+COLOURED, COLOUR_TIME, WHITE = 0.3, 20.0, 0.03  # m, s, m: GPS noise per axis (first-order Gauss-Markov, and white)
+SPEED_BIAS, SPEED_WHITE, SPEED_QUANTUM = 0.01, 0.05, 0.02  # 1, m/s, m/s: a wheel sensor in a basic safety message
+JITTER = 0.015  # s by which stamps are off the clock
+LOST, REPEATED = 0.04, 0.02  # shares of messages
+OUTAGE = 0.6  # s without any message, once per vehicle
+
+
+@dataclass(frozen=True)
+class Leg:
+    """`metres` of path with constant curvature [1/m], positive to the left."""
+
+    metres: float
+    curvature: float = 0.0
+
+
+@dataclass(frozen=True)
+class Phase:
+    """`seconds` of driving with constant acceleration [m/s²]."""
+
+    seconds: float
+    acceleration: float = 0.0
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A vehicle's true motion: from a pose (x, y, heading) at a speed, along legs, through phases; it begins at `begin` [s]."""
+
+    vehicle: Vehicle
+    pose: tuple[float, float, float]
+    speed: float
+    legs: tuple[Leg, ...]
+    phases: tuple[Phase, ...]
+    begin: float = 0.0
+
+    def state(self, time: Floats) -> Floats:
+        """(T, 4) true x, y, heading and speed at times [s] since the start."""
+        distance, speed = self._motion(time)
+        out = np.empty((len(time), 4))
+        out[:, 3] = speed
+        x, y, heading = self.pose
+        begin = 0.0
+        for number, leg in enumerate(self.legs):
+            last = number == len(self.legs) - 1
+            here = (distance >= begin) & ((distance < begin + leg.metres) | last)
+            out[here, :3] = along(x, y, heading, leg.curvature, distance[here] - begin)
+            x, y, heading = along(x, y, heading, leg.curvature, np.array([leg.metres]))[0]
+            begin += leg.metres
+        return out
+
+    def _motion(self, time: Floats) -> tuple[Floats, Floats]:
+        """Distance driven and speed."""
+        distance, speed = np.zeros(len(time)), np.full(len(time), self.speed)
+        entry, begin = self.speed, self.begin
+        for phase in self.phases:
+            during = np.clip(time - begin, 0.0, phase.seconds)
+            distance += entry * during + 0.5 * phase.acceleration * during**2
+            speed += phase.acceleration * during
+            entry += phase.acceleration * phase.seconds
+            begin += phase.seconds
+        return distance, np.where(speed < 1e-9, 0.0, speed)
+
+    @property
+    def end(self) -> float:
+        """The time [s] at which the last phase ends."""
+        return self.begin + sum(phase.seconds for phase in self.phases)
+
+    @property
+    def changepoints(self) -> tuple[float, ...]:
+        """Times [s] at which the acceleration changes."""
+        return tuple((self.begin + np.cumsum([phase.seconds for phase in self.phases[:-1]])).tolist())
+
+
+def along(x: float, y: float, heading: float, curvature: float, metres: Floats) -> Floats:
+    """(K, 3) poses at distances along a straight line or an arc."""
+    end = heading + curvature * metres
+    if curvature == 0.0:
+        return np.column_stack([x + metres * np.cos(heading), y + metres * np.sin(heading), end])
+    return np.column_stack(
+        [x + (np.sin(end) - np.sin(heading)) / curvature, y - (np.cos(end) - np.cos(heading)) / curvature, end]
+    )
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case with its ground truth; its time runs from 0, when all vehicles are within radio range, to `duration`."""
+
+    name: str
+    drives: tuple[Drive, ...]
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return min(drive.end for drive in self.drives)
+
+    @property
+    def changepoints(self) -> tuple[float, ...]:
+        """Times [s] at which any vehicle's acceleration changes while all are there."""
+        return tuple(sorted({time for drive in self.drives for time in drive.changepoints if 0.0 < time < self.duration}))
+
+
+def quarter(radius: float, side: int) -> Leg:
+    """A right-angled turn to the left (side 1) or the right (-1)."""
+    return Leg(radius * np.pi / 2.0, side / radius)
+
+
+def make_case(name: str) -> Case:
+    """Return one of the three cases; the main road runs east, a side road joins from the south at x = 0."""
+    east, west, north = 0.0, np.pi, np.pi / 2.0
+    near, far = -LANE / 2.0, LANE / 2.0  # y of the eastbound and the westbound lane; x of the lanes of the side road
+    first, second = Vehicle("1"), Vehicle("2")
+    if name == "a":
+        arrives = (Phase(2.0), Phase(4.0, -1.25), Phase(20.0))  # heard before the other comes into range, so its heading is known
+        waits = Drive(first, (far, -9.0 - 20.0, north), 5.0, (Leg(1.0),), arrives, begin=-8.0)
+        brakes = 11.0 / 7.0
+        stop = near - 8.0 - 2.0  # 2 m before the turn of radius 8 m begins
+        turns = Drive(
+            second,
+            (stop - 38.5, near, east),
+            11.0,
+            (Leg(40.5), quarter(8.0, -1), Leg(1.0)),
+            (Phase(7.0, -brakes), Phase(3.0), Phase(8.0, 0.7)),
+        )
+        return Case("synthetic_a", (waits, turns))
+    if name == "b":
+        passes = Drive(first, (-36.0, near, east), 5.0, (Leg(1.0),), (Phase(15.0, 0.45),))
+        turns = Drive(
+            second,
+            (near + 12.0 + 50.0, far, west),
+            10.5,
+            (Leg(50.0), quarter(12.0, 1), Leg(1.0)),
+            (Phase(7.0, -1.0), Phase(8.0, 0.5)),
+        )
+        return Case("synthetic_b", (passes, turns))
+    if name != "c":
+        raise ValueError(f"there is no case {name!r}; choose one of {', '.join(CASES)}")
+    slows = Drive(
+        first,
+        (-46.0, near, east),
+        8.0,
+        (Leg(1.0),),
+        (Phase(4.0), Phase(4.0, -1.25), Phase(4.0), Phase(4.0, 1.5)),
+    )
+    speeds_up = Drive(
+        second,
+        (47.0, far, west),
+        4.0,
+        (Leg(1.0),),
+        (Phase(4.0), Phase(4.0, 1.0), Phase(4.0), Phase(4.0, -1.0)),
+    )
+    return Case("synthetic_c", (slows, speeds_up))
+
+
+@dataclass(frozen=True, order=True)
+class Recorded:
+    """One message of the bag, ordered by the time it was received."""
+
+    received_ns: int
+    topic: str
+    type: str
+    data: bytes
+
+
+def record(case: Case, seed: int = 0) -> tuple[Recorded, ...]:
+    """Return the messages that a receiver records of a case, in the order of reception."""
+    messages: list[Recorded] = []
+    for number, drive in enumerate(case.drives):
+        rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, CASES.index(case.name[-1]), number])))
+        messages += record_drive(drive, rng)
+    return tuple(sorted(messages))
+
+
+def record_drive(drive: Drive, rng: np.random.Generator) -> Iterator[Recorded]:
+    """Yield the messages of one vehicle: fix and speed at jittered stamps, some lost, some repeated."""
+    count = round((drive.end - drive.begin) / PERIOD) + 1
+    clock = drive.begin + np.arange(count) * PERIOD
+    jitter = np.clip(rng.normal(0.0, JITTER, count), -2.5 * JITTER, 2.5 * JITTER)
+    jitter[[0, -1]] = 0.0
+    state = drive.state(clock + jitter)
+    east, north = state[:, :2].T + coloured_noise(count, rng).T
+    latitude, longitude = np.round(geodetic(np.stack([east, north], axis=-1), ORIGIN), 7)  # as in a basic safety message
+    speed = state[:, 3] * (1.0 + SPEED_BIAS) + np.where(state[:, 3] > 0.0, rng.normal(0.0, SPEED_WHITE, count), 0.0)
+    speed = np.maximum(np.round(speed / SPEED_QUANTUM) * SPEED_QUANTUM, 0.0)
+    lost = rng.random((count, 2)) < LOST
+    outage = rng.uniform(0.3, 0.6) * drive.end
+    lost |= ((clock > outage) & (clock < outage + OUTAGE))[:, None]
+    lost[[0, -1]] = False
+    repeated = rng.random((count, 2)) < REPEATED
+    latency = rng.uniform(0.02, 0.06, (count, 4))
+    header = STORES.types["std_msgs/msg/Header"]
+    for i in range(count):
+        stamp = START_NS + round((clock[i] + jitter[i]) * 1e9)
+        head = header(stamp=nanoseconds_to_time(stamp), frame_id=f"vehicle_{drive.vehicle.id}")
+        messages = (
+            ("fix", FIX, fix_message(head, float(latitude[i]), float(longitude[i]))),
+            ("speed", TWIST, twist_message(head, float(speed[i]))),
+        )
+        for kind, (name, message_type, message) in enumerate(messages):
+            data = bytes(STORES.serialize_cdr(message, message_type))
+            for again in range(0 if lost[i, kind] else 2 if repeated[i, kind] else 1):
+                received = stamp + round(latency[i, kind + 2 * again] * 1e9)
+                yield Recorded(received, f"/vehicle_{drive.vehicle.id}/{name}", message_type, data)
+
+
+def coloured_noise(count: int, rng: np.random.Generator) -> Floats:
+    """(count, 2) GPS noise: a first-order Gauss-Markov process and white noise on top."""
+    keep = np.exp(-PERIOD / COLOUR_TIME)
+    kicks = rng.normal(0.0, COLOURED, (count, 2))
+    coloured = np.empty((count, 2))
+    coloured[0] = kicks[0]
+    for before, i in pairwise(range(count)):
+        coloured[i] = keep * coloured[before] + np.sqrt(1.0 - keep**2) * kicks[i]
+    return coloured + rng.normal(0.0, WHITE, (count, 2))
+
+
+def nanoseconds_to_time(stamp: int) -> object:
+    """A builtin_interfaces/Time."""
+    return STORES.types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9)
+
+
+def fix_message(header: object, latitude: float, longitude: float) -> object:
+    """A NavSatFix with the noise's covariance."""
+    variance = COLOURED**2 + WHITE**2
+    return STORES.types[FIX](
+        header=header,
+        status=STORES.types["sensor_msgs/msg/NavSatStatus"](status=0, service=1),
+        latitude=latitude,
+        longitude=longitude,
+        altitude=260.0,
+        position_covariance=np.array([variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, 4.0 * variance]),
+        position_covariance_type=2,
+    )
+
+
+def twist_message(header: object, speed: float) -> object:
+    """A TwistStamped with the speed along the vehicle's x axis."""
+    vector = STORES.types["geometry_msgs/msg/Vector3"]
+    twist = STORES.types["geometry_msgs/msg/Twist"]
+    linear, angular = vector(x=speed, y=0.0, z=0.0), vector(x=0.0, y=0.0, z=0.0)
+    return STORES.types[TWIST](header=header, twist=twist(linear=linear, angular=angular))
+
+
+def write_case(case: Case, folder: Path) -> Path:
+    """Write the case as a rosbag2 folder (MCAP, metadata version 9) named after it; return the bag's path."""
+    bag = folder / case.name
+    forever = QosTime(9223372036, 854775807)
+    qos = Qos(
+        QosHistory.KEEP_LAST,
+        1000,
+        QosReliability.RELIABLE,
+        QosDurability.VOLATILE,
+        forever,
+        forever,
+        QosLiveliness.AUTOMATIC,
+        forever,
+        False,
+    )
+    messages = record(case)
+    with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        writer.set_custom_data("origin", "synthetic: made by scenario_gen, not recorded")
+        connections = {
+            topic: writer.add_connection(topic, kind, typestore=STORES, offered_qos_profiles=[qos])
+            for topic, kind in sorted({(message.topic, message.type) for message in messages})
+        }
+        for message in messages:
+            writer.write(connections[message.topic], message.received_ns, message.data)
+    return bag
+
+
+def main(folder: Path = RESOURCES) -> None:
+    """Write all three bags anew."""
+    import shutil
+
+    for name in CASES:
+        case = make_case(name)
+        shutil.rmtree(folder / case.name, ignore_errors=True)
+        bag = write_case(case, folder)
+        size = sum(file.stat().st_size for file in bag.iterdir())
+        print(f"{bag}: {case.duration:g} s, {len(case.drives)} vehicles, {size // 1000} kB")
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:2]))

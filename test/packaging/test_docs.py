@@ -1,0 +1,51 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the pages name is there: files, links, public names, targets of make."""
+
+import re
+
+import pytest
+from source_files import ROOT
+
+import scenario_gen
+
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "examples" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_files_links_and_targets_of_a_page_are_there(page):
+    text = page.read_text()
+    named = {name for name in re.findall(r"`((?:scenario_gen|test|docs|examples|config)/[\w./]+)`", text) if "*" not in name}
+    assert not [name for name in named if not (ROOT / name).exists()]
+    links = {link.partition("#")[0] for link in re.findall(r"\]\((?!https?:)([^)]+)\)", text)} - {""}
+    assert not [link for link in links if not (page.parent / link).exists()]
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    assert set(re.findall(r"`make ([a-z]+)", text)) <= targets
+
+
+def test_every_public_name_is_on_the_page_of_the_library_and_every_page_on_the_site():
+    page = (ROOT / "docs" / "library.md").read_text()
+    shown = dict(re.findall(r"\{py:(?:class|func)\}`(\w+) <([\w.]+)>`", page))
+    assert shown == {name: f"{getattr(scenario_gen, name).__module__}.{name}" for name in scenario_gen.__all__}
+    site = (ROOT / "docs" / "index.md").read_text().split()
+    assert {path.stem for path in (ROOT / "docs").glob("*.md")} - {"index"} <= set(site)
+
+
+def test_the_version_is_the_same_everywhere():
+    assert f'version="{scenario_gen.__version__}"' in (ROOT / "setup.py").read_text()
+    assert f"<version>{scenario_gen.__version__}</version>" in (ROOT / "package.xml").read_text()
+    assert (
+        re.search(r"^(\d+\.\d+\.\d+)\n-----$", (ROOT / "CHANGELOG.rst").read_text(), re.MULTILINE)[1] == scenario_gen.__version__
+    )

@@ -1,0 +1,91 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The library: its public names, what importing it loads, and what the core does without any extra."""
+
+import ast
+import json
+from pathlib import Path
+import subprocess
+import sys
+
+from licences import extras
+import pytest
+
+import scenario_gen
+from scenario_gen import bundled, MissingExtraError, read_log
+from scenario_gen.errors import needs
+
+EXTRA_MODULES = ("jinja2", "lz4", "mcap", "ompl", "plotly", "pyarrow", "rich", "rosbags", "typer", "zstandard")
+MODULES = {"pillow": "PIL", "pyyaml": "yaml"}  # by distribution, where they differ
+
+
+def python(*arguments):
+    return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, check=False, cwd=Path(__file__).parent)
+
+
+def test_a_type_checker_sees_the_names_that_are_there_at_run_time():
+    tree = ast.parse(Path(scenario_gen.__file__).read_text())
+    (seen,) = (node for node in tree.body if isinstance(node, ast.If))
+    imported = {(node.module.partition(".")[2], alias.name) for node in seen.body for alias in node.names}
+    assert imported == {(module, name) for name, module in scenario_gen._MODULE.items()}
+    assert set(scenario_gen.__all__) == set(scenario_gen._MODULE) <= set(dir(scenario_gen))
+    for name in scenario_gen.__all__:
+        assert getattr(scenario_gen, name).__name__ == name
+    with pytest.raises(AttributeError, match="no attribute 'segments'"):
+        _ = scenario_gen.segments
+
+
+def test_importing_the_package_loads_nothing_and_importing_the_pipeline_no_extra():
+    ran = python("-c", "import sys; before = set(sys.modules); import scenario_gen; print(*(set(sys.modules) - before))")
+    assert {name.partition(".")[0] for name in ran.stdout.split()} <= {"scenario_gen", *sys.stdlib_module_names}
+    ran = python("-c", "import sys, scenario_gen.pipeline; print(*sys.modules)")
+    assert not {name.partition(".")[0] for name in ran.stdout.split()} & set(EXTRA_MODULES)
+
+
+def test_the_core_works_without_any_extra(tmp_path):
+    """As in an environment where no extra is installed (`make core` makes a real one): their modules cannot be imported."""
+    log = write_csv(tmp_path / "log.csv")
+    absent = f"import sys; sys.modules.update(dict.fromkeys({EXTRA_MODULES}))"
+    ran = python("-c", f"{absent}; sys.argv = ['core_use.py', {str(log)!r}]; import core_use")
+    assert ran.returncode == 0, ran.stderr
+    told = json.loads(ran.stdout)
+    assert told["scenarios"] == 4 and told["changepoints"] and told["same"]
+    assert [sentence.rpartition("[")[2].partition("]")[0] for sentence in told["refusals"]] == ["bags", "report"]
+    assert not set(told["loaded"]) & set(EXTRA_MODULES)
+
+
+def test_the_command_names_the_extra_that_it_lacks():
+    ran = python("-c", "import sys; sys.modules['typer'] = None; from scenario_gen.__main__ import main; main()")
+    assert (ran.returncode, ran.stdout) == (1, "")
+    assert ran.stderr == "error: typer not installed; `pip install 'scenario_gen[cli]'` brings it\n"
+
+
+def test_every_module_of_an_extra_is_one_that_is_looked_for():
+    assert {MODULES.get(one.name, one.name) for name, listed in extras().items() if name != "core" for one in listed} == set(
+        EXTRA_MODULES
+    )
+    with pytest.raises(MissingExtraError, match=r"nowhere not installed; `pip install 'scenario_gen\[bags\]'`"):
+        needs("bags", "json", "nowhere")
+
+
+def write_csv(path):
+    """Write the bundled case a as a table, which the core alone reads."""
+    (encounter,) = read_log(bundled("a")).encounters
+    rows = ["vehicle,time_s,x_m,y_m,speed_mps"]
+    for n, vehicle in enumerate(encounter.vehicles):
+        for t, (x, y), speed in zip(encounter.time, encounter.position[n], encounter.speed[n], strict=True):
+            rows.append(f"{vehicle.id},{t:.1f},{x:.6f},{y:.6f},{speed:.6f}")
+    path.write_text("\n".join(rows) + "\n")
+    return path

@@ -1,0 +1,189 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Waits, conflicts and passing orders: known cases, and agreement with shapely on random ones."""
+
+import csv
+from pathlib import Path
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+import shapely
+
+from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, Wait
+from scenario_gen.types.encounter import Encounter, Vehicle
+
+CARS = (Vehicle("a"), Vehicle("b"))
+TIME = np.arange(101) * 0.1
+
+
+def straight(x, y, yaw, speed, time=TIME):
+    """Position (T, 2) and heading (T,) of a steady straight drive."""
+    s = speed * time
+    return np.stack([x + s * np.cos(yaw), y + s * np.sin(yaw)], -1), np.full(time.size, yaw)
+
+
+def conflicts(*tracks, vehicles=CARS, time=TIME):
+    position, heading = (np.array(a) for a in zip(*tracks, strict=True))
+    return find_conflicts(vehicles, time, position, heading)
+
+
+def encounter(speed):
+    n, t = speed.shape
+    return Encounter("test", CARS[:n], 0, 100_000_000, np.zeros((n, t, 2)), np.zeros((n, t)), speed)
+
+
+def box(length, width, x, y, yaw):
+    corners = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) * (0.5 * length, 0.5 * width)
+    rotation = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    return shapely.Polygon(corners @ rotation.T + (x, y))
+
+
+def test_a_crossing_is_ordered_by_first_entry():
+    (found,) = conflicts(straight(-30, 0, 0, 5), straight(0, -20, np.pi / 2, 5))
+    assert (found.first, found.second, found.following) == (1, 0, False)
+    # b's front (2.4 m ahead) reaches a's sweep (|y| <= 0.95) after 20 - 2.4 - 0.95 = 16.65 m, its rear leaves it 6.7 m later
+    assert found.entry_first == pytest.approx(16.65 / 5, abs=1e-3)
+    assert found.exit_first == pytest.approx((20 + 2.4 + 0.95) / 5, abs=1e-3)
+    assert found.entry_second == pytest.approx((30 - 2.4 - 0.95) / 5, abs=1e-3)
+
+
+def test_parallel_lanes_are_no_conflict_and_a_slight_touch_is_one():
+    assert conflicts(straight(0, 0, 0, 10), straight(100, 2.0, np.pi, 10)) == ()
+    (found,) = conflicts(straight(0, 0, 0, 10), straight(110, 1.8, np.pi, 10))
+    # both sweeps share a strip; a enters it where b's journey ends, b where a's ends
+    assert not found.following
+    assert (found.first, found.second) == (0, 1)
+    (found,) = conflicts(straight(0, 0, 0, 10), straight(110, 1.8, np.pi, 20))
+    assert (found.first, found.entry_first, found.entry_second) == (0, 0.0, pytest.approx((110 - 102.4 - 2.4) / 20, abs=1e-3))
+
+
+@pytest.mark.parametrize("leader", [0, 1])
+def test_following_is_ordered_along_the_route(leader):
+    tracks = [straight(0, 0, 0, 10), straight(0, 0, 0, 10)]
+    tracks[leader] = straight(20, 0.3, 0, 9)
+    (found,) = conflicts(*tracks)
+    assert found.following
+    assert (found.first, found.second, found.entry_first) == (leader, 1 - leader, 0.0)
+    assert found.entry_second == pytest.approx(15.2 / 10, abs=1e-3)
+
+
+@pytest.mark.parametrize("leader", [0, 1])
+def test_cars_recorded_on_top_of_each_other_keep_the_order_along_the_route(leader):
+    tracks = [straight(0, 0, 0, 10), straight(0, 0.2, 0, 10)]
+    tracks[leader] = straight(3, 0, 0, 10)
+    (found,) = conflicts(*tracks)
+    assert found.following
+    assert found.first == leader
+
+
+def test_a_vehicle_that_stands_in_the_way_is_first():
+    (found,) = conflicts(straight(0, 0, 0, 10), straight(50, 1.0, 0, 0))
+    assert (found.first, found.following, found.entry_first, found.exit_first) == (1, False, 0.0, 10.0)
+
+
+def test_entering_at_the_same_instant_is_ordered_by_index():
+    (found,) = conflicts(straight(-20, 0, 0, 5), straight(0, -20, np.pi / 2, 5))
+    assert (found.first, found.second) == (0, 1)
+
+
+def test_merging_is_ordered_by_who_merges_first():
+    x = np.linspace(0, 100, TIME.size)
+    merge = np.stack([x + 5, 3.5 * (1 - 1 / (1 + np.exp(-(x - 40) / 5)))], -1)
+    heading = np.arctan2(np.gradient(merge[:, 1]), np.gradient(merge[:, 0]))
+    (found,) = conflicts(straight(-10, 0, 0, 10), (merge, heading))
+    assert (found.first, found.following) == (1, True)
+
+
+def test_a_fast_crossing_between_two_samples_is_seen():
+    time = np.arange(11) * 1.0  # 40 m between samples
+    (found,) = conflicts(straight(-100, 0, 0, 40, time), straight(20, -210, np.pi / 2, 40, time), time=time)
+    assert found.first == 0
+    assert found.entry_first == pytest.approx((120 - 2.4 - 0.95) / 40, abs=0.01)
+
+
+def test_waits_are_slow_for_at_least_a_second():
+    speed = np.full((2, 101), 5.0)
+    speed[0, 20:40] = 0.0
+    speed[0, 60:66] = 0.0  # half a second
+    speed[1] = 0.2
+    assert find_waits(encounter(speed)) == (Wait(0, pytest.approx(2.2), pytest.approx(3.7)), Wait(1, 0.0, 10.0, creeps=True))
+
+
+def test_a_wait_creeps_if_it_does_not_stand_for_a_second():
+    speed = np.full((2, 101), 5.0)
+    speed[0, 20:60] = 0.3
+    speed[0, 30:39] = 0.0  # 0.8 s
+    speed[1, 20:60] = 0.3
+    speed[1, 30:41] = 0.05  # 1.0 s
+    assert [wait.creeps for wait in find_waits(encounter(speed))] == [True, False]
+
+
+def test_one_noisy_sample_does_not_end_a_wait():
+    speed = np.full((2, 101), 0.1)
+    speed[0, 50] = 1.4
+    assert find_waits(encounter(speed)) == (Wait(0, 0.0, 10.0), Wait(1, 0.0, 10.0))
+
+
+@settings(deadline=None, max_examples=150)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_existence_and_entry_agree_with_shapely(seed):
+    rng = np.random.default_rng(seed)
+    time = np.arange(41) * 0.1
+    vehicles = tuple(Vehicle(str(i), rng.uniform(2, 8), rng.uniform(0.8, 2.5)) for i in range(2))
+    tracks = []
+    for _ in range(2):
+        yaw = rng.uniform(-np.pi, np.pi) + np.cumsum(np.full(time.size, rng.uniform(-0.05, 0.05)))
+        step = np.stack([np.cos(yaw), np.sin(yaw)], -1) * rng.uniform(0, 1.5)
+        tracks.append((rng.uniform(-15, 15, 2) + np.cumsum(step, 0), yaw))
+    found = conflicts(*tracks, vehicles=vehicles, time=time)
+    boxes = [
+        [box(v.length, v.width, *p, h) for p, h in zip(*track, strict=True)] for v, track in zip(vehicles, tracks, strict=True)
+    ]
+    sweeps = [shapely.union_all(one) for one in boxes]
+    area = sweeps[0].intersection(sweeps[1]).area
+    if not found:
+        assert area < 1e-3
+    elif area > 1e-3:
+        entry = [next(t for t, one in zip(time, boxes[i], strict=True) if one.intersects(sweeps[1 - i])) for i in range(2)]
+        times = {found[0].first: found[0].entry_first, found[0].second: found[0].entry_second}
+        for i in range(2):
+            assert times[i] == pytest.approx(entry[i], abs=0.11)
+        if not found[0].following and abs(entry[0] - entry[1]) > 0.11:
+            assert found[0].first == int(entry[1] < entry[0])
+
+
+def read_ngsim(path: Path):
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    ids = sorted({row["vehicle_id"] for row in rows})
+    tracks = [[[float(r[c]) for c in ("x_m", "y_m", "heading_rad")] for r in rows if r["vehicle_id"] == i] for i in ids]
+    common = min(len(track) for track in tracks)
+    columns = np.array([track[:common] for track in tracks])
+    return columns[..., :2], np.unwrap(columns[..., 2], axis=1)
+
+
+@pytest.mark.data
+def test_recorded_left_turner_yields_to_the_oncoming_car(data):
+    """The oncoming car passes first, then the left turner; in the opposite-direction case nobody meets."""
+    folder = data / "trajectories" / "ngsim_commonroad"
+    position, heading = read_ngsim(folder / "encounter_b_left_turn_vs_opposite_Lanker-2_13_2839_21019.csv")
+    time = np.arange(position.shape[1]) * 0.1
+    (found,) = find_conflicts(CARS, time, position, heading)
+    assert isinstance(found, Conflict)
+    assert found.exit_first < found.entry_second
+    position, heading = read_ngsim(folder / "encounter_c_opposite_stop_go_Peach-4_2_134_334.csv")
+    assert find_conflicts(CARS, np.arange(position.shape[1]) * 0.1, position, heading) == ()

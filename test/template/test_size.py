@@ -1,0 +1,76 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Encounters that are too large are refused at once, with what would fit."""
+
+import numpy as np
+import pytest
+
+from scenario_gen.errors import RefusedError
+from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.template.size import MOST_VEHICLE_SECONDS, refuse_too_large
+from scenario_gen.types.encounter import Encounter, Vehicle
+
+
+def standing(count, seconds):
+    flat = np.zeros((count, round(seconds / 0.1) + 1))
+    vehicles = tuple(Vehicle(str(k)) for k in range(count))
+    return Encounter("large", vehicles, 0, 100_000_000, np.zeros((*flat.shape, 2)), flat, flat)
+
+
+@pytest.mark.parametrize(("count", "seconds"), [(2, 1000.0), (30, 60.0), (30, 130.0), (64, 60.0)])
+def test_long_ones_of_few_and_short_ones_of_many_are_taken(count, seconds):
+    refuse_too_large(standing(count, seconds))
+
+
+def test_too_many_vehicle_seconds_are_refused_before_any_work():
+    encounter = standing(30, 1000.0)
+    with pytest.raises(RefusedError) as caught:
+        generate(encounter, "no such road", PipelineConfig(), count=10, seed=0)
+    said = str(caught.value)
+    assert "30 vehicles for 1000 s are 30000 vehicle seconds, 4000 are possible" in said
+    assert "--set log.max_duration=133" in said and "--set log.max_vehicles=4" in said and len(said) <= 500
+    refuse_too_large(standing(30, 133.0))
+    refuse_too_large(standing(4, 1000.0))
+    assert MOST_VEHICLE_SECONDS >= 30 * 133.0
+
+
+def test_too_many_vehicles_are_refused():
+    with pytest.raises(RefusedError, match=r"65 vehicles, 64 are possible.*log\.max_vehicles=64"):
+        refuse_too_large(standing(65, 10.0))
+
+
+def driving(offset=0.0, jump=0.0, samples=100, period_ns=100_000_000):
+    """Two vehicles side by side; the second one's positions are off by `offset` [m], and one of them by `jump`."""
+    position = np.zeros((2, samples, 2))
+    position[..., 0] = np.arange(samples) * period_ns * 1e-8  # at 10 m/s
+    position[1, :, 1] = 4.0 + offset
+    position[1, samples // 2, 1] += jump
+    flat = np.zeros((2, samples))
+    return Encounter("tracks", (Vehicle("a"), Vehicle("b")), 0, period_ns, position, flat, flat + 10.0)
+
+
+@pytest.mark.parametrize("metres", [1e4, 1e7, -1e7])
+def test_vehicles_that_are_not_where_they_can_be_are_refused(metres):
+    with pytest.raises(RefusedError, match=r"vehicle \w is never nearer than .* m to another, 2000 m are possible"):
+        refuse_too_large(driving(offset=metres))
+    with pytest.raises(RefusedError, match=r"positions of vehicle b are up to .* m apart while its speeds add up to 100 m"):
+        refuse_too_large(driving(jump=metres))
+    refuse_too_large(driving(offset=1900.0))
+    refuse_too_large(driving(jump=1900.0))
+
+
+def test_too_many_samples_are_refused_however_short_their_period():
+    with pytest.raises(RefusedError, match=r"a sample every 0.001 s have 200000 samples, 45000 are possible.*log\.period=0\.1"):
+        refuse_too_large(driving(samples=100_000, period_ns=1_000_000))
+    refuse_too_large(driving(samples=20_000))

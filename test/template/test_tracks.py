@@ -1,0 +1,192 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Cleaned tracks, path coordinates, separation."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from scenario_gen.curve import crossings, Curve
+from scenario_gen.errors import RefusedError
+from scenario_gen.template.frenet import to_frenet
+from scenario_gen.template.separation import footprint_gap, separate, smallest_gaps
+from scenario_gen.template.tracks import clean_tracks
+from scenario_gen.types.encounter import Encounter, Vehicle
+
+
+def encounter_of(*motions, dt=0.1):
+    """An encounter of (T, 3) poses; speeds by differences."""
+    poses = np.stack(motions)
+    step = np.hypot(*np.moveaxis(np.diff(poses[:, :, :2], axis=1), 2, 0)) / dt
+    speed = np.concatenate((step, step[:, -1:]), axis=1)
+    vehicles = tuple(Vehicle(str(i)) for i in range(len(poses)))
+    return Encounter("made", vehicles, 0, round(dt * 1e9), poses[..., :2], poses[..., 2], speed)
+
+
+def line(x0, y0, yaw, speed, t=100):
+    s = np.arange(t) * 0.1 * speed
+    return np.column_stack((x0 + s * np.cos(yaw), y0 + s * np.sin(yaw), np.full(t, yaw)))
+
+
+def arc(x0, y0, yaw, radius, speed, t=100):
+    """Poses on a circle that turns left (radius > 0) or right."""
+    a = yaw + np.arange(t) * 0.1 * speed / radius
+    return np.column_stack((x0 + radius * (np.sin(a) - np.sin(yaw)), y0 - radius * (np.cos(a) - np.cos(yaw)), a))
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.floats(6.0, 200.0), st.sampled_from([-1.0, 1.0]), st.floats(-3.0, 3.0), st.floats(2.0, 60.0), st.floats(-4.0, 4.0))
+def test_projection_undoes_placing_beside_a_curve(radius, sign, yaw, length, offset):
+    s = np.linspace(0.0, min(length, 4.0 * radius), 400)
+    a = yaw + sign * s / radius
+    xy = np.column_stack((sign * radius * (np.sin(a) - np.sin(yaw)), -sign * radius * (np.cos(a) - np.cos(yaw))))
+    curve = Curve.through(xy)
+    at = np.linspace(-5.0, curve.length + 5.0, 37) if radius > 40.0 else np.linspace(0.1, curve.length - 0.1, 37)
+    poses = curve.beside(at, np.full(37, offset))
+    station, found = curve.project(poses[:, :2])
+    assert np.abs(station - at).max() < 0.06
+    assert np.abs(found - offset).max() < 0.02
+
+
+def test_crossings_are_found_at_their_stations():
+    one = Curve(np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]]))
+    two = Curve(np.array([[4.0, -3.0, np.pi / 2.0], [4.0, 3.0, np.pi / 2.0]]))
+    assert crossings(one, two).tolist() == [[pytest.approx(4.0), pytest.approx(3.0)]]
+    assert len(crossings(one, Curve(one.points + np.array([0.0, 1.0, 0.0])))) == 0
+
+
+def test_noise_is_smoothed_and_a_standing_vehicle_is_a_point():
+    rng = np.random.Generator(np.random.PCG64(3))
+    clean = arc(0.0, 0.0, 0.3, 30.0, 8.0)
+    noisy = clean.copy()
+    noisy[:, :2] += rng.normal(0.0, 0.2, (100, 2))
+    still = np.tile([20.0, -9.0, 1.0], (100, 1))
+    encounter = encounter_of(clean, still)
+    noisy_encounter = Encounter(
+        "noisy", encounter.vehicles, 0, 100_000_000, np.stack((noisy, still))[..., :2], encounter.heading, encounter.speed
+    )
+    moving, standing = clean_tracks(noisy_encounter)
+    error = np.hypot(*(moving.poses[:, :2] - clean[:, :2]).T)
+    assert error.max() < 0.6
+    assert error[5:-5].max() < 0.25
+    assert np.abs(moving.poses[5:-5, 2] - clean[5:-5, 2]).max() < 0.12
+    assert (np.diff(moving.progress) > 0.0).all()
+    assert standing.still
+    assert standing.travelled == 0.0
+    assert standing.poses[0].tolist() == pytest.approx([20.0, -9.0, 1.0])
+
+
+def test_a_junction_turn_is_one_and_a_bend_is_not():
+    turner, bender = clean_tracks(encounter_of(arc(0.0, 0.0, 0.0, 10.0, 2.0), arc(0.0, 50.0, 0.0, -80.0, 8.0)))
+    assert turner.turns
+    assert turner.turning(30.0) > 0.0
+    assert not turner.makes_u_turn
+    assert not bender.turns
+    (round_, _) = clean_tracks(encounter_of(arc(0.0, 0.0, 0.0, 6.0, 2.0), line(0.0, 40.0, 0.0, 5.0)))
+    assert round_.makes_u_turn
+
+
+def test_gaps_survive_when_a_winding_road_is_laid_out_straight():
+    lead, follow = arc(0.0, 0.0, 0.0, 90.0, 12.0, 400), arc(0.0, 0.0, 0.0, 90.0, 12.0, 400)
+    encounter = encounter_of(lead[50:350], follow[:300])  # 5 s, 60 m behind
+    frenet = to_frenet(clean_tracks(encounter))
+    assert np.abs(frenet.station[0] - frenet.station[1] - 60.0).max() < 0.1
+    assert frenet.direction.tolist() == [1, 1]
+    assert frenet.lanes == 1
+
+
+def test_lanes_and_changes_of_lane_are_told_from_offsets():
+    t = 200
+    changing = line(0.0, 3.6, 0.0, 10.0, t)
+    x = np.clip((np.arange(t) - 60) / 60.0, 0.0, 1.0)
+    changing[:, 1] -= 3.6 * x**2 * (3.0 - 2.0 * x)
+    encounter = encounter_of(changing, line(-30.0, 0.0, 0.0, 10.0, t), line(200.0, 7.3, np.pi, 9.0, t))
+    frenet = to_frenet(clean_tracks(encounter))
+    assert frenet.direction.tolist() in ([1, 1, -1], [-1, -1, 1])
+    assert frenet.lane.tolist() == [[0, 1], [1, 1], [0, 0]]
+    assert frenet.change[0, 40] < 0.05
+    assert frenet.change[0, -40] > 0.95
+    assert not frenet.change[1:].any()
+
+
+@pytest.mark.parametrize(
+    ("apart", "between"), [(3.5, (0, 0)), (7.0, (1, 0)), (12.0, (1, 1)), (14.0, (2, 1)), (25.0, (2, 2)), (-4.0, (0, 0))]
+)
+def test_oncoming_vehicles_that_are_far_apart_have_lanes_between_them(apart, between):
+    encounter = encounter_of(line(0.0, 0.0, 0.0, 10.0), line(120.0, apart, np.pi, 9.0))
+    frenet = to_frenet(clean_tracks(encounter))
+    assert frenet.between == between
+    spread = frenet.spread()
+    ahead, against = (spread.lane[frenet.direction == sign, 0].item() for sign in (1, -1))
+    assert (ahead, against) == between
+    assert spread.lanes == max(between) + 1
+
+
+def test_a_line_continued_by_one_far_beside_it_does_not_jump():
+    encounter = encounter_of(line(0.0, 0.0, 0.0, 7.0), line(125.0, 18.0, np.pi, 6.0))
+    frenet = to_frenet(clean_tracks(encounter))
+    assert np.ptp(frenet.line.points[:, 1]) < 1.0
+    assert abs(abs(frenet.offset[1] - frenet.offset[0]).mean() - 18.0) < 0.5
+
+
+def test_turns_and_crossings_are_not_along_a_road():
+    with pytest.raises(RefusedError, match="vehicle 0 turns left"):
+        to_frenet(clean_tracks(encounter_of(arc(0.0, 0.0, 0.0, 10.0, 2.0), line(0.0, 30.0, 0.0, 5.0))))
+    with pytest.raises(RefusedError, match="across"):
+        to_frenet(clean_tracks(encounter_of(line(0.0, 0.0, 0.0, 8.0), line(30.0, -30.0, np.pi / 2.0, 5.0))))
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0), st.floats(-3.14, 3.14), st.floats(-3.14, 3.14))
+def test_footprint_gap_has_the_sign_of_shapely(x, y, yaw_a, yaw_b):
+    shapely = pytest.importorskip("shapely")
+    from shapely import affinity
+
+    car = Vehicle("a")
+    poses = (np.array([[x, y, yaw_a]]), np.array([[0.0, 0.0, yaw_b]]))
+    boxes = [
+        affinity.translate(affinity.rotate(shapely.box(-2.4, -0.95, 2.4, 0.95), p[0, 2], use_radians=True), p[0, 0], p[0, 1])
+        for p in poses
+    ]
+    gap = float(footprint_gap(car, poses[0], car, poses[1])[0][0])
+    distance = boxes[0].distance(boxes[1])
+    assert (gap < 0.0) == (distance == 0.0) or abs(gap) < 1e-9
+    assert gap <= distance + 1e-9
+
+
+def test_overlapping_vehicles_are_pulled_apart_by_the_least():
+    tracks = clean_tracks(encounter_of(line(0.0, 0.0, 0.0, 8.0), line(0.5, 1.5, 0.0, 8.0)))
+    assert smallest_gaps(tracks)[0, 1] == pytest.approx(-0.4, abs=0.01)
+    separation = separate(tracks, 0.5, 3.0)
+    assert smallest_gaps(separation.tracks)[0, 1] > 0.499
+    assert separation.moved.tolist() == pytest.approx([0.45, 0.45], abs=0.01)
+    assert len(separation.notes) == 2
+    assert "0.45 m" in separation.notes[0]
+    with pytest.raises(RefusedError, match="vehicles 1 and 0"):
+        separate(tracks, 0.5, 0.3)
+
+
+def test_a_bend_no_car_can_steer_is_eased_and_turns_as_far():
+    t = 60
+    tight = np.vstack((line(0.0, 0.0, 0.0, 5.0, t), arc(29.5, 0.0, 0.0, 3.5, 2.0, 56)))
+    last = tight[-1]
+    tight = np.vstack((tight, line(last[0], last[1], last[2], 5.0, t)))
+    (track, _) = clean_tracks(encounter_of(tight, np.tile([0.0, 30.0, 0.0], (len(tight), 1))))
+    curvature = np.abs(np.diff(track.curve.points[:, 2])) / np.diff(track.curve.station)
+    assert curvature.max() <= 0.17
+    turned = track.curve.points[-1, 2] - track.curve.points[0, 2]
+    assert turned == pytest.approx(tight[-1, 2] - tight[0, 2], abs=0.05)
+    assert track.deviation < 3.0

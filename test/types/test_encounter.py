@@ -1,0 +1,76 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+from hypothesis import example, given
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from scenario_gen.arrays import canonical_angle, canonical_heading
+from scenario_gen.errors import InputError
+from scenario_gen.types.encounter import Encounter, Vehicle
+
+
+def encounter(**changes):
+    arguments = {
+        "name": "test",
+        "vehicles": (Vehicle("a"), Vehicle("b")),
+        "start_ns": 0,
+        "dt_ns": 100_000_000,
+        "position": np.zeros((2, 5, 2)),
+        "heading": np.zeros((2, 5)),
+        "speed": np.zeros((2, 5)),
+    }
+    return Encounter(**(arguments | changes))
+
+
+def test_arrays_cannot_be_changed_behind_our_back():
+    position = np.zeros((2, 5, 2))
+    made = encounter(position=position)
+    position[:] = 1.0
+    assert not made.position.any()
+    with pytest.raises(ValueError, match="read-only"):
+        made.position[0, 0, 0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"speed": np.full((2, 5), -1.0)}, "negative speed"),
+        ({"speed": np.full((2, 5), np.nan)}, "not finite"),
+        ({"position": np.zeros((2, 4, 2))}, "disagree in shape"),
+        ({"vehicles": (Vehicle("a"), Vehicle("a"))}, "not unique"),
+        ({"speed": np.zeros((1, 5))}, "at least 2"),
+    ],
+)
+def test_bad_encounters_are_refused(changes, said):
+    with pytest.raises(InputError, match=said):
+        encounter(**changes)
+
+
+@given(st.floats(-50.0, 50.0))
+@example(np.pi)
+@example(-np.pi)
+@example(3.1415926535)
+def test_a_canonical_angle_survives_a_quaternion_bit_for_bit(angle):
+    canonical = canonical_angle(angle)
+    z, w = np.sin(canonical / 2), np.cos(canonical / 2)
+    assert canonical_angle(2.0 * np.arctan2(z, w)) == canonical
+
+
+@given(st.lists(st.floats(-0.5, 0.5), min_size=2, max_size=50), st.floats(-10.0, 10.0))
+def test_canonical_heading_is_continuous_and_idempotent(steps, start):
+    heading = canonical_heading(start + np.cumsum(steps))
+    assert np.abs(np.diff(heading)).max() <= 0.5 + 1e-8
+    assert (canonical_heading(heading) == heading).all()
