@@ -23,6 +23,7 @@ standing and moving only. The gap to other vehicles is left out: it is an integr
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -35,6 +36,7 @@ from scenario_gen.types.encounter import Encounter
 STAND_SPEED = 0.5
 STAND_BLUR = 0.2
 STAND_WINDOW = 0.9
+POSITION_FLOOR, SPEED_FLOOR = 0.5, 0.5
 
 
 def _best_window(signals: Sequence[Floats], width: int, degree: int, value: Callable[[list[Floats]], Floats]) -> Floats:
@@ -63,6 +65,31 @@ def _best_window(signals: Sequence[Floats], width: int, degree: int, value: Call
     chosen = around[misfit[around].argmin(axis=0), t]
     result: Floats = value(coefficients)[chosen]
     return result
+
+
+def without_spikes(values: Floats, floor: float) -> Floats:
+    """Replace single samples of values (T, D) that lie far from their neighbours by what lies between these (Hampel's filter).
+
+    Far is six times the usual distance (by its median) from the median of the two samples on either side, and `floor`.
+    """
+    if len(values) < 5:
+        return values
+    around = np.stack([values[:-4], values[1:-3], values[3:-1], values[4:]])
+    middle = np.median(around, axis=0)
+    far = np.sqrt(np.square(values[2:-2] - middle).sum(axis=1))
+    spikes = np.zeros(len(values), np.bool_)
+    spikes[2:-2] = far > np.maximum(6.0 * 1.4826 * np.median(far), floor)
+    if not spikes.any():
+        return values
+    t, kept = np.arange(len(values)), ~spikes
+    return np.column_stack([np.interp(t, t[kept], column[kept]) for column in values.T])
+
+
+def without_outliers(encounter: Encounter) -> Encounter:
+    """Return the encounter without single positions and speeds that no vehicle could have had between its neighbours."""
+    position = np.stack([without_spikes(xy, POSITION_FLOOR) for xy in encounter.position])
+    speed = np.stack([without_spikes(v[:, None], SPEED_FLOOR)[:, 0] for v in encounter.speed])
+    return replace(encounter, position=position, speed=speed)
 
 
 def longitudinal_acceleration(speed: Floats, dt: float, window: float) -> Floats:

@@ -14,7 +14,7 @@
 
 """The posterior over segmentations: a point estimate, changepoint probabilities, intervals, and whether to believe them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -34,6 +34,11 @@ class Posterior:
         chain: (S,) chain of each sample.
         trace: per chain (S', 5), see `_chain.TRACE`.
         kept: (chains,) which chains the samples are from; the others are stuck in a far less probable place.
+        states: weak-limit truncation L that was used.
+        full: whether all of them were in use more than now and then, so that more might be.
+        dof: degrees of freedom of the noise; 0: Gaussian.
+        weight: what a sample counted for.
+        channels: (D',) channels that were used; the others do not vary or follow from these.
     """
 
     labels: Ints
@@ -43,6 +48,21 @@ class Posterior:
     chain: Ints
     trace: tuple[Floats, ...]
     kept: Bools
+    states: int = 1
+    full: bool = False
+    dof: float = 0.0
+    weight: float = 1.0
+    channels: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    @property
+    def r_hat(self) -> Floats:
+        """(5,) split R̂ of each trace over all chains."""
+        return r_hat(list(self.trace))
+
+    @property
+    def ess(self) -> Floats:
+        """(5,) effective sample size of each trace over all chains."""
+        return ess(list(self.trace))
 
     @classmethod
     def constant(cls, samples: int) -> "Posterior":
@@ -90,6 +110,40 @@ class Posterior:
         """(n,) posterior probability of 0, 1, 2, ... primitives in use."""
         used = np.array([len(np.unique(row)) for row in self.samples])
         return np.bincount(used) / len(used)
+
+
+def r_hat(traces: list[Floats]) -> Floats:
+    """Split R̂ (Gelman et al. 2013, 11.4) of traces, each (S, n): (n,); 1 where nothing varies."""
+    if not traces or len(traces[0]) < 4:
+        return np.ones(5)
+    half = min(len(trace) for trace in traces) // 2
+    parts = np.array([part for trace in traces for part in (trace[:half], trace[half : 2 * half])])
+    within = parts.var(axis=1, ddof=1).mean(axis=0)
+    between = parts.mean(axis=1).var(axis=0, ddof=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.sqrt((half - 1) / half + between / within)
+    return np.where(within > 0.0, ratio, np.where(between > 0.0, np.inf, 1.0))
+
+
+def ess(traces: list[Floats]) -> Floats:
+    """Effective sample size (Gelman et al. 2013, 11.5) of traces, each (S, n): (n,), by Geyer's initial positive pairs."""
+    half = min((len(trace) for trace in traces), default=0) // 2
+    if half < 4:
+        return np.zeros(5)
+    parts = np.array([part for trace in traces for part in (trace[:half], trace[half : 2 * half])])
+    chains, n, quantities = parts.shape
+    centred = parts - parts.mean(axis=1, keepdims=True)
+    within = parts.var(axis=1, ddof=1).mean(axis=0)
+    total = (n - 1) / n * within + parts.mean(axis=1).var(axis=0, ddof=1)
+    lags = np.array([(centred[:, lag:] * centred[:, : n - lag]).sum(axis=1).mean(axis=0) / n for lag in range(n)])
+    result = np.full(quantities, float(chains * n))
+    for i in range(quantities):
+        if total[i] > 0.0:
+            rho = 1.0 - (within[i] - lags[:, i] * n / (n - 1)) / total[i]
+            pairs = rho[: n // 2 * 2].reshape(-1, 2).sum(axis=1)
+            stop = int(np.argmax(pairs < 0.0)) if (pairs < 0.0).any() else len(pairs)
+            result[i] = chains * n / max(2.0 * float(np.minimum.accumulate(pairs[:stop]).sum()) - 1.0, 1.0 / np.log10(chains * n))
+    return result
 
 
 def changepoints_of(labels: Ints, ends: Ints) -> Ints:

@@ -22,7 +22,7 @@ import numpy as np
 from scenario_gen.arrays import Ints
 from scenario_gen.parameters import check, parameter
 from scenario_gen.segmentation.descriptions import describe_segments
-from scenario_gen.segmentation.features import driving_features, paper_features
+from scenario_gen.segmentation.features import driving_features, paper_features, without_outliers
 from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.segmentation.posterior import in_order, Posterior
 from scenario_gen.segmentation.series import segment_series
@@ -30,7 +30,7 @@ from scenario_gen.segmentation.trends import Trends
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.segmentation import Segmentation
 
-DRIVING_SAMPLER = SamplerConfig(weight=0.5)
+DRIVING_SAMPLER = SamplerConfig(weight=0.5, chains=3, sweeps=90)
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,7 @@ def segment(encounter: Encounter, config: SegmentationConfig = DEFAULT, seed: in
         posterior = segment_series(paper_features(encounter), config.sampler, seed)
         points = cut(posterior, config, encounter.dt)
     else:
+        encounter = without_outliers(encounter)
         features, blur = driving_features(
             encounter, config.speed_window, config.turn_window, config.speed_noise, config.turn_noise
         )

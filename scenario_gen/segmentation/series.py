@@ -14,16 +14,24 @@
 
 """A plain (T, D) array -> posterior over its segmentations: the sticky HDP-HMM without any driving in it."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import InputError
 from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
-from scenario_gen.segmentation.hdp_hmm.problem import Problem
-from scenario_gen.segmentation.hdp_hmm.start import find_start, sample_weight, Start
-from scenario_gen.segmentation.posterior import pool, Posterior
+from scenario_gen.segmentation.hdp_hmm.problem import new_top, Place, Problem
+from scenario_gen.segmentation.hdp_hmm.start import FAR_QUANTILE, find_start, MOST_STATES, other_start, Start
+from scenario_gen.segmentation.posterior import pool, Posterior, r_hat
+
+ROOM = 5  # states beyond those that the start found
+FIRST_LOOK = 40
+MOST_FULL = 0.05  # share of a chain's samples that may use all states
+COLLINEAR = 1e-4
+FAR_RANGES = 3.0
 
 
 def segment_series(
@@ -37,53 +45,161 @@ def segment_series(
     """Sample the segmentations of a series under the sticky HDP-HMM (Fox et al. 2011; priors chosen from the data).
 
     Args:
-        x: (T, D), any units: what does not vary is left out, the rest is scaled to unit variance, or by `blur` if that is more.
+        x: (T, D), any units, NaN where nothing was measured; see `standardised`.
         config: model and sampler.
         seed: same seed, same answer, bit for bit.
         ends: where several sequences stand one after the other, the index one past the last sample of each.
         blur: (D,) standard deviation, in x's units, below which differences in a channel mean nothing (None: 0).
 
     Raises:
-        InputError: fewer than 4 samples, or a value that is not finite.
+        InputError: fewer than 4 samples, an infinite value, or a sequence too short for the order.
     """
     x = np.asarray(x, dtype=np.float64)
     if x.ndim == 1:
         x = x[:, None]
     if x.ndim != 2 or x.shape[0] < 4:
         raise InputError(f"a series to segment needs at least 4 samples in (T, D), not an array of shape {x.shape}")
-    if not np.isfinite(x).all():
-        row, column = np.argwhere(~np.isfinite(x))[0]
+    if np.isinf(x).any():
+        row, column = np.argwhere(np.isinf(x))[0]
         raise InputError(
-            f"the series to segment holds {x[row, column]} at sample {row}, channel {column}; fill or drop such samples"
+            f"the series to segment holds {x[row, column]} at sample {row}, channel {column}; put NaN where nothing was measured"
         )
     stops = np.array([len(x)] if ends is None else ends, dtype=np.int64)
     if stops[-1] != len(x) or (np.diff(np.concatenate([[0], stops])) < 1).any():
         raise InputError(f"the ends of the sequences must rise to the number of samples, {len(x)}; they are {stops.tolist()}")
-    spread = x.std(axis=0)
-    varies = spread > 1e-9 * np.maximum(np.abs(x).max(axis=0), 1e-300)
-    if not varies.any():
-        return Posterior.constant(len(x))
     known = np.zeros(x.shape[1]) if blur is None else np.asarray(blur)
-    unit = np.maximum(spread, known)[varies]  # what varies less than it is known shall not be blown up to look like the rest
-    unknown = np.square(known[varies] / unit)
-    scaled = (x[:, varies] - x[:, varies].mean(axis=0)) / unit
-    first, *seeds = np.random.SeedSequence([seed]).spawn(config.chains + 1)
+    scaled, unknown, channels = standardised(x, known)
+    if not len(channels):
+        return Posterior.constant(len(x))
     problem = Problem.build(scaled, stops, config, unknown)
-    ready = None
-    if config.weight == 0.0:
-        weight, start = sample_weight(problem, config, np.random.Generator(np.random.PCG64(first)))
-        problem = replace(problem, weight=weight)
-        ready = start if weight == 1.0 else None
-    results = [_run(problem, config, index, stream, ready if index == 0 else None) for index, stream in enumerate(seeds)]
-    return pool([labels for labels, _ in results], [trace for _, trace in results], stops, problem.lead)
+    return sample(problem, config, seed, stops, channels)
 
 
-def _run(
-    problem: Problem, config: SamplerConfig, index: int, stream: np.random.SeedSequence, known: Start | None
-) -> tuple[Ints, Floats]:
-    """Run chain number `index`, from the start `known` if there is one; returns kept labels (S, T') and their trace (S, 5)."""
-    rng = np.random.Generator(np.random.PCG64(stream))
-    start = known or find_start(problem, config, index, rng)
-    sweeps = max(config.sweeps - start.sweeps, 4)
-    burn = sweeps // 3
-    return problem.run(config, start.prior, start.labels, burn, sweeps - burn, int(rng.integers(2**62)))
+def standardised(x: Floats, known: Floats) -> tuple[Floats, Floats, Ints]:
+    """Centre and scale the channels of x (T, D); leave out those that do not vary or that follow from the others.
+
+    The scale is the spread without the farthest 2 % on either side, so that outliers do not set it. A channel that is, to 1 in
+    10⁴, a linear combination of those before it would make every covariance singular and adds nothing.
+
+    Args:
+        x: (T, D), NaN where nothing was measured.
+        known: (D,) spread below which differences mean nothing.
+
+    Returns:
+        (T, D') series, (D',) variance to which each channel is known, and which channels (D',) they are.
+    """
+    few = (~np.isnan(x)).sum(axis=0) < 2
+    whole = without_outliers(np.where(few, 0.0, x))
+    spread, centre = np.nanstd(whole, axis=0), np.nanmean(whole, axis=0)
+    low, high = np.nanquantile(whole, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
+    inner = np.nanstd(np.clip(whole, low, high), axis=0)
+    varies = spread > 1e-9 * np.maximum(np.nanmax(np.abs(whole), axis=0), 1e-300)
+    unit = np.where(inner > 0.1 * spread, inner, spread)
+    unit = np.maximum(unit, known)  # what varies less than it is known shall not be blown up to look like the rest
+    channels = np.flatnonzero(varies)
+    scaled = (whole[:, channels] - centre[channels]) / unit[channels]
+    complete = scaled[~np.isnan(scaled).any(axis=1)]
+    if len(complete) > 2 * len(channels):
+        kept = independent(complete / np.maximum(complete.std(axis=0), 1e-300))
+        channels, scaled = channels[kept], scaled[:, kept]
+    return np.ascontiguousarray(scaled), np.square(known[channels] / unit[channels]), channels
+
+
+def without_outliers(x: Floats) -> Floats:
+    """Replace cells of x (T, D) by NaN that lie far outside the rest of their channel, one or two in a row.
+
+    What noise with heavy tails cannot be asked to explain (a lost sensor's 10⁶) would still set the scale of all else; what
+    lasts longer is a state, however rare.
+    """
+    low, high = np.nanquantile(x, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
+    reach = FAR_RANGES * (high - low)
+    far = (x < low - reach) | (x > high + reach)
+    if not far.any() or (high <= low).all():
+        return x
+    near = np.zeros((len(x) + 4, x.shape[1]), np.int64)
+    near[2:-2] = far
+    around = near[:-4] + near[1:-3] + near[2:-2] + near[3:-1] + near[4:]
+    return np.where(far & (around <= 2) & (high > low), np.nan, x)
+
+
+def independent(x: Floats) -> Ints:
+    """Columns of x (T, D) that are no linear combination of those kept before them (Gram-Schmidt, twice)."""
+    basis: list[Floats] = []
+    kept = []
+    for i, column in enumerate((x - x.mean(axis=0)).T):
+        rest = column
+        for _ in range(2):
+            for direction in basis:
+                rest = rest - exact.dot(direction, rest) * direction
+        length = np.sqrt(exact.dot(rest, rest))
+        if length > COLLINEAR * np.sqrt(exact.dot(column, column)):
+            basis.append(rest / length)
+            kept.append(i)
+    return np.array(kept, dtype=np.int64)
+
+
+def sample(problem: Problem, config: SamplerConfig, seed: int, ends: Ints, channels: Ints) -> Posterior:
+    """Run the chains until they agree, or for as many sweeps as there may be; with more states if all are used."""
+    first, *seeds = np.random.SeedSequence([seed]).spawn(config.chains + 1)
+    start = find_start(problem, config, np.random.Generator(np.random.PCG64(first)))
+    streams = [np.random.Generator(np.random.PCG64(stream)) for stream in seeds]
+    places = [start.place] + [other_start(start, index, streams[index]) for index in range(1, config.chains)]
+    states = config.states or start.states + ROOM
+    places = [Place(np.minimum(place.labels, states - 1), place.mass) for place in places]
+    while True:
+        chains = [Chain(start, config, place, states, rng) for place, rng in zip(places, streams, strict=True)]
+        for kept in schedule(config.sweeps):
+            for chain in chains:
+                chain.extend(kept)
+            if config.r_hat > 1.0 and float(r_hat([chain.trace for chain in chains]).max()) <= config.r_hat:
+                break
+        full = max(float(np.mean(chain.trace[:, 1] == states)) for chain in chains) > MOST_FULL
+        if not full or config.states or states >= MOST_STATES:
+            break
+        places, states = [chain.place for chain in chains], min(2 * states, MOST_STATES)
+    posterior = pool([chain.samples for chain in chains], [chain.trace for chain in chains], ends, problem.lead)
+    return replace(posterior, states=states, full=full, dof=start.problem.dof, weight=start.problem.weight, channels=channels)
+
+
+def schedule(sweeps: int) -> Iterator[int]:
+    """Sweeps to have run before each look at whether the chains agree: each time half as many more."""
+    ran = min(FIRST_LOOK, sweeps)
+    while True:
+        yield ran
+        if ran >= sweeps:
+            return
+        ran = min(ran + ran // 2, sweeps)
+
+
+class Chain:
+    """A chain that can be continued; the first half of what it has run is burnt in and not kept."""
+
+    def __init__(self, start: Start, config: SamplerConfig, place: Place, states: int, rng: np.random.Generator) -> None:
+        """Start at `place` with L = `states`."""
+        self._start, self._config, self._rng = start, config, rng
+        self._samples: list[Ints] = []
+        self._traces: list[Floats] = []
+        self._ran = 0
+        self._prior = start.prior
+        self._top = new_top(states)
+        self.place = place
+
+    def extend(self, sweeps: int) -> None:
+        """Run until `sweeps` sweeps have been run."""
+        more = sweeps - self._ran
+        seed = int(self._rng.integers(2**62))
+        problem = self._start.problem
+        self.place, self._prior, samples, trace = problem.run(self._config, self._prior, self.place, self._top, 0, more, seed)
+        self._samples.append(samples)
+        self._traces.append(trace)
+        self._ran = sweeps
+
+    @property
+    def samples(self) -> Ints:
+        """(S, T') kept labels."""
+        return np.concatenate(self._samples)[self._ran // 2 :]
+
+    @property
+    def trace(self) -> Floats:
+        """(S, 5) their trace."""
+        return np.concatenate(self._traces)[self._ran // 2 :]

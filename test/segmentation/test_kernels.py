@@ -19,9 +19,11 @@ from itertools import permutations
 import numpy as np
 import pytest
 from scipy.special import gammainccinv
+from scipy.stats import multivariate_normal
 
 from scenario_gen.segmentation.hdp_hmm.chain import update_outer
-from scenario_gen.segmentation.hdp_hmm.emission import BLOCK, block_likelihood, block_log_likelihood
+from scenario_gen.segmentation.hdp_hmm.emission import accumulate, BLOCK, block_likelihood, block_log_likelihood
+from scenario_gen.segmentation.hdp_hmm.observed import observed_log_likelihood
 from scenario_gen.segmentation.hdp_hmm.problem import moving_mean, unexplained
 from scenario_gen.segmentation.hdp_hmm.start import kmeans
 from scenario_gen.segmentation.posterior import matched_labels
@@ -41,35 +43,59 @@ def test_likelihood_of_a_block():
     states, d, n = 5, 7, 50
     vt = np.vstack([np.ones(n), rng.normal(size=(d, n)) * 4.0])
     coef = rng.normal(size=(states, d, d + 1)) * np.tri(d, d + 1, 1)
-    logdet = rng.normal(size=states)
+    shape = np.column_stack([rng.normal(size=states), rng.uniform(size=states)])
     logs, row, work, out = np.empty((states, BLOCK)), np.empty(BLOCK), np.empty((2, BLOCK)), np.empty((n, states))
-    block_log_likelihood(vt, 0, n, coef, logdet, 0.5, logs, row)
-    truth = 0.5 * (logdet[:, None] - 0.5 * ((coef @ vt) ** 2).sum(axis=1))
+    squares = ((coef @ vt) ** 2).sum(axis=1) + shape[:, 1:]
+    block_log_likelihood(vt, 0, n, coef, shape, 0.5, 3.0, logs, row)
+    student = 0.5 * shape[:, :1] - 0.5 * (3.0 + 0.5 * d) * np.log1p(0.5 * squares / 3.0)
+    np.testing.assert_allclose(logs[:, :n], student, rtol=1e-12)
+    block_log_likelihood(vt, 0, n, coef, shape, 0.5, 0.0, logs, row)
+    truth = 0.5 * (shape[:, :1] - 0.5 * squares)
     np.testing.assert_allclose(logs[:, :n], truth, rtol=1e-12)
     block_likelihood(logs, n, row, work, out)
     below = (truth - truth.max(axis=0)).T
     np.testing.assert_allclose(out, np.where(below > -300.0, np.exp(below), 0.0), rtol=1e-11)
 
 
+def test_likelihood_of_the_observed_channels_is_the_marginal():
+    rng = np.random.default_rng(6)
+    d, hidden = 4, np.array([True, False, True, False])
+    coef = np.tril(rng.normal(size=(d, d + 1)), 1)
+    coef[np.arange(d), np.arange(1, d + 1)] += 3.0
+    whitening = coef[:, 1:]
+    mean, covariance = np.linalg.solve(whitening, -coef[:, 0]), np.linalg.inv(whitening.T @ whitening)
+    y, out = rng.normal(size=d), np.empty(1)
+    shape = np.array([[np.log(np.diag(whitening)).sum(), 0.0]])
+    v = np.concatenate([[1.0], np.where(hidden, 1e3, y)])
+    observed_log_likelihood(v, hidden, coef[None], shape, 1.0, 0.0, out)
+    seen = ~hidden
+    truth = multivariate_normal(mean[seen], covariance[np.ix_(seen, seen)]).logpdf(y[seen]) + 0.5 * seen.sum() * np.log(
+        2.0 * np.pi
+    )
+    assert out[0] == pytest.approx(truth)
+
+
 def test_statistics_follow_the_labels():
     rng = np.random.default_rng(2)
-    v, before = rng.normal(size=(60, 3)), rng.integers(0, 4, 60)
-    outer, counts = np.zeros((5, 3, 3)), np.zeros(5, np.int64)
-    update_outer(v, before, before.copy(), True, outer, counts)
+    v, before, mass = rng.normal(size=(60, 3)), rng.integers(0, 4, 60), rng.uniform(0.5, 2.0, 60)
+    mass[7] = 0.0
+    outer, sums = np.zeros((5, 3, 3)), np.zeros((5, 2))
+    accumulate(v, before, mass, outer, sums)
     labels = rng.integers(1, 5, 60)
-    update_outer(v, before, labels, False, outer, counts)
-    np.testing.assert_array_equal(counts, np.bincount(labels, minlength=5))
+    update_outer(v, before, labels, mass, outer, sums)
+    np.testing.assert_allclose(sums[:, 1], np.bincount(labels, mass, minlength=5), atol=1e-12)
+    np.testing.assert_array_equal(sums[:, 0], np.bincount(labels[mass > 0.0], minlength=5))
     for k in range(5):
-        np.testing.assert_allclose(np.tril(outer[k]), np.tril(v[labels == k].T @ v[labels == k]), atol=1e-12)
-    np.testing.assert_array_equal(before, labels)
+        own = v[labels == k]
+        np.testing.assert_allclose(np.tril(outer[k]), np.tril((own.T * mass[labels == k]) @ own), atol=1e-12)
 
 
 def test_residuals_of_regressions():
     rng = np.random.default_rng(3)
     z, y, labels = np.column_stack([np.ones(80), rng.normal(size=(80, 2))]), rng.normal(size=(80, 2)), rng.integers(0, 3, 80)
-    precision, residual, scatter = np.eye(3) * 0.3, np.empty((80, 2)), np.empty((2, 2))
+    precision, residual, scatter, squares = np.eye(3) * 0.3, np.empty((80, 2)), np.empty((2, 2)), np.empty(80)
     g0 = np.block([[precision, np.zeros((3, 2))], [np.zeros((2, 3)), np.eye(2)]])
-    unexplained(np.hstack([z, y]), labels, g0, 3, residual, scatter)
+    unexplained(np.hstack([z, y]), np.ones(80), labels, g0, 3, residual, scatter, squares)
     for k in range(3):
         own = labels == k
         fit = np.linalg.solve(z[own].T @ z[own] + precision, z[own].T @ y[own])

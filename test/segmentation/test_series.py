@@ -90,7 +90,7 @@ def test_channel_that_varies_less_than_it_is_known_hides_nothing(tremble):
     assert posterior.labels.max() == 1
 
 
-@pytest.mark.parametrize("bad", [np.zeros((3, 2)), np.full((10, 2), np.nan), np.zeros((0, 2))])
+@pytest.mark.parametrize("bad", [np.zeros((3, 2)), np.full((10, 2), np.inf), np.zeros((0, 2))])
 def test_refuses_what_it_cannot_use(bad):
     with pytest.raises(InputError):
         segment_series(bad)

@@ -21,6 +21,8 @@ import numpy as np
 from scenario_gen.arrays import Floats
 from scenario_gen.parameters import check, parameter
 
+GAUSSIAN_DOF = 1000.0
+
 
 @dataclass(frozen=True)
 class SamplerConfig:
@@ -28,9 +30,19 @@ class SamplerConfig:
 
     emission: str = parameter("gaussian", "what a state emits", choices=("gaussian", "autoregressive"))
     order: int = parameter(1, "past samples an autoregressive emission looks at", low=1, high=5)
-    states: int = parameter(20, "weak-limit truncation L: states that exist, used or not", low=2, high=100)
-    chains: int = parameter(3, "independent chains, each from a start of its own", low=1, high=16)
-    sweeps: int = parameter(100, "Gibbs sweeps of each chain, those of its start included", low=10, high=100_000)
+    states: int = parameter(
+        0,
+        "weak-limit truncation L: states there are, used or not; 0: from the data, and more when all are used",
+        low=0,
+        high=200,
+    )
+    chains: int = parameter(4, "independent chains, each from a start of its own", low=1, high=16)
+    sweeps: int = parameter(600, "most Gibbs sweeps of each chain; it ends when the chains agree", low=10, high=100_000)
+    r_hat: float = parameter(1.1, "split R-hat below which, on every trace, chains agree; 1: run all sweeps", low=1.0, high=10.0)
+    moves: int = parameter(4, "split or merge moves tried in a sweep", low=0, high=100)
+    dof: float = parameter(
+        0.0, "degrees of freedom of Student-t noise; 0: from the data; 1000 or more: Gaussian", low=0.0, high=1e9
+    )
     mean_weight: float = parameter(
         0.05,
         "prior samples that the mean (or the regression) of a state is worth; a mean more where the states found lie close",
@@ -41,10 +53,10 @@ class SamplerConfig:
         0.0, "what one sample counts for, below 1 where neighbours repeat each other; 0: from the data", low=0.0, high=1.0
     )
     gamma_shape: float = parameter(1.0, "shape of γ's Gamma prior", low=1e-3)
-    gamma_rate: float = parameter(0.1, "rate of γ's Gamma prior", low=1e-6)
+    gamma_rate: float = parameter(0.5, "rate of γ's Gamma prior", low=1e-6)
     alpha_kappa_shape: float = parameter(1.0, "shape of the Gamma prior of α+κ", low=1e-3)
     alpha_kappa_rate: float = parameter(0.01, "rate of the Gamma prior of α+κ", low=1e-6)
-    rho_a: float = parameter(10.0, "first parameter of ρ's Beta prior, ρ = κ/(α+κ)", low=1e-3)
+    rho_a: float = parameter(40.0, "first parameter of ρ's Beta prior, ρ = κ/(α+κ)", low=1e-3)
     rho_b: float = parameter(1.0, "second parameter of ρ's Beta prior", low=1e-3)
 
     def __post_init__(self) -> None:

@@ -35,6 +35,8 @@ LOG2_E = 1.4426950408889634
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 TO_INTEGER = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer, which its lowest bits then hold
 ONE_BITS = 1023 << 52  # the bits of 1.0
+ROOT_BITS = 0x3FE6A09E667F3BCD  # the bits of √½: mantissas lie in √½ .. √2
+LN2 = 6.93147180559945309417e-01
 
 
 @kernel(inline=True)
@@ -55,41 +57,54 @@ def cholesky(matrix: Floats) -> bool:
 
 
 @kernel(inline=True)
-def accumulate(v: Floats, labels: Ints, g0: Floats, weight: float, blur: Floats, g: Floats, counts: Ints) -> None:
-    """Fill g (L, M, M; lower triangles) and counts (L,) from samples v (T, M) and labels (T,).
+def accumulate(v: Floats, labels: Ints, mass: Floats, outer: Floats, sums: Floats) -> None:
+    """Fill the statistics of all states from samples v (T, M), labels (T,) and masses (T,).
 
-    `weight` is what a sample counts for (1: all of it; less where neighbouring samples repeat each other); `blur`
-    (D,) the variance to which a sample's channels are known at all.
+    Args:
+        v: rows (z, y).
+        labels: 0 .. L - 1.
+        mass: what a sample's square counts for: 1, the scale of heavy-tailed noise, or 0 for a sample that was not observed.
+        outer: (L, M, M) output, Σ mass v vᵀ; lower triangles.
+        sums: (L, 2) output, observed samples and Σ mass.
     """
-    outer = np.zeros(g.shape)
-    for k in range(len(counts)):
-        counts[k] = 0
+    outer[:] = 0.0
+    sums[:] = 0.0
     for t in range(v.shape[0]):
-        add_sample(v[t], 1.0, outer[labels[t]])
-        counts[labels[t]] += 1
-    posterior(outer, counts, g0, weight, blur, g)
+        if mass[t] > 0.0:
+            add_sample(v[t], mass[t], outer[labels[t]])
+            sums[labels[t], 0] += 1.0
+            sums[labels[t], 1] += mass[t]
 
 
 @kernel(inline=True)
-def add_sample(v: Floats, sign: float, outer: Floats) -> None:
-    """Add sign × v vᵀ to `outer` (M, M; lower triangle)."""
+def add_sample(v: Floats, mass: float, outer: Floats) -> None:
+    """Add mass × v vᵀ to `outer` (M, M; lower triangle)."""
     for i in range(len(v)):
-        c = sign * v[i]
+        c = mass * v[i]
         for j in range(i + 1):
             outer[i, j] += c * v[j]
 
 
 @kernel(inline=True)
-def posterior(outer: Floats, counts: Ints, g0: Floats, weight: float, blur: Floats, g: Floats) -> None:
-    """Fill g (L, M, M; lower triangles) from the states' Σ v vᵀ, `outer`, and counts; see `accumulate`."""
+def posterior_factor(outer: Floats, total: float, g0: Floats, weight: float, blur: Floats, out: Floats) -> None:
+    """Fill `out` (M, M) with the Cholesky factor of a state's G.
+
+    Args:
+        outer: (M, M) Σ mass v vᵀ of its samples; lower triangle.
+        total: Σ mass.
+        g0: (M, M) joint prior.
+        weight: what a sample counts for (1: all of it; less where neighbouring samples repeat each other).
+        blur: (D,) variance to which a sample's channels are known at all.
+        out: see above.
+    """
     m = g0.shape[0]
     d = len(blur)
-    for k in range(g.shape[0]):
-        for i in range(m):
-            for j in range(i + 1):
-                g[k, i, j] = g0[i, j] + weight * outer[k, i, j]
-            if i >= m - d:
-                g[k, i, i] += weight * counts[k] * blur[i - (m - d)]
+    for i in range(m):
+        for j in range(i + 1):
+            out[i, j] = g0[i, j] + weight * outer[i, j]
+        if i >= m - d:
+            out[i, i] += weight * total * blur[i - (m - d)]
+    cholesky(out)
 
 
 @kernel(inline=True)
@@ -109,8 +124,8 @@ def log_marginal(factor: Floats, n: float, p: int, nu: float) -> float:
 
 
 @kernel(inline=True)
-def draw_emission(state: State, factor: Floats, n: float, p: int, nu: float, blur: Floats, coef: Floats) -> float:
-    """Draw (A, Σ) from the posterior; returns log|Σ|^(-1/2) - tr(Σ⁻¹ blur)/2.
+def draw_emission(state: State, factor: Floats, n: float, p: int, nu: float, coef: Floats) -> float:
+    """Draw (A, Σ) from the posterior; returns log|Σ|^(-1/2).
 
     `coef` (D, M) becomes the map of v to its whitened residual: W y - B z with WᵀW = Σ⁻¹ (W lower) and B = W A.
     Σ⁻¹ = Ly⁻ᵀ U Uᵀ Ly⁻¹ with U upper triangular (Bartlett), so W = Uᵀ Ly⁻¹; A = (Lyz + W⁻¹ E) Lz⁻¹, E standard normal.
@@ -131,33 +146,35 @@ def draw_emission(state: State, factor: Floats, n: float, p: int, nu: float, blu
             for q in range(j):
                 coef[i, p + q] -= c * factor[p + j, p + q]
         logdet += exact.log(coef[i, p + i])
-        for j in range(i + 1):
-            logdet -= 0.5 * coef[i, p + j] ** 2 * blur[j]
         for q in range(p):
             coef[i, q] = -normal(state)
-        for j in range(i + 1):
-            c = coef[i, p + j]
-            for q in range(p):
-                coef[i, q] -= c * factor[p + j, q]
-        for j in range(p - 1, -1, -1):
-            c = coef[i, j] / factor[j, j]
-            coef[i, j] = c
-            for q in range(j):
-                coef[i, q] -= c * factor[j, q]
+        regression(factor, p, coef, i)
     return logdet
 
 
 @kernel(inline=True)
 def block_log_likelihood(
-    vt: Floats, start: int, stop: int, coef: Floats, logdet: Floats, weight: float, out: Floats, row: Floats
+    vt: Floats, start: int, stop: int, coef: Floats, shape: Floats, weight: float, dof: float, out: Floats, row: Floats
 ) -> None:
-    """Fill out (L, BLOCK) with log p(y_t | z_t, state) up to a constant, t in start..stop; vt is (M, T), row (BLOCK,)."""
+    """Fill out (L, BLOCK) with log p(y_t | z_t, state) up to a constant.
+
+    Args:
+        vt: (M, T) samples.
+        start: first sample.
+        stop: one past the last, at most BLOCK further.
+        coef: (L, D, M) emissions, see `draw_emission`.
+        shape: (L, 2) log|Σ|^(-1/2) and tr(Σ⁻¹ blur).
+        weight: what a sample counts for.
+        dof: degrees of freedom of Student-t noise; 0: Gaussian.
+        out: output.
+        row: (BLOCK,) work space.
+    """
     states, d, m = coef.shape
     n = stop - start
     for k in range(states):
         total = out[k]
         for t in range(n):
-            total[t] = 0.0
+            total[t] = shape[k, 1]
         for i in range(d):
             used = m - d + i + 1
             c = coef[k, i]
@@ -178,8 +195,98 @@ def block_log_likelihood(
                     row[t] += c0 * x[t]
             for t in range(n):
                 total[t] += row[t] * row[t]
-        for t in range(n):
-            total[t] = weight * (logdet[k] - 0.5 * total[t])
+        if dof > 0.0:
+            student(total, n, weight * shape[k, 0], weight / dof, 0.5 * (dof + weight * d), row)
+        else:
+            for t in range(n):
+                total[t] = weight * (shape[k, 0] - 0.5 * total[t])
+
+
+@kernel(inline=True)
+def student(total: Floats, n: int, logdet: float, share: float, power: float, work: Floats) -> None:
+    """Overwrite the squares `total` (BLOCK,) with logdet - power log(1 + share × square), n of them.
+
+    The logarithm is 2 artanh((m - 1) / (m + 1)) of the mantissa, a series, which is vectorised; it is right to 1e-13.
+    """
+    bits = work.view(np.int64)
+    for t in range(n):
+        work[t] = 1.0 + share * total[t]
+    for t in range(n):
+        total[t] = float((bits[t] - ROOT_BITS) >> 52)
+        bits[t] -= ((bits[t] - ROOT_BITS) >> 52) << 52
+    for t in range(n):
+        f = (work[t] - 1.0) / (work[t] + 1.0)
+        s = f * f
+        p = 2.0 / 17.0
+        p = p * s + 2.0 / 15.0
+        p = p * s + 2.0 / 13.0
+        p = p * s + 2.0 / 11.0
+        p = p * s + 2.0 / 9.0
+        p = p * s + 2.0 / 7.0
+        p = p * s + 2.0 / 5.0
+        p = p * s + 2.0 / 3.0
+        p = p * s + 2.0
+        total[t] = logdet - power * (total[t] * LN2 + p * f)
+
+
+@kernel(inline=True)
+def square(coef: Floats, v: Floats) -> float:
+    """Squared whitened residual of one sample v (M,) under one state's coef (D, M)."""
+    d, m = coef.shape
+    total = 0.0
+    for i in range(d):
+        rest = 0.0
+        for j in range(m - d + i + 1):
+            rest += coef[i, j] * v[j]
+        total += rest * rest
+    return total
+
+
+@kernel(inline=True)
+def mean_emission(factor: Floats, n: float, p: int, nu: float, blur: Floats, coef: Floats, shape: Floats) -> None:
+    """Fill coef (D, M) and shape (2,), see `block_log_likelihood`, with the posterior's mean precision and regression."""
+    m = factor.shape[0]
+    d = m - p
+    root = math.sqrt(nu + n)
+    shape[0] = 0.0
+    for i in range(d):
+        for j in range(d):
+            coef[i, p + j] = root if i == j else 0.0
+        for j in range(i, -1, -1):
+            c = coef[i, p + j] / factor[p + j, p + j]
+            coef[i, p + j] = c
+            for q in range(j):
+                coef[i, p + q] -= c * factor[p + j, p + q]
+        shape[0] += exact.log(coef[i, p + i])
+        for q in range(p):
+            coef[i, q] = 0.0
+        regression(factor, p, coef, i)
+    shape[1] = blurred(coef, blur)
+
+
+@kernel(inline=True)
+def regression(factor: Floats, p: int, coef: Floats, i: int) -> None:
+    """Complete row i of coef: from what stands for z there, and the whitening, to -W A's share of it."""
+    for j in range(i + 1):
+        c = coef[i, p + j]
+        for q in range(p):
+            coef[i, q] -= c * factor[p + j, q]
+    for j in range(p - 1, -1, -1):
+        c = coef[i, j] / factor[j, j]
+        coef[i, j] = c
+        for q in range(j):
+            coef[i, q] -= c * factor[j, q]
+
+
+@kernel(inline=True)
+def blurred(coef: Floats, blur: Floats) -> float:
+    """tr(Σ⁻¹ blur) of a state's coef (D, M)."""
+    d, m = coef.shape
+    total = 0.0
+    for i in range(d):
+        for j in range(i + 1):
+            total += coef[i, m - d + j] ** 2 * blur[j]
+    return total
 
 
 @kernel(inline=True)

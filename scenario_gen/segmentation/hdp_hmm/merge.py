@@ -19,8 +19,8 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F, F1, F2, I, I1, kernel, OUT1, OUTI1
-from scenario_gen.segmentation.hdp_hmm.chain import count_transitions
-from scenario_gen.segmentation.hdp_hmm.emission import accumulate, cholesky, log_marginal
+from scenario_gen.segmentation.hdp_hmm.emission import accumulate, log_marginal, posterior_factor
+from scenario_gen.segmentation.hdp_hmm.transitions import count_transitions
 
 
 @kernel(inline=True)
@@ -54,11 +54,21 @@ def merge_gain(n: Ints, i: int, j: int, stay: float, move: float) -> float:
 
 
 @kernel(inline=True)
-def join(a: Floats, b: Floats, g0: Floats, out: Floats) -> None:
-    """Fill `out` (M, M) with a + b - g0, lower triangles: what two states together know."""
-    for i in range(len(g0)):
-        for j in range(i + 1):
-            out[i, j] = a[i, j] + b[i, j] - g0[i, j]
+def joint_marginal(
+    outer: Floats, sums: Floats, i: int, j: int, g0: Floats, p: int, nu: float, weight: float, blur: Floats, factor: Floats
+) -> float:
+    """Log marginal likelihood of the samples of states i and j as one state (of i alone if they are the same)."""
+    m = g0.shape[0]
+    count, total = sums[i, 0], sums[i, 1]
+    joint = outer[i].copy()
+    if i != j:
+        count += sums[j, 0]
+        total += sums[j, 1]
+        for a in range(m):
+            for b in range(a + 1):
+                joint[a, b] += outer[j, a, b]
+    posterior_factor(joint, total, g0, weight, blur, factor)
+    return log_marginal(factor, weight * count, p, nu)
 
 
 @kernel(inline=True)
@@ -74,9 +84,19 @@ def best_merge(data: Floats, own: Floats, counts: Ints, n: Ints, stay: float, mo
     return best_i, best_j
 
 
-@kernel(F2, I1, F2, F1, I, F, F, OUT1, OUTI1)
+@kernel(F2, F1, I1, F2, F, F1, I, F, F, OUT1, OUTI1)
 def merge_states(
-    v: Floats, ends: Ints, g0: Floats, hyper: Floats, regressors: int, stay: float, move: float, score: Floats, labels: Ints
+    v: Floats,
+    mass: Floats,
+    ends: Ints,
+    g0: Floats,
+    nu: float,
+    hyper: Floats,
+    regressors: int,
+    stay: float,
+    move: float,
+    score: Floats,
+    labels: Ints,
 ) -> None:
     """Merge states greedily while the probability of the labels, emissions and transitions integrated out, grows.
 
@@ -84,8 +104,10 @@ def merge_states(
 
     Args:
         v: (T, M) samples.
+        mass: (T,) see `accumulate`.
         ends: index one past the last sample of each sequence.
         g0: (M, M) joint prior of the emissions.
+        nu: prior degrees of freedom ν0.
         hyper: as `run_chain` has it.
         regressors: P.
         stay: prior weight of the own state in a transition row.
@@ -93,37 +115,35 @@ def merge_states(
         score: (1,) output, log p(samples | labels).
         labels: (T,) updated; `labels.max() + 1` states.
     """
-    m = v.shape[1]
-    nu, weight, blur = hyper[6], hyper[7], hyper[8:]
+    m, p = v.shape[1], regressors
+    weight, blur = hyper[6], hyper[8:]
     states = 0
     for t in range(len(labels)):
         states = max(states, labels[t] + 1)
-    g = np.empty((states, m, m))
-    counts = np.empty(states, np.int64)
+    outer, sums, factor = np.empty((states, m, m)), np.empty((states, 2)), np.empty((m, m))
+    counts = np.zeros(states, np.int64)
     n = np.empty((states + 1, states), np.int64)
-    factor = g0.copy()
-    cholesky(factor)
-    base = log_marginal(factor, 0, regressors, nu)
+    posterior_factor(np.zeros((m, m)), 0.0, g0, weight, blur, factor)
+    base = log_marginal(factor, 0, p, nu)
     own = np.zeros(states)
     data = np.full((states, states), np.nan)
-    accumulate(v, labels, g0, weight, blur, g, counts)
+    accumulate(v, labels, mass, outer, sums)
+    for t in range(len(labels)):
+        counts[labels[t]] += 1
     for k in range(states):
-        join(g[k], g0, g0, factor)
-        cholesky(factor)
-        own[k] = log_marginal(factor, weight * counts[k], regressors, nu) - base
+        own[k] = joint_marginal(outer, sums, k, k, g0, p, nu, weight, blur, factor) - base
     while True:
         count_transitions(labels, ends, n)
         for i in range(states):
             for j in range(i):
                 if counts[i] > 0 and counts[j] > 0 and np.isnan(data[i, j]):
-                    join(g[i], g[j], g0, factor)
-                    cholesky(factor)
-                    data[i, j] = log_marginal(factor, weight * (counts[i] + counts[j]), regressors, nu) - base
+                    data[i, j] = joint_marginal(outer, sums, i, j, g0, p, nu, weight, blur, factor) - base
         i, j = best_merge(data, own, counts, n, stay, move)
         if i < 0:
             break
         own[j], own[i] = data[i, j], 0.0
-        join(g[i], g[j], g0, g[j])
+        outer[j] += outer[i]
+        sums[j] += sums[i]
         counts[j] += counts[i]
         counts[i] = 0
         for t in range(len(labels)):

@@ -22,7 +22,7 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F2, I, kernel, OUT2, OUTI1
 from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
-from scenario_gen.segmentation.hdp_hmm.problem import compact, moving_mean, Prior, Problem
+from scenario_gen.segmentation.hdp_hmm.problem import compact, moving_mean, new_top, Place, Prior, Problem
 from scenario_gen.segmentation.hdp_hmm.random import State, uniform
 
 
@@ -102,32 +102,43 @@ def kmeans(x: Floats, seed: int, rounds: int, centres: Floats, labels: Ints) -> 
 
 
 WINDOWS = (9, 15, 5, 25)
-EXTRA_DEGREES = (3, 10, 20, 50, 100)
-STAGES = (20, 15)
+GUESS = (25.0, 0.1)  # ν0 - D and κ0 to begin with
+DEGREES_OF_FREEDOM = (2.0, 3.0, 4.0, 6.0, 10.0)
+LEAST_GAIN = 10.0
+CLUSTERS, MOST_STATES = 20, 160
+FULL = 0.8
+MORE_STATES = 2
+STAGES = (15, 10)
 LEAST_WEIGHT = 0.02
 KMEANS_ROUNDS = 10
-GUESS_COUNTS = 6
-MOST_MEAN_WEIGHT = 3.0
+FAR_QUANTILE, FAR_MARGIN = 0.02, 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Labels (T',) to start from, the prior to run under, and the sweeps spent to find them."""
+    """Where to start from, and the problem and prior to run under, chosen from the data."""
 
-    labels: Ints
+    problem: Problem
     prior: Prior
-    sweeps: int
+    place: Place
+
+    @property
+    def states(self) -> int:
+        """States in use."""
+        return int(self.place.labels.max()) + 1
 
 
-def cluster(problem: Problem, states: int, window: int, rng: np.random.Generator) -> Ints:
-    """(T',) labels of k-means on the samples averaged over `window`."""
+def cluster(problem: Problem, clusters: int, window: int, rng: np.random.Generator) -> Place:
+    """Labels of k-means on the samples averaged over `window`; what lies far outside the rest is drawn in first."""
     window = min(window, max(len(problem.v) // 8, 1))
     signals = problem.y if problem.regressors == 1 else _dynamics(problem)
-    smooth = np.ascontiguousarray(moving_mean(signals, window))
-    centres = np.empty((smooth.shape[1], min(states, max(2, len(smooth) // 4))))
+    low, high = np.quantile(signals, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
+    margin = FAR_MARGIN * (high - low)
+    smooth = np.ascontiguousarray(moving_mean(np.clip(signals, low - margin, high + margin), window))
+    centres = np.empty((smooth.shape[1], min(clusters, max(2, len(smooth) // 4))))
     labels = np.empty(len(smooth), np.int64)
     kmeans(smooth, int(rng.integers(2**62)), KMEANS_ROUNDS, centres, labels)
-    return compact(labels)
+    return Place(compact(labels), problem.observed)
 
 
 def _dynamics(problem: Problem) -> Floats:
@@ -138,80 +149,92 @@ def _dynamics(problem: Problem) -> Floats:
     return np.hstack([y, step / (step.std(axis=0) + 1e-12), size / (size.std(axis=0) + 1e-12)])
 
 
-def sample_weight(problem: Problem, config: SamplerConfig, rng: np.random.Generator) -> tuple[float, Start]:
+def find_start(problem: Problem, config: SamplerConfig, rng: np.random.Generator) -> Start:
+    """Find where the first chain starts, and choose from the data what the model leaves open.
+
+    k-means on averaged samples gives labels; a few Gibbs sweeps clean them; states are merged while the marginal likelihood
+    grows; twice. Chosen on the way: how heavy the noise's tails are (`tails`), what a sample counts for (`sample_weight`), and
+    the mean of the states' covariances, which is what is seen within the states found. Where most clusters stay in use, it
+    begins again with twice as many.
+    """
+    clusters = config.states or CLUSTERS
+    while True:
+        start = _search(problem, config, clusters, rng)
+        if config.states or start.states < FULL * clusters or clusters >= min(MOST_STATES, len(problem.v) // 8):
+            return start
+        clusters *= 2
+
+
+def _search(problem: Problem, config: SamplerConfig, clusters: int, rng: np.random.Generator) -> Start:
+    place = cluster(problem, clusters, WINDOWS[0], rng)
+    rough = _autocorrelation(problem, place)
+    prior = Prior(problem.within(place), *GUESS)
+    for stage, sweeps in enumerate(STAGES):
+        top = new_top(max(clusters, place.labels.max() + 1))
+        place, held, _, _ = problem.run(config, prior, place, top, sweeps - 1, 1, int(rng.integers(2**62)))
+        place = Place(problem.merge(config, held, place)[1], place.mass)
+        prior = replace(held, within=problem.within(place))
+        if stage == 0:
+            chosen = problem
+            if config.dof == 0.0:
+                chosen = replace(chosen, dof=tails(problem, place))
+            if config.weight == 0.0:
+                chosen = replace(chosen, weight=sample_weight(problem, place, rough))
+            if chosen.dof == 0.0:
+                place = Place(place.labels, problem.observed)
+            if chosen.weight != problem.weight:
+                place = cluster(chosen, clusters, WINDOWS[0], rng)
+            problem = chosen
+    return Start(problem, prior, place)
+
+
+def other_start(start: Start, index: int, rng: np.random.Generator) -> Place:
+    """Labels for chain number `index` > 0: k-means with another window, into as many states as `start` found and a few more."""
+    return cluster(start.problem, start.states + MORE_STATES, WINDOWS[index % len(WINDOWS)], rng)
+
+
+def tails(problem: Problem, place: Place) -> float:
+    """Degrees of freedom of the noise, of a grid, by the likelihood of the whitened squares; 0 (Gaussian) if none is far better.
+
+    For each a common scale of the squares is fitted, too: states fitted under other tails have another spread.
+    """
+    squares = problem.unexplained(place)[2][place.mass > 0.0]
+    d, n = problem.dimensions, len(squares)
+    if n == 0:
+        return 0.0
+    scale = n * d / max(float(squares.sum()), 1e-300)
+    gaussian = 0.5 * n * d * (exact.log(scale) - 1.0)
+    best, chosen = LEAST_GAIN / problem.weight if problem.weight > 0.0 else LEAST_GAIN, 0.0
+    for dof in DEGREES_OF_FREEDOM:
+        c = scale
+        for _ in range(30):
+            c = n * d / float(((dof + d) * squares / (dof + c * squares)).sum())
+        value = n * (exact.lgamma(0.5 * (dof + d)) - exact.lgamma(0.5 * dof) - 0.5 * d * exact.log(0.5 * dof))
+        value += 0.5 * n * d * exact.log(c) - 0.5 * (dof + d) * float(exact.log(1.0 + c * squares / dof).sum())
+        if value - gaussian > best:
+            best, chosen = value - gaussian, dof
+    return chosen
+
+
+def sample_weight(problem: Problem, place: Place, rough: float) -> float:
     """What a sample counts for: (1 - φ) / (1 + φ), φ the lag-1 autocorrelation of what states leave unexplained.
 
     An HMM takes samples as independent given their state. Where they are not (smoothed, slowly varying or oversampled
     signals), it believes each wiggle and spends states on it. The weight makes n correlated samples count for as many
     independent ones as they are worth; for independent samples it is 1. States that are not right yet leave
-    correlation too, so φ is the smaller of two: around k-means' labels, and around those a chain would start from.
-
-    Returns:
-        The weight, and the start found on the way, which holds for the weight 1.
+    correlation too, so φ is the smaller of two: around k-means' labels (`rough`), and around those of `place`.
     """
-    whole = replace(problem, weight=1.0)
-    rough = cluster(whole, config.states, WINDOWS[0], rng)
-    start = find_start(whole, config, 0, rng)
-    phi = min(_autocorrelation(whole, rough), _autocorrelation(whole, start.labels))
-    return 1.0 if phi < 2.0 / np.sqrt(len(rough)) else max((1.0 - phi) / (1.0 + phi), LEAST_WEIGHT), start
+    phi = min(rough, _autocorrelation(problem, place))
+    return 1.0 if phi < 2.0 / np.sqrt(len(problem.v)) else max((1.0 - phi) / (1.0 + phi), LEAST_WEIGHT)
 
 
-def _autocorrelation(problem: Problem, labels: Ints) -> float:
+def _autocorrelation(problem: Problem, place: Place) -> float:
     """Lag-1 autocorrelation of the residuals, mean over channels, from neighbours with one label."""
-    residual = problem.unexplained(labels)[0]
+    labels = place.labels
+    residual = problem.unexplained(place)[0] * np.sqrt(place.mass)[:, None]
     pairs = labels[:-1] == labels[1:]
     pairs[problem.ends[:-1] - 1] = False
     if not pairs.any():
         return 0.0
     power = np.square(residual).mean(axis=0) + 1e-300
     return float(np.mean((residual[:-1] * residual[1:])[pairs].mean(axis=0) / power))
-
-
-def find_start(problem: Problem, config: SamplerConfig, index: int, rng: np.random.Generator) -> Start:
-    """Find where chain number `index` starts.
-
-    k-means on the samples averaged over a window (another one in each chain) gives L labels; a few Gibbs sweeps clean
-    them; states are merged while the marginal likelihood grows; twice. S0 is (ν0 - D - 1) times the covariance within
-    the states found, so that the prior's mean is what is seen; κ0 see `mean_precision`; ν0, which says how alike the
-    states' covariances are, is the value of a grid that gives the merged labels the highest marginal likelihood.
-    """
-    labels = cluster(problem, config.states, WINDOWS[index % len(WINDOWS)], rng)
-    prior = priors_around(problem, labels)[-2]
-    spent = 0
-    for stage in STAGES:
-        sweeps = min(stage, config.sweeps // 4)
-        labels = compact(problem.run(config, prior, labels, sweeps - 1, 1, int(rng.integers(2**62)))[0][0])
-        spent += sweeps
-        priors = priors_around(problem, labels)
-        merged = [problem.merge(config, candidate, labels) for candidate in priors]
-        best = int(np.argmax([score for score, _ in merged]))
-        prior, labels = priors[best], merged[best][1]
-    return Start(labels, prior, spent)
-
-
-def priors_around(problem: Problem, labels: Ints) -> list[Prior]:
-    """Return the priors with ν0 = D + each of EXTRA_DEGREES whose mean covariance is that within the states of labels (T',)."""
-    within = problem.within(labels)
-    precision = mean_precision(problem, labels, within)
-    return [Prior(within * (extra - 1.0), float(problem.dimensions + extra), precision) for extra in EXTRA_DEGREES]
-
-
-def mean_precision(problem: Problem, labels: Ints, within: Floats) -> Floats:
-    """(P, P) prior K; for Gaussian states κ0, which says how far apart their means are beside their own spread.
-
-    With a κ0 far too small, states that differ little do not pay for a mean of their own and are merged. What the given
-    states' means say, 1 / κ0 = mean squared Mahalanobis length per channel, counts for the (K - 1) D numbers they are;
-    the configured guess for GUESS_COUNTS; averaged on the scale of logarithms.
-    """
-    counts = np.bincount(labels)
-    states = len(counts)
-    if problem.regressors > 1 or states < 2:
-        return problem.precision
-    means = np.array([np.bincount(labels, y) for y in problem.y.T]) / counts
-    lengths = (means * exact.solve_positive(within, means)).sum(axis=0) / problem.dimensions
-    seen = float((lengths * counts).sum()) / len(labels) * states / (states - 1) - states / len(labels)
-    guess = float(problem.precision[0, 0])
-    most = max(MOST_MEAN_WEIGHT, guess)
-    said = min(max(1.0 / max(seen, 1.0 / most), guess), most)
-    share = (states - 1) * problem.dimensions
-    return np.eye(1) * exact.exp((GUESS_COUNTS * exact.log(guess) + share * exact.log(said)) / (GUESS_COUNTS + share))

@@ -1,0 +1,109 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The emissions' prior: how alike and how far apart states are is drawn with the emissions integrated out.
+
+ν0 says how alike the states' covariances are, κ0 how far apart their means lie beside their own spread. Both decide what a state
+of its own costs, so neither is fixed: each is one of a grid, drawn given the labels.
+"""
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.kernels import kernel
+from scenario_gen.segmentation.hdp_hmm.emission import cholesky, log_marginal, posterior_factor
+from scenario_gen.segmentation.hdp_hmm.random import State, uniform
+
+
+@kernel(inline=True)
+def set_prior(
+    mean: Floats, precision: Floats, within: Floats, extra: float, worth: float, g0: Floats, factor: Floats
+) -> tuple[float, float]:
+    """Fill g0 (M, M), see `emission`; returns the log marginal of no samples, and ν0.
+
+    Args:
+        mean: (D, P) M.
+        precision: (P, P) of which K is `worth` times.
+        within: (D, D) of which S0 is (ν0 - D - 1) times.
+        extra: ν0 - D.
+        worth: see precision.
+        g0: output.
+        factor: (M, M) output, its Cholesky factor.
+    """
+    d, p = mean.shape
+    for i in range(p):
+        for j in range(p):
+            g0[i, j] = worth * precision[i, j]
+    for i in range(d):
+        for j in range(p):
+            value = 0.0
+            for q in range(p):
+                value += mean[i, q] * g0[q, j]
+            g0[p + i, j] = value
+            g0[j, p + i] = value
+    for i in range(d):
+        for j in range(d):
+            value = (extra - 1.0) * within[i, j]
+            for q in range(p):
+                value += g0[p + i, q] * mean[j, q]
+            g0[p + i, p + j] = value
+    factor[:] = g0
+    cholesky(factor)
+    return log_marginal(factor, 0.0, p, d + extra), d + extra
+
+
+@kernel(inline=True)
+def sample_prior(
+    state: State,
+    outer: Floats,
+    sums: Floats,
+    mean: Floats,
+    precision: Floats,
+    within: Floats,
+    extras: Floats,
+    worths: Floats,
+    weight: float,
+    blur: Floats,
+    chosen: Ints,
+    g0: Floats,
+    factor: Floats,
+) -> None:
+    """Draw `chosen` (2,), which of `extras` and `worths` hold, one given the other, from the states' statistics."""
+    p = mean.shape[1]
+    for side in range(2):
+        options = extras if side == 0 else worths
+        if len(options) < 2:
+            continue
+        logs = np.empty(len(options))
+        for option in range(len(options)):
+            extra = options[option] if side == 0 else extras[chosen[0]]
+            worth = options[option] if side == 1 else worths[chosen[1]]
+            base, nu = set_prior(mean, precision, within, extra, worth, g0, factor)
+            logs[option] = 0.0
+            for k in range(len(outer)):
+                if sums[k, 0] > 0.0:
+                    posterior_factor(outer[k], sums[k, 1], g0, weight, blur, factor)
+                    logs[option] += log_marginal(factor, weight * sums[k, 0], p, nu) - base
+        top = logs.max()
+        total = 0.0
+        for option in range(len(options)):
+            logs[option] = exact.exp(logs[option] - top)
+            total += logs[option]
+        u = uniform(state) * total
+        option = 0
+        while option < len(options) - 1 and u > logs[option]:
+            u -= logs[option]
+            option += 1
+        chosen[side] = option
