@@ -31,22 +31,10 @@ from msg_conventions import trajectory
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.diagnostics import Level, Status
 from msg_conventions.tracks import FRAME
-from msg_conventions.trajectory import Trajectory, TYPE
+from msg_conventions.trajectory import Trajectory
 from scenario_gen.errors import InputError
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
-
-__all__ = [
-    "POSTERIOR_TYPE",
-    "TYPE",
-    "decode_changepoints",
-    "decode_posterior",
-    "encode_changepoints",
-    "encode_live_changepoints",
-    "encode_posterior",
-    "segment_descriptions",
-    "segmentation_status",
-]
 
 POSTERIOR_TYPE = "sensor_msgs/msg/PointCloud2"
 UINT16, FLOAT32, FLOAT64 = 4, 7, 8  # sensor_msgs/PointField datatypes

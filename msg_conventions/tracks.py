@@ -22,11 +22,9 @@ The encounter's name and geodetic origin do not travel: nothing is computed from
 import numpy as np
 
 from msg_conventions import trajectory
-from msg_conventions.trajectory import Trajectory, TYPE
+from msg_conventions.trajectory import Trajectory
 from scenario_gen.errors import InputError
 from scenario_gen.types.encounter import Encounter
-
-__all__ = ["FRAME", "TYPE", "decode_tracks", "encode_tracks"]
 
 FRAME = "local_enu"
 SHORTEST_STEP_NS, LONGEST_STEP_NS = 1_000_000, 10_000_000_000

@@ -49,7 +49,7 @@ from scenario_gen.nodes.diagnostics import NodeDiagnostics
 from scenario_gen.nodes.frames import find_motion, Frames, Instant
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.topics import message_class, Pace, publish, qos, unacknowledged
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.storage.config import BagConfig
 from scenario_gen.storage.messages import bag_topics, BagMessage, read_messages
 
@@ -60,7 +60,7 @@ KINDS = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, 
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Parameters):
     """The player's parameters."""
 
     bag: str = parameter("", "bag to play: its folder or one of its files")
@@ -78,9 +78,6 @@ class Config:
     patience: float = parameter(
         60.0, "wait so long for subscribers that acknowledge nothing, then go on and warn; 0: for ever", unit="s", low=0.0
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Player(Node):  # type: ignore[misc]

@@ -37,12 +37,12 @@ from scenario_gen.logs import encounters_of, LogConfig, Sample
 from scenario_gen.logs.raw import RawLog
 from scenario_gen.nodes.base import StageNode
 from scenario_gen.nodes.live import LiveConfig, LiveStreams
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.segmentation import LiveSegmenter, OnlineConfig, segment, SegmentationConfig
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Parameters):
     """The segmenter's parameters; `live`, `log` and `online` are for streams and take effect at the next activation."""
 
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
@@ -50,9 +50,6 @@ class Config:
     live: LiveConfig = field(default_factory=LiveConfig)
     log: LogConfig = field(default_factory=LogConfig)
     online: OnlineConfig = field(default_factory=OnlineConfig)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Segmenter(StageNode):

@@ -31,7 +31,7 @@ from scenario_gen.sampling import regenerate, SamplingConfig
 from scenario_gen.segmentation import segment, SegmentationConfig
 from scenario_gen.storage.config import BagConfig
 from scenario_gen.storage.messages import bag_topics, BagMessage, DEFAULT, within
-from scenario_gen.storage.writer import AtomicBag
+from scenario_gen.storage.writer import atomic_bag
 from scenario_gen.template.interaction import waits_to_keep
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.generation import GenerationResult
@@ -127,7 +127,7 @@ def write_regenerated(made: Regenerated, folder: Path, inputs: Sequence[Path] = 
     Raises:
         InputError: the folder is there and is something else, holds an input, or cannot be written.
     """
-    with AtomicBag(folder, REGENERATED, inputs) as bag:
+    with atomic_bag(folder, REGENERATED, inputs) as bag:
         for message in made.messages:
             add_message(bag, message.topic, message.data, message.stamp_ns)
     return folder

@@ -16,11 +16,11 @@
 
 from dataclasses import dataclass
 
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 
 
 @dataclass(frozen=True)
-class SamplingConfig:
+class SamplingConfig(Parameters):
     """What varies from scenario to scenario, by how much, and within which limits of motion."""
 
     lateral_sigma: float = parameter(
@@ -49,6 +49,3 @@ class SamplingConfig:
         0.2, "share by which the clock may be stretched where no speed profile exists", low=0.0, high=1.0
     )
     attempts: int = parameter(20, "candidates drawn per scenario asked for, at most", low=1, high=10_000)
-
-    def __post_init__(self) -> None:
-        check(self)

@@ -16,7 +16,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import heapq
 import io
 from pathlib import Path
@@ -30,19 +30,21 @@ from scenario_gen.errors import guarded, InputError
 from scenario_gen.storage.config import Allowance, BagConfig
 from scenario_gen.storage.files import files_of, METADATA
 from scenario_gen.storage.mcap import McapFile, open_mcap
+from scenario_gen.storage.metadata import quality_of
 from scenario_gen.storage.records import DamagedError
 from scenario_gen.storage.sqlite import open_sqlite, SqliteFile
+from scenario_gen.types.qos import Quality
 
 COPIED = 1 << 20  # bytes at a time
 
 
 @dataclass(frozen=True)
-class StoredTopic:
-    """A topic of one file: name, type, offered QoS profiles as YAML, number of messages."""
+class BagTopic:
+    """A topic of a bag: its full name, type, what its (first) publisher offered, and its number of messages."""
 
     name: str
     type: str
-    qos: str
+    quality: Quality
     count: int
 
 
@@ -67,26 +69,17 @@ class StoredBag:
         self._compression = compression
         self._allowance = allowance
 
-    def topics(self) -> list[StoredTopic]:
-        """Return the topics of every file; one that is in several comes several times.
+    def topics(self) -> tuple[BagTopic, ...]:
+        """Return the topics, sorted by name; of one that is in several files the first one's, with the messages of all.
 
         Raises:
             InputError: a file is damaged.
         """
-        found = []
-        for file, storage in self._files:
-            if isinstance(storage, SqliteFile):
-                found += [StoredTopic(t.name, t.type, t.qos, t.count) for t in storage.topics]
-                continue
-            with _place(file):
-                storage.complete()
-                for channel in storage.channels.values():
-                    schema = storage.schemas.get(channel.schema_id)
-                    if schema is None:
-                        raise DamagedError(0, f"the type of topic {shown(channel.topic)} is missing (schema {channel.schema_id})")
-                    count = (storage.counts or {}).get(channel.id, 0)
-                    found.append(StoredTopic(channel.topic, schema.name, channel.metadata.get("offered_qos_profiles", ""), count))
-        return found
+        found: dict[str, BagTopic] = {}
+        for name, kind, qos, count in (entry for file, storage in self._files for entry in _listed(file, storage)):
+            topic = found.get(name) or BagTopic(name, kind, quality_of(qos), 0)
+            found[name] = replace(topic, count=topic.count + count)
+        return tuple(found[name] for name in sorted(found))
 
     def messages(self, wanted: Callable[[str, str], bool] = lambda _topic, _type: True) -> Iterator[StoredMessage]:
         """Yield the messages of the topics that are `wanted`, by name and type, in order of their stamps; of all files together.
@@ -123,6 +116,21 @@ class StoredBag:
             raise InputError(f"{file}: a message decompresses to more than bag.most_chunk_bytes ({most})")
         self._allowance.unpack(len(whole))
         return whole
+
+
+def _listed(file: Path, storage: McapFile | SqliteFile) -> Iterator[tuple[str, str, str, int]]:
+    """Yield name, type, offered QoS profiles as YAML and number of messages of each topic of a file."""
+    if isinstance(storage, SqliteFile):
+        yield from ((topic.name, topic.type, topic.qos, topic.count) for topic in storage.topics)
+        return
+    with _place(file):
+        storage.complete()
+        for channel in storage.channels.values():
+            if channel.schema_id not in storage.schemas:
+                raise DamagedError(0, f"the type of topic {shown(channel.topic)} is missing (schema {channel.schema_id})")
+            count = (storage.counts or {}).get(channel.id, 0)
+            kind = storage.schemas[channel.schema_id].name
+            yield channel.topic, kind, channel.metadata.get("offered_qos_profiles", ""), count
 
 
 def _type(storage: McapFile, schema_id: int) -> str:

@@ -16,29 +16,16 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scenario_gen.errors import InputError
-from scenario_gen.storage.bag import open_bag
+from scenario_gen.storage.bag import BagTopic, open_bag
 from scenario_gen.storage.bag import StoredMessage as BagMessage
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.metadata import quality_of
-from scenario_gen.types.qos import Quality
 
 __all__ = ["BagMessage", "BagTopic", "bag_topics", "read_messages", "within"]
 
 DEFAULT = BagConfig()
-
-
-@dataclass(frozen=True)
-class BagTopic:
-    """A topic of a bag: its full name, type, what its (first) publisher offered, and its number of messages."""
-
-    name: str
-    type: str
-    quality: Quality
-    count: int
 
 
 @contextmanager
@@ -66,13 +53,8 @@ def bag_topics(path: Path, config: BagConfig = DEFAULT) -> tuple[BagTopic, ...]:
     Raises:
         InputError: the bag is missing, damaged or empty of metadata.
     """
-    found: dict[str, BagTopic] = {}
     with open_bag(path, config) as bag:
-        for stored in bag.topics():
-            topic = BagTopic(stored.name, stored.type, quality_of(stored.qos), stored.count)
-            earlier = found.get(topic.name)
-            found[topic.name] = replace(earlier, count=earlier.count + topic.count) if earlier else topic
-    return tuple(found[name] for name in sorted(found))
+        return bag.topics()
 
 
 def read_messages(

@@ -63,3 +63,11 @@ class Road:
             raise InputError(
                 f"road {self.name!r} has origin {self.origin}; at most {FARTHEST:g} m from the frame's origin are read"
             )
+
+    def drivable_at(self, points: Floats) -> Bools:
+        """Return whether points (..., 2) [m] lie in drivable cells; none beyond the grid does."""
+        cell = np.floor((points - self.origin) / self.resolution).astype(np.int64)
+        height, width = self.drivable.shape
+        inside = (cell[..., 0] >= 0) & (cell[..., 0] < width) & (cell[..., 1] >= 0) & (cell[..., 1] < height)
+        found = self.drivable[np.clip(cell[..., 1], 0, height - 1), np.clip(cell[..., 0], 0, width - 1)]
+        return np.asarray(inside & found)

@@ -42,7 +42,7 @@ from scenario_gen.roads import build_road
 from scenario_gen.segmentation import segment
 from scenario_gen.storage.messages import read_messages
 from scenario_gen.storage.metadata import qos_yaml
-from scenario_gen.storage.writer import AtomicBag
+from scenario_gen.storage.writer import atomic_bag
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import Cause, ScenarioSet
 from scenario_gen.validity import Limits
@@ -99,7 +99,7 @@ def test_a_bag_without_scenarios_is_refused(tmp_path):
 
 def only(bag, folder, topics):
     """Copy the messages of these topics to another bag, as somebody else might have recorded it."""
-    with AtomicBag(folder) as copy:
+    with atomic_bag(folder) as copy:
         for name in topics:
             kind, quality = topic_entry(name)
             copy.add_topic(f"/{name}", kind, qos_yaml(quality))
@@ -158,7 +158,7 @@ def test_that_page_in_a_browser(tmp_path, size):
 def test_what_nodes_say_on_one_topic_is_told_apart_by_their_namespaces(tmp_path):
     run = real_run()
     bag = write_recording(tmp_path / "run", {"/here": run})
-    with AtomicBag(tmp_path / "recorded") as copy:
+    with atomic_bag(tmp_path / "recorded") as copy:
         for message in read_messages(bag):
             topic = message.topic.replace("/here/diagnostics", "/diagnostics")
             kind, quality = topic_entry(topic)
