@@ -185,12 +185,8 @@ def _leg(task: _Task, a: int, b: int, direct_allowed: bool) -> Guess:
 
 def _radius(task: _Task, start: Floats, end: Floats) -> float:
     """Half the width and the margin, or what room there is at the ends of the leg if that is less."""
-    ends = np.stack((start, end))[:, :2]
-    cell = np.floor((ends - task.road.origin) / task.road.resolution).astype(int)
-    field = clearance_field(task.road)
-    height, width = field.shape
-    cell = np.clip(cell, 0, (width - 1, height - 1))
-    room = float(field[cell[:, 1], cell[:, 0]].min()) - task.road.resolution
+    row, column, _ = task.road.cells(np.stack((start, end))[:, :2])
+    room = float(clearance_field(task.road)[row, column].min()) - task.road.resolution
     return max(min(0.5 * task.vehicle.width + task.config.margin, room), 0.0)
 
 

@@ -140,13 +140,11 @@ def _ahead(pose: Floats) -> Floats:
 def _needed(road: Road, disc: Floats, need: float, start: Floats, end: Floats, spacing: float, count: int) -> Floats:
     """Clearance wanted along the band (count,): what there is at its ends, rising from there by 5 cm per metre to `need`."""
     field = clearance_field(road)
-    limit = np.array(field.shape) - 1
     along = np.arange(count) * spacing
     wanted = np.full(count, need)
     for pose, distance in ((start, along), (end, along[::-1])):
-        cell = ((pose[:2] + disc[:, None] * _ahead(pose) - road.origin) / road.resolution).astype(int)[:, ::-1]
-        room = field[tuple(np.clip(cell, 0, limit).T)].min()
-        wanted = np.minimum(wanted, room + TAPER * distance)
+        row, column, _ = road.cells(pose[:2] + disc[:, None] * _ahead(pose))
+        wanted = np.minimum(wanted, field[row, column].min() + TAPER * distance)
     return wanted
 
 
