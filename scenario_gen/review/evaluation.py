@@ -25,17 +25,10 @@ from scenario_gen.review.validation import Reference
 from scenario_gen.storage.config import BagConfig
 from scenario_gen.storage.messages import DEFAULT, within
 from scenario_gen.template.interaction import find_conflicts, find_waits
-from scenario_gen.types.evaluation import CheckCounts, Evaluation
+from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.generation import GenerationResult, WITHOUT
 from scenario_gen.types.scenario import Scenario, ScenarioSet, Verdict
 from scenario_gen.validity import Checker, Limits
-
-
-def evaluate_bag(
-    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0, bag: BagConfig = DEFAULT
-) -> tuple[Evaluation, ...]:
-    """Evaluate every namespace of a bag, as `bag_results` does, and return the figures alone."""
-    return tuple(result.evaluation for result in bag_results(path, config, limits, seed, bag))
 
 
 def bag_results(

@@ -20,9 +20,9 @@ from pathlib import Path
 
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.fitting import fit_template, FittingConfig
-from scenario_gen.folders import Kind
+from scenario_gen.folders import Kind, sha256_of
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.recordings.provenance import read_parameters, sha256_of, versions
+from scenario_gen.recordings.provenance import read_parameters, versions
 from scenario_gen.recordings.read import INFO, Namespace, read_recording, RequestSummary, ScenarioEntry
 from scenario_gen.recordings.template import decode_template, missing_topics
 from scenario_gen.recordings.write import add_message, same_tracks, scenario_bytes
