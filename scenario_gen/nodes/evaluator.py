@@ -147,6 +147,6 @@ class Evaluator(StageNode):
             values = {"request": summary.request, "samples": str(row.samples), **figures}
             notes = (*row.notes, chosen) if row.name == WITH and len(decoded) < summary.published else row.notes
             statuses.append(Status(f"{self.get_fully_qualified_name()}: {row.name}", Level.OK, "; ".join(notes), values))
-        self.send("report", encode_diagnostics(statuses, encounter.start_ns))
+        self.outputs.send("report", encode_diagnostics(statuses, encounter.start_ns))
         self.diagnostics.resolve("requests")
         self.get_logger().info(f"request {summary.request} evaluated: {len(decoded)} scenarios")

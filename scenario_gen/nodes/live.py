@@ -78,7 +78,7 @@ class LiveStreams:
         try:
             self._subscribe()
         except InputError as error:
-            self._node.failed("streams", error)
+            self._node.diagnostics.failed("streams", error)
         if monotonic() - self._heard > self._config.silence:
             self.end()
 

@@ -78,7 +78,7 @@ class LogPlayer(StageNode):
         encounter = result.encounters[config.encounter]
         stop_if_cancelled()
         if not config.stream:
-            self.send("tracks", encode_tracks(encounter))
+            self.outputs.send("tracks", encode_tracks(encounter))
         n, samples = encounter.speed.shape
         message = f"{encounter.name}: {n} vehicles, {samples} samples over {encounter.duration:.1f} s"
         notes = {f"note.{k}": note for k, note in enumerate(result.quality.notes)}
@@ -106,11 +106,9 @@ class LogPlayer(StageNode):
             stamp = encounter.start_ns + k * encounter.dt_ns
             self.outputs.publish(clock, CdrWriter().stamp(stamp).finish())
             for i, name in enumerate(names):
-                self.send(
-                    vehicle_topic(name, "fix"),
-                    encode_fix(float(places[i, k, 0]), float(places[i, k, 1]), stamp, f"vehicle_{name}"),
-                )
-                self.send(vehicle_topic(name, "speed"), encode_speed(float(encounter.speed[i, k]), stamp, f"vehicle_{name}"))
+                frame, (latitude, longitude) = f"vehicle_{name}", places[i, k].tolist()
+                self.outputs.send(vehicle_topic(name, "fix"), encode_fix(latitude, longitude, stamp, frame))
+                self.outputs.send(vehicle_topic(name, "speed"), encode_speed(float(encounter.speed[i, k]), stamp, frame))
         else:
             self.status(Level.OK, f"{encounter.name}: streamed", "stream", encounter.start_ns)
         self.destroy_publisher(clock)

@@ -111,10 +111,10 @@ class Planner(StageNode):
         made["fit"] = encode_fit(encounter, fit, road.frame_id)
         made["fit/info"] = encode_hashes("fit", messages | made, encounter.start_ns)
         for topic, data in made.items():
-            self.send(topic, data)
+            self.outputs.send(topic, data)
         self.get_logger().info(f"planned {len(routes)} routes through {len(anchors)} anchors")
         statuses = fit_statuses(fit, self.get_fully_qualified_name(), template_hashes(messages))
-        self.report(*statuses, stamp_ns=encounter.start_ns)
+        self.diagnostics.report(*statuses, stamp_ns=encounter.start_ns)
 
     async def _get_plan(self, request: GetPlan.Request, response: GetPlan.Response) -> GetPlan.Response:
         """Plan for a caller, off the executor's thread."""

@@ -86,7 +86,6 @@ class Player(Node):  # type: ignore[misc]
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("player", namespace=namespace)
         self.parameters = ConfigParameters(self, Config())
-        self.parameters.log()
         self.diagnostics = NodeDiagnostics(self, self._report_progress)
         self._at: float | None = None  # seconds of the bag that have been played, while it is
         self.done = False

@@ -96,7 +96,6 @@ class Recorder(Node):  # type: ignore[misc]
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("recorder", namespace=namespace)
         self.parameters = ConfigParameters(self, Config())
-        self.parameters.log()
         self._bag: BagWriter | None = None
         self._listening: dict[str, Any] = {}
         self._refused: set[str] = set()

@@ -107,9 +107,9 @@ class RoadServer(StageNode):
         }
         stop_if_cancelled()
         for topic, data in messages.items():
-            self.send(topic, data)
+            self.outputs.send(topic, data)
         template = {"tracks": tracks} if tracks else {}
-        self.send("road/info", encode_hashes("road", messages | template, stamp_ns))
+        self.outputs.send("road/info", encode_hashes("road", messages | template, stamp_ns))
         self._grid = messages["map"]
         height, width = road.drivable.shape
         message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, {len(road.entries)} entries"

@@ -91,15 +91,15 @@ class Segmenter(StageNode):
         encounter = decode_tracks(data)
         segmentation = segment(encounter, self.config.segmentation, self.config.seed)
         stop_if_cancelled()
-        self.send("changepoints", encode_changepoints(encounter, segmentation))
-        self.send("posterior", encode_posterior(encounter, segmentation))
+        self.outputs.send("changepoints", encode_changepoints(encounter, segmentation))
+        self.outputs.send("posterior", encode_posterior(encounter, segmentation))
         status = segmentation_status(segmentation, self.get_fully_qualified_name())
         self.get_logger().info(status.message)
-        self.report(status, stamp_ns=encounter.start_ns)
+        self.diagnostics.report(status, stamp_ns=encounter.start_ns)
 
     def _sampled(self, sample: Sample) -> None:
         if (found := self._online.push(sample)) is not None:
-            self.send("changepoints/live", encode_live_changepoints(found))
+            self.outputs.send("changepoints/live", encode_live_changepoints(found))
 
     def _ended(self, log: RawLog, config: LogConfig) -> None:
         """Read what the streams amount to, off the executor's thread."""
@@ -112,7 +112,7 @@ class Segmenter(StageNode):
             n, samples = encounter.speed.shape
             message = f"streams of {n} vehicles, {samples} samples; the largest of {len(result.encounters)} encounter(s)"
             self.status(Level.OK, message, "encounter", encounter.start_ns, **notes)
-            self.send("tracks", encode_tracks(encounter))
+            self.outputs.send("tracks", encode_tracks(encounter))
 
         self.work(f"encounter {self._encounters}", job)
 
