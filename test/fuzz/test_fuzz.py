@@ -20,7 +20,7 @@ import pytest
 
 pytestmark = pytest.mark.spread
 TARGETS = targets()
-DAMAGED = 400 if LONG else 20
+DAMAGED = 400 if LONG else 10
 
 
 @pytest.mark.parametrize("name", TARGETS)

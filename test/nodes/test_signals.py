@@ -20,6 +20,7 @@ import subprocess
 import sys
 import time
 
+from node_server import Forked, start_nodes
 import pytest
 from suite_processes import RESOURCES
 
@@ -38,15 +39,19 @@ def _started(node: str, domain: int, *arguments: str) -> "subprocess.Popen[str]"
     )
 
 
+def _forked(node: str, domain: int, *arguments: str) -> Forked:
+    return start_nodes("start", node, "--ros-args", *arguments, ROS_DOMAIN_ID=str(domain))
+
+
 ENDS = {"once": (signal.SIGINT,), "twice": (signal.SIGINT, signal.SIGINT), "terminated": (signal.SIGTERM,)}
 
 
 def test_a_recorder_closes_its_bag(domain, tmp_path):
     """Three recorders of one player, each ended in its own way."""
-    player = _started("player", domain, "-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "rate:=50.0", "-p", "loop:=true")
+    player = _forked("player", domain, "-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "rate:=50.0", "-p", "loop:=true")
     recording = ("-p", "topics:=/?vehicle_.*", "-p", "compress:=false")
     recorders = {
-        name: _started("recorder", domain, "-r", f"__node:={name}", "-p", f"bag:={tmp_path / name}", *recording) for name in ENDS
+        name: _forked("recorder", domain, "-r", f"__node:={name}", "-p", f"bag:={tmp_path / name}", *recording) for name in ENDS
     }
     try:
         deadline = time.monotonic() + 180.0
@@ -88,6 +93,8 @@ def test_a_bad_start_is_one_message_and_exit_code_2(domain, tmp_path):
         ("player", ("-p", f"bag:={tmp_path / 'text.mcap'}"), "text.mcap"),
         ("recorder", ("-p", f"bag:={tmp_path}"), "exists"),
     ):
-        output, _ = _started(node, domain, *arguments).communicate(timeout=120.0)
+        process = _forked(node, domain, *arguments)
+        output, _ = process.communicate(timeout=120.0)
+        assert process.returncode == 2
         assert words in output
         assert "Traceback" not in output, output

@@ -27,7 +27,7 @@ from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.nearest import ImpossibleError
 from scenario_gen.types.request import Request
 
-COUNT = 5 if LONG else 2
+COUNT = 5 if LONG else 1
 pytestmark = pytest.mark.spread
 
 

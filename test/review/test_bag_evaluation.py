@@ -20,7 +20,7 @@ from dataclasses import replace
 from functools import partial
 import io
 
-from browser_tab import chromium, DESKTOP, PHONE, Tab
+from browser_tab import DESKTOP, PHONE, Tab
 from evaluation_worlds import report_case
 import numpy as np
 from PIL import Image
@@ -137,14 +137,13 @@ def test_the_page_of_our_own_bag_shows_the_template_as_that_of_the_run(tmp_path)
     assert "Fitted to the road" in page and run.segmentation.descriptions[0] in page
 
 
-@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
-def test_that_page_in_a_browser(tmp_path, size):
+def test_that_page_in_a_browser(browser, tmp_path):
     """With fit and without, it loads without errors or requests, draws the routes and is no wider than the screen."""
     bag = write_recording(tmp_path / "run", real_run())
     bare = only(bag, tmp_path / "bare", ("tracks", "scenarios"))
     page = tmp_path / "report.html"
     write_report(page, ReportInput([*bag_results(bag, QUICK), *bag_results(bare, QUICK)]))
-    with chromium() as browser:
+    for size in (DESKTOP, PHONE):
         tab = Tab(browser, page, size)
         routes = tab.page.locator('[data-case="0"] [data-role="routes"]')
         pixels = Image.open(io.BytesIO(b64decode(routes.evaluate("c => c.toDataURL()").partition(",")[2])))
