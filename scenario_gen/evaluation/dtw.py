@@ -185,6 +185,8 @@ class Alignment:
 def dtw_distance(a: npt.ArrayLike, b: npt.ArrayLike, distance: Distance = "euclidean", band: int | None = None) -> float:
     """Exact DTW distance of two series: the least sum of distances over all monotone paths.
 
+    Source: Sakoe & Chiba 1978; paper V-B.
+
     Args:
         a: (n,) or (n, D).
         b: (m,) or (m, D).
@@ -239,7 +241,10 @@ def feature_rows(a: Floats, b: Floats, extents: Floats, rows: range, distance: D
 
 
 def mean_feature(a: Floats, b: Floats, distance: Distance = "euclidean") -> Floats:
-    """Return the mean (n, m) of the feature matrices of S samples a (S, D, n) and b (S, D, m)."""
+    """Return the mean (n, m) of the feature matrices of S samples a (S, D, n) and b (S, D, m).
+
+    Source: paper V-B, Fig. 5.
+    """
     extents = feature_extents(a, b, distance)
     n, m = a.shape[2], b.shape[2]
     mean = np.empty((n, m))

@@ -70,6 +70,8 @@ class _Task:
 def plan_routes(road: Road, fit: Fit, config: PlanningConfig = PlanningConfig(), seed: int = 0) -> tuple[Route, ...]:
     """Plan one route per vehicle through its anchors.
 
+    Source: paper III-B, between consecutive changepoints.
+
     Start and end are met exactly, with their headings; interior anchors are strong but soft targets (see `deviations`).
     In drivable mode the footprint stays on the road along the whole route and the curvature within the limit.
 

@@ -96,6 +96,8 @@ def smooth(
 ) -> Curve:
     """Draw a curve from `start` to `end` (poses (3,)) near the interior `targets`.
 
+    Source: elastic bands (Quinlan & Khatib 1993).
+
     Returns:
         The first curve within the limits; if there is none, the last one, with what is wrong about it.
     """
@@ -185,7 +187,10 @@ def _assigned(points: Floats, targets: Targets) -> tuple[Floats, Floats]:
 
 
 def monotone_matching(cost: Floats) -> Ints:
-    """Match rows (A) of `cost` (A, M), of any unit, to columns without going back, so that its sum is least: (A,) columns."""
+    """Match rows (A) of `cost` (A, M), of any unit, to columns without going back, so that its sum is least: (A,) columns.
+
+    Source: dynamic programming (Bellman 1957).
+    """
     total = cost[0]
     came_from = np.empty(cost.shape, dtype=np.int64)
     for k in range(1, len(cost)):

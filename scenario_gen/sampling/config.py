@@ -21,7 +21,10 @@ from scenario_gen.parameters import parameter, Parameters
 
 @dataclass(frozen=True)
 class SamplingConfig(Parameters):
-    """What varies from scenario to scenario, by how much, and within which limits of motion."""
+    """What varies from scenario to scenario, by how much, and within which limits of motion.
+
+    Source: σ_f and l of eq 14, σ_ω of eq 13; the others are ours.
+    """
 
     lateral_sigma: float = parameter(
         0.3, "σ_f: standard deviation across the route, between anchors", unit="m", low=0.0, high=10.0

@@ -70,6 +70,8 @@ _SMOOTHING = 4.0  # m along the route, each of two passes
 def lateral_covariance_root(path: BasePath, room: Floats, config: SamplingConfig) -> Floats:
     """Square root (G, r) of the covariance of the deviation [m] at the route's nodes.
 
+    Source: eqs 12 to 15, of the deviation as a function of arc length.
+
     Given are deviation and slope 0 at both ends (the asked poses), and 0 with noise σ_ω at every interior anchor.
     Where the road leaves less than `ROOM_SIGMAS`·σ_f of room the process is scaled down to it.
 

@@ -135,6 +135,8 @@ def sample_scenarios(
 ) -> ScenarioSet:
     """Draw candidates until `count` are valid or the budget is spent.
 
+    Source: paper III-C.
+
     Args:
         encounter: the template.
         segmentation: its changepoints.

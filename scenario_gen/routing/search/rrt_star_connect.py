@@ -139,7 +139,10 @@ class _Trees:
 
 
 class RrtStarConnect:
-    """The paper's planner, behind the Protocol of all planners."""
+    """The paper's planner, behind the Protocol of all planners.
+
+    Source: paper III-B and appendix.
+    """
 
     def __init__(self, config: RrtStarConnectConfig = RrtStarConnectConfig()) -> None:
         self.config = config

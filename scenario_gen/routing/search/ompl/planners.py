@@ -47,7 +47,10 @@ class OmplConfig(Parameters):
 
 
 class OmplPlanner:
-    """One of OMPL's planners; `name` is a key of `solve.PLANNERS`."""
+    """One of OMPL's planners; `name` is a key of `solve.PLANNERS`.
+
+    Source: the Open Motion Planning Library (Şucan, Moll & Kavraki 2012).
+    """
 
     def __init__(self, name: str, config: OmplConfig = OmplConfig()) -> None:
         self.name = name
