@@ -50,8 +50,8 @@ from scenario_gen.nodes.frames import find_motion, Frames, Instant
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.topics import message_class, Pace, publish, qos, unacknowledged
 from scenario_gen.parameters import parameter, Parameters
+from scenario_gen.storage.bag import bag_topics, BagMessage, read_messages
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import bag_topics, BagMessage, read_messages
 
 STREAMED = BagConfig(most_bytes=2**62)  # a message is published and forgotten, so a bag may be of any size
 PATIENCE = 5.0  # seconds in which listeners have to take the last messages

@@ -22,8 +22,8 @@ from scenario_gen.errors import InputError
 from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.recordings.read import Namespace, NO_ENTRY, read_recording, SCENARIOS
 from scenario_gen.review.validation import Reference
+from scenario_gen.storage.bag import within
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import DEFAULT, within
 from scenario_gen.template.interaction import find_conflicts, find_waits
 from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.generation import GenerationResult, WITHOUT
@@ -32,7 +32,7 @@ from scenario_gen.validity import Checker, Limits
 
 
 def bag_results(
-    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0, bag: BagConfig = DEFAULT
+    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0, bag: BagConfig = BagConfig()
 ) -> tuple[GenerationResult, ...]:
     """Evaluate every namespace of a bag that holds both `tracks` and `scenarios`, ready for the report.
 

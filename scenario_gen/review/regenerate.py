@@ -29,8 +29,8 @@ from scenario_gen.recordings.write import add_message, same_tracks, scenario_byt
 from scenario_gen.routing import plan_routes, PlanningConfig
 from scenario_gen.sampling import regenerate, SamplingConfig
 from scenario_gen.segmentation import segment, SegmentationConfig
+from scenario_gen.storage.bag import bag_topics, BagMessage, within
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import bag_topics, BagMessage, DEFAULT, within
 from scenario_gen.storage.writer import atomic_bag
 from scenario_gen.template.interaction import waits_to_keep
 from scenario_gen.types.encounter import Encounter
@@ -65,7 +65,7 @@ def regenerate_scenario(
     namespace: str | None = None,
     request: str | None = None,
     log: Path | None = None,
-    config: BagConfig = DEFAULT,
+    config: BagConfig = BagConfig(),
 ) -> Regenerated:
     """Make scenario `index` of a bag again and compare it with the recorded SHA-256.
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A bag of one or several files as raw messages in order of their stamps."""
+"""Any rosbag2 bag, MCAP or SQLite, of one or several files, as raw messages in order of their stamps."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, ExitStack
@@ -49,7 +49,7 @@ class BagTopic:
 
 
 @dataclass(frozen=True)
-class StoredMessage:
+class BagMessage:
     """A message as it lies in the bag: CDR bytes and the time it was logged, nanoseconds."""
 
     topic: str
@@ -81,7 +81,7 @@ class StoredBag:
             found[name] = replace(topic, count=topic.count + count)
         return tuple(found[name] for name in sorted(found))
 
-    def messages(self, wanted: Callable[[str, str], bool] = lambda _topic, _type: True) -> Iterator[StoredMessage]:
+    def messages(self, wanted: Callable[[str, str], bool] = lambda _topic, _type: True) -> Iterator[BagMessage]:
         """Yield the messages of the topics that are `wanted`, by name and type, in order of their stamps; of all files together.
 
         Raises:
@@ -91,7 +91,7 @@ class StoredBag:
             self._allowance.hold(len(message.data))
             yield message
 
-    def _of_file(self, file: Path, storage: McapFile | SqliteFile, wanted: Callable[[str, str], bool]) -> Iterator[StoredMessage]:
+    def _of_file(self, file: Path, storage: McapFile | SqliteFile, wanted: Callable[[str, str], bool]) -> Iterator[BagMessage]:
         if isinstance(storage, SqliteFile):
             topics = {topic.id: (topic.name, topic.type, topic.encoding) for topic in storage.topics}
             logged = storage.messages(_of(topics, wanted, file))
@@ -103,7 +103,7 @@ class StoredBag:
             logged = _strictly(file, storage.in_order(set(own))) if own else iter(())
         for stamp, number, data in logged:
             name, kind, _ = topics[number]
-            yield StoredMessage(name, kind, self._whole(data, file), stamp)
+            yield BagMessage(name, kind, self._whole(data, file), stamp)
 
     def _whole(self, data: bytes, file: Path) -> bytes:
         """Return a message, decompressed where the bag compresses each by itself."""
@@ -232,3 +232,44 @@ def _unpacked(file: Path, stack: ExitStack, allowance: Allowance) -> Path:
                 return target
             allowance.unpack(len(block))
             whole.write(block)
+
+
+@contextmanager
+def within(path: Path) -> Iterator[None]:
+    """Name the bag in errors about what lies in it: a decoder knows the topic only.
+
+    Raises:
+        InputError: as raised inside, with the bag's name.
+    """
+    try:
+        yield
+    except InputError as error:
+        if str(path) in str(error):
+            raise
+        raise InputError(f"{path}: {error}") from error
+
+
+def bag_topics(path: Path, config: BagConfig = BagConfig()) -> tuple[BagTopic, ...]:
+    """Return the topics of a bag, sorted by name.
+
+    Args:
+        path: a bag's folder, or one of its files.
+        config: what is read at most.
+
+    Raises:
+        InputError: the bag is missing, damaged or empty of metadata.
+    """
+    with open_bag(path, config) as bag:
+        return bag.topics()
+
+
+def read_messages(
+    path: Path, wanted: Callable[[str], bool] = lambda _: True, config: BagConfig = BagConfig()
+) -> Iterator[BagMessage]:
+    """Yield the messages of the topics that are `wanted`, in the order they were logged; those of all files of a bag together.
+
+    Raises:
+        InputError: the bag is missing or damaged, or larger than `config` allows.
+    """
+    with open_bag(path, config) as bag:
+        yield from bag.messages(lambda topic, _: wanted(topic))

@@ -40,7 +40,7 @@ from scenario_gen.report.page import render, ReportInput, write_report
 from scenario_gen.review.evaluation import bag_results
 from scenario_gen.roads import build_road
 from scenario_gen.segmentation import segment
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 from scenario_gen.storage.metadata import qos_yaml
 from scenario_gen.storage.writer import atomic_bag
 from scenario_gen.types.request import Request

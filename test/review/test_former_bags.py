@@ -32,7 +32,7 @@ from scenario_gen.results import provenance_of
 from scenario_gen.review.evaluation import bag_results
 from scenario_gen.review.regenerate import regenerate_scenario
 from scenario_gen.review.validation import validate_bag
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 from scenario_gen.storage.writer import atomic_bag
 
 SINCE = ("road/info", "fit/info")  # topics that came with 0.2

@@ -30,7 +30,7 @@ from scenario_gen.recordings.write import write_recording
 from scenario_gen.results import provenance_of
 from scenario_gen.review.regenerate import regenerate_scenario, write_regenerated
 from scenario_gen.review.validation import validate_bag
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 from scenario_gen.storage.metadata import qos_yaml
 from scenario_gen.storage.writer import atomic_bag
 from scenario_gen.types.request import Request

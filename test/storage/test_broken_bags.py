@@ -32,8 +32,8 @@ from scenario_gen.recordings.write import write_recording
 from scenario_gen.review.evaluation import bag_results
 from scenario_gen.review.regenerate import regenerate_scenario
 from scenario_gen.review.validation import UNUSABLE, validate_bag
+from scenario_gen.storage.bag import bag_topics, read_messages
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import bag_topics, read_messages
 from scenario_gen.storage.reindex import reindex
 from scenario_gen.storage.writer import BagWriter
 
