@@ -81,6 +81,11 @@ def stretch(b: Floats, u0: float, u1: float, out: Floats) -> None:
 
 TURN_ROUNDING = 1e-4  # rad, change of heading that a vehicle may show without having moved
 SLACK = 1e-6  # rounding of a value that keeps exactly to its limit
+LIMITS = (
+    *("max_speed", "max_acceleration", "max_deceleration", "max_lateral_acceleration", "max_curvature"),
+    *("slip", "slip_share", "acceleration_tolerance"),
+)
+"""Of `Limits`, those that `worst_excess` takes."""
 
 
 class Check(IntEnum):
@@ -157,8 +162,7 @@ def worst_excess(
         heading: (N, T) rad.
         speed: (N, T) m/s.
         acceleration: (N, T) m/s².
-        limits: max_speed, max_acceleration, max_deceleration, max_lateral_acceleration, max_curvature, slip, slip_share,
-            acceleration_tolerance.
+        limits: those that LIMITS names, in its order.
         out: one row per `Check`.
     """
     top, speeding, braking, lateral, curvature = limits[0], limits[1], limits[2], limits[3], limits[4]
