@@ -16,6 +16,7 @@
 
 from collections import OrderedDict
 from collections.abc import Iterator
+import gc
 import os
 from pathlib import Path
 
@@ -92,6 +93,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if not item.get_closest_marker("spread"):
             item.add_marker(pytest.mark.xdist_group("browser" if "browser" in item.fixturenames else item.path.stem))
+
+
+def pytest_collection_finish() -> None:
+    """Look for no garbage in what has been loaded: it stays."""
+    gc.collect()
+    gc.freeze()
 
 
 def _not_in_ci(report: pytest.TestReport | pytest.CollectReport) -> None:

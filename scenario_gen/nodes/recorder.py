@@ -93,6 +93,8 @@ def _disk_errors() -> Iterator[None]:
 class Recorder(Node):  # type: ignore[misc]
     """Records what matches."""
 
+    ENDING = REST + 5.0  # seconds
+
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("recorder", namespace=namespace)
         self.parameters = ConfigParameters(self, Config())
@@ -166,12 +168,9 @@ class Recorder(Node):  # type: ignore[misc]
             self._write(topic, taken[0], taken[1]["publication_sequence_number"])
         return True
 
-    def destroy_node(self) -> None:
-        """Close the bag, then the node."""
-        try:
-            self.stop()
-        finally:
-            super().destroy_node()
+    def close(self) -> None:
+        """Close the bag; what else has to be done at the end may fail."""
+        self.stop()
 
     def _look_around(self) -> None:
         """Subscribe to topics that have come up since."""

@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 import contextlib
 from dataclasses import asdict, dataclass, field
 import faulthandler
+import gc
 import importlib
 import json
 import mmap
@@ -177,6 +178,7 @@ def over_time(_signal: int, _frame: object) -> None:
 def child(target: Target, seeds: Sequence[bytes], first: int, last: int, progress: mmap.mmap, pipe: int) -> None:
     """Execute inputs `first` to before `last`; write the number of each before it runs, and failures to the pipe."""
     warnings.simplefilter("ignore")
+    gc.freeze()  # to look for garbage in what the parent has loaded would copy all of it
     faulthandler.disable()  # pytest's: the parent says what happened
     signal.signal(signal.SIGPROF, over_time)
     size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()

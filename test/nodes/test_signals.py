@@ -86,6 +86,39 @@ def test_ctrl_c_while_the_libraries_load(domain):
     assert process.returncode in (0, 130, -2)
 
 
+STUCK = """
+from scenario_gen.interrupts import hear
+hear()
+import ctypes
+from scenario_gen.nodes import process
+from rclpy.node import Node
+process.ENDING = 1.0
+class Stuck(Node):
+    def __init__(self, namespace):
+        super().__init__("stuck", namespace=namespace)
+    def autostart(self):
+        print("ready", flush=True)
+    def close(self):
+        print("closed")
+    def destroy_node(self):
+        ctypes.PyDLL(None).sleep(600)
+process.run_nodes([Stuck], ["stuck"])
+"""
+
+
+def test_a_node_ends_when_dds_waits_for_itself_holding_the_lock_of_python(domain):
+    """What it had to keep is kept, and where it was stuck is said."""
+    environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
+    process = subprocess.Popen(
+        [sys.executable, "-c", STUCK], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment
+    )
+    assert process.stdout is not None and process.stdout.readline() == "ready\n"
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=120.0)
+    assert process.returncode == 1
+    assert output.startswith("closed\nTimeout") and "in destroy_node" in output, output
+
+
 def test_a_bad_start_is_one_message_and_exit_code_2(domain, tmp_path):
     (tmp_path / "text.mcap").write_text("no bag")
     for node, arguments, words in (
