@@ -41,7 +41,7 @@ from scenario_gen.nodes.diagnostics import NodeDiagnostics
 from scenario_gen.nodes.losses import Losses, remedy
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.topics import adapted_quality, message_class, qos
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.storage.metadata import qos_yaml
 from scenario_gen.storage.writer import BagWriter, Split
 
@@ -61,7 +61,7 @@ def default_topics(namespace: str) -> str:
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Parameters):
     """The recorder's parameters."""
 
     bag: str = parameter("", "folder of the bag to begin at once; empty waits for ~/start and names it by the time")
@@ -74,7 +74,7 @@ class Config:
     split_seconds: float = parameter(0.0, "begin a new file after so long; 0 never", unit="s", low=0.0)
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         try:
             re.compile(self.topics)
         except re.error as error:
@@ -98,7 +98,6 @@ class Recorder(Node):  # type: ignore[misc]
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("recorder", namespace=namespace)
         self.parameters = ConfigParameters(self, Config())
-        self.parameters.log()
         self._bag: BagWriter | None = None
         self._listening: dict[str, Any] = {}
         self._refused: set[str] = set()

@@ -96,11 +96,6 @@ def common_component(road: Road, start_xy: Floats, goal_xy: Floats, radius: floa
     return next((label for label in _reachable(road, start, radius) if label in theirs), None)
 
 
-def connected(road: Road, start_xy: Floats, goal_xy: Floats, radius: float) -> bool:
-    """Whether a disc of `radius` [m] can move from start (2,) [m] to goal (2,) [m]."""
-    return common_component(road, start_xy, goal_xy, radius) is not None
-
-
 def _reachable(road: Road, xy: Floats, radius: float) -> Iterator[int]:
     """Labels of the cell centres near `xy` that a straight move leads to, nearest first."""
     labels = components(road, radius)

@@ -28,7 +28,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.nodes.run_suite import Job, run_suite
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.recordings.write import result_messages
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 
 pytestmark = [pytest.mark.dds, pytest.mark.slow]
 JOBS = (

@@ -32,8 +32,8 @@ from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, 
 from msg_conventions.scenario_info import encode_info, scenario_entry
 from msg_conventions.scenarios import digest, encode_scenario
 from scenario_gen.cli import app
+from scenario_gen.storage.bag import bag_topics, read_messages
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import bag_topics, read_messages
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Scenario
 

@@ -27,7 +27,7 @@ from typer.testing import CliRunner
 import yaml
 
 from scenario_gen.cli import app
-from scenario_gen.storage.messages import bag_topics, read_messages
+from scenario_gen.storage.bag import bag_topics, read_messages
 
 pytestmark = pytest.mark.dds
 

@@ -24,7 +24,7 @@ from node_server import Forked, start_nodes
 import pytest
 from suite_processes import RESOURCES
 
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 
 pytestmark = pytest.mark.dds
 

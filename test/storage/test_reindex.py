@@ -28,7 +28,7 @@ import yaml
 
 from scenario_gen.cli import app
 from scenario_gen.errors import InputError
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 from scenario_gen.storage.reindex import reindex
 
 

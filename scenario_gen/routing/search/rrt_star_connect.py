@@ -22,7 +22,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.roads.clearance import clearance_in_cells, to_cells, to_metres
 from scenario_gen.roads.connectivity import component_cells, corner_cells
 from scenario_gen.routing.search import tree_nodes as trees
@@ -40,7 +40,7 @@ BATCH = 512  # iterations between two looks at the clock
 
 
 @dataclass(frozen=True)
-class RrtStarConnectConfig:
+class RrtStarConnectConfig(Parameters):
     """Settings of RRT*-Connect; lengths in cells, as in the paper."""
 
     step: float = parameter(120.0, "longest new edge (the paper's preset: 5)", unit="cells", low=0.1, high=1e6)
@@ -55,9 +55,6 @@ class RrtStarConnectConfig:
     corners: float = parameter(0.5, "share of samples beside convex corners of obstacles (the paper: 0)", low=0.0, high=0.9)
     informed: bool = parameter(True, "sample only where a shorter path can lie, once there is one")
     pull: bool = parameter(True, "pull the path taut at the end (string pulling)")
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 PAPER = RrtStarConnectConfig(step=5.0, zeta=30.0, greedy=False, skip=False, corners=0.0, informed=False, pull=False)
@@ -142,7 +139,10 @@ class _Trees:
 
 
 class RrtStarConnect:
-    """The paper's planner, behind the Protocol of all planners."""
+    """The paper's planner, behind the Protocol of all planners.
+
+    Source: paper III-B and appendix.
+    """
 
     def __init__(self, config: RrtStarConnectConfig = RrtStarConnectConfig()) -> None:
         self.config = config
