@@ -166,7 +166,7 @@ def test_only_an_informed_search_leaves_out_what_cannot_help():
     drivable[95:140, 100] = False  # a wall to go round
     road, ends = road_of("open", drivable), np.array([[80.5, 100.5], [120.5, 100.5]])
     for config, everywhere in ((PAPER, True), (RrtStarConnectConfig(greedy=False, pull=False), False)):
-        search, m = grown(road, ends, config, 10_000)
+        search, m = grown(road, ends, config, 4_000)
         place = search.node[m, :2]
         by_way_of = np.hypot(*(place - ends[0]).T) + np.hypot(*(place - ends[1]).T)
         assert (np.mean(by_way_of > 2.0 * search.best) > 0.3) == everywhere
