@@ -17,8 +17,6 @@
 Only for looking at; nothing is read back but the footprint. Frame: that of the vehicles drawn. QoS: reliable, transient_local.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
@@ -30,7 +28,6 @@ from scenario_gen.types.scenario import Scenario
 
 FOOTPRINT_TYPE = "geometry_msgs/msg/PolygonStamped"
 MARKERS_TYPE = "visualization_msgs/msg/MarkerArray"
-Numbers = Sequence[float]
 CUBE, LINE_STRIP, DELETE_ALL = 1, 4, 3
 COLOURS = ((0.12, 0.47, 0.71), (0.84, 0.15, 0.16), (0.17, 0.63, 0.17), (1.0, 0.5, 0.05), (0.58, 0.4, 0.74), (0.55, 0.34, 0.29))
 
@@ -59,12 +56,21 @@ def scenario_markers(scenario: Scenario, stamp_ns: int) -> bytes:
     names = tokens(vehicle.id for vehicle in scenario.vehicles)
     writer = CdrWriter().pack("I", 1 + 2 * len(names))
 
-    def add(namespace: str, kind: int, action: int, pose: Numbers, scale: Numbers, colour: Numbers, points: Floats) -> None:
+    def add(
+        namespace: str,
+        kind: int,
+        scale: tuple[float, ...] = (0.1, 0.0, 0.0),
+        colour: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0),
+        pose: tuple[float, ...] = (0.0, 0.0, 0.0),
+        *,
+        action: int = 0,
+        points: Floats | None = None,
+    ) -> None:
         writer.header(stamp_ns, scenario.frame_id).string(namespace).pack("i", 0, kind, action)
         writer.pack("d", *pose_rows(np.array([pose]))[0]).pack("d", *scale)
         writer.pack("f", *colour).stamp(0).pack("B", 0)
-        writer.pack("I", len(points))
-        if len(points):
+        writer.pack("I", 0 if points is None else len(points))
+        if points is not None:
             writer.align(8).raw(np.column_stack([points, np.zeros(len(points))]).tobytes())
         writer.pack("I", 0)  # colours
         writer.string("").header(0, "").string("").pack("I", 0)  # texture: resource, image header, format, bytes
@@ -72,11 +78,10 @@ def scenario_markers(scenario: Scenario, stamp_ns: int) -> bytes:
         writer.string("").string("").string("").pack("I", 0)  # text; mesh resource; mesh file: name and bytes
         writer.pack("B", 0)
 
-    none, at_origin = np.zeros((0, 2)), (0.0, 0.0, 0.0)
-    add("", 0, DELETE_ALL, at_origin, (0.1, 0.0, 0.0), (1.0, 1.0, 1.0, 1.0), none)
+    add("", 0, action=DELETE_ALL)
     for k, (name, vehicle) in enumerate(zip(names, scenario.vehicles, strict=True)):
         colour, path = COLOURS[k % len(COLOURS)], scenario.position[k]
         start = (*path[0].tolist(), float(scenario.heading[k, 0]))
-        add(f"path_{name}", LINE_STRIP, 0, at_origin, (0.15, 0.0, 0.0), (*colour, 0.6), path)
-        add(f"box_{name}", CUBE, 0, start, (vehicle.length, vehicle.width, 1.5), (*colour, 0.8), none)
+        add(f"path_{name}", LINE_STRIP, (0.15, 0.0, 0.0), (*colour, 0.6), points=path)
+        add(f"box_{name}", CUBE, (vehicle.length, vehicle.width, 1.5), (*colour, 0.8), start)
     return writer.finish()

@@ -154,18 +154,22 @@ def attempt(
     return GenerationResult(encounter, segmentation, road, fit, routes, generated, seed)
 
 
-@dataclass(eq=False)
 class _Search:
     """Everything that the suggestions for one request need."""
 
-    encounter: Encounter
-    segmentation: Segmentation
-    road: Road
-    config: PipelineConfig
-    asked: Request
-    seed: int
-    wanted: int
-    cancelled: Cancelled
+    def __init__(
+        self,
+        encounter: Encounter,
+        segmentation: Segmentation,
+        road: Road,
+        config: PipelineConfig,
+        asked: Request,
+        seed: int,
+        wanted: int,
+        cancelled: Cancelled,
+    ) -> None:
+        self.encounter, self.segmentation, self.road, self.config = encounter, segmentation, road, config
+        self.asked, self.seed, self.wanted, self.cancelled = asked, seed, wanted, cancelled
 
     @cached_property
     def base(self) -> dict[str, Floats]:
