@@ -101,6 +101,11 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+def pytest_sessionfinish() -> None:
+    """Let all of it go at the end: libraries complain of what they miss then."""
+    gc.unfreeze()
+
+
 def _not_in_ci(report: pytest.TestReport | pytest.CollectReport) -> None:
     """In CI what is skipped has failed."""
     reason = report.longrepr[-1] if isinstance(report.longrepr, tuple) else report.longrepr

@@ -112,9 +112,12 @@ def test_a_node_ends_when_dds_waits_for_itself_holding_the_lock_of_python(domain
     process = subprocess.Popen(
         [sys.executable, "-c", STUCK], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment
     )
-    assert process.stdout is not None and process.stdout.readline() == "ready\n"
-    process.send_signal(signal.SIGINT)
-    output, _ = process.communicate(timeout=120.0)
+    try:
+        assert process.stdout is not None and process.stdout.readline() == "ready\n"
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=120.0)
+    finally:
+        process.kill()
     assert process.returncode == 1
     assert output.startswith("closed\nTimeout") and "in destroy_node" in output, output
 
