@@ -26,12 +26,12 @@ import numpy as np
 
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.segmentation.trends import Trends
 
 
 @dataclass(frozen=True)
-class OnlineConfig:
+class OnlineConfig(Parameters):
     """How the online segmenter decides."""
 
     window: float = parameter(30.0, "past that is kept at most", unit="s", low=5.0, high=600.0)
@@ -42,9 +42,6 @@ class OnlineConfig:
         1e-6, "probability with which noise alone looks like a changepoint", low=1e-12, high=0.5, was="chance_alone"
     )
     min_segment: float = parameter(0.5, "least distance between changepoints", unit="s", low=0.2, high=10.0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 @dataclass(frozen=True)

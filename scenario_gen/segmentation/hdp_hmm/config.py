@@ -19,13 +19,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.arrays import Floats
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 
 GAUSSIAN_DOF = 1000.0
 
 
 @dataclass(frozen=True)
-class SamplerConfig:
+class SamplerConfig(Parameters):
     """The sticky HDP-HMM and its sampler; the defaults suit any series from D = 1 to D = 24."""
 
     emission: str = parameter("gaussian", "what a state emits", choices=("gaussian", "autoregressive"))
@@ -58,9 +58,6 @@ class SamplerConfig:
     alpha_kappa_rate: float = parameter(0.01, "rate of the Gamma prior of α+κ", low=1e-6)
     rho_a: float = parameter(40.0, "first parameter of ρ's Beta prior, ρ = κ/(α+κ)", low=1e-3)
     rho_b: float = parameter(1.0, "second parameter of ρ's Beta prior", low=1e-3)
-
-    def __post_init__(self) -> None:
-        check(self)
 
     @property
     def hyper(self) -> Floats:
