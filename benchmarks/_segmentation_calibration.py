@@ -49,7 +49,7 @@ class Calibration:
 
 def from_prior(rng: np.random.Generator, samples: int, d: int, config: SamplerConfig) -> tuple[Floats, Ints]:
     """Draw a series (T, D) and its labels from the sticky HDP-HMM's prior, covariances Inverse-Wishart(D + 10, 9 I)."""
-    states = config.states
+    states = config.states or 20
     gamma = rng.gamma(config.gamma_shape) / config.gamma_rate
     total = rng.gamma(config.alpha_kappa_shape) / config.alpha_kappa_rate
     rho = rng.beta(config.rho_a, config.rho_b)

@@ -24,6 +24,7 @@ first sample, since when the same vehicles have been there. QoS: reliable, trans
 """
 
 from collections.abc import Mapping
+import math
 
 import numpy as np
 
@@ -158,11 +159,13 @@ def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str 
     )
 
 
-def segmentation_status(segmentation: Segmentation, node: str) -> Status:
-    """Return what the segmenter found, in words; `node` is its full name."""
+def segmentation_status(segmentation: Segmentation, node: str, duration: float) -> Status:
+    """Return what the segmenter found in an encounter of `duration` s, in words; `node` is its full name."""
     values = {f"segment.{k}": text for k, text in enumerate(segmentation.descriptions)}
     message = f"{len(segmentation.changepoints)} changepoints, {segmentation.n_primitives} primitives"
-    return Status(f"{node}: segmentation", Level.OK, message, values)
+    remark = segmentation.remark(duration)
+    values |= {} if math.isnan(segmentation.r_hat) else {"r_hat": f"{segmentation.r_hat:.3g}"}
+    return Status(f"{node}: segmentation", Level.WARN if remark else Level.OK, remark or message, values)
 
 
 def segment_descriptions(statuses: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:

@@ -96,7 +96,7 @@ class Segmenter(StageNode):
         stop_if_cancelled()
         self.send("changepoints", encode_changepoints(encounter, segmentation))
         self.send("posterior", encode_posterior(encounter, segmentation))
-        status = segmentation_status(segmentation, self.get_fully_qualified_name())
+        status = segmentation_status(segmentation, self.get_fully_qualified_name(), encounter.duration)
         self.get_logger().info(status.message)
         self.report(status, stamp_ns=encounter.start_ns)
 

@@ -71,7 +71,10 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
     yield "posterior", encode_posterior(encounter, result.segmentation), stamp
     for name, vehicle in zip(names, encounter.vehicles, strict=True):
         yield vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}"), stamp
-    statuses = (segmentation_status(result.segmentation, "/segmenter"), *fit_statuses(fit, "/planner", hashes))
+    statuses = (
+        segmentation_status(result.segmentation, "/segmenter", result.encounter.duration),
+        *fit_statuses(fit, "/planner", hashes),
+    )
     yield "diagnostics", encode_diagnostics(statuses, stamp), stamp
     ego = result.generated.ego
     for topic, data in () if ego is None else ego_messages(ego, stamp):

@@ -93,6 +93,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "metrics": evaluation.metrics,
         "ego": case.generated.ego.vehicles[0].id if case.generated.ego else "",
         "k": len(case.segmentation.changepoints),
+        "remark": case.segmentation.remark(duration),
         "rate": len(case.segmentation.changepoints) / duration,
         "errors": {
             (arm, key): _found(evaluation, case.row if arm == WITH else arm, key)

@@ -41,8 +41,8 @@ def summary(cases: Sequence[GenerationResult]) -> RenderableType:
     )
 
 
-def _case(case: GenerationResult) -> tuple[Text, Text]:
-    """The name of a case, and its figures."""
+def _case(case: GenerationResult) -> list[Text]:
+    """The name of a case, its figures, and what is to be said of its segmentation."""
     made, found = case.generated, case.evaluation.row(WITH)
     order = formatted(found.values.get("order_kept"), "%", bounds=False) if found else "–"
     title = Text(printable(case.title), style="bold")
@@ -58,7 +58,8 @@ def _case(case: GenerationResult) -> tuple[Text, Text]:
         _errors(case, "e_speed"),
         f"   order {order if order == '–' else order + ' %'}{measured}",
     )
-    return title, figures
+    remark = case.segmentation.remark(case.encounter.duration)
+    return [title, figures, *([Text(f"  {remark}", style="yellow")] if remark else [])]
 
 
 def _errors(case: GenerationResult, metric: str) -> Text:

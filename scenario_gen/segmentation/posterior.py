@@ -20,6 +20,8 @@ import numpy as np
 
 from scenario_gen.arrays import Bools, Floats, frozen, frozen_ints, Ints
 
+MOST_SAMPLES = 400  # labels of more sweeps than these are thinned evenly; traces are not
+
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
@@ -28,7 +30,7 @@ class Posterior:
     Attributes:
         labels: (T,) the point estimate, 0 .. K - 1 in order of first appearance: the most probable label of every sample, which
             minimises the expected Hamming distance to the samples once their labels are matched.
-        samples: (S, T) sampled labels of the chains that agree on where the mass is, matched to the estimate.
+        samples: (S, T) sampled labels, of sweeps evenly apart, of the chains that agree where the mass is; matched to `labels`.
         probability: (T,) posterior probability of a changepoint at each sample.
         ends: index one past the last sample of each sequence.
         chain: (S,) chain of each sample.
@@ -187,9 +189,10 @@ def pool(samples: list[Ints], traces: list[Floats], ends: Ints, lead: int) -> Po
     means = np.array([trace[:, 0].mean() for trace in traces])
     best = int(np.argmax(means))
     kept = means >= means[best] - max(10.0, 3.0 * float(traces[best][:, 0].std()))
-    stack = np.vstack([s for s, keep in zip(samples, kept, strict=True) if keep])
-    chain = np.concatenate([np.full(len(s), k) for k, (s, keep) in enumerate(zip(samples, kept, strict=True)) if keep])
-    scores = np.concatenate([t[:, 0] for t, keep in zip(traces, kept, strict=True) if keep])
+    every = max(1, -(-sum(len(s) for s, keep in zip(samples, kept, strict=True) if keep) // MOST_SAMPLES))
+    stack = np.vstack([s[::every] for s, keep in zip(samples, kept, strict=True) if keep])
+    chain = np.concatenate([np.full(len(s[::every]), k) for k, (s, keep) in enumerate(zip(samples, kept, strict=True)) if keep])
+    scores = np.concatenate([t[::every, 0] for t, keep in zip(traces, kept, strict=True) if keep])
     estimate = stack[int(np.argmax(scores))]
     size = int(stack.max()) + 1
     for _ in range(3):

@@ -94,13 +94,14 @@ def segment(encounter: Encounter, config: SegmentationConfig = DEFAULT, seed: in
         posterior = segment_series(features, config.sampler, seed, blur=blur)
         points = on_trends(encounter, posterior, cut(posterior, config, encounter.dt), config)
     labels = in_order(relabel(posterior.labels, points))
-    return Segmentation(labels, points, posterior.probability, describe_segments(encounter, points))
+    r_hat = float(posterior.r_hat.max())
+    return Segmentation(labels, points, posterior.probability, describe_segments(encounter, points), r_hat)
 
 
 def on_trends(encounter: Encounter, posterior: Posterior, points: Ints, config: SegmentationConfig) -> Ints:
     """Put changepoints (K,) where trends change, see `trends`, and keep the most useful ones up to `max_rate`."""
     trends = Trends.of(encounter.position, encounter.speed, encounter.dt)
-    least = trends.threshold(config.significance_level)
+    least, certain = (trends.threshold(config.significance_level**power) for power in (1, 2))
     reach = round(config.settle / encounter.dt)
     gap = max(2, int(np.ceil(config.min_segment / encounter.dt - 1e-9)))
     most = int(encounter.duration * config.max_rate)
@@ -109,6 +110,8 @@ def on_trends(encounter: Encounter, posterior: Posterior, points: Ints, config: 
     found = trends.settle([int(c) for c in points], reach, gap)
     found = trends.settle(trends.drop(found, least, everything), reach, gap)
     found = trends.settle(trends.add(found, candidates, least, gap), reach, gap)
+    # speeds that change by less than their noise in the sampler's window still show in a line's knots over many seconds
+    found = trends.settle(trends.add(found, np.arange(trends.samples), certain, gap), reach, gap)
     found = trends.settle(trends.drop(found, least, most), reach, gap)
     return np.array(found, dtype=np.int64)
 

@@ -148,7 +148,7 @@ def sample(problem: Problem, config: SamplerConfig, seed: int, ends: Ints, chann
     first, *seeds = np.random.SeedSequence([seed]).spawn(config.chains + 1)
     start = find_start(problem, config, np.random.Generator(np.random.PCG64(first)))
     streams = [np.random.Generator(np.random.PCG64(stream)) for stream in seeds]
-    places = [start.place] + [other_start(start, index, streams[index]) for index in range(1, config.chains)]
+    places = [start.place] + [other_start(start, config, index, streams[index]) for index in range(1, config.chains)]
     states = config.states or start.states + ROOM
     places = [Place(np.minimum(place.labels, states - 1), place.mass) for place in places]
     while True:

@@ -15,9 +15,12 @@
 """What the segmenter answers."""
 
 from dataclasses import dataclass
+import math
 
 from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints
 from scenario_gen.types.encounter import Vehicle
+
+LONG_WITHOUT = 15.0  # s without a changepoint that are worth a word
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,12 +32,14 @@ class Segmentation:
         changepoints: (K,) sample indices, each the first sample whose primitive differs (0 is none); labels change exactly there.
         changepoint_probability: (T,) posterior probability that a changepoint sits at each sample.
         descriptions: K + 1 sentences, one per segment ("vehicle 0 brakes, vehicle 1 stands").
+        r_hat: largest split R-hat of the sampler's traces: whether its chains agreed; nan: not known.
     """
 
     labels: Ints
     changepoints: Ints
     changepoint_probability: Floats
     descriptions: tuple[str, ...]
+    r_hat: float = math.nan
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "labels", frozen_ints(self.labels))
@@ -45,6 +50,15 @@ class Segmentation:
     def n_primitives(self) -> int:
         """Number of distinct primitives."""
         return int(self.labels.max()) + 1
+
+    def remark(self, duration: float) -> str:
+        """What its user should know of it, or nothing: an encounter of `duration` s in which nothing seemed to change."""
+        if len(self.changepoints) or duration <= LONG_WITHOUT:
+            return ""
+        return (
+            f"no changepoint in {duration:.0f} s: speeds and courses looked constant; what is generated keeps no other dynamics "
+            "(if they were not: raise segmentation.significance_level, lower segmentation.speed_noise and turn_noise)"
+        )
 
 
 @dataclass(frozen=True, eq=False)

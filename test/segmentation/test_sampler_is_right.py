@@ -23,6 +23,7 @@ from scenario_gen.segmentation.hdp_hmm.chain import run_chain
 HYPER = np.array([3.0, 1.0, 6.0, 0.5, 4.0, 2.0])
 STATES = 4
 EXTRAS, WORTHS = np.array([6.0, 9.0, 20.0]), np.array([0.5, 1.0, 3.0])
+ODDS = np.array([0.2, 0.5, 0.3])
 
 
 def draw_prior(rng, samples, d, order):
@@ -37,7 +38,7 @@ def draw_prior(rng, samples, d, order):
     for t in range(1, samples):
         labels[t] = rng.choice(STATES, p=pi[labels[t - 1]])
     p = 1 + order * d
-    chosen = rng.integers([len(EXTRAS), len(WORTHS)])
+    chosen = np.array([rng.integers(len(EXTRAS)), rng.choice(len(WORTHS), p=ODDS)])
     extra, worth = EXTRAS[chosen[0]], WORTHS[chosen[1]]
     mean, precision, within = prior(d, order)
     bartlett = np.zeros((STATES, d, d))
@@ -88,7 +89,7 @@ def gibbs(v, labels, top, mass, chosen, d, order, dof, moves, gaps, hidden, seed
     samples, trace, emissions = np.empty((1, len(v)), np.int64), np.empty((1, 5)), np.empty((STATES, d, v.shape[1]))
     vt = np.ascontiguousarray(v.T)
     top = top.copy()
-    fixed = (np.array([len(v)]), *prior(d, order), EXTRAS, WORTHS)
+    fixed = (np.array([len(v)]), *prior(d, order), EXTRAS, WORTHS, np.log(ODDS))
     sizes = (1 + order * d, moves, seed, 0)
     run_chain(v, vt, gaps, hidden, mass, *fixed, chosen, hyper, labels, top, *sizes, samples, trace, emissions)
     whitening = emissions[:, :, 1 + order * d :]

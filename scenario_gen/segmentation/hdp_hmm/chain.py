@@ -188,7 +188,7 @@ def update_outer(v: Floats, before: Ints, labels: Ints, mass: Floats, outer: Flo
                 outer[a] = 0.0
 
 
-@kernel(OUT2, OUT2, I1, B2, OUT1, I1, F2, F2, F2, F1, F1, OUTI1, F1, I1, OUT1, I, I, I, I, OUTI2, OUT2, OUT3)
+@kernel(OUT2, OUT2, I1, B2, OUT1, I1, F2, F2, F2, F1, F1, F1, OUTI1, F1, I1, OUT1, I, I, I, I, OUTI2, OUT2, OUT3)
 def run_chain(
     v: Floats,
     vt: Floats,
@@ -201,6 +201,7 @@ def run_chain(
     within: Floats,
     extras: Floats,
     worths: Floats,
+    odds: Floats,
     chosen: Ints,
     hyper: Floats,
     start: Ints,
@@ -226,7 +227,8 @@ def run_chain(
         precision: (P, P) their prior precision K is this times one of `worths`.
         within: (D, D) prior mean of the states' covariances; S0 is (ν0 - D - 1) times it.
         extras: (A,) what ν0 - D may be, all equally probable beforehand.
-        worths: (B,) what K may be in units of `precision`, all equally probable beforehand.
+        worths: (B,) what K may be in units of `precision`.
+        odds: (B,) logarithms of how probable each is beforehand.
         chosen: (2,) which of them hold now; updated.
         hyper: hyperpriors (see HYPER), then the weight of a sample, the noise's degrees of freedom (0: Gaussian), and the
             blur of each of the D channels.
@@ -269,7 +271,7 @@ def run_chain(
         else:
             update_outer(v, before, labels, mass, outer, sums)
         if sweep % PRIOR_EVERY == 0:
-            sample_prior(state, outer, sums, mean, precision, within, extras, worths, weight, blur, chosen, g0, factor)
+            sample_prior(state, outer, sums, mean, precision, within, extras, worths, odds, weight, blur, chosen, g0, factor)
             base, nu = set_prior(mean, precision, within, extras[chosen[0]], worths[chosen[1]], g0, factor)
         for k in range(states):
             posterior_factor(outer[k], sums[k, 1], g0, weight, blur, factors[k])

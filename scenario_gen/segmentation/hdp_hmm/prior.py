@@ -74,13 +74,17 @@ def sample_prior(
     within: Floats,
     extras: Floats,
     worths: Floats,
+    odds: Floats,
     weight: float,
     blur: Floats,
     chosen: Ints,
     g0: Floats,
     factor: Floats,
 ) -> None:
-    """Draw `chosen` (2,), which of `extras` and `worths` hold, one given the other, from the states' statistics."""
+    """Draw `chosen` (2,), which of `extras` and `worths` hold, one given the other, from the states' statistics.
+
+    `odds` (B,) are the logarithms of how probable each of `worths` is beforehand.
+    """
     p = mean.shape[1]
     for side in range(2):
         options = extras if side == 0 else worths
@@ -91,7 +95,7 @@ def sample_prior(
             extra = options[option] if side == 0 else extras[chosen[0]]
             worth = options[option] if side == 1 else worths[chosen[1]]
             base, nu = set_prior(mean, precision, within, extra, worth, g0, factor)
-            logs[option] = 0.0
+            logs[option] = odds[option] if side == 1 else 0.0
             for k in range(len(outer)):
                 if sums[k, 0] > 0.0:
                     posterior_factor(outer[k], sums[k, 1], g0, weight, blur, factor)

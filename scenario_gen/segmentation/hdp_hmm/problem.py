@@ -89,7 +89,8 @@ def unexplained(
 
 START = (1.0, 50.0, 0.9)
 MERGE_ROWS = (40.0, 0.1)
-MEAN_WORTHS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
+MEAN_WORTHS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # log-normal beforehand, about 0.1, with a factor of 4.5
+MEAN_ODDS = (-1.2, -0.3, 0.0, -0.3, -1.2, -2.6, -4.7)
 EXTRA_DEGREES = (3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 300.0, 1000.0)
 GUESSED_DOF = 5.0  # until the data have said how heavy the noise's tails are
 
@@ -122,6 +123,7 @@ class Problem:
         mean: (D, P) prior mean M of the regression.
         precision: (P, P) unit of the prior K.
         worths: (B,) what K may be in units of it.
+        odds: (B,) logarithms of how probable each is beforehand.
         lead: samples at the head of each sequence that have no full past and hence no row.
         weight: what a sample counts for.
         dof: degrees of freedom of Student-t noise; 0: Gaussian.
@@ -136,6 +138,7 @@ class Problem:
     mean: Floats
     precision: Floats
     worths: Floats
+    odds: Floats
     lead: int
     weight: float
     dof: float
@@ -207,6 +210,7 @@ class Problem:
             mean=mean,
             precision=np.eye(p) * (config.mean_weight if order else 1.0),
             worths=np.array([1.0]) if order else np.array(MEAN_WORTHS),
+            odds=np.zeros(1) if order else np.array(MEAN_ODDS),
             lead=order,
             weight=config.weight or 1.0,
             dof=GUESSED_DOF if config.dof == 0.0 else (0.0 if config.dof >= GAUSSIAN_DOF else config.dof),
@@ -272,6 +276,7 @@ class Problem:
             prior.within,
             extras,
             self.worths,
+            self.odds,
             chosen,
             self.hyper(config),
             place.labels,

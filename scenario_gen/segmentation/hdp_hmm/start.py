@@ -188,9 +188,12 @@ def _search(problem: Problem, config: SamplerConfig, clusters: int, rng: np.rand
     return Start(problem, prior, place)
 
 
-def other_start(start: Start, index: int, rng: np.random.Generator) -> Place:
-    """Labels for chain number `index` > 0: k-means with another window, into as many states as `start` found and a few more."""
-    return cluster(start.problem, start.states + MORE_STATES, WINDOWS[index % len(WINDOWS)], rng)
+def other_start(start: Start, config: SamplerConfig, index: int, rng: np.random.Generator) -> Place:
+    """Where chain number `index` > 0 starts: k-means with another window, a few sweeps, merges, under the prior of `start`."""
+    problem, clusters = start.problem, start.states + MORE_STATES
+    place = cluster(problem, clusters, WINDOWS[index % len(WINDOWS)], rng)
+    place = problem.run(config, start.prior, place, new_top(clusters), STAGES[1] - 1, 1, int(rng.integers(2**62)))[0]
+    return Place(problem.merge(config, start.prior, place)[1], place.mass)
 
 
 def tails(problem: Problem, place: Place) -> float:
