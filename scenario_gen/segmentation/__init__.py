@@ -14,6 +14,7 @@
 
 """Encounter -> primitives and changepoints, with their posterior (paper II-B)."""
 
+from scenario_gen.segmentation.estimator import SegmentationWarning, StickyHDPHMM
 from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.segmentation.library import assign, Assignment, build_library, PrimitiveLibrary
 from scenario_gen.segmentation.live import LiveSegmenter
@@ -35,6 +36,8 @@ __all__ = [
     "SamplerConfig",
     "Segmentation",
     "SegmentationConfig",
+    "SegmentationWarning",
+    "StickyHDPHMM",
     "assign",
     "build_library",
     "segment",

@@ -41,6 +41,8 @@ class Posterior:
         dof: degrees of freedom of the noise; 0: Gaussian.
         weight: what a sample counted for.
         channels: (D',) channels that were used; the others do not vary or follow from these.
+        extra: ν0 - D of the emissions' prior, as last drawn (geometric mean of the chains).
+        worth: κ0, or what the prior precision K is in units of the configured one, likewise.
     """
 
     labels: Ints
@@ -55,6 +57,8 @@ class Posterior:
     dof: float = 0.0
     weight: float = 1.0
     channels: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    extra: float = 25.0
+    worth: float = 0.1
 
     @property
     def r_hat(self) -> Floats:

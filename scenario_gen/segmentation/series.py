@@ -89,7 +89,7 @@ def standardised(x: Floats, known: Floats) -> tuple[Floats, Floats, Ints]:
         (T, D') series, (D',) variance to which each channel is known, and which channels (D',) they are.
     """
     few = (~np.isnan(x)).sum(axis=0) < 2
-    whole = without_outliers(np.where(few, 0.0, x))
+    whole = without_outliers(np.where(few, 0.0, x), outlier_bounds(np.where(few, 0.0, x)))
     spread, centre = np.nanstd(whole, axis=0), np.nanmean(whole, axis=0)
     low, high = np.nanquantile(whole, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
     inner = np.nanstd(np.clip(whole, low, high), axis=0)
@@ -105,21 +105,26 @@ def standardised(x: Floats, known: Floats) -> tuple[Floats, Floats, Ints]:
     return np.ascontiguousarray(scaled), np.square(known[channels] / unit[channels]), channels
 
 
-def without_outliers(x: Floats) -> Floats:
-    """Replace cells of x (T, D) by NaN that lie far outside the rest of their channel, one or two in a row.
+def outlier_bounds(x: Floats) -> Floats:
+    """(2, D) values beyond which cells of x (T, D) lie far outside the rest of their channel; infinite where most are alike."""
+    low, high = np.nanquantile(x, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
+    reach = np.where(high > low, FAR_RANGES * (high - low), np.inf)
+    return np.stack([low - reach, high + reach])
+
+
+def without_outliers(x: Floats, bounds: Floats) -> Floats:
+    """Replace cells of x (T, D) outside `bounds` (2, D) by NaN where they come one or two in a row.
 
     What noise with heavy tails cannot be asked to explain (a lost sensor's 10⁶) would still set the scale of all else; what
     lasts longer is a state, however rare.
     """
-    low, high = np.nanquantile(x, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
-    reach = FAR_RANGES * (high - low)
-    far = (x < low - reach) | (x > high + reach)
-    if not far.any() or (high <= low).all():
+    far = (x < bounds[0]) | (x > bounds[1])
+    if not far.any():
         return x
     near = np.zeros((len(x) + 4, x.shape[1]), np.int64)
     near[2:-2] = far
     around = near[:-4] + near[1:-3] + near[2:-2] + near[3:-1] + near[4:]
-    return np.where(far & (around <= 2) & (high > low), np.nan, x)
+    return np.where(far & (around <= 2), np.nan, x)
 
 
 def independent(x: Floats) -> Ints:
@@ -158,7 +163,18 @@ def sample(problem: Problem, config: SamplerConfig, seed: int, ends: Ints, chann
             break
         places, states = [chain.place for chain in chains], min(2 * states, MOST_STATES)
     posterior = pool([chain.samples for chain in chains], [chain.trace for chain in chains], ends, problem.lead)
-    return replace(posterior, states=states, full=full, dof=start.problem.dof, weight=start.problem.weight, channels=channels)
+    drawn = exact.log(np.array([[chain.prior.extra, chain.prior.worth] for chain in chains]))
+    extra, worth = exact.exp(drawn.mean(axis=0)).tolist()
+    return replace(
+        posterior,
+        states=states,
+        full=full,
+        dof=start.problem.dof,
+        weight=start.problem.weight,
+        channels=channels,
+        extra=extra,
+        worth=worth,
+    )
 
 
 def schedule(sweeps: int) -> Iterator[int]:
@@ -180,7 +196,7 @@ class Chain:
         self._samples: list[Ints] = []
         self._traces: list[Floats] = []
         self._ran = 0
-        self._prior = start.prior
+        self.prior = start.prior
         self._top = new_top(states)
         self.place = place
 
@@ -189,7 +205,7 @@ class Chain:
         more = sweeps - self._ran
         seed = int(self._rng.integers(2**62))
         problem = self._start.problem
-        self.place, self._prior, samples, trace = problem.run(self._config, self._prior, self.place, self._top, 0, more, seed)
+        self.place, self.prior, samples, trace = problem.run(self._config, self.prior, self.place, self._top, 0, more, seed)
         self._samples.append(samples)
         self._traces.append(trace)
         self._ran = sweeps
