@@ -53,7 +53,7 @@ class SamplerConfig(Parameters):
         0.0, "what one sample counts for, below 1 where neighbours repeat each other; 0: from the data", low=0.0, high=1.0
     )
     gamma_shape: float = parameter(1.0, "shape of γ's Gamma prior", low=1e-3)
-    gamma_rate: float = parameter(0.5, "rate of γ's Gamma prior", low=1e-6)
+    gamma_rate: float = parameter(1.0, "rate of γ's Gamma prior", low=1e-6)
     alpha_kappa_shape: float = parameter(1.0, "shape of the Gamma prior of α+κ", low=1e-3)
     alpha_kappa_rate: float = parameter(0.01, "rate of the Gamma prior of α+κ", low=1e-6)
     rho_a: float = parameter(40.0, "first parameter of ρ's Beta prior, ρ = κ/(α+κ)", low=1e-3)
