@@ -24,7 +24,7 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.roads.clearance import clearance_in_cells, to_cells, to_metres
-from scenario_gen.roads.connectivity import component_cells, corner_cells
+from scenario_gen.roads.connectivity import component_cells
 from scenario_gen.routing.search import tree_nodes as trees
 from scenario_gen.routing.search.planner import Budget, BudgetSpentError, check_query, path_length, Plan, Query
 from scenario_gen.routing.search.shortcut import pull_string
@@ -66,8 +66,7 @@ class _Trees:
     def __init__(self, road: Road, query: Query, label: int, config: RrtStarConnectConfig, seed: int) -> None:
         self.clearance = clearance_in_cells(road)
         self.ends = to_cells(road, np.array((query.start, query.goal)))
-        self.free_cells = component_cells(road, query.radius, label)
-        self.corner_cells = corner_cells(road, query.radius, label)
+        self.free_cells, self.corner_cells = component_cells(road, query.radius, label)
         least_gamma = 2.0 * math.sqrt(1.5 * max(len(self.free_cells), 1) / math.pi)  # Karaman & Frazzoli 2011, d = 2
         gamma = config.gamma_factor * least_gamma
         side = max(max(self.clearance.shape) / 8.0, 1.0)
