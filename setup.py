@@ -38,6 +38,9 @@ def needed(name: str) -> dict[str, list[str]]:
 
 EXTRAS = needed("requirements.in")
 CORE = EXTRAS.pop("core")
+EXTRAS["segmentation"] = [
+    wanted for wanted in CORE if wanted.startswith(("numpy", "scipy", "numba"))
+]  # all that it needs of the core
 EXTRAS["cli"] += [*EXTRAS["bags"], *EXTRAS["parquet"], *EXTRAS["report"]]
 EXTRAS["all"] = [*EXTRAS["cli"], *EXTRAS["planners"]]
 EXTRAS["ros"] = [*EXTRAS["all"], *chain.from_iterable(needed("requirements-ros.in").values())]

@@ -15,12 +15,11 @@
 """YAML and JSON that others wrote, read with bounds: size, depth, no aliases, plain values only, a schema."""
 
 from collections.abc import Mapping
+from functools import cache
 import json
 from pathlib import Path
 import stat
 from typing import Any, NoReturn
-
-import yaml
 
 from scenario_gen.errors import guarded, InputError
 
@@ -34,22 +33,27 @@ NUMBER = {"type": "number", "minimum": -LARGEST, "maximum": LARGEST}
 COUNT = {"type": "integer", "minimum": 0, "maximum": WHOLE - 1}
 
 
-class _Loader(yaml.CSafeLoader):  # type: ignore[misc]
-    """Plain values only: a date is text, `<<` and `=` are keys like others; numbers of more than 64 bits are refused."""
+@cache
+def _loader() -> Any:
+    """Make the class that reads YAML; PyYAML is imported when the first document is read, for the segmentation does without."""
+    import yaml
 
-    yaml_implicit_resolvers = {  # noqa: RUF012 - as the base declares it
-        first: [(tag, pattern) for tag, pattern in known if tag in PLAIN]
-        for first, known in yaml.CSafeLoader.yaml_implicit_resolvers.items()
-    }
+    class Loader(yaml.CSafeLoader):  # type: ignore[misc]
+        """Plain values only: a date is text, `<<` and `=` are keys like others; numbers of more than 64 bits are refused."""
 
-    def construct_yaml_int(self, node: Any) -> int:
-        value: int = super().construct_yaml_int(node)
-        if not -WHOLE <= value < WHOLE:
-            raise yaml.constructor.ConstructorError(None, None, "an integer of more than 64 bits", node.start_mark)
-        return value
+        yaml_implicit_resolvers = {  # noqa: RUF012 - as the base declares it
+            first: [(tag, pattern) for tag, pattern in known if tag in PLAIN]
+            for first, known in yaml.CSafeLoader.yaml_implicit_resolvers.items()
+        }
 
+        def construct_yaml_int(self, node: Any) -> int:
+            value: int = super().construct_yaml_int(node)
+            if not -WHOLE <= value < WHOLE:
+                raise yaml.constructor.ConstructorError(None, None, "an integer of more than 64 bits", node.start_mark)
+            return value
 
-_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
+    Loader.add_constructor("tag:yaml.org,2002:int", Loader.construct_yaml_int)
+    return Loader
 
 
 def parse_yaml(text: str, what: str) -> Any:
@@ -62,11 +66,13 @@ def parse_yaml(text: str, what: str) -> Any:
     Raises:
         InputError: the text is too long, too deep, has aliases or tags of other kinds, or is no YAML.
     """
+    import yaml
+
     if len(text) > MOST_YAML:
         raise InputError(f"{what}: {len(text)} characters of YAML; at most {MOST_YAML} are read")
     try:
         _check_events(text, what)
-        return yaml.load(text, Loader=_Loader)
+        return yaml.load(text, Loader=_loader())
     except yaml.YAMLError as error:
         raise InputError(f"{what}: {_yaml_said(error)}") from error
     except (ValueError, KeyError, IndexError, AttributeError) as error:  # PyYAML's own constructors, of `!!int ""` or `!!bool x`
@@ -79,8 +85,10 @@ def _check_events(text: str, what: str) -> None:
     Raises:
         InputError: it is too deep, or has an alias or a tag of another kind.
     """
+    import yaml
+
     depth = 0
-    for event in yaml.parse(text, Loader=_Loader):
+    for event in yaml.parse(text, Loader=_loader()):
         place = f"{what}, line {event.start_mark.line + 1}, column {event.start_mark.column + 1}"
         if isinstance(event, yaml.AliasEvent):
             raise InputError(f"{place}: the alias *{event.anchor} is not read; write the value out")
@@ -92,7 +100,7 @@ def _check_events(text: str, what: str) -> None:
             raise InputError(f"{place}: lists or mappings nested more than {DEEPEST} deep are not read")
 
 
-def _yaml_said(error: yaml.YAMLError) -> str:
+def _yaml_said(error: Exception) -> str:
     """Return place and problem in one line."""
     mark = getattr(error, "problem_mark", None)
     place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""

@@ -20,7 +20,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.encounter import Tracks
 
 STANDING = 0.5
 STEADY = 0.25
@@ -49,7 +49,7 @@ def describe_motion(speed: Floats, heading: Floats, dt: float) -> str:
     return f"{verb} from {first:.1f} to {last:.1f} m/s{bend}"
 
 
-def describe_segments(encounter: Encounter, changepoints: Ints) -> tuple[str, ...]:
+def describe_segments(encounter: Tracks, changepoints: Ints) -> tuple[str, ...]:
     """One sentence per segment between changepoints (K,), naming every vehicle by its id."""
     edges = [0, *(int(c) for c in changepoints), encounter.speed.shape[1]]
     return tuple(

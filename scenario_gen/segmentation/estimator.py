@@ -47,7 +47,11 @@ class EstimatorError(InputError, ValueError):
 
 @contextmanager
 def as_value_error() -> Iterator[None]:
-    """Turn an InputError into an EstimatorError."""
+    """Turn an InputError into an EstimatorError.
+
+    Raises:
+        EstimatorError: the block raised an InputError.
+    """
     try:
         yield
     except InputError as error:

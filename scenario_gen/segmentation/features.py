@@ -31,7 +31,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.segmentation.hdp_hmm.problem import moving_mean
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.encounter import Tracks
 
 STAND_SPEED = 0.5
 STAND_BLUR = 0.2
@@ -85,7 +85,7 @@ def without_spikes(values: Floats, floor: float) -> Floats:
     return np.column_stack([np.interp(t, t[kept], column[kept]) for column in values.T])
 
 
-def without_outliers(encounter: Encounter) -> Encounter:
+def without_outliers(encounter: Tracks) -> Tracks:
     """Return the encounter without single positions and speeds that no vehicle could have had between its neighbours."""
     position = np.stack([without_spikes(xy, POSITION_FLOOR) for xy in encounter.position])
     speed = np.stack([without_spikes(v[:, None], SPEED_FLOOR)[:, 0] for v in encounter.speed])
@@ -119,7 +119,7 @@ def moving(speed: Floats, dt: float) -> Floats:
 
 
 def driving_features(
-    encounter: Encounter, speed_window: float, turn_window: float, speed_noise: float, turn_noise: float
+    encounter: Tracks, speed_window: float, turn_window: float, speed_noise: float, turn_noise: float
 ) -> tuple[Floats, Floats]:
     """Features (T, 3N) of an encounter, vehicle by vehicle, and the (3N,) spreads below which they mean nothing.
 
@@ -139,6 +139,6 @@ def driving_features(
     return np.column_stack(columns), np.tile([speed_noise, turn_noise, STAND_BLUR], len(encounter.vehicles))
 
 
-def paper_features(encounter: Encounter) -> Floats:
+def paper_features(encounter: Tracks) -> Floats:
     """(T, 3N) positions and speeds as the paper stacks them."""
     return np.column_stack([np.column_stack([p, v]) for p, v in zip(encounter.position, encounter.speed, strict=True)])

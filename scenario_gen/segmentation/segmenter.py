@@ -19,15 +19,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.arrays import Ints
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.errors import InputError
 from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.segmentation.descriptions import describe_segments
 from scenario_gen.segmentation.features import driving_features, paper_features, without_outliers
 from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.segmentation.posterior import in_order, Posterior
 from scenario_gen.segmentation.series import segment_series
-from scenario_gen.segmentation.trends import Trends
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.segmentation.trends import course, Trends
+from scenario_gen.types.encounter import Tracks, Vehicle
 from scenario_gen.types.segmentation import Segmentation
 
 DRIVING_SAMPLER = SamplerConfig(weight=0.5, chains=3, sweeps=90)
@@ -69,11 +70,11 @@ class SegmentationConfig(Parameters):
 DEFAULT = SegmentationConfig()
 
 
-def segment(encounter: Encounter, config: SegmentationConfig = DEFAULT, seed: int = 0) -> Segmentation:
+def segment(encounter: Tracks, config: SegmentationConfig = DEFAULT, seed: int = 0) -> Segmentation:
     """Cut an encounter into joint primitives (paper II-B).
 
     Args:
-        encounter: N vehicles, T samples.
+        encounter: N >= 1 vehicles, T samples.
         config: with `preset="paper"` the sampler sees raw positions and speeds, and only what is too short is merged.
         seed: same seed, same answer.
 
@@ -95,7 +96,31 @@ def segment(encounter: Encounter, config: SegmentationConfig = DEFAULT, seed: in
     return Segmentation(labels, points, posterior.probability, describe_segments(encounter, points), r_hat)
 
 
-def on_trends(encounter: Encounter, posterior: Posterior, points: Ints, config: SegmentationConfig) -> Ints:
+def segment_track(
+    position: Floats, speed: Floats, dt: float, config: SegmentationConfig = DEFAULT, seed: int = 0
+) -> Segmentation:
+    """Cut the drive of one vehicle alone into primitives; see `segment`.
+
+    Args:
+        position: (T, 2) m.
+        speed: (T,) m/s.
+        dt: sampling period, s.
+        config: as for an encounter.
+        seed: same seed, same answer.
+
+    Raises:
+        InputError: fewer than 4 samples, shapes that disagree, a value that is not finite, or a negative speed.
+    """
+    position, speed = np.asarray(position, np.float64), np.asarray(speed, np.float64)
+    if position.ndim != 2 or position.shape[1] != 2 or speed.shape != (len(position),) or len(speed) < 4:
+        raise InputError(f"a track is (T, 2) positions and (T,) speeds, T at least 4; not {position.shape} and {speed.shape}")
+    if not (dt > 0.0 and np.isfinite(position).all() and np.isfinite(speed).all()):
+        raise InputError(f"a track holds finite positions and speeds, dt > 0 s apart; dt is {dt}")
+    heading = course(position, speed, dt)[0]
+    return segment(Tracks("track", (Vehicle("0"),), 0, round(dt * 1e9), position[None], heading[None], speed[None]), config, seed)
+
+
+def on_trends(encounter: Tracks, posterior: Posterior, points: Ints, config: SegmentationConfig) -> Ints:
     """Put changepoints (K,) where trends change, see `trends`, and keep the most useful ones up to `max_rate`."""
     trends = Trends.of(encounter.position, encounter.speed, encounter.dt)
     least, certain = (trends.threshold(config.significance_level**power) for power in (1, 2))

@@ -38,8 +38,8 @@ class Vehicle:
 
 
 @dataclass(frozen=True, eq=False)
-class Encounter:
-    """N >= 2 vehicles on one clock. No NaN is ever inside.
+class Tracks:
+    """N >= 1 vehicles on one clock. No NaN is ever inside.
 
     Attributes:
         name: where it comes from, for people.
@@ -65,8 +65,8 @@ class Encounter:
         object.__setattr__(self, "position", frozen(self.position))
         object.__setattr__(self, "speed", frozen(self.speed))
         n, t = self.speed.shape
-        if n < 2 or t < 2:
-            raise InputError(f"encounter {self.name!r} has {n} vehicle(s) and {t} sample(s); at least 2 of each are needed")
+        if n < 1 or t < 2:
+            raise InputError(f"{self.name!r} has {n} vehicle(s) and {t} sample(s); at least 1 and 2 are needed")
         if self.position.shape != (n, t, 2) or self.heading.shape != (n, t) or len(self.vehicles) != n:
             raise InputError(f"encounter {self.name!r}: arrays disagree in shape")
         if not all(np.isfinite(a).all() for a in (self.position, self.heading, self.speed)):
@@ -92,6 +92,20 @@ class Encounter:
     def duration(self) -> float:
         """Seconds from the first to the last sample."""
         return float(self.time[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class Encounter(Tracks):
+    """N >= 2 vehicles on one clock. No NaN is ever inside.
+
+    Its attributes are those of `Tracks`.
+    """
+
+    def __post_init__(self) -> None:
+        n, t = np.shape(self.speed)
+        if n < 2 or t < 2:
+            raise InputError(f"encounter {self.name!r} has {n} vehicle(s) and {t} sample(s); at least 2 of each are needed")
+        super().__post_init__()
 
 
 def once_per_encounter(function: "Callable[[Encounter], Derived]") -> "Callable[[Encounter], Derived]":

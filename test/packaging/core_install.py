@@ -12,8 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""`make core`: the wheel and the core's locked packages, alone in an environment of their own, segment and generate."""
+"""`make core`: the wheel and the core's locked packages, alone in an environment of their own, segment and generate.
 
+And the wheel with the locked packages of the extra `segmentation`, and nothing else, fits the estimator.
+"""
+
+from collections.abc import Sequence
 import json
 from pathlib import Path
 import re
@@ -22,33 +26,48 @@ import sys
 import tempfile
 
 from licences import extras, installed, needed_at_run_time, ROOT
+from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
-from test_library import EXTRA_MODULES, write_csv
+from test_library_alone import EXTRA_MODULES, write_csv
+
+PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
+SEGMENTATION = ("numpy", "scipy", "numba")  # the extra's
 
 
-def core_lock() -> str:
-    """Return the part of requirements.lock that the core needs, hashes included."""
-    needed = needed_at_run_time(installed(), extras()["core"])
+def lock_of(wanted: Sequence[Requirement]) -> str:
+    """Return the part of requirements.lock that is needed, hashes included."""
+    needed = needed_at_run_time(installed(), wanted)
     blocks = re.split(r"^(?=\w)", (ROOT / "requirements.lock").read_text(encoding="utf-8"), flags=re.MULTILINE)
     return "".join(block for block in blocks if canonicalize_name(re.split(r"[=\s]", block)[0]) in needed)
+
+
+def environment(folder: Path, wheel: Path, wanted: Sequence[Requirement]) -> Path:
+    """Make an environment of what is wanted and of the wheel; return its Python."""
+    folder.mkdir()
+    (folder / "lock").write_text(lock_of(wanted), encoding="utf-8")
+    run(sys.executable, "-m", "venv", folder / "env")
+    python = folder / "env" / "bin" / "python"
+    run(python, *PIP, "install", "--require-hashes", "-r", folder / "lock")
+    run(python, *PIP, "install", "--no-deps", wheel)
+    return python
 
 
 def main() -> None:
     """Build, install, run, and say what was seen."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "core.lock").write_text(core_lock(), encoding="utf-8")
-        pip = (sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check")
-        run(*pip, "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, ROOT)
+        run(sys.executable, *PIP, "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, ROOT)
         (wheel,) = folder.glob("*.whl")
-        run(sys.executable, "-m", "venv", folder / "env")
-        python = folder / "env" / "bin" / "python"
-        pip = (python, "-m", "pip", "--quiet", "--disable-pip-version-check")
-        run(*pip, "install", "--require-hashes", "-r", folder / "core.lock")
-        run(*pip, "install", "--no-deps", wheel)
-        run(*pip, "check")
+        core = extras()["core"]
+        alone = environment(folder / "segmentation", wheel, [one for one in core if one.name in SEGMENTATION])
+        fitted = json.loads(run(alone, ROOT / "test" / "packaging" / "segmentation_use.py"))
+        few = run(alone, "-m", "pip", "freeze").split()
+        python = environment(folder / "core", wheel, core)
+        run(python, *PIP, "check")
         told = json.loads(run(python, ROOT / "test" / "packaging" / "core_use.py", write_csv(folder / "log.csv")))
         packages = run(python, "-m", "pip", "freeze").split()
+    assert fitted["states"] == 2 and not set(fitted["loaded"]) - {*SEGMENTATION, "llvmlite", "scenario_gen"}, fitted
+    print(f"{len(few)} packages: {', '.join(few)}: two states found; imported in {fitted['seconds']:.2f} s")
     assert told["scenarios"] == 4 and told["same"] and not set(told["loaded"]) & set(EXTRA_MODULES), told
     print(f"{len(packages)} packages: {', '.join(packages)}")
     print(f"{told['scenarios']} scenarios from {len(told['changepoints'])} changepoints")

@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 from scenario_gen.errors import InputError
-from scenario_gen.segmentation import segment, SegmentationConfig
+from scenario_gen.segmentation import segment, segment_track, SegmentationConfig
 from scenario_gen.types.encounter import Encounter
 
 
@@ -115,3 +115,39 @@ def test_short_segments_and_small_clusters_are_merged(encounter_of, preset, shor
     lengths = np.diff([0, *found.changepoints, 150])
     assert lengths.min() >= round(shortest / 0.1)
     assert np.bincount(found.labels).min() >= 2
+
+
+def lone_drive(seed=0):
+    """Steady, braking to a stop, standing, pulling away into a left bend."""
+    dt, rng = 0.1, np.random.default_rng(seed)
+    acceleration = np.repeat([0.0, -1.5, 0.0, 1.5], [60, 67, 40, 60])
+    turn = np.repeat([0.0, 0.0, 0.0, 0.2], [60, 67, 40, 60])
+    speed = np.maximum(10.0 + np.cumsum(acceleration) * dt, 0.0)
+    heading = np.cumsum(turn) * dt
+    position = np.cumsum(np.column_stack([speed * np.cos(heading), speed * np.sin(heading)]) * dt, axis=0)
+    return position + rng.normal(size=position.shape) * 0.1, np.maximum(speed + rng.normal(size=len(speed)) * 0.1, 0.0), dt
+
+
+def test_one_vehicle_alone_can_be_segmented():
+    found = segment_track(*lone_drive(), seed=1)
+    for truth in (60, 127, 167):
+        assert np.abs(found.changepoints - truth).min() <= 5
+    assert len(found.changepoints) <= 5
+    assert any("brakes to a stop" in words for words in found.descriptions)
+    assert any("turning left" in words for words in found.descriptions)
+
+
+@pytest.mark.parametrize(
+    ("position", "speed", "dt"),
+    [
+        (np.zeros((3, 2)), np.zeros(3), 0.1),
+        (np.zeros((9, 3)), np.zeros(9), 0.1),
+        (np.zeros((9, 2)), np.zeros(8), 0.1),
+        (np.full((9, 2), np.nan), np.zeros(9), 0.1),
+        (np.zeros((9, 2)), np.full(9, -1.0), 0.1),
+        (np.zeros((9, 2)), np.zeros(9), 0.0),
+    ],
+)
+def test_a_track_that_cannot_be_used_is_refused(position, speed, dt):
+    with pytest.raises(InputError):
+        segment_track(position, speed, dt)
