@@ -2,6 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
+export PYTHONDONTWRITEBYTECODE =
 
 # A sourced Jazzy keeps its own rclpy: then no ROS wheel is installed, and the environment sees the system's packages.
 # What lies in a virtual environment that is active is no Jazzy, but wheels that an earlier `make` put there.
@@ -62,13 +63,14 @@ licences: $(READY)
 
 install: $(READY)
 
-# The environment: locked packages, the project itself, and its kernels compiled once.
+# The environment: locked packages, the project itself, its kernels compiled once, and the tests (pytest rewrites their asserts).
 $(READY): requirements.lock requirements-ros.lock setup.py
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(not (3, 11) <= v <= (3, 13) and f"Python {v[0]}.{v[1]} found; 3.11, 3.12 or 3.13 is needed: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(if $(SOURCED),--system-site-packages) .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes $(LOCKED)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	$(BIN)/python -m scenario_gen.compiling
+	@$(BIN)/python -m pytest --collect-only >/dev/null || true
 	@touch $(READY)
 
 # The report's tests drive Chromium, package.xml is checked by xmllint; where they are missing and cannot be installed here, those tests

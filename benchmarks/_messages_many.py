@@ -22,7 +22,7 @@ from benchmarks._messages_processes import nodes
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.storage.messages import bag_topics
+from scenario_gen.storage.bag import bag_topics
 
 COUNT = sized(100_000, quick=30)
 MOST = 1024.0  # MiB

@@ -41,10 +41,32 @@ class Calibration:
     intervals: int
 
     @property
+    def table(self) -> str:
+        """Every decile in words."""
+        rows = zip(self.predicted, self.observed, self.counts, strict=True)
+        return "predicted: observed (n) " + ", ".join(f"{p:.2f}: {o:.2f} ({n})" for p, o, n in rows)
+
+    @property
     def worst(self) -> float:
         """Largest distance of predicted and observed in a decile with at least 30 samples."""
         enough = self.counts >= 30
         return float(np.abs(self.predicted - self.observed)[enough].max())
+
+
+def deciles(predicted: Floats, truth: Floats) -> tuple[Floats, Floats, Ints]:
+    """Mean prediction, how often it came true, and how many, (10,) each, by decile of the prediction."""
+    decile = np.minimum((predicted * 10.0).astype(np.int64), 9)
+    counts = np.bincount(decile, minlength=10)
+    with np.errstate(invalid="ignore"):
+        return np.bincount(decile, predicted, 10) / counts, np.bincount(decile, truth, 10) / counts, counts
+
+
+def near(changepoints: Ints, samples: int, radius: int) -> Floats:
+    """(T,) 1 where a changepoint lies within `radius` samples."""
+    result = np.zeros(samples)
+    for c in changepoints:
+        result[max(c - radius, 0) : c + radius + 1] = 1.0
+    return result
 
 
 def from_prior(rng: np.random.Generator, samples: int, d: int, config: SamplerConfig) -> tuple[Floats, Ints]:
@@ -86,19 +108,11 @@ def calibrate(seeds: range, samples: int = 200, d: int = 2, radius: int = 5) -> 
         x, labels = from_prior(rng, samples, d, config)
         posterior = segment_series(x, config, seed)
         real = np.flatnonzero(np.diff(labels)) + 1
-        near = np.zeros(samples, np.bool_)
-        for c in real:
-            near[max(c - radius, 0) : c + radius + 1] = True
         apart = slice(int(rng.integers(2 * radius)), None, 2 * radius)
         predicted.append(posterior.probability_within(radius)[apart])
-        truth.append(near[apart].astype(np.float64))
+        truth.append(near(real, samples, radius)[apart])
         inside += _covered(posterior, real, rng)
-    p, y = np.concatenate(predicted), np.concatenate(truth)
-    decile = np.minimum((p * 10.0).astype(np.int64), 9)
-    counts = np.bincount(decile, minlength=10)
-    with np.errstate(invalid="ignore"):
-        means = np.bincount(decile, p, 10) / counts, np.bincount(decile, y, 10) / counts
-    return Calibration(*means, counts, float(np.mean(inside)), len(inside))
+    return Calibration(*deciles(np.concatenate(predicted), np.concatenate(truth)), float(np.mean(inside)), len(inside))
 
 
 def _covered(posterior: Posterior, real: Ints, rng: np.random.Generator) -> list[bool]:

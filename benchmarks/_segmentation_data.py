@@ -14,7 +14,7 @@
 
 """Sequences with known states for the segmentation benchmark: cells A-D (docs/segmentation.md states their separation)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,16 +39,19 @@ class Labelled:
         return np.flatnonzero(np.diff(self.labels)) + 1
 
 
-CELLS = {"A": (300, 6, 4), "B": (3000, 6, 6), "C": (3000, 24, 8)}
+CELLS = {"A": (300, 6, 4), "B": (3000, 6, 6), "C": (3000, 24, 8), "many": (12_000, 6, 30)}
 DWELL = 40.0
 DISTANCE = 2.0
 
 
-def gaussian_hmm(cell: str, seed: int) -> Labelled:
-    """A sticky Gaussian HMM: mean dwell 40, state means about 2 apart in all, eigenvalues in 0.25-1.5 on random axes."""
+def gaussian_hmm(cell: str, seed: int, distance: float = DISTANCE, dof: float = 0.0) -> Labelled:
+    """A sticky Gaussian HMM: mean dwell 40, state means about `distance` apart in all, eigenvalues in 0.25-1.5 on random axes.
+
+    With `dof` > 0 the noise is Student's t with so many degrees of freedom.
+    """
     samples, dimensions, states = CELLS[cell]
     rng = np.random.default_rng([seed, ord(cell)])
-    means = rng.normal(size=(states, dimensions)) * DISTANCE / np.sqrt(2.0 * dimensions)
+    means = rng.normal(size=(states, dimensions)) * distance / np.sqrt(2.0 * dimensions)
     covariances = np.empty((states, dimensions, dimensions))
     for k in range(states):
         axes = np.linalg.qr(rng.normal(size=(dimensions, dimensions)))[0]
@@ -60,7 +63,10 @@ def gaussian_hmm(cell: str, seed: int) -> Labelled:
     for t in range(1, samples):
         labels[t] = rng.choice(states, p=transition[labels[t - 1]])
     factors = np.linalg.cholesky(covariances)
-    x = means[labels] + np.einsum("tij,tj->ti", factors[labels], rng.normal(size=(samples, dimensions)))
+    noise = np.einsum("tij,tj->ti", factors[labels], rng.normal(size=(samples, dimensions)))
+    if dof > 0.0:
+        noise /= np.sqrt(rng.chisquare(dof, size=(samples, 1)) / dof)
+    x = means[labels] + noise
     return Labelled(x, labels, means, covariances, transition)
 
 
@@ -136,3 +142,24 @@ def driving(seed: int, samples: int = 1200) -> Labelled:
     )
     x = np.column_stack([noisy_position[0], noisy_speed[0], noisy_position[1], noisy_speed[1]])
     return Labelled(x, labels, encounter=encounter)
+
+
+def with_outliers(encounter: Encounter, rng: np.random.Generator, share: float = 0.01) -> Encounter:
+    """Single speeds off by 10 m/s and single positions off by 20 m (standard deviations)."""
+    position, speed = encounter.position.copy(), encounter.speed.copy()
+    wrong = rng.uniform(size=speed.shape) < share
+    speed[wrong] = np.maximum(speed[wrong] + 10.0 * rng.normal(size=wrong.sum()), 0.0)
+    wrong = rng.uniform(size=speed.shape) < share
+    position[wrong] += 20.0 * rng.normal(size=(wrong.sum(), 2))
+    return replace(encounter, position=position, speed=speed)
+
+
+def with_gaps(encounter: Encounter, rng: np.random.Generator, share: float = 0.05) -> Encounter:
+    """Samples of a vehicle lost, and filled with lines between their neighbours as the reader of logs does."""
+    position, speed = encounter.position.copy(), encounter.speed.copy()
+    t = np.arange(speed.shape[1])
+    for xy, v in zip(position, speed, strict=True):
+        kept = rng.uniform(size=len(t)) >= share
+        v[:] = np.interp(t, t[kept], v[kept])
+        xy[:] = np.column_stack([np.interp(t, t[kept], xy[kept, axis]) for axis in range(2)])
+    return replace(encounter, position=position, speed=speed)

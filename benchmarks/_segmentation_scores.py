@@ -48,14 +48,16 @@ def changes(labels: Ints) -> Ints:
     return np.flatnonzero(np.diff(labels)) + 1
 
 
-def smoother(sequence: Labelled) -> Ints:
-    """(T,) the most probable label of each sample under the true parameters."""
+def smoother(sequence: Labelled, dof: float = 0.0) -> Ints:
+    """(T,) the most probable label of each sample under the true parameters; `dof` > 0: of Student's t."""
     assert sequence.means is not None and sequence.covariances is not None and sequence.transition is not None
     log_likelihood = np.empty((len(sequence.x), len(sequence.means)))
     for k, (mean, covariance) in enumerate(zip(sequence.means, sequence.covariances, strict=True)):
         factor = np.linalg.cholesky(covariance)
         rest = np.linalg.solve(factor, (sequence.x - mean).T)
-        log_likelihood[:, k] = -0.5 * (rest**2).sum(axis=0) - np.log(np.diag(factor)).sum()
+        squares = (rest**2).sum(axis=0)
+        squares = (dof + len(mean)) * np.log1p(squares / dof) if dof else squares
+        log_likelihood[:, k] = -0.5 * squares - np.log(np.diag(factor)).sum()
     likelihood: Floats = np.exp(log_likelihood - log_likelihood.max(axis=1, keepdims=True))
     forward, backward = np.empty_like(likelihood), np.ones_like(likelihood)
     forward[0] = likelihood[0] / likelihood[0].sum()

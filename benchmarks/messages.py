@@ -36,7 +36,7 @@ from msg_conventions.scenarios import decode_scenario, encode_scenario
 from scenario_gen.arrays import Floats
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.nodes.domain import free_domain, this_host_only
-from scenario_gen.storage.messages import bag_topics
+from scenario_gen.storage.bag import bag_topics
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import Scenario
 

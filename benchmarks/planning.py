@@ -36,7 +36,7 @@ from benchmarks.row import Row
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import RefusedError
 from scenario_gen.roads.clearance import clearance_in_cells, distance_transform
-from scenario_gen.roads.connectivity import component_at, components, connected
+from scenario_gen.roads.connectivity import common_component, component_at, components
 from scenario_gen.routing import plan_routes, PlanningConfig
 from scenario_gen.routing.search.ompl.solve import PLANNERS, solve
 from scenario_gen.routing.search.planner import Budget, BudgetSpentError, path_length, plan_with_retry, Query
@@ -229,7 +229,7 @@ def _recorded(queries: int = QUERIES_OF_A_MAP) -> list[Row]:
             component_at(road, np.zeros(2), radius)
             for seed in range(queries):
                 start, goal = road.origin + (cells[rng.integers(len(cells), size=2)][:, ::-1] + 0.5) * road.resolution
-                if not connected(road, start, goal, radius):
+                if common_component(road, start, goal, radius) is None:
                     continue
                 ways += 1
                 started = process_time()

@@ -32,7 +32,7 @@ from benchmarks._size import sized
 from benchmarks.messages import _Client, _done
 from benchmarks.row import Row
 from scenario_gen.nodes.domain import free_domain, this_host_only
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 
 NODES = ("evaluator", "gp_sampler", "planner", "segmenter", "road_server", "log_player")[sized(0, quick=5) :]
 LOAD = sized(16, quick=1)

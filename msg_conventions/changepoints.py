@@ -31,23 +31,11 @@ import numpy as np
 from msg_conventions import trajectory
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.diagnostics import Level, Status
-from msg_conventions.tracks import FRAME
-from msg_conventions.trajectory import Trajectory, TYPE
+from msg_conventions.tracks import encode_samples, FRAME
+from msg_conventions.trajectory import Trajectory
 from scenario_gen.errors import InputError
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
-
-__all__ = [
-    "POSTERIOR_TYPE",
-    "TYPE",
-    "decode_changepoints",
-    "decode_posterior",
-    "encode_changepoints",
-    "encode_live_changepoints",
-    "encode_posterior",
-    "segment_descriptions",
-    "segmentation_status",
-]
 
 POSTERIOR_TYPE = "sensor_msgs/msg/PointCloud2"
 UINT16, FLOAT32, FLOAT64 = 4, 7, 8  # sensor_msgs/PointField datatypes
@@ -57,19 +45,7 @@ DATATYPES = {"<f4": FLOAT32, "<u2": UINT16, "<f8": FLOAT64}
 
 def encode_changepoints(encounter: Encounter, segmentation: Segmentation) -> bytes:
     """Return the states at the changepoints as CDR bytes."""
-    at = segmentation.changepoints
-    return trajectory.encode(
-        Trajectory(
-            stamp_ns=encounter.start_ns,
-            frame_id=FRAME,
-            vehicles=encounter.vehicles,
-            time_ns=at * encounter.dt_ns,
-            position=encounter.position[:, at],
-            heading=encounter.heading[:, at],
-            speed=encounter.speed[:, at],
-            acceleration=np.gradient(encounter.speed, encounter.dt, axis=1)[:, at],
-        )
-    )
+    return encode_samples(encounter, segmentation.changepoints)
 
 
 def encode_live_changepoints(found: LiveChangepoints) -> bytes:

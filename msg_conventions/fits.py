@@ -27,14 +27,12 @@ import numpy as np
 
 from msg_conventions import trajectory
 from msg_conventions.diagnostics import Level, Status
-from msg_conventions.trajectory import Trajectory, TYPE
+from msg_conventions.trajectory import Trajectory
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import guarded, InputError
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.scenario import BoundaryStates
-
-__all__ = ["TYPE", "anchor_stamps", "decode_asked", "decode_fit", "decode_fitted", "encode_fit", "fit_statuses"]
 
 
 def anchor_stamps(encounter: Encounter, changepoints: Ints) -> list[int]:

@@ -22,10 +22,8 @@ from collections.abc import Mapping
 import hashlib
 import re
 
-from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status, TYPE
+from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status
 from scenario_gen.errors import InputError
-
-__all__ = ["INFOS", "MAP_HASH", "TEMPLATE_HASH", "TYPE", "decode_hashes", "encode_hashes", "hash_of", "template_hashes"]
 
 INFOS = ("road/info", "fit/info")
 DIGITS = 12

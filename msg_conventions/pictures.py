@@ -17,9 +17,6 @@
 Only for looking at; nothing is read back but the footprint. Frame: that of the vehicles drawn. QoS: reliable, transient_local.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
@@ -54,56 +51,37 @@ def decode_footprint(data: bytes, what: str = "footprint") -> Floats:
     return reader.array("<f4", 3 * count, 4).reshape(count, 3)[:, :2].astype(np.float64)
 
 
-@dataclass(frozen=True)
-class Marker:
-    """One visualization_msgs/Marker: a box at `pose`, or a line through `points` (M, 2+)."""
-
-    namespace: str
-    id: int
-    kind: int
-    pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    scale: tuple[float, float, float] = (0.1, 0.0, 0.0)
-    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    alpha: float = 1.0
-    points: Floats | None = None
-    text: str = ""
-
-
-def encode_markers(markers: Sequence[Marker], stamp_ns: int, frame_id: str, *, clear: bool = True) -> bytes:
-    """Return a MarkerArray as CDR bytes; `clear` first deletes what was drawn before."""
-    writer = CdrWriter().pack("I", len(markers) + clear)
-    if clear:
-        _marker(writer, Marker("", 0, 0), stamp_ns, frame_id, action=DELETE_ALL)
-    for marker in markers:
-        _marker(writer, marker, stamp_ns, frame_id, action=0)
-    return writer.finish()
-
-
-def _marker(writer: CdrWriter, marker: Marker, stamp_ns: int, frame_id: str, *, action: int) -> None:
-    writer.header(stamp_ns, frame_id).string(marker.namespace).pack("i", marker.id, marker.kind, action)
-    writer.pack("d", *pose_rows(np.array([marker.pose]))[0]).pack("d", *marker.scale)
-    writer.pack("f", *marker.colour, marker.alpha).stamp(0).pack("B", 0)
-    points = np.zeros((0, 2)) if marker.points is None else marker.points
-    writer.pack("I", len(points))
-    if len(points):
-        writer.align(8).raw(np.column_stack([points[:, :2], np.zeros(len(points))]).tobytes())
-    writer.pack("I", 0)  # colours
-    writer.string("").header(0, "").string("").pack("I", 0)  # texture: resource, image header, format, bytes
-    writer.pack("I", 0)  # uv coordinates
-    writer.string(marker.text).string("").string("").pack("I", 0)  # mesh resource; mesh file: name and bytes
-    writer.pack("B", 0)
-
-
 def scenario_markers(scenario: Scenario, stamp_ns: int) -> bytes:
-    """Return one scenario as a MarkerArray: a line along each path, a box at its start."""
+    """Return one scenario as a MarkerArray that replaces the one before: a line along each path, a box at its start."""
     names = tokens(vehicle.id for vehicle in scenario.vehicles)
-    markers: list[Marker] = []
+    writer = CdrWriter().pack("I", 1 + 2 * len(names))
+
+    def add(
+        namespace: str,
+        kind: int,
+        scale: tuple[float, ...] = (0.1, 0.0, 0.0),
+        colour: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0),
+        pose: tuple[float, ...] = (0.0, 0.0, 0.0),
+        *,
+        action: int = 0,
+        points: Floats | None = None,
+    ) -> None:
+        writer.header(stamp_ns, scenario.frame_id).string(namespace).pack("i", 0, kind, action)
+        writer.pack("d", *pose_rows(np.array([pose]))[0]).pack("d", *scale)
+        writer.pack("f", *colour).stamp(0).pack("B", 0)
+        writer.pack("I", 0 if points is None else len(points))
+        if points is not None:
+            writer.align(8).raw(np.column_stack([points, np.zeros(len(points))]).tobytes())
+        writer.pack("I", 0)  # colours
+        writer.string("").header(0, "").string("").pack("I", 0)  # texture: resource, image header, format, bytes
+        writer.pack("I", 0)  # uv coordinates
+        writer.string("").string("").string("").pack("I", 0)  # text; mesh resource; mesh file: name and bytes
+        writer.pack("B", 0)
+
+    add("", 0, action=DELETE_ALL)
     for k, (name, vehicle) in enumerate(zip(names, scenario.vehicles, strict=True)):
-        colour = COLOURS[k % len(COLOURS)]
-        x, y = scenario.position[k, 0]
-        size = (vehicle.length, vehicle.width, 1.5)
-        markers += [
-            Marker(f"path_{name}", 0, LINE_STRIP, scale=(0.15, 0.0, 0.0), colour=colour, alpha=0.6, points=scenario.position[k]),
-            Marker(f"box_{name}", 0, CUBE, (float(x), float(y), float(scenario.heading[k, 0])), size, colour, 0.8),
-        ]
-    return encode_markers(markers, stamp_ns, scenario.frame_id)
+        colour, path = COLOURS[k % len(COLOURS)], scenario.position[k]
+        start = (*path[0].tolist(), float(scenario.heading[k, 0]))
+        add(f"path_{name}", LINE_STRIP, (0.15, 0.0, 0.0), (*colour, 0.6), points=path)
+        add(f"box_{name}", CUBE, (vehicle.length, vehicle.width, 1.5), (*colour, 0.8), start)
+    return writer.finish()

@@ -24,11 +24,9 @@ import numpy as np
 
 from msg_conventions import trajectory
 from msg_conventions.cdr import NANOSECONDS
-from msg_conventions.trajectory import Trajectory, TYPE
+from msg_conventions.trajectory import Trajectory
 from scenario_gen.errors import InputError
 from scenario_gen.types.scenario import Scenario
-
-__all__ = ["TYPE", "decode_scenario", "digest", "encode_scenario"]
 
 
 def encode_scenario(scenario: Scenario, stamp_ns: int) -> bytes:

@@ -16,10 +16,9 @@
 
 import re
 
-from msg_conventions import diagnostics, ego, frames, paths, pictures, roads, trajectory
+from msg_conventions import changepoints, diagnostics, ego, frames, paths, pictures, roads, trajectory
 from scenario_gen.types.qos import Quality
 
-CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
 FIX_TYPE = "sensor_msgs/msg/NavSatFix"
 TWIST_TYPE = "geometry_msgs/msg/TwistStamped"
 
@@ -37,7 +36,7 @@ TOPICS: dict[str, tuple[str, Quality]] = {
     "tracks": (trajectory.TYPE, LATCHED),
     "changepoints": (trajectory.TYPE, LATCHED),
     "changepoints/live": (trajectory.TYPE, MANY),
-    "posterior": ("sensor_msgs/msg/PointCloud2", LATCHED),
+    "posterior": (changepoints.POSTERIOR_TYPE, LATCHED),
     "fit": (trajectory.TYPE, LATCHED),
     "fit/info": (diagnostics.TYPE, LATCHED),
     "vehicle_*/route": (paths.TYPE, LATCHED),

@@ -22,11 +22,10 @@ The encounter's name and geodetic origin do not travel: nothing is computed from
 import numpy as np
 
 from msg_conventions import trajectory
-from msg_conventions.trajectory import Trajectory, TYPE
+from msg_conventions.trajectory import Trajectory
+from scenario_gen.arrays import Ints
 from scenario_gen.errors import InputError
 from scenario_gen.types.encounter import Encounter
-
-__all__ = ["FRAME", "TYPE", "decode_tracks", "encode_tracks"]
 
 FRAME = "local_enu"
 SHORTEST_STEP_NS, LONGEST_STEP_NS = 1_000_000, 10_000_000_000
@@ -34,16 +33,21 @@ SHORTEST_STEP_NS, LONGEST_STEP_NS = 1_000_000, 10_000_000_000
 
 def encode_tracks(encounter: Encounter) -> bytes:
     """Return the encounter as CDR bytes."""
+    return encode_samples(encounter, np.arange(encounter.speed.shape[1]))
+
+
+def encode_samples(encounter: Encounter, at: Ints) -> bytes:
+    """Return the states at samples `at` (K,) of the encounter as CDR bytes."""
     return trajectory.encode(
         Trajectory(
             stamp_ns=encounter.start_ns,
             frame_id=FRAME,
             vehicles=encounter.vehicles,
-            time_ns=np.arange(encounter.speed.shape[1], dtype=np.int64) * encounter.dt_ns,
-            position=encounter.position,
-            heading=encounter.heading,
-            speed=encounter.speed,
-            acceleration=np.gradient(encounter.speed, encounter.dt, axis=1),
+            time_ns=at * encounter.dt_ns,
+            position=encounter.position[:, at],
+            heading=encounter.heading[:, at],
+            speed=encounter.speed[:, at],
+            acceleration=np.gradient(encounter.speed, encounter.dt, axis=1)[:, at],
         )
     )
 

@@ -17,6 +17,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -105,7 +106,7 @@ def nearest_if_impossible(
     *,
     count: int,
     seed: int,
-    cancelled: Cancelled | None = None,
+    cancelled: Cancelled = lambda: False,
 ) -> Iterator[None]:
     """Answer a refusal in the body with the nearest requests that are possible; none if it was cancelled.
 
@@ -118,7 +119,7 @@ def nearest_if_impossible(
     except RefusedError as error:
         if not request.moves:
             raise
-        search = _Search(encounter, segmentation, road, config, request, seed, min(count, ENOUGH), cancelled or (lambda: False))
+        search = _Search(encounter, segmentation, road, config, request, seed, min(count, ENOUGH), cancelled)
         found = tuple(search.run())
         raise ImpossibleError(str(error), () if search.cancelled() else found) from error
 
@@ -133,9 +134,9 @@ def attempt(
     count: int,
     seed: int,
     waits: tuple[Wait, ...] | None = None,
-    progress: Progress | None = None,
-    cancelled: Cancelled | None = None,
-    found: OnValid | None = None,
+    progress: Progress = lambda *_: None,
+    cancelled: Cancelled = lambda: False,
+    found: OnValid = lambda *_: None,
 ) -> GenerationResult:
     """Fit, plan and sample with given changepoints, without evaluation; `waits` that are kept are the template's unless given.
 
@@ -169,12 +170,16 @@ class _Search:
     ) -> None:
         self.encounter, self.segmentation, self.road, self.config = encounter, segmentation, road, config
         self.asked, self.seed, self.wanted, self.cancelled = asked, seed, wanted, cancelled
+
+    @cached_property
+    def base(self) -> dict[str, Floats]:
+        """Start and end states of the fitting without any asked, (N, 4) by end; nothing where that is not possible either."""
         try:
-            unasked = fit_template(encounter, segmentation, road, config.fitting)
-            plan_routes(road, unasked, config.planning, seed)
-            self.base = {"starts": unasked.asked.start, "goals": unasked.asked.end}
+            unasked = fit_template(self.encounter, self.segmentation, self.road, self.config.fitting)
+            plan_routes(self.road, unasked, self.config.planning, self.seed)
         except ScenarioGenError:
-            self.base = {}
+            return {}
+        return {"starts": unasked.asked.start, "goals": unasked.asked.end}
 
     def possible(self, request: Request, stretch: float | None = None) -> bool:
         """Whether scenarios of the request can be had within its budget."""

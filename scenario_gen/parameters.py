@@ -14,7 +14,7 @@
 
 """Parameters declared once: default, unit, range and meaning; the command line, the nodes and docs/ read them here."""
 
-from dataclasses import Field, field, fields, is_dataclass, replace
+from dataclasses import dataclass, Field, field, fields, is_dataclass, replace
 import math
 from pathlib import Path
 from typing import Any, TypeVar
@@ -51,11 +51,18 @@ def parameter(
     return field(default=default, metadata=meta)
 
 
-def check(config: Any) -> None:
-    """Raise InputError if a value of `config` has the wrong type or is out of range; call it in `__post_init__`."""
-    for entry in fields(config):
-        if entry.metadata:
-            check_value(entry.name, entry, getattr(config, entry.name))
+@dataclass(frozen=True)
+class Parameters:
+    """Base of every configuration: its values are checked when it is made.
+
+    Raises:
+        InputError: a value has the wrong type or is out of range.
+    """
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            if entry.metadata:
+                check_value(entry.name, entry, getattr(self, entry.name))
 
 
 def check_value(name: str, entry: "Field[Any]", value: Any) -> None:

@@ -44,7 +44,7 @@ def generate(
     count: int = 50,
     seed: int = 0,
     request: Request = Request(),
-    progress: Progress | None = None,
+    progress: Progress = lambda *_: None,
 ) -> GenerationResult:
     """Segment, fit, plan, sample (every candidate is checked) and evaluate.
 

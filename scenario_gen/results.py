@@ -21,10 +21,10 @@ from pathlib import Path
 
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import read_evaluations
-from scenario_gen.folders import Kind, write_text
+from scenario_gen.folders import Kind, sha256_of, write_text
 from scenario_gen.parameters import flatten
 from scenario_gen.pipeline import PipelineConfig
-from scenario_gen.recordings.provenance import parameter_texts, sha256_of, versions
+from scenario_gen.recordings.provenance import parameter_texts, versions
 from scenario_gen.recordings.read import INFO, read_recording
 from scenario_gen.recordings.write import add_results
 from scenario_gen.report.page import ReportInput, write_report

@@ -12,8 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Shared fixtures: where the recorded data is; a rule that CI may not skip, with one exception; the short form of the tests."""
+"""Shared fixtures; a rule that CI may not skip, with one exception; the short form of the tests and their order."""
 
+from collections import OrderedDict
+from collections.abc import Iterator
+import gc
 import os
 from pathlib import Path
 
@@ -39,16 +42,68 @@ def crashes() -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def browser() -> Iterator[object]:
+    """Headless Chromium, for all tests of a worker; the test skips where it is not installed."""
+    from browser_tab import chromium
+
+    with chromium() as instance:
+        yield instance
+
+
+LONGEST = """
+browser live_segmentation recorder over_dds loss demo_bag packaging bad_tracks restart doctor frames asked_states under_load
+recorded_encounters requests_over_dds first_start benchmarks every_cpu signals diagnostics cli_out folder_faults service_calls
+ros_parameters streams silence suites maps launching broken_bags cli rrt_star_connect fuzz fit
+"""  # of the groups of tests, longest first
+ORDER = {name: place for place, name in enumerate(LONGEST.split())}
+
+
+class LongestFirst(OrderedDict[str, dict[str, bool]]):
+    """Groups of tests that wait for a worker: the longest are taken first, so that none is left alone with one at the end."""
+
+    def popitem(self, last: bool = False) -> tuple[str, dict[str, bool]]:
+        """Return what is next; xdist asks for the first."""
+
+        def place(group: str) -> int:
+            name = Path(group.partition("::")[0]).stem.removeprefix("test_")  # of a test marked `spread` its id stands here
+            return ORDER.get(name, len(ORDER))
+
+        group = min(self, key=place)
+        return group, self.pop(group)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """Let xdist take the longest groups first; of itself it takes those of the most tests."""
+    from xdist.scheduler import LoadGroupScheduling
+
+    scheduler = LoadGroupScheduling(config, log)
+    scheduler.workqueue = LongestFirst()
+    return scheduler
+
+
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """In the short form leave out what is marked `long`; let one worker run a file, unless it is marked `spread`."""
+    """In the short form leave out what is marked `long`; let one worker run a file (or a group), unless it is marked `spread`."""
     left_out = [] if LONG else [item for item in items if item.get_closest_marker("long")]
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if not item.get_closest_marker("long")]
     for item in items:
         if not item.get_closest_marker("spread"):
-            item.add_marker(pytest.mark.xdist_group(item.path.stem))
+            item.add_marker(pytest.mark.xdist_group("browser" if "browser" in item.fixturenames else item.path.stem))
+
+
+def pytest_collection_finish() -> None:
+    """Look for no garbage in what has been loaded: it stays."""
+    gc.collect()
+    gc.freeze()
+
+
+def pytest_sessionfinish() -> None:
+    """Let all of it go at the end: libraries complain of what they miss then."""
+    gc.unfreeze()
 
 
 def _not_in_ci(report: pytest.TestReport | pytest.CollectReport) -> None:

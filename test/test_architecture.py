@@ -15,6 +15,7 @@
 """The shape of the house: stages import only what stands before them, rclpy only in the nodes, nothing local leaks out."""
 
 import ast
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 import re
@@ -55,10 +56,16 @@ RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])
 
 
+@cache
+def imports(path: Path) -> tuple[ast.AST, ...]:
+    """Return the import statements of a file, at any depth."""
+    return tuple(node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Import | ast.ImportFrom))
+
+
 def imported(path: Path) -> set[str]:
     """Return the dotted names of all modules that the file imports, at any depth."""
     names: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in imports(path):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -75,25 +82,25 @@ def test_every_stage_has_a_place_in_the_order():
     assert {stage(path) for path in PACKAGE.rglob("*.py")} - {"__init__"} <= set(RANK)
 
 
-@pytest.mark.parametrize("path", [p for p in PYTHON_FILES if PACKAGE in p.parents and stage(p) != "__init__"], ids=str)
-def test_a_stage_imports_only_what_stands_before_it(path):
-    for name in imported(path):
-        parts = name.split(".")
-        if parts[0] == "scenario_gen" and len(parts) > 1 and parts[1] in RANK:
-            assert RANK[parts[1]] <= RANK[stage(path)], f"{path.name} imports {name}"
+def test_a_stage_imports_only_what_stands_before_it():
+    for path in (path for path in PYTHON_FILES if PACKAGE in path.parents and stage(path) != "__init__"):
+        for name in imported(path):
+            parts = name.split(".")
+            if parts[0] == "scenario_gen" and len(parts) > 1 and parts[1] in RANK:
+                assert RANK[parts[1]] <= RANK[stage(path)], f"{path} imports {name}"
 
 
 FOUNDATION = ("types", "errors", "arrays", "exact", "documents")  # of scenario_gen, for the conventions
 
 
-@pytest.mark.parametrize("path", PYTHON_FILES, ids=str)
-def test_the_conventions_stand_on_the_types_and_below_recordings_and_nodes(path):
+def test_the_conventions_stand_on_the_types_and_below_recordings_and_nodes():
     """Messages are made and read by recordings and nodes alone, and know of nothing but the types."""
-    names = [name.split(".") for name in imported(path)]
-    if PACKAGE not in path.parents:
-        assert {parts[1] for parts in names if parts[0] == "scenario_gen" and len(parts) > 1} <= set(FOUNDATION)
-    elif stage(path) not in ("recordings", "nodes"):
-        assert "msg_conventions" not in {parts[0] for parts in names}
+    for path in PYTHON_FILES:
+        names = [name.split(".") for name in imported(path)]
+        if PACKAGE not in path.parents:
+            assert {parts[1] for parts in names if parts[0] == "scenario_gen" and len(parts) > 1} <= set(FOUNDATION), path
+        elif stage(path) not in ("recordings", "nodes"):
+            assert "msg_conventions" not in {parts[0] for parts in names}, path
 
 
 def module(path: Path) -> str:
@@ -104,7 +111,7 @@ def module(path: Path) -> str:
 def modules_imported(path: Path, known: set[str]) -> set[str]:
     """Return the modules among the `known` that a file imports: of `from package import module`, the module."""
     found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in imports(path):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -139,10 +146,10 @@ def test_no_modules_and_no_folders_import_each_other_in_a_circle():
     assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}})
 
 
-@pytest.mark.parametrize("path", PYTHON_FILES, ids=str)
-def test_rclpy_is_imported_only_in_the_nodes(path):
-    if PACKAGE / "nodes" not in path.parents:
-        assert not {name for name in imported(path) if name.split(".")[0] == "rclpy"}
+def test_rclpy_is_imported_only_in_the_nodes():
+    for path in PYTHON_FILES:
+        if PACKAGE / "nodes" not in path.parents:
+            assert not {name for name in imported(path) if name.split(".")[0] == "rclpy"}, path
 
 
 def test_the_command_line_loads_no_library_before_a_command_needs_it():

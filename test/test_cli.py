@@ -27,7 +27,7 @@ import yaml
 
 from scenario_gen.cli import main
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ import pytest
 from msg_conventions.scenarios import decode_scenario
 from scenario_gen import cli
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 
 LOG = bundled("b")
 QUICK = ("--road", "t_intersection", "--seed", "7", "--set", "evaluation.uniform=false", "--set", "evaluation.resamples=10")

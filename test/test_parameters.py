@@ -17,17 +17,14 @@ from dataclasses import dataclass, field
 import pytest
 
 from scenario_gen.errors import InputError
-from scenario_gen.parameters import assigned, check, flatten, parameter, updated
+from scenario_gen.parameters import assigned, flatten, parameter, Parameters, updated
 from scenario_gen.recordings.provenance import read_parameters
 
 
 @dataclass(frozen=True)
-class Inner:
+class Inner(Parameters):
     gain: float = parameter(0.5, "how much", unit="m", low=0.0, high=1.0)
     mode: str = parameter("a", "which", choices=("a", "b"))
-
-    def __post_init__(self):
-        check(self)
 
 
 @dataclass(frozen=True)

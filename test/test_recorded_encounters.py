@@ -23,6 +23,7 @@ from oracle import oracle_violations
 import pytest
 
 from scenario_gen.errors import RefusedError
+from scenario_gen.evaluation import EvaluationConfig
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.template.interaction import find_conflicts, find_waits
@@ -30,8 +31,8 @@ from scenario_gen.types.generation import GenerationResult, WITH, WITHOUT
 
 ROADS = ("corridor", "four_way", "t_intersection", "straight")
 OWN_MAPS = ("USA_Lanker-2_13_T-1", "USA_Peach-4_2_T-1")
-COUNT = 50 if LONG else 10
-CONFIG = PipelineConfig()
+COUNT = 50 if LONG else 5
+CONFIG = PipelineConfig() if LONG else PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False))
 pytestmark = pytest.mark.spread
 
 

@@ -28,6 +28,8 @@ from scenario_gen.template.interaction import find_conflicts
 class Criticality:
     """What one motion came to.
 
+    Source: time to collision, Hayward 1972; post-encroachment time, Allen, Shin & Cooper 1978.
+
     Attributes:
         min_distance: least distance between two footprints [m]; NaN with one vehicle.
         min_ttc: least time to collision [s], at most the horizon; likewise.

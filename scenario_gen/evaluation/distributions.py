@@ -117,6 +117,8 @@ class Comparison:
 def wasserstein(a: Floats, b: Floats) -> float:
     """Wasserstein-1 distance of two samples (n,) and (m,): the area between their distribution functions.
 
+    Source: Vallender 1974.
+
     The same as scipy.stats.wasserstein_distance, whose package takes a second to import at every start.
     """
     values = np.sort(np.concatenate([a, b]))
@@ -174,7 +176,10 @@ def compare(quantity: Quantity, template: Floats, samples: Sequence[Floats], poi
 
 
 def jensen_shannon(p: Floats, q: Floats) -> Floats:
-    """Return the Jensen-Shannon divergence in bits of histograms p (..., bins) and q (bins,), counts or shares."""
+    """Return the Jensen-Shannon divergence in bits of histograms p (..., bins) and q (bins,), counts or shares.
+
+    Source: Lin 1991, with logarithms of base 2.
+    """
     with np.errstate(invalid="ignore", divide="ignore"):
         p = p / p.sum(axis=-1, keepdims=True)
         q = q / q.sum()

@@ -46,11 +46,17 @@ def diversity(table: Floats, weights: Floats) -> Floats:
 
 
 def displacement_to(position: Floats, target: Floats) -> Floats:
-    """Return (S,): mean distance in metres of samples (S, N, T, 2) to a target (N, T, 2), over vehicles and instants (ADE)."""
+    """Return (S,): mean distance in metres of samples (S, N, T, 2) to a target (N, T, 2), over vehicles and instants (ADE).
+
+    Source: the average displacement error (Pellegrini et al. 2009).
+    """
     step = position - target
     return np.asarray(exact.hypot(step[..., 0], step[..., 1]).mean(axis=(1, 2)))
 
 
 def weighted_min(values: Floats, weights: Floats) -> Floats:
-    """Return the least value (B,) among the samples (S,) that weights (B, S) contain."""
+    """Return the least value (B,) among the samples (S,) that weights (B, S) contain.
+
+    Source: the best of several samples, as minADE takes it (Gupta et al. 2018).
+    """
     return np.asarray(np.where(weights > 0.0, values, np.inf).min(axis=1))

@@ -32,18 +32,23 @@ Distance = Literal["euclidean", "manhattan"]
 
 
 @kernel(inline=True)
-def _distances(a: Floats, i: int, b: Floats, manhattan: bool, out: Floats) -> None:
-    """Write the distance of sample i of a (D, n) to every sample of b (D, m) into out (m,)."""
-    m = out.size
+def _sums(a: Floats, i: int, b: Floats, manhattan: bool, out: Floats) -> None:
+    """Write the distance of sample i of a (D, n) to every sample of b (D, m) into out (m,); squared if Euclidean."""
     for channel in range(a.shape[0]):
         x = a[channel, i]
         row = b[channel]
-        for j in range(m):
+        for j in range(out.size):
             difference = x - row[j]
             step = abs(difference) if manhattan else difference * difference
             out[j] = step if channel == 0 else out[j] + step
+
+
+@kernel(inline=True)
+def _distances(a: Floats, i: int, b: Floats, manhattan: bool, out: Floats) -> None:
+    """Write the distance of sample i of a (D, n) to every sample of b (D, m) into out (m,)."""
+    _sums(a, i, b, manhattan, out)
     if not manhattan:
-        for j in range(m):
+        for j in range(out.size):
             out[j] = np.sqrt(out[j])
 
 
@@ -55,13 +60,7 @@ def _extent(a: Floats, b: Floats, manhattan: bool, out: Floats) -> None:
     low = np.full(m, np.inf)
     high = np.zeros(m)
     for i in range(a.shape[1]):
-        for channel in range(a.shape[0]):
-            x = a[channel, i]
-            other = b[channel]
-            for j in range(m):
-                difference = x - other[j]
-                step = abs(difference) if manhattan else difference * difference
-                row[j] = step if channel == 0 else row[j] + step
+        _sums(a, i, b, manhattan, row)
         for j in range(m):  # kept per column: a running scalar minimum would not vectorise
             low[j] = row[j] if row[j] < low[j] else low[j]
             high[j] = row[j] if row[j] > high[j] else high[j]
@@ -186,6 +185,8 @@ class Alignment:
 def dtw_distance(a: npt.ArrayLike, b: npt.ArrayLike, distance: Distance = "euclidean", band: int | None = None) -> float:
     """Exact DTW distance of two series: the least sum of distances over all monotone paths.
 
+    Source: Sakoe & Chiba 1978; paper V-B.
+
     Args:
         a: (n,) or (n, D).
         b: (m,) or (m, D).
@@ -240,7 +241,10 @@ def feature_rows(a: Floats, b: Floats, extents: Floats, rows: range, distance: D
 
 
 def mean_feature(a: Floats, b: Floats, distance: Distance = "euclidean") -> Floats:
-    """Return the mean (n, m) of the feature matrices of S samples a (S, D, n) and b (S, D, m)."""
+    """Return the mean (n, m) of the feature matrices of S samples a (S, D, n) and b (S, D, m).
+
+    Source: paper V-B, Fig. 5.
+    """
     extents = feature_extents(a, b, distance)
     n, m = a.shape[2], b.shape[2]
     mean = np.empty((n, m))

@@ -28,7 +28,7 @@ from scenario_gen.evaluation.criticality import Criticality, criticality
 from scenario_gen.evaluation.distributions import compare, QUANTITIES, values_of
 from scenario_gen.evaluation.metrics import LIMIT_CAUSES, METRICS
 from scenario_gen.evaluation.motion import at_count, at_period, Motion, of_vehicles, stacked
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import CheckCounts, Evaluation, Interval, Row, TEMPLATE
 from scenario_gen.types.generation import GenerationResult, ORACLE
@@ -41,7 +41,7 @@ Scenarios = Sequence[Scenario] | ScenarioSet
 
 
 @dataclass(frozen=True)
-class EvaluationConfig:
+class EvaluationConfig(Parameters):
     """How a set of scenarios is measured."""
 
     level: float = parameter(0.95, "confidence level of the intervals", low=0.5, high=0.999)
@@ -51,9 +51,6 @@ class EvaluationConfig:
     period: float = parameter(0.1, "sampling period of distributions and criticality", unit="s", low=0.01, high=1.0)
     ttc_horizon: float = parameter(10.0, "times to collision above this count as this", unit="s", low=1.0, high=100.0)
     uniform: bool = parameter(True, "command line: generate also with as many changepoints evenly spaced in time, a row to beat")
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 @dataclass(frozen=True, eq=False)

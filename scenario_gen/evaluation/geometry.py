@@ -43,6 +43,8 @@ def footprint_distance(motion: Motion, a: int, b: int) -> Floats:
 def time_to_collision(motion: Motion, a: int, b: int) -> Floats:
     """Return the time (T,) in seconds until footprints a and b touch if both keep their velocity; inf if never.
 
+    Source: Hayward 1972.
+
     Exact for footprints that do not turn: on each of the four separating axes they overlap during one interval of time,
     and they touch when all four intervals have begun and none has ended.
     """

@@ -20,7 +20,7 @@ loop is a C callback, which numba keeps like any kernel, and it is loaded when t
 
 from collections.abc import Callable
 import inspect
-from typing import Any
+from typing import Any, overload, Protocol
 
 from llvmlite import ir
 from numba import types
@@ -29,6 +29,7 @@ from numba.extending import intrinsic
 from numba.np.ufunc import _internal  # type: ignore[attr-defined,unused-ignore]
 import numpy as np
 
+from scenario_gen.arrays import Floats
 from scenario_gen.kernels import F, I, keep, kernel, register
 
 ADDRESSES = types.CPointer(I)
@@ -75,6 +76,26 @@ def _write(_context: Any, _address: Any, _k: Any, _value: Any) -> Any:
     return types.void(I, I, F), generate
 
 
+class Function(Protocol):
+    """A ufunc of one argument."""
+
+    @overload
+    def __call__(self, x: Floats, /) -> Floats: ...
+    @overload
+    def __call__(self, x: float, /) -> float: ...
+
+
+class Function2(Protocol):
+    """A ufunc of two arguments."""
+
+    @overload
+    def __call__(self, x: Floats, y: Floats | float, /) -> Floats: ...
+    @overload
+    def __call__(self, x: float, y: Floats, /) -> Floats: ...
+    @overload
+    def __call__(self, x: float, y: float, /) -> float: ...
+
+
 class Elementwise:
     """A function of numbers: a ufunc to Python, and a kernel to the kernels that call it."""
 
@@ -113,6 +134,10 @@ class Elementwise:
         return self._ufunc(*values)
 
 
-def elementwise(function: Callable[..., float]) -> Callable[..., float]:
+@overload
+def elementwise(function: Callable[[float], float]) -> Function: ...
+@overload
+def elementwise(function: Callable[[float, float], float]) -> Function2: ...
+def elementwise(function: Callable[..., float]) -> Any:
     """Make a ufunc of a function of one or two numbers."""
     return Elementwise(function)

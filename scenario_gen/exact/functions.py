@@ -22,46 +22,22 @@ Sources: fdlibm 5.3 (Sun Microsystems 1993) for exp, log, sin, cos and arctan; W
 Cephes (Moshier 1989) for ndtr; Stirling's series (Abramowitz & Stegun 6.1.41) for lgamma.
 """
 
-from collections.abc import Callable
 import math
-from typing import Any, cast, overload, Protocol
+from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 import numpy as np
 
-from scenario_gen.arrays import Floats
 from scenario_gen.exact.elementwise import elementwise
 from scenario_gen.kernels import F, kernel
 
-Scalar = Callable[..., float]
 ROUNDS = 6755399441055744.0  # 1.5 * 2**52: a number added to it is rounded to an integer, which its lowest bits then hold
 ROUNDS_BITS = 0x4338000000000000
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 PI = 3.141592653589793
 LARGEST_ANGLE = 1e6  # [rad] up to here sin and cos are right to the last bits
-
-
-class Function(Protocol):
-    """A ufunc of one argument."""
-
-    @overload
-    def __call__(self, x: Floats, /) -> Floats: ...
-    @overload
-    def __call__(self, x: float, /) -> float: ...
-
-
-class Function2(Protocol):
-    """A ufunc of two arguments."""
-
-    @overload
-    def __call__(self, x: Floats, y: Floats | float, /) -> Floats: ...
-    @overload
-    def __call__(self, x: float, y: Floats, /) -> Floats: ...
-    @overload
-    def __call__(self, x: float, y: float, /) -> float: ...
-
 
 # Coefficients, the highest power first.
 EXP = (
@@ -243,7 +219,8 @@ def _polynomial(x: float, coefficients: tuple[float, ...]) -> float:
 
 
 @elementwise
-def _exp(x: float) -> float:
+def exp(x: float) -> float:
+    """Return e to the power of x."""
     y = min(max(x, -746.0), 710.0)
     shifted = y * 1.4426950408889634 + ROUNDS
     k = _bits(shifted) - ROUNDS_BITS
@@ -260,7 +237,8 @@ def _exp(x: float) -> float:
 
 
 @elementwise
-def _log(x: float) -> float:
+def log(x: float) -> float:
+    """Return the natural logarithm; -inf at 0, NaN below."""
     small = x < 2.2250738585072014e-308
     b = _bits(x * 1.8014398509481984e16 if small else x)  # 2**54
     b += 0x3FF0000000000000 - 0x3FE6A09E00000000  # so that the mantissa lies between sqrt(1/2) and sqrt(2)
@@ -311,7 +289,8 @@ def _cosine(x: float, low: float) -> float:
 
 
 @elementwise
-def _sin(x: float) -> float:
+def sin(x: float) -> float:
+    """Return the sine of an angle [rad]."""
     high, low, n = _reduced(x)
     s, c = _sine(high, low), _cosine(high, low)
     value = c if n & 1 else s
@@ -319,7 +298,8 @@ def _sin(x: float) -> float:
 
 
 @elementwise
-def _cos(x: float) -> float:
+def cos(x: float) -> float:
+    """Return the cosine of an angle [rad]."""
     high, low, n = _reduced(x)
     s, c = _sine(high, low), _cosine(high, low)
     value = s if n & 1 else c
@@ -327,7 +307,8 @@ def _cos(x: float) -> float:
 
 
 @elementwise
-def _tan(x: float) -> float:
+def tan(x: float) -> float:
+    """Return the tangent of an angle [rad]."""
     high, low, n = _reduced(x)
     s, c = _sine(high, low), _cosine(high, low)
     return -c / s if n & 1 else s / c
@@ -352,12 +333,14 @@ def _arctan_of(x: float) -> float:
 
 
 @elementwise
-def _arctan(x: float) -> float:
+def arctan(x: float) -> float:
+    """Return the angle [rad], in [-pi/2, pi/2], whose tangent is x."""
     return _arctan_of(x)
 
 
 @elementwise
-def _arctan2(y: float, x: float) -> float:
+def arctan2(y: float, x: float) -> float:
+    """Return the angle [rad], in [-pi, pi], of the point (x, y)."""
     if np.isnan(x) or np.isnan(y):
         return x + y
     down, left = _bits(y) < 0, _bits(x) < 0
@@ -376,31 +359,35 @@ def _arctan2(y: float, x: float) -> float:
 
 
 @elementwise
-def _tanh(x: float) -> float:
+def tanh(x: float) -> float:
+    """Return the hyperbolic tangent."""
     if abs(x) < 0.1:  # where the difference below would lose digits
         return x * _polynomial(x * x, TANH)
-    value = 1.0 - 2.0 / (_exp(2.0 * min(abs(x), 22.0)) + 1.0)
+    value = 1.0 - 2.0 / (exp(2.0 * min(abs(x), 22.0)) + 1.0)
     return -value if x < 0.0 else value
 
 
 @elementwise
-def _hypot(x: float, y: float) -> float:
+def hypot(x: float, y: float) -> float:
+    """Return the length of (x, y), without care for what overflows."""
     return math.sqrt(x * x + y * y)
 
 
 @elementwise
-def _lgamma(x: float) -> float:
+def lgamma(x: float) -> float:
+    """Return the logarithm of the gamma function for x > 0; NaN else."""
     if not x > 0.0:
         return np.nan
     product, a = 1.0, x
     while a < 10.0:
         product *= a
         a += 1.0
-    return (a - 0.5) * _log(a) - a + 0.91893853320467274178 + _polynomial(1.0 / (a * a), STIRLING) / a - _log(product)
+    return (a - 0.5) * log(a) - a + 0.91893853320467274178 + _polynomial(1.0 / (a * a), STIRLING) / a - log(product)
 
 
 @elementwise
-def _ndtr(x: float) -> float:
+def ndtr(x: float) -> float:
+    """Return the standard normal distribution's probability up to x."""
     if np.isnan(x):
         return x
     a = abs(x) * 0.70710678118654752440
@@ -412,12 +399,13 @@ def _ndtr(x: float) -> float:
         share = _polynomial(a, NEAR_TOP) / _polynomial(a, NEAR_BOTTOM)
     else:
         share = _polynomial(a, FAR_TOP) / _polynomial(a, FAR_BOTTOM)
-    tail = 0.5 * _exp(-z) * share if z < 745.0 else 0.0
+    tail = 0.5 * exp(-z) * share if z < 745.0 else 0.0
     return tail if x < 0.0 else 1.0 - tail
 
 
 @elementwise
-def _ndtri(p: float) -> float:
+def ndtri(p: float) -> float:
+    """Return the x up to which the standard normal distribution has the probability p."""
     q = p - 0.5
     if abs(q) <= 0.425:
         r = 0.180625 - q * q
@@ -427,7 +415,7 @@ def _ndtri(p: float) -> float:
         return -np.inf if q < 0.0 else np.inf
     if not r > 0.0:
         return np.nan
-    r = math.sqrt(-_log(r))
+    r = math.sqrt(-log(r))
     if r <= 5.0:
         value = _polynomial(r - 1.6, OUTER_TOP) / _polynomial(r - 1.6, OUTER_BOTTOM)
     else:
@@ -441,17 +429,3 @@ def power(x: Any, n: int) -> Any:
     for _ in range(abs(n) - 1):
         value = value * x
     return 1.0 / value if n < 0 else value
-
-
-exp = cast("Function", _exp)
-log = cast("Function", _log)
-sin = cast("Function", _sin)
-cos = cast("Function", _cos)
-tan = cast("Function", _tan)
-arctan = cast("Function", _arctan)
-arctan2 = cast("Function2", _arctan2)
-tanh = cast("Function", _tanh)
-hypot = cast("Function2", _hypot)
-lgamma = cast("Function", _lgamma)
-ndtr = cast("Function", _ndtr)
-ndtri = cast("Function", _ndtri)

@@ -16,11 +16,11 @@
 
 from dataclasses import dataclass
 
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 
 
 @dataclass(frozen=True)
-class FittingConfig:
+class FittingConfig(Parameters):
     """Parameters of the fitting (paper III-A)."""
 
     placement: str = parameter(
@@ -33,6 +33,3 @@ class FittingConfig:
     max_move: float = parameter(3.0, "farthest that an anchor or a path may be moved", unit="m", low=0.0, high=100.0)
     clearance: float = parameter(0.5, "gap kept between the footprints of fitted vehicles", unit="m", low=0.0, high=5.0)
     margin: float = parameter(0.3, "room beside a footprint that the placement looks for", unit="m", low=0.0, high=5.0)
-
-    def __post_init__(self) -> None:
-        check(self)

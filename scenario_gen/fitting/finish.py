@@ -44,6 +44,8 @@ def finish(
 ) -> Fit:
     """Read the anchors off a placement; `given` (N, 2, 4) are start and end states to be met exactly, if any; NaN: not given.
 
+    Source: eq 9.
+
     Raises:
         RefusedError: an anchor is farther than `max_move` from the nearest pose with room.
     """

@@ -52,7 +52,10 @@ class Placement:
 
 
 def check_scale(scale: float, what: str, config: FittingConfig) -> None:
-    """Raise RefusedError if a scale is too far from one."""
+    """Raise RefusedError if a scale is too far from one.
+
+    Source: s of eq 9.
+    """
     if not config.scale_low <= scale <= config.scale_high:
         raise RefusedError(
             f"{what} would need scale {scale:.2f}; accepted is {config.scale_low:g} to {config.scale_high:g} "

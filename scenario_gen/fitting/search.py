@@ -170,12 +170,8 @@ def _turned(points: Floats, yaw: float) -> Floats:
 
 def _fine_cost(discs: Floats, road: Road, need: float, scale: float, state: Floats) -> float:
     points = scale * _turned(discs, float(state[2])) + state[:2]
-    cell = np.floor((points - road.origin) / road.resolution).astype(np.int64)
-    height, width = road.drivable.shape
-    inside = (cell[:, 0] >= 0) & (cell[:, 0] < width) & (cell[:, 1] >= 0) & (cell[:, 1] < height)
-    clearance = np.zeros(len(points))
-    clearance[inside] = clearance_field(road)[cell[inside, 1], cell[inside, 0]]
-    return float(_penalty(clearance, need).mean())
+    row, column, inside = road.cells(points)
+    return float(_penalty(np.where(inside, clearance_field(road)[row, column], 0.0), need).mean())
 
 
 def _refined(discs: Floats, road: Road, need: float, motion: _Motion) -> _Motion:

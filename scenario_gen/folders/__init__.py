@@ -15,7 +15,7 @@
 """Folders of results: whole or not at all, and in the place of nothing but an earlier result of the same kind."""
 
 from scenario_gen.folders.disk import naming, sync, write_text
-from scenario_gen.folders.marker import Kind, MARKER
+from scenario_gen.folders.marker import Kind, MARKER, sha256_of
 from scenario_gen.folders.replace import replaced_folder
 
-__all__ = ["MARKER", "Kind", "naming", "replaced_folder", "sync", "write_text"]
+__all__ = ["MARKER", "Kind", "naming", "replaced_folder", "sha256_of", "sync", "write_text"]

@@ -117,3 +117,12 @@ def _read(path: Path) -> dict[str, Any] | None:
     if not isinstance(found, dict) or found.keys() != shape.keys() or found["format"] != FORMAT:
         return None
     return found if all(isinstance(found[key], of) for key, of in shape.items()) else None
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file, or of a folder's files in order of their names."""
+    digest = hashlib.sha256()
+    for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+        if file.is_file() and file.name != MARKER:  # which is about the files, and not in every bag
+            digest.update(file.read_bytes())
+    return digest.hexdigest()

@@ -38,31 +38,6 @@ JUMP_SPEED = 10.0  # m/s by which a measured speed may be wrong before a fix cou
 RELOCATED = 5  # so many fixes in a row that agree with each other are a new place, not jumps
 
 
-@dataclass(frozen=True, eq=False)
-class Track:
-    """One vehicle's clean observations, stamps strictly increasing; metres and m/s in the local frame.
-
-    Attributes:
-        id: the vehicle's name.
-        fix_ns: (F,) stamps.
-        fix: (F, 2) metres.
-        heading: (F,) rad, NaN where unknown.
-        speed_ns: (S,) stamps.
-        speed: (S,) m/s.
-        length: metres.
-        width: metres.
-    """
-
-    id: str
-    fix_ns: Ints
-    fix: Floats
-    heading: Floats
-    speed_ns: Ints
-    speed: Floats
-    length: float
-    width: float
-
-
 @dataclass
 class Drops:
     """Counts of dropped rows by reason, with the first row of each."""
@@ -77,11 +52,12 @@ class Drops:
             self.first[reason] = min(self.first.get(reason, int(rows[0])), int(rows.min()))
 
 
-def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Track, ...], Drops, tuple[float, float] | None]:
+def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Drops, tuple[float, float] | None]:
     """Drop what cannot be true and bring every vehicle into the local frame.
 
     Returns:
-        One track per vehicle with at least two fixes; the drops; the frame's origin (latitude, longitude) or None.
+        The vehicles with at least two fixes, in metres, stamps strictly increasing, no NaN but in headings; the drops; the
+        frame's origin (latitude, longitude) or None.
 
     Raises:
         InputError: nothing usable is left, or `strict` and something had to be repaired.
@@ -286,7 +262,7 @@ def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig
         )
 
 
-def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig) -> Track:
+def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig) -> Observations:
     """Drop fixes that the vehicle cannot have reached at the speeds it measured; several in a row that agree are believed."""
     limit = reach(vehicle)
     step = exact.hypot(*np.diff(vehicle.fix, axis=0).T)
@@ -295,16 +271,10 @@ def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig) -> Tra
     if (step > JUMP_SLACK + limit[1:] * seconds).any():
         keep = reachable(vehicle.fix_ns.astype(np.float64) * 1e-9, vehicle.fix, limit)
         drops.add("position jumps", vehicle.fix_row[~keep])
-    return Track(
-        id=vehicle.id,
-        fix_ns=vehicle.fix_ns[keep],
-        fix=vehicle.fix[keep],
-        heading=vehicle.heading[keep],
-        speed_ns=vehicle.speed_ns,
-        speed=vehicle.speed,
-        length=vehicle.length if np.isfinite(vehicle.length) else config.length,
-        width=vehicle.width if np.isfinite(vehicle.width) else config.width,
-    )
+    length = vehicle.length if np.isfinite(vehicle.length) else config.length
+    width = vehicle.width if np.isfinite(vehicle.width) else config.width
+    every = np.ones(len(vehicle.speed_ns), dtype=bool)
+    return replace(select(vehicle, keep, every), length=length, width=width)
 
 
 def reach(vehicle: Observations) -> Floats:

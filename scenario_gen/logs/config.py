@@ -18,13 +18,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from scenario_gen.errors import InputError
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 
 FORMATS = ("auto", "spmd", "table", "bag")
 
 
 @dataclass(frozen=True)
-class LogConfig:
+class LogConfig(Parameters):
     """How a log is read, cleaned and cut into encounters."""
 
     format: str = parameter("auto", "source format; auto looks at the file's name and content", choices=FORMATS)
@@ -68,9 +68,6 @@ class LogConfig:
     row_limit: int = parameter(2_000_000, "most rows or messages of a log", low=1)
     vehicle_limit: int = parameter(10_000, "most vehicles of a log", low=2)
     tick_limit: int = parameter(2_000_000, "most ticks of the common clock, over all vehicles, from first to last stamp", low=1)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 def listed(text: str) -> list[str]:

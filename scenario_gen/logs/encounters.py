@@ -25,16 +25,17 @@ cross, follow, merge or pass), and a vehicle joins that so meets all the members
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, runs
-from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, SLOWEST, Track
+from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, select, SLOWEST
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.quality import VehicleQuality
+from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing
 
 TURNED = np.radians(120.0)  # who drives off from a stop this far from where it came from has reversed, or turned on the spot
@@ -51,7 +52,7 @@ REST = 2.0  # s of a long standstill that stay with the encounter before or afte
 class Piece:
     """A vehicle's smooth motion between two long gaps, on the log's common clock."""
 
-    track: Track
+    track: Observations
     smooth: Smooth
 
     @property
@@ -73,7 +74,7 @@ class Piece:
         return self.smooth.speed[first - self.first : last - self.first]
 
 
-def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Piece], VehicleQuality]:
+def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[list[Piece], VehicleQuality]:
     """Cut a track at gaps, relocations and reversals, and smooth each piece.
 
     A gap may always be two and a half of the source's own periods long, so that a source of 1 Hz is not cut to bits.
@@ -113,7 +114,7 @@ def pieces_of(track: Track, origin_ns: int, config: LogConfig) -> tuple[list[Pie
     return pieces, quality
 
 
-def laps(track: Track, config: LogConfig) -> Bools:
+def laps(track: Observations, config: LogConfig) -> Bools:
     """(F-1,) where a track of hours is cut, so that the memory which smoothing takes does not grow with it."""
     lap = (track.fix_ns - track.fix_ns[0]) // round(MOST_TICKS * config.period * 1e9)
     new: Bools = np.diff(lap) > 0
@@ -125,7 +126,7 @@ def longest_bridge(seconds: Floats, config: LogConfig) -> float:
     return max(config.longest_gap, 2.5 * min(float(np.median(seconds)), SLOWEST)) + 1e-6
 
 
-def reversals(track: Track, config: LogConfig) -> Bools:
+def reversals(track: Observations, config: LogConfig) -> Bools:
     """(F-1,) where to cut because the vehicle drives back where it came from after a stop: a heading cannot follow that."""
     seconds = (track.fix_ns - track.fix_ns[0]).astype(np.float64) * 1e-9
     speed_t = (track.speed_ns - track.fix_ns[0]).astype(np.float64) * 1e-9
@@ -151,7 +152,7 @@ def departure(fix: Floats) -> Floats | None:
     return offset[far[0]] / away[far[0]] if len(far) else None
 
 
-def parts(track: Track, cuts: Bools) -> list[Track]:
+def parts(track: Observations, cuts: Bools) -> list[Observations]:
     """Split a track after each True of `cuts` (F-1,); parts of one fix are left out."""
     edges = [0, *(np.flatnonzero(cuts) + 1).tolist(), len(track.fix_ns)]
     found = []
@@ -159,8 +160,7 @@ def parts(track: Track, cuts: Bools) -> list[Track]:
         if end - begin < 2:
             continue
         during = (track.speed_ns >= track.fix_ns[begin]) & (track.speed_ns <= track.fix_ns[end - 1])
-        fixes = {name: getattr(track, name)[begin:end] for name in ("fix_ns", "fix", "heading")}
-        found.append(replace(track, **fixes, speed_ns=track.speed_ns[during], speed=track.speed[during]))
+        found.append(select(track, np.arange(begin, end), during))
     return found
 
 

@@ -32,8 +32,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints, runs
 from scenario_gen.errors import InputError
-from scenario_gen.logs.cleaning import Track
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.raw import Observations
 
 if TYPE_CHECKING:
     from scipy import sparse  # slow to import
@@ -231,10 +231,6 @@ class Motion:
         return (coefficients[1:] + coefficients[:-1]) / 2.0, np.diff(coefficients) / self.dt
 
 
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline  # slow to import
-
-
 @dataclass(frozen=True, eq=False)
 class Smooth:
     """A piece of a track on the common clock: T samples from tick `first` on.
@@ -260,7 +256,7 @@ class Smooth:
     moved: Floats
 
 
-def smooth_piece(piece: Track, origin_ns: int, config: LogConfig) -> Smooth | None:
+def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smooth | None:
     """Fit path and motion to a piece of a track; `origin_ns` is the stamp of tick 0 of the common clock.
 
     Returns:
@@ -325,7 +321,7 @@ def layout(ticks: Floats, stands: Bools, speed: Floats, raw: Floats, seconds: Fl
     return guess
 
 
-def path_of(guess: Floats, piece: Track, weight: Floats, noise: float) -> Path:
+def path_of(guess: Floats, piece: Observations, weight: Floats, noise: float) -> Path:
     """Fit the path; one too short to have a shape is straight, in the recorded heading where there is one.
 
     Args:

@@ -25,10 +25,10 @@ import numpy as np
 
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
-from scenario_gen.logs.cleaning import clean, RELOCATED, Track
+from scenario_gen.logs.cleaning import clean, RELOCATED
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import longest_bridge
-from scenario_gen.logs.raw import natural, RawLog, Rows, Segment
+from scenario_gen.logs.raw import natural, Observations, RawLog, Rows, Segment
 from scenario_gen.logs.smoothing import speed_of_fixes
 from scenario_gen.types.encounter import Vehicle
 
@@ -158,7 +158,7 @@ class Streams:
         self._forget(self._next * self._dt_ns - WINDOW_NS)
         return found
 
-    def _tracks(self) -> tuple[Track, ...]:
+    def _tracks(self) -> tuple[Observations, ...]:
         """Clean the last seconds."""
         names = sorted((name for name, rows in self._recent.items() if len(rows.fixes) >= 2), key=natural)
         log = self._log("streams", {name: self._recent[name] for name in names})
@@ -166,7 +166,7 @@ class Streams:
             return ()
         return clean(log, self.config)[0]
 
-    def _awaited(self, track: Track, tick: int) -> bool:
+    def _awaited(self, track: Observations, tick: int) -> bool:
         """Say whether a vehicle's next fix may still come: it has been there, and is slower than the others."""
         silent = (self._newest - self._late_ns - int(track.fix_ns[-1])) * 1e-9
         return bool(track.fix_ns[-1] < tick) and silent <= longest_bridge(np.diff(track.fix_ns) * 1e-9, self._config)
@@ -201,7 +201,7 @@ class Streams:
         return log
 
 
-def sample_at(tracks: Sequence[Track], stamp_ns: int, config: LogConfig) -> Sample | None:
+def sample_at(tracks: Sequence[Observations], stamp_ns: int, config: LogConfig) -> Sample | None:
     """Return who is where at an instant; between two fixes that are not too far apart; None for fewer than two vehicles."""
     vehicles, position, speed = [], [], []
     for track in tracks:

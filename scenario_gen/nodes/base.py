@@ -22,7 +22,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
 
-from msg_conventions.diagnostics import Level, Status
+from msg_conventions.diagnostics import Level
 from msg_conventions.topics import LATCHED, topic_entry
 from scenario_gen.nodes.diagnostics import NodeDiagnostics
 from scenario_gen.nodes.inputs import refuse_damaged
@@ -57,7 +57,6 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         self._worker: Worker | None = None
         self.parameters = ConfigParameters(self, config)
         self.declare_parameter("autostart", True)
-        self.parameters.log()
 
     @property
     def default_callback_group(self) -> ReentrantCallbackGroup:
@@ -103,10 +102,6 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             self._latched.pop(topic, None)
             self.diagnostics.resolve(topic)
 
-    def send(self, topic: str, data: bytes) -> None:
-        """Publish the CDR bytes of a topic of the suite, if the node is active."""
-        self.outputs.send(topic, data)
-
     def serve(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
         """Offer a service; whatever goes wrong in it, the caller gets an answer and the node lives on."""
 
@@ -114,7 +109,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             try:
                 return callback(request, response)
             except Exception as error:
-                self.failed(name, error)
+                self.diagnostics.failed(name, error)
                 self.diagnostics.resolve(name)
                 return response
 
@@ -155,17 +150,9 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         """Cancel all jobs, or those of one name; return their names."""
         return self._worker.cancel(only) if self._worker is not None else []
 
-    def report(self, *statuses: Status, stamp_ns: int = 0) -> None:
-        """Report statuses on /diagnostics, until others about the same are reported."""
-        self.diagnostics.report(*statuses, stamp_ns=stamp_ns)
-
     def status(self, level: Level, message: str, subject: str = "status", stamp_ns: int = 0, **values: str) -> None:
         """Report one status on /diagnostics and log it; an abandoned job ends here, before it is logged."""
         self.diagnostics.status(level, message, subject, values, stamp_ns)
-
-    def failed(self, name: str, error: BaseException) -> None:
-        """Report on /diagnostics that something went wrong; the node lives on."""
-        self.diagnostics.failed(name, error)
 
     def update_diagnostics(self) -> None:
         """Bring up to date, each second, what /diagnostics reports of the work that goes on."""
@@ -183,7 +170,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Subscribe to the inputs."""
-        self._worker = Worker(self.failed, self.get_name(), self.diagnostics.resolve)
+        self._worker = Worker(self.diagnostics.failed, self.get_name(), self.diagnostics.resolve)
         self.outputs.activate()
         self.diagnostics.enable(True)
         self.diagnostics.state("active")
@@ -237,4 +224,4 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             self.received(topic, data)
             self.diagnostics.resolve(topic)
         except Exception as error:
-            self.failed(topic, error)
+            self.diagnostics.failed(topic, error)

@@ -29,7 +29,7 @@ from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.nodes.base import StageNode
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.recordings.requests import Match, RequestTracker, TrackedRequest
 from scenario_gen.types.generation import WITH
 
@@ -39,7 +39,7 @@ SETTLED = 5.0  # seconds without news after which it is said what a closed reque
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Parameters):
     """The evaluator's parameters."""
 
     seed: int = parameter(0, "seed of the bootstrap, and of the choice of what is measured", low=0)
@@ -49,9 +49,6 @@ class Config:
     keep: int = parameter(3000, "scenarios kept of requests that are not whole yet; the oldest requests are given up", low=1)
     wait: int = parameter(100, "closed requests that wait for scenarios on their way; older ones are given up", low=1)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Evaluator(StageNode):
@@ -150,6 +147,6 @@ class Evaluator(StageNode):
             values = {"request": summary.request, "samples": str(row.samples), **figures}
             notes = (*row.notes, chosen) if row.name == WITH and len(decoded) < summary.published else row.notes
             statuses.append(Status(f"{self.get_fully_qualified_name()}: {row.name}", Level.OK, "; ".join(notes), values))
-        self.send("report", encode_diagnostics(statuses, encounter.start_ns))
+        self.outputs.send("report", encode_diagnostics(statuses, encounter.start_ns))
         self.diagnostics.resolve("requests")
         self.get_logger().info(f"request {summary.request} evaluated: {len(decoded)} scenarios")

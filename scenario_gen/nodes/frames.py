@@ -34,8 +34,8 @@ from msg_conventions.tracks import FRAME
 from msg_conventions.trajectory import decode, Trajectory, TYPE
 from scenario_gen.errors import InputError
 from scenario_gen.nodes.topics import create_publisher, create_subscription, publish
+from scenario_gen.storage.bag import bag_topics, read_messages
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import bag_topics, read_messages
 from scenario_gen.types.names import tokens
 
 MAP = "map"

@@ -31,7 +31,7 @@ import yaml
 
 from scenario_gen.documents import parse_yaml, read_yaml, shown
 from scenario_gen.errors import InputError
-from scenario_gen.parameters import check, parameter, updated
+from scenario_gen.parameters import parameter, Parameters, updated
 
 LIVE = "live"
 ROADS = ("straight", "t_intersection", "four_way", "corridor")
@@ -44,7 +44,7 @@ NAMESPACE = re.compile(r"/|/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 
 @dataclass(frozen=True)
-class Arguments:
+class Arguments(Parameters):
     """The arguments of the launch file; parameters of nodes are declared as there."""
 
     log: str = parameter("", f"log to read: a file, a bag or a folder of files; {LIVE}: wait for what others publish")
@@ -66,9 +66,6 @@ class Arguments:
     respawn: bool = parameter(False, "start again what ended, after 2 s")
     log_level: str = parameter("info", "least severity that is logged: " + ", ".join(LEVELS), choices=LEVELS)
     rviz: bool = parameter(False, "open RViz")
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 ENTRIES = {entry.name: entry for entry in fields(Arguments)}

@@ -28,7 +28,7 @@ from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, Sample, Streams
 from scenario_gen.logs.raw import RawLog
 from scenario_gen.nodes.topics import adapted_quality
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.template.size import MOST_VEHICLES
 from scenario_gen.types.names import token
 
@@ -37,15 +37,12 @@ TYPES = {"fix": FIX_TYPE, "speed": TWIST_TYPE}
 
 
 @dataclass(frozen=True)
-class LiveConfig:
+class LiveConfig(Parameters):
     """How a node listens to streams."""
 
     listen: bool = parameter(True, "listen to vehicle_<id>/fix and vehicle_<id>/speed, too")
     late: float = parameter(0.5, "a message may be so far behind the newest one and still count", unit="s", low=0.0, high=10.0)
     silence: float = parameter(2.0, "when nothing comes for so long, real time, the streams have ended", unit="s", low=0.1)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class LiveStreams:
@@ -81,7 +78,7 @@ class LiveStreams:
         try:
             self._subscribe()
         except InputError as error:
-            self._node.failed("streams", error)
+            self._node.diagnostics.failed("streams", error)
         if monotonic() - self._heard > self._config.silence:
             self.end()
 

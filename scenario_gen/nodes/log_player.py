@@ -35,7 +35,7 @@ from scenario_gen.errors import InputError
 from scenario_gen.geodesy import latitude_longitude
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.nodes.base import StageNode
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.names import tokens
 
@@ -43,7 +43,7 @@ HEAD_START = 1.0  # seconds in which listeners find the streams, which are not l
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Parameters):
     """The log player's parameters."""
 
     log_path: str = parameter("", "log to read: a file, a bag or a folder of files")
@@ -52,9 +52,6 @@ class Config:
     rate: float = parameter(1.0, "how many times as fast as it was recorded the stream is", low=0.01, high=1000.0)
     wait_matching_subscriptions: int = parameter(0, "do not begin to stream before each stream has so many listeners", low=0)
     log: LogConfig = field(default_factory=LogConfig)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class LogPlayer(StageNode):
@@ -81,7 +78,7 @@ class LogPlayer(StageNode):
         encounter = result.encounters[config.encounter]
         stop_if_cancelled()
         if not config.stream:
-            self.send("tracks", encode_tracks(encounter))
+            self.outputs.send("tracks", encode_tracks(encounter))
         n, samples = encounter.speed.shape
         message = f"{encounter.name}: {n} vehicles, {samples} samples over {encounter.duration:.1f} s"
         notes = {f"note.{k}": note for k, note in enumerate(result.quality.notes)}
@@ -109,11 +106,9 @@ class LogPlayer(StageNode):
             stamp = encounter.start_ns + k * encounter.dt_ns
             self.outputs.publish(clock, CdrWriter().stamp(stamp).finish())
             for i, name in enumerate(names):
-                self.send(
-                    vehicle_topic(name, "fix"),
-                    encode_fix(float(places[i, k, 0]), float(places[i, k, 1]), stamp, f"vehicle_{name}"),
-                )
-                self.send(vehicle_topic(name, "speed"), encode_speed(float(encounter.speed[i, k]), stamp, f"vehicle_{name}"))
+                frame, (latitude, longitude) = f"vehicle_{name}", places[i, k].tolist()
+                self.outputs.send(vehicle_topic(name, "fix"), encode_fix(latitude, longitude, stamp, frame))
+                self.outputs.send(vehicle_topic(name, "speed"), encode_speed(float(encounter.speed[i, k]), stamp, frame))
         else:
             self.status(Level.OK, f"{encounter.name}: streamed", "stream", encounter.start_ns)
         self.destroy_publisher(clock)

@@ -45,7 +45,7 @@ from scenario_gen.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.fitting import fit_template, FittingConfig
 from scenario_gen.nodes.base import REQUESTS, StageNode
 from scenario_gen.nodes.inputs import Inputs
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.routing import plan_routes, PlanningConfig
 from scenario_gen.routing.plan import make_planner
 from scenario_gen.routing.search.planner import plan_with_retry, Query
@@ -57,7 +57,7 @@ ROAD = ("map", "road/entries", "road/exits")
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Parameters):
     """The planner's parameters."""
 
     fitting: FittingConfig = field(default_factory=FittingConfig)
@@ -65,9 +65,6 @@ class Config:
     seed: int = parameter(0, "seed of the planner", low=0)
     radius: float = parameter(1.0, "radius of the disc that ~/get_plan plans for", unit="m", low=0.0, high=20.0)
     pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Planner(StageNode):
@@ -114,10 +111,10 @@ class Planner(StageNode):
         made["fit"] = encode_fit(encounter, fit, road.frame_id)
         made["fit/info"] = encode_hashes("fit", messages | made, encounter.start_ns)
         for topic, data in made.items():
-            self.send(topic, data)
+            self.outputs.send(topic, data)
         self.get_logger().info(f"planned {len(routes)} routes through {len(anchors)} anchors")
         statuses = fit_statuses(fit, self.get_fully_qualified_name(), template_hashes(messages))
-        self.report(*statuses, stamp_ns=encounter.start_ns)
+        self.diagnostics.report(*statuses, stamp_ns=encounter.start_ns)
 
     async def _get_plan(self, request: GetPlan.Request, response: GetPlan.Response) -> GetPlan.Response:
         """Plan for a caller, off the executor's thread."""

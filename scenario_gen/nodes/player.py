@@ -49,9 +49,9 @@ from scenario_gen.nodes.diagnostics import NodeDiagnostics
 from scenario_gen.nodes.frames import find_motion, Frames, Instant
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.topics import message_class, Pace, publish, qos, unacknowledged
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
+from scenario_gen.storage.bag import bag_topics, BagMessage, read_messages
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import bag_topics, BagMessage, read_messages
 
 STREAMED = BagConfig(most_bytes=2**62)  # a message is published and forgotten, so a bag may be of any size
 PATIENCE = 5.0  # seconds in which listeners have to take the last messages
@@ -60,7 +60,7 @@ KINDS = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, 
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Parameters):
     """The player's parameters."""
 
     bag: str = parameter("", "bag to play: its folder or one of its files")
@@ -79,9 +79,6 @@ class Config:
         60.0, "wait so long for subscribers that acknowledge nothing, then go on and warn; 0: for ever", unit="s", low=0.0
     )
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 class Player(Node):  # type: ignore[misc]
     """Plays one bag."""
@@ -89,7 +86,6 @@ class Player(Node):  # type: ignore[misc]
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("player", namespace=namespace)
         self.parameters = ConfigParameters(self, Config())
-        self.parameters.log()
         self.diagnostics = NodeDiagnostics(self, self._report_progress)
         self._at: float | None = None  # seconds of the bag that have been played, while it is
         self.done = False

@@ -23,6 +23,7 @@ The kernels of all nodes are loaded, or compiled once per machine, by a thread w
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+import faulthandler
 import importlib
 import os
 from pathlib import Path
@@ -49,6 +50,7 @@ from scenario_gen.nodes.ros_parameters import help_of, USAGE
 from scenario_gen.nodes.services import ResponseRetry
 
 OFTEN = 5.0  # seconds between two reports of how many kernels are there
+ENDING = 5.0  # seconds that a node, asked to end, may take to look up, and then to leave its ROS domain
 Maker = Callable[[str | None], Any]
 
 
@@ -181,6 +183,8 @@ def _spin(executor: SingleThreadedExecutor, nodes: Sequence[Any]) -> int:
     asked = threading.Event()
 
     def end() -> None:
+        if not asked.is_set():
+            _leave_within(max(getattr(node, "ENDING", ENDING) for node in nodes))
         asked.set()
         executor.create_task(lambda: None)  # so that it looks up
 
@@ -207,8 +211,15 @@ def _end(nodes: Sequence[Any], executor: SingleThreadedExecutor) -> int:
         getattr(node, "cancel", list)()  # all at once, so that none is waited for before another is told
     for node in nodes:
         try:
-            node.destroy_node()
+            getattr(node, "close", list)()
         except (ScenarioGenError, OSError) as error:  # a bag that cannot be closed, say
+            code = tell(error)
+    _flush()
+    _leave_within(ENDING)  # nothing is lost from here on
+    for node in nodes:
+        try:
+            node.destroy_node()
+        except (ScenarioGenError, OSError) as error:
             code = tell(error)
     executor.shutdown(timeout_sec=1.0)
     for node in nodes:
@@ -219,9 +230,21 @@ def _end(nodes: Sequence[Any], executor: SingleThreadedExecutor) -> int:
     return code
 
 
+def _leave_within(seconds: float) -> None:
+    """End the process after so many seconds whatever it does, with exit code 1 and where it stood on its standard error.
+
+    DDS was seen to wait for itself for ever, in a call that holds Python's lock; what ends the process here does without it.
+    """
+    faulthandler.dump_traceback_later(seconds, exit=True, file=2)
+
+
 def _leave(code: int) -> NoReturn:
     """End the process: all that matters is closed, and to take Python and the compiler down costs half a second of the CPU."""
+    _flush()
+    os._exit(code)
+
+
+def _flush() -> None:
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):
             stream.flush()
-    os._exit(code)

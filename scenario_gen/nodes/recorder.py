@@ -41,7 +41,7 @@ from scenario_gen.nodes.diagnostics import NodeDiagnostics
 from scenario_gen.nodes.losses import Losses, remedy
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.topics import adapted_quality, message_class, qos
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.storage.metadata import qos_yaml
 from scenario_gen.storage.writer import BagWriter, Split
 
@@ -61,7 +61,7 @@ def default_topics(namespace: str) -> str:
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Parameters):
     """The recorder's parameters."""
 
     bag: str = parameter("", "folder of the bag to begin at once; empty waits for ~/start and names it by the time")
@@ -74,7 +74,7 @@ class Config:
     split_seconds: float = parameter(0.0, "begin a new file after so long; 0 never", unit="s", low=0.0)
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         try:
             re.compile(self.topics)
         except re.error as error:
@@ -93,10 +93,11 @@ def _disk_errors() -> Iterator[None]:
 class Recorder(Node):  # type: ignore[misc]
     """Records what matches."""
 
+    ENDING = REST + 5.0  # seconds
+
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("recorder", namespace=namespace)
         self.parameters = ConfigParameters(self, Config())
-        self.parameters.log()
         self._bag: BagWriter | None = None
         self._listening: dict[str, Any] = {}
         self._refused: set[str] = set()
@@ -167,12 +168,9 @@ class Recorder(Node):  # type: ignore[misc]
             self._write(topic, taken[0], taken[1]["publication_sequence_number"])
         return True
 
-    def destroy_node(self) -> None:
-        """Close the bag, then the node."""
-        try:
-            self.stop()
-        finally:
-            super().destroy_node()
+    def close(self) -> None:
+        """Close the bag; what else has to be done at the end may fail."""
+        self.stop()
 
     def _look_around(self) -> None:
         """Subscribe to topics that have come up since."""

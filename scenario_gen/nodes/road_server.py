@@ -37,20 +37,17 @@ from msg_conventions.tracks import decode_tracks
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.nodes.base import REQUESTS, StageNode
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.roads import build_road, RoadConfig
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Parameters):
     """The road server's parameters."""
 
     road_name: str = parameter("t_intersection", "straight, t_intersection, four_way, corridor, or a map_server YAML file")
     wait_for_tracks: bool = parameter(False, "publish nothing until tracks say what the road is sized to")
     road: RoadConfig = field(default_factory=RoadConfig)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 def road_of_url(url: str) -> str:
@@ -110,9 +107,9 @@ class RoadServer(StageNode):
         }
         stop_if_cancelled()
         for topic, data in messages.items():
-            self.send(topic, data)
+            self.outputs.send(topic, data)
         template = {"tracks": tracks} if tracks else {}
-        self.send("road/info", encode_hashes("road", messages | template, stamp_ns))
+        self.outputs.send("road/info", encode_hashes("road", messages | template, stamp_ns))
         self._grid = messages["map"]
         height, width = road.drivable.shape
         message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, {len(road.entries)} entries"

@@ -105,7 +105,7 @@ class ConfigParameters:
     """Keeps a configuration and the ROS parameters of a node the same."""
 
     def __init__(self, node: Node, config: Any) -> None:
-        """Declare every parameter of `config`; overrides from the command line or a file take effect.
+        """Declare every parameter of `config`, and log the values in effect; overrides of the command line or a file are taken.
 
         Raises:
             InputError: an override has the wrong type or is out of range.
@@ -125,6 +125,9 @@ class ConfigParameters:
         node.add_pre_set_parameters_callback(self._keep)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._take)
+        # a parameter file keyed to another node would be ignored in silence
+        values = ", ".join(f"{name}={value!r}" for name, (_, value) in flatten(self.config).items())
+        node.get_logger().info(f"effective parameters: {values}")
 
     def _by_former_name(self, name: str, entry: "Field[Any]", value: Any) -> Any:
         """Return the value given under the name that a parameter had one version ago, else `value`."""
@@ -169,11 +172,6 @@ class ConfigParameters:
 
     def _take(self, parameters: list[Parameter]) -> None:
         self.config = with_values(self.config, parameters)
-
-    def log(self) -> None:
-        """Log the values in effect: a parameter file keyed to another node would be ignored in silence."""
-        values = ", ".join(f"{name}={value!r}" for name, (_, value) in flatten(self.config).items())
-        self._node.get_logger().info(f"effective parameters: {values}")
 
 
 def help_of(name: str, nodes: Sequence[Any]) -> str:

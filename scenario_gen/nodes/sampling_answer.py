@@ -24,7 +24,7 @@ from msg_conventions.scenario_info import encode_info, INFO, request_summary, Re
 from msg_conventions.scenarios import encode_scenario
 from msg_conventions.topics import vehicle_topic
 from scenario_gen.fitting import FittingConfig
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter
 from scenario_gen.recordings.provenance import parameter_texts, versions
 from scenario_gen.recordings.template import decode_template
 from scenario_gen.routing import PlanningConfig
@@ -61,7 +61,6 @@ class Config(Request):
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
-        check(self)
         super().__post_init__()
 
 

@@ -154,7 +154,7 @@ class OpenRequests:
             asked, name = _named(request.parameters)
             opened = self.add(name)
         except ScenarioGenError as error:
-            node.failed("generate", error)
+            node.diagnostics.failed("generate", error)
             node.diagnostics.resolve("generate")
             response.result.reason = str(error)
             return response

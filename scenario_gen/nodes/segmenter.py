@@ -37,12 +37,12 @@ from scenario_gen.logs import encounters_of, LogConfig, Sample
 from scenario_gen.logs.raw import RawLog
 from scenario_gen.nodes.base import StageNode
 from scenario_gen.nodes.live import LiveConfig, LiveStreams
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.segmentation import LiveSegmenter, OnlineConfig, segment, SegmentationConfig
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Parameters):
     """The segmenter's parameters; `live`, `log` and `online` are for streams and take effect at the next activation."""
 
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
@@ -50,9 +50,6 @@ class Config:
     live: LiveConfig = field(default_factory=LiveConfig)
     log: LogConfig = field(default_factory=LogConfig)
     online: OnlineConfig = field(default_factory=OnlineConfig)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Segmenter(StageNode):
@@ -94,15 +91,15 @@ class Segmenter(StageNode):
         encounter = decode_tracks(data)
         segmentation = segment(encounter, self.config.segmentation, self.config.seed)
         stop_if_cancelled()
-        self.send("changepoints", encode_changepoints(encounter, segmentation))
-        self.send("posterior", encode_posterior(encounter, segmentation))
+        self.outputs.send("changepoints", encode_changepoints(encounter, segmentation))
+        self.outputs.send("posterior", encode_posterior(encounter, segmentation))
         status = segmentation_status(segmentation, self.get_fully_qualified_name(), encounter.duration)
         self.get_logger().info(status.message)
-        self.report(status, stamp_ns=encounter.start_ns)
+        self.diagnostics.report(status, stamp_ns=encounter.start_ns)
 
     def _sampled(self, sample: Sample) -> None:
         if (found := self._online.push(sample)) is not None:
-            self.send("changepoints/live", encode_live_changepoints(found))
+            self.outputs.send("changepoints/live", encode_live_changepoints(found))
 
     def _ended(self, log: RawLog, config: LogConfig) -> None:
         """Read what the streams amount to, off the executor's thread."""
@@ -115,7 +112,7 @@ class Segmenter(StageNode):
             n, samples = encounter.speed.shape
             message = f"streams of {n} vehicles, {samples} samples; the largest of {len(result.encounters)} encounter(s)"
             self.status(Level.OK, message, "encounter", encounter.start_ns, **notes)
-            self.send("tracks", encode_tracks(encounter))
+            self.outputs.send("tracks", encode_tracks(encounter))
 
         self.work(f"encounter {self._encounters}", job)
 

@@ -15,9 +15,7 @@
 """What is needed to make a scenario again, as texts in the summary of its request: parameters and versions, out and in."""
 
 from collections.abc import Mapping
-import hashlib
 from importlib import metadata
-from pathlib import Path
 import platform
 from typing import Any, TypeVar
 
@@ -25,7 +23,6 @@ import yaml
 
 import scenario_gen
 from scenario_gen.errors import InputError
-from scenario_gen.folders import MARKER
 from scenario_gen.parameters import flatten, former_name, updated
 
 Config = TypeVar("Config")
@@ -64,12 +61,3 @@ def _number(kind: type, text: str) -> Any:
         return kind(text)
     except ValueError:
         return text
-
-
-def sha256_of(path: Path) -> str:
-    """Return the SHA-256 of a file, or of a folder's files in order of their names."""
-    digest = hashlib.sha256()
-    for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
-        if file.is_file() and file.name != MARKER:  # which is about the files, and not in every bag
-            digest.update(file.read_bytes())
-    return digest.hexdigest()

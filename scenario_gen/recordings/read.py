@@ -39,8 +39,8 @@ from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.recordings.requests import RequestTracker
 from scenario_gen.recordings.template import anchor_index, decode_routes, template_statuses
+from scenario_gen.storage.bag import BagMessage, read_messages, within
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import BagMessage, DEFAULT, read_messages, within
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit
 from scenario_gen.types.road import Road
@@ -91,7 +91,7 @@ class Recording:
         return {key: " | ".join(dict.fromkeys(values)) for key, values in found.items()}
 
 
-def read_recording(path: Path, config: BagConfig = DEFAULT, topics: Collection[str] = ()) -> Recording:
+def read_recording(path: Path, config: BagConfig = BagConfig(), topics: Collection[str] = ()) -> Recording:
     """Read the messages of a bag.
 
     Args:
@@ -442,7 +442,7 @@ class Namespace:
         return Fit(encounter.vehicles, fitted, anchor_index(encounter, changepoints), asked, notes), routes
 
 
-def read_scenario_set(path: Path, namespace: str = "", config: BagConfig = DEFAULT) -> ScenarioSet:
+def read_scenario_set(path: Path, namespace: str = "", config: BagConfig = BagConfig()) -> ScenarioSet:
     """Return the last request's scenarios and counts from a bag, whoever recorded it.
 
     Raises:

@@ -31,7 +31,7 @@ from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.recordings.read import SCENARIOS
 from scenario_gen.storage.metadata import qos_yaml
-from scenario_gen.storage.writer import AtomicBag, BagWriter
+from scenario_gen.storage.writer import atomic_bag, BagWriter
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.names import tokens
@@ -102,7 +102,7 @@ def write_recording(folder: Path, results: GenerationResult | Mapping[str, Gener
     Raises:
         InputError: the folder is there and is something else, or cannot be written; a road or a fit is not known.
     """
-    with AtomicBag(folder) as bag:
+    with atomic_bag(folder) as bag:
         add_results(bag, {"": results} if isinstance(results, GenerationResult) else results)
     return folder
 

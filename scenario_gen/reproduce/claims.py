@@ -119,14 +119,14 @@ def _interaction(case: PaperCase) -> Claim:
         shown = []
         for name in (WITH, WITHOUT, UNIFORM):
             if name in case.similarity:
-                error, correlation = (case.similarity[name].values[f"{what}_{kind}"] for what in ("e", "correlation"))
+                error, correlation = (case.similarity[name][f"{what}_{kind}"] for what in ("e", "correlation"))
                 shown.append(f"{name} {error.value:.3f} [{error.low:.3f}, {error.high:.3f}]")
                 for key, value in (("", error.value), (" low", error.low), (" high", error.high)):
                     values[f"e_{kind} {name}{key}"] = finite(value)
                 values[f"correlation_{kind} {name}"] = finite(correlation.value)
         said.append(f"{kind}: " + ", ".join(shown))
     errors = [
-        case.similarity[name].values[f"e_{kind}"].value
+        case.similarity[name][f"e_{kind}"].value
         for kind in ("position", "speed")
         for name in (WITH, WITHOUT)
         if name in case.similarity

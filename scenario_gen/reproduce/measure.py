@@ -60,13 +60,6 @@ class Regressions:
 
 
 @dataclass(frozen=True, eq=False)
-class Similarity:
-    """Figure 5 of one arm: E and correlation, each with its interval."""
-
-    values: dict[str, Interval]
-
-
-@dataclass(frozen=True, eq=False)
 class PaperCase:
     """Everything the four figures show of one encounter.
 
@@ -78,7 +71,7 @@ class PaperCase:
         arms: figure 4, samples by arm.
         off_road, stop_speed: share of instants off the road; mean speed during the template's waits [m/s], NaN if there is none.
         regressions: figure 2.
-        similarity: figure 5 by arm.
+        similarity: figure 5 by arm: E and correlation, each with its interval.
         refused: why an arm, or the whole encounter (""), is missing.
     """
 
@@ -90,7 +83,7 @@ class PaperCase:
     off_road: dict[str, float] = field(default_factory=dict)
     stop_speed: dict[str, float] = field(default_factory=dict)
     regressions: Regressions | None = None
-    similarity: dict[str, Similarity] = field(default_factory=dict)
+    similarity: dict[str, dict[str, Interval]] = field(default_factory=dict)
     refused: dict[str, str] = field(default_factory=dict)
 
 
@@ -148,11 +141,7 @@ def line_error(speed: Floats, changepoints: Ints) -> float:
 
 def off_road(road: Road, position: Floats) -> float:
     """Share of positions (..., 2) [m], centres of vehicles, that lie off the road."""
-    cell = np.floor((position - road.origin) / road.resolution).astype(np.int64)
-    height, width = road.drivable.shape
-    inside = (cell >= 0).all(axis=-1) & (cell[..., 0] < width) & (cell[..., 1] < height)
-    column, row = np.clip(cell[..., 0], 0, width - 1), np.clip(cell[..., 1], 0, height - 1)
-    return float(1.0 - (inside & road.drivable[row, column]).mean())
+    return float(1.0 - road.drivable_at(position).mean())
 
 
 def stop_speed(encounter: Encounter, arm: Sampled) -> float:
@@ -190,15 +179,15 @@ def compare_priors(route: Route, seed: int) -> Regressions:
     return Regressions(x, truth, training, priors)
 
 
-def similarity_of(encounter: Encounter, arm: Sampled, seed: int) -> Similarity:
+def similarity_of(encounter: Encounter, arm: Sampled, seed: int) -> dict[str, Interval]:
     """Figure 5 as numbers: E and the correlation of the mean matrix, for position and speed."""
     bootstrap = Bootstrap.draw(np.arange(len(arm.position)), RESAMPLES, LEVEL, seed)
     places = pair_similarities(encounter.position, arm.position, "euclidean")
     paces = pair_similarities(encounter.speed[..., None], arm.speed[..., None], "manhattan")
-    values = {}
+    values: dict[str, Interval] = {}
     for kind, pairs in (("position", places), ("speed", paces)):
         values[f"e_{kind}"] = bootstrap.interval(lambda weights, pairs=pairs: mean_error(pairs, weights))  # type: ignore[misc]
         values[f"correlation_{kind}"] = bootstrap.interval(
             lambda weights, pairs=pairs: mean_correlation(pairs, weights)  # type: ignore[misc]
         )
-    return Similarity(values)
+    return values

@@ -22,24 +22,17 @@ from scenario_gen.errors import InputError
 from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.recordings.read import Namespace, NO_ENTRY, read_recording, SCENARIOS
 from scenario_gen.review.validation import Reference
+from scenario_gen.storage.bag import within
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import DEFAULT, within
 from scenario_gen.template.interaction import find_conflicts, find_waits
-from scenario_gen.types.evaluation import CheckCounts, Evaluation
+from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.generation import GenerationResult, WITHOUT
 from scenario_gen.types.scenario import Scenario, ScenarioSet, Verdict
 from scenario_gen.validity import Checker, Limits
 
 
-def evaluate_bag(
-    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0, bag: BagConfig = DEFAULT
-) -> tuple[Evaluation, ...]:
-    """Evaluate every namespace of a bag, as `bag_results` does, and return the figures alone."""
-    return tuple(result.evaluation for result in bag_results(path, config, limits, seed, bag))
-
-
 def bag_results(
-    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0, bag: BagConfig = DEFAULT
+    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0, bag: BagConfig = BagConfig()
 ) -> tuple[GenerationResult, ...]:
     """Evaluate every namespace of a bag that holds both `tracks` and `scenarios`, ready for the report.
 

@@ -20,18 +20,18 @@ from pathlib import Path
 
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.fitting import fit_template, FittingConfig
-from scenario_gen.folders import Kind
+from scenario_gen.folders import Kind, sha256_of
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.recordings.provenance import read_parameters, sha256_of, versions
+from scenario_gen.recordings.provenance import read_parameters, versions
 from scenario_gen.recordings.read import INFO, Namespace, read_recording, RequestSummary, ScenarioEntry
 from scenario_gen.recordings.template import decode_template, missing_topics
 from scenario_gen.recordings.write import add_message, same_tracks, scenario_bytes
 from scenario_gen.routing import plan_routes, PlanningConfig
 from scenario_gen.sampling import regenerate, SamplingConfig
 from scenario_gen.segmentation import segment, SegmentationConfig
+from scenario_gen.storage.bag import bag_topics, BagMessage, within
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import bag_topics, BagMessage, DEFAULT, within
-from scenario_gen.storage.writer import AtomicBag
+from scenario_gen.storage.writer import atomic_bag
 from scenario_gen.template.interaction import waits_to_keep
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.generation import GenerationResult
@@ -65,7 +65,7 @@ def regenerate_scenario(
     namespace: str | None = None,
     request: str | None = None,
     log: Path | None = None,
-    config: BagConfig = DEFAULT,
+    config: BagConfig = BagConfig(),
 ) -> Regenerated:
     """Make scenario `index` of a bag again and compare it with the recorded SHA-256.
 
@@ -127,7 +127,7 @@ def write_regenerated(made: Regenerated, folder: Path, inputs: Sequence[Path] = 
     Raises:
         InputError: the folder is there and is something else, holds an input, or cannot be written.
     """
-    with AtomicBag(folder, REGENERATED, inputs) as bag:
+    with atomic_bag(folder, REGENERATED, inputs) as bag:
         for message in made.messages:
             add_message(bag, message.topic, message.data, message.stamp_ns)
     return folder

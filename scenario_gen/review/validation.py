@@ -30,8 +30,8 @@ import numpy as np
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS
+from scenario_gen.storage.bag import within
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import DEFAULT, within
 from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, Wait
 from scenario_gen.types.names import tokens
 from scenario_gen.types.road import Road
@@ -102,7 +102,7 @@ class Reference:
         return Checker(self.road, asked, conflicts, waits, limits)
 
 
-def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = DEFAULT) -> tuple[Validation, ...]:
+def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = BagConfig()) -> tuple[Validation, ...]:
     """Check every scenario of every namespace that holds any; `config` says how much is read at most.
 
     Raises:

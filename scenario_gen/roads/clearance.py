@@ -104,7 +104,10 @@ def footprint_fits(road: Road, poses: Floats, length: float, width: float) -> Bo
 
 @kernel(B2, OUT2)
 def distance_transform(drivable: Bools, out: Floats) -> None:
-    """Fill `out` (H, W) with the distance [cells] from each centre to the nearest non-drivable square."""
+    """Fill `out` (H, W) with the distance [cells] from each centre to the nearest non-drivable square.
+
+    Source: the lower envelope of parabolas (Felzenszwalb & Huttenlocher 2012), here of squares instead of points.
+    """
     height, width = drivable.shape
     for i in range(height):  # down the columns: cells to the nearest non-drivable one above
         for j in range(width):
@@ -199,6 +202,8 @@ def near_squares_free(clearance: Floats, ax: float, ay: float, bx: float, by: fl
 @kernel(F2, F, F, F, F, F)
 def free_length(clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float) -> float:
     """How far a disc can surely move from a towards b; infinity if all the way, exactly; else what is verified, to a cell.
+
+    Source: sphere tracing (Hart 1996), with exact checks where it would have to creep.
 
     The clearance field (H, W), all in cells, skips what is surely free, squares decide the rest.
     """

@@ -17,11 +17,11 @@
 from dataclasses import dataclass
 
 from scenario_gen.errors import RefusedError
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 
 
 @dataclass(frozen=True)
-class RoadConfig:
+class RoadConfig(Parameters):
     """Parameters of the built-in roads and of `corridor`, and what is read of a map; a map keeps its own geometry."""
 
     lane_width: float = parameter(3.5, "width of a lane", unit="m", low=2.0, high=1000.0)
@@ -39,9 +39,6 @@ class RoadConfig:
         25_000_000, "most cells of a road that is drawn, or pixels of a map that is read", low=1, high=80_000_000
     )
     image_outside_folder: bool = parameter(False, "read also a map's image that lies outside the folder of its YAML file")
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 def refuse_too_many_cells(name: str, width: int, height: int, config: RoadConfig) -> None:

@@ -43,17 +43,12 @@ def components(road: Road, radius: float) -> Ints:
     return known[radius]
 
 
-def component_cells(road: Road, radius: float, label: int) -> Ints:
-    """Flat indices (n,) of the cells of one component, in order; read-only, cached."""
-    return _cells_of(road, radius, label)[0]
+def component_cells(road: Road, radius: float, label: int) -> tuple[Ints, Ints]:
+    """Flat indices of the cells of one component, in order, for a disc of `radius` [m]; cached.
 
-
-def corner_cells(road: Road, radius: float, label: int) -> Ints:
-    """Those cells of a component that lie diagonally before a convex corner of what the disc cannot enter: (c,) flat indices."""
-    return _cells_of(road, radius, label)[1]
-
-
-def _cells_of(road: Road, radius: float, label: int) -> tuple[Ints, Ints]:
+    Returns:
+        All of them (n,), and those (c,) that lie diagonally before a convex corner of what the disc cannot enter.
+    """
     known = _cells.setdefault(road, {})
     if (radius, label) not in known:
         inside = np.zeros(np.add(road.drivable.shape, 2), dtype=np.bool_)
@@ -94,11 +89,6 @@ def common_component(road: Road, start_xy: Floats, goal_xy: Floats, radius: floa
         return first or last
     theirs = set(_reachable(road, goal, radius))
     return next((label for label in _reachable(road, start, radius) if label in theirs), None)
-
-
-def connected(road: Road, start_xy: Floats, goal_xy: Floats, radius: float) -> bool:
-    """Whether a disc of `radius` [m] can move from start (2,) [m] to goal (2,) [m]."""
-    return common_component(road, start_xy, goal_xy, radius) is not None
 
 
 def _reachable(road: Road, xy: Floats, radius: float) -> Iterator[int]:

@@ -38,6 +38,8 @@ _BLOCK = 1 << 20  # pixels worked on at a time, so that a large map takes little
 def read_map(path: Path, config: RoadConfig) -> Road:
     """Read a map_server YAML and its image; what is free there is drivable, what is occupied or unknown is not.
 
+    Source: map_io of nav2_map_server, whose modes and thresholds these are.
+
     Raises:
         InputError: a file is missing, broken or too large, a key is missing or has a value that cannot be used, or the image
             lies outside the folder of the YAML file.

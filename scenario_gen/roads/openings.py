@@ -16,7 +16,7 @@
 
 import numpy as np
 
-from scenario_gen.arrays import Bools, Floats
+from scenario_gen.arrays import Bools, Floats, runs
 from scenario_gen.errors import InputError
 from scenario_gen.roads.config import RoadConfig
 
@@ -46,7 +46,7 @@ def find_openings(drivable: Bools, resolution: float, origin: Floats, config: Ro
     total = 0
     keep_right = 1 if config.traffic_side == "right" else -1
     for cells, axis, fixed, outward, right in edges:
-        for first, last in _runs(cells):
+        for first, last in runs(cells):
             size = (last - first) * resolution
             if size < _MIN_WIDTH:
                 continue
@@ -66,9 +66,3 @@ def find_openings(drivable: Bools, resolution: float, origin: Floats, config: Ro
                 if side <= 0:
                     entries.append([*at, outward + np.pi])
     return np.array(entries).reshape(-1, 3), np.array(exits).reshape(-1, 3)
-
-
-def _runs(cells: Bools) -> list[tuple[int, int]]:
-    """Half-open index ranges of consecutive True cells."""
-    edge = np.flatnonzero(np.diff(np.concatenate(([False], cells, [False])).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in edge.reshape(-1, 2)]

@@ -16,13 +16,13 @@
 
 from dataclasses import dataclass, field
 
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.routing.search.ompl.planners import OmplConfig
 from scenario_gen.routing.search.rrt_star_connect import RrtStarConnectConfig
 
 
 @dataclass(frozen=True)
-class PlanningConfig:
+class PlanningConfig(Parameters):
     """How routes are planned."""
 
     planner: str = parameter(
@@ -40,6 +40,3 @@ class PlanningConfig:
 
     rrt_star_connect: RrtStarConnectConfig = field(default_factory=RrtStarConnectConfig)
     ompl: OmplConfig = field(default_factory=OmplConfig)
-
-    def __post_init__(self) -> None:
-        check(self)

@@ -78,13 +78,11 @@ def keep_to_side(road: Road, path: Floats, radius: float, side: str) -> Guess:
 def ray_cast(road: Road, points: Floats, direction: Floats) -> Floats:
     """How far (P,) [m] it is from each point (P, 2) along its direction (P, 2) to the edge of the road, VIEW at most."""
     field = clearance_field(road)
-    height, width = field.shape
     gone = np.zeros(len(points))
     active = np.ones(len(points), dtype=bool)
     for _ in range(int(2 * VIEW / road.resolution)):
-        cell = np.floor((points + gone[:, None] * direction - road.origin) / road.resolution).astype(int)
-        inside = (cell >= 0).all(axis=1) & (cell[:, 0] < width) & (cell[:, 1] < height)
-        room = np.where(inside, field[np.clip(cell[:, 1], 0, height - 1), np.clip(cell[:, 0], 0, width - 1)], 0.0)
+        row, column, inside = road.cells(points + gone[:, None] * direction)
+        room = np.where(inside, field[row, column], 0.0)
         active &= (room > 0.0) & (gone < VIEW)
         if not active.any():
             break

@@ -70,6 +70,8 @@ class _Task:
 def plan_routes(road: Road, fit: Fit, config: PlanningConfig = PlanningConfig(), seed: int = 0) -> tuple[Route, ...]:
     """Plan one route per vehicle through its anchors.
 
+    Source: paper III-B, between consecutive changepoints.
+
     Start and end are met exactly, with their headings; interior anchors are strong but soft targets (see `deviations`).
     In drivable mode the footprint stays on the road along the whole route and the curvature within the limit.
 
@@ -185,12 +187,8 @@ def _leg(task: _Task, a: int, b: int, direct_allowed: bool) -> Guess:
 
 def _radius(task: _Task, start: Floats, end: Floats) -> float:
     """Half the width and the margin, or what room there is at the ends of the leg if that is less."""
-    ends = np.stack((start, end))[:, :2]
-    cell = np.floor((ends - task.road.origin) / task.road.resolution).astype(int)
-    field = clearance_field(task.road)
-    height, width = field.shape
-    cell = np.clip(cell, 0, (width - 1, height - 1))
-    room = float(field[cell[:, 1], cell[:, 0]].min()) - task.road.resolution
+    row, column, _ = task.road.cells(np.stack((start, end))[:, :2])
+    room = float(clearance_field(task.road)[row, column].min()) - task.road.resolution
     return max(min(0.5 * task.vehicle.width + task.config.margin, room), 0.0)
 
 

@@ -96,6 +96,8 @@ def smooth(
 ) -> Curve:
     """Draw a curve from `start` to `end` (poses (3,)) near the interior `targets`.
 
+    Source: elastic bands (Quinlan & Khatib 1993).
+
     Returns:
         The first curve within the limits; if there is none, the last one, with what is wrong about it.
     """
@@ -140,13 +142,11 @@ def _ahead(pose: Floats) -> Floats:
 def _needed(road: Road, disc: Floats, need: float, start: Floats, end: Floats, spacing: float, count: int) -> Floats:
     """Clearance wanted along the band (count,): what there is at its ends, rising from there by 5 cm per metre to `need`."""
     field = clearance_field(road)
-    limit = np.array(field.shape) - 1
     along = np.arange(count) * spacing
     wanted = np.full(count, need)
     for pose, distance in ((start, along), (end, along[::-1])):
-        cell = ((pose[:2] + disc[:, None] * _ahead(pose) - road.origin) / road.resolution).astype(int)[:, ::-1]
-        room = field[tuple(np.clip(cell, 0, limit).T)].min()
-        wanted = np.minimum(wanted, room + TAPER * distance)
+        row, column, _ = road.cells(pose[:2] + disc[:, None] * _ahead(pose))
+        wanted = np.minimum(wanted, field[row, column].min() + TAPER * distance)
     return wanted
 
 
@@ -187,7 +187,10 @@ def _assigned(points: Floats, targets: Targets) -> tuple[Floats, Floats]:
 
 
 def monotone_matching(cost: Floats) -> Ints:
-    """Match rows (A) of `cost` (A, M), of any unit, to columns without going back, so that its sum is least: (A,) columns."""
+    """Match rows (A) of `cost` (A, M), of any unit, to columns without going back, so that its sum is least: (A,) columns.
+
+    Source: dynamic programming (Bellman 1957).
+    """
     total = cost[0]
     came_from = np.empty(cost.shape, dtype=np.int64)
     for k in range(1, len(cost)):

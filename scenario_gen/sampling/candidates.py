@@ -154,7 +154,10 @@ def _scenario(vehicles: tuple[Vehicle, ...], time: Floats, state: Floats, seed: 
 
 
 class CandidateModel:
-    """Draws candidates of one encounter on its routes."""
+    """Draws candidates of one encounter on its routes.
+
+    Source: paper III-C.
+    """
 
     def __init__(self, vehicles: tuple[VehicleModel, ...], warp: TimeWarp, max_slide: float) -> None:
         self.vehicles, self.warp, self.max_slide = vehicles, warp, max_slide

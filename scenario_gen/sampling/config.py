@@ -16,12 +16,15 @@
 
 from dataclasses import dataclass
 
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 
 
 @dataclass(frozen=True)
-class SamplingConfig:
-    """What varies from scenario to scenario, by how much, and within which limits of motion."""
+class SamplingConfig(Parameters):
+    """What varies from scenario to scenario, by how much, and within which limits of motion.
+
+    Source: σ_f and l of eq 14, σ_ω of eq 13; the others are ours.
+    """
 
     lateral_sigma: float = parameter(
         0.3, "σ_f: standard deviation across the route, between anchors", unit="m", low=0.0, high=10.0
@@ -49,6 +52,3 @@ class SamplingConfig:
         0.2, "share by which the clock may be stretched where no speed profile exists", low=0.0, high=1.0
     )
     attempts: int = parameter(20, "candidates drawn per scenario asked for, at most", low=1, high=10_000)
-
-    def __post_init__(self) -> None:
-        check(self)

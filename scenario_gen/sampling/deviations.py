@@ -17,7 +17,7 @@
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats
+from scenario_gen.arrays import Floats
 from scenario_gen.sampling.config import SamplingConfig
 from scenario_gen.sampling.gp import Features, Observations, Regression
 from scenario_gen.sampling.path import BasePath
@@ -70,6 +70,8 @@ _SMOOTHING = 4.0  # m along the route, each of two passes
 def lateral_covariance_root(path: BasePath, room: Floats, config: SamplingConfig) -> Floats:
     """Square root (G, r) of the covariance of the deviation [m] at the route's nodes.
 
+    Source: eqs 12 to 15, of the deviation as a function of arc length.
+
     Given are deviation and slope 0 at both ends (the asked poses), and 0 with noise σ_ω at every interior anchor.
     Where the road leaves less than `ROOM_SIGMAS`·σ_f of room the process is scaled down to it.
 
@@ -106,22 +108,13 @@ def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> F
     room, free = np.zeros(len(path.node)), np.ones(len(path.node), dtype=np.bool_)
     for step in np.arange(1, int(np.ceil(most / _ROOM_STEP)) + 1) * _ROOM_STEP:
         for side in (0.5 * vehicle.width + step, -0.5 * vehicle.width - step):
-            free &= _drivable(road, axis + side * left).all(axis=1)
+            free &= road.drivable_at(axis + side * left).all(axis=1)
         room[free] = min(step, most)
     reach = int(np.ceil(_SMOOTHING / max(path.spacing, 1e-9))) if len(room) > 1 else 0
     smooth = minimum_filter1d(room, 4 * reach + 1, mode="nearest")
     for _ in range(2):
         smooth = uniform_filter1d(smooth, 2 * reach + 1, mode="nearest")
     return np.asarray(smooth)
-
-
-def _drivable(road: Road, points: Floats) -> Bools:
-    """Whether points (..., 2) lie in drivable cells."""
-    cell = np.floor((points - road.origin) / road.resolution).astype(np.int64)
-    height, width = road.drivable.shape
-    inside = (cell[..., 0] >= 0) & (cell[..., 0] < width) & (cell[..., 1] >= 0) & (cell[..., 1] < height)
-    found = road.drivable[np.clip(cell[..., 1], 0, height - 1), np.clip(cell[..., 0], 0, width - 1)]
-    return np.asarray(inside & found)
 
 
 def soft_clipped(deviation: Floats, room: Floats) -> Floats:

@@ -87,6 +87,8 @@ class Features:
 class Observations:
     """Values seen of f.
 
+    Source: the training outputs of eq 13.
+
     Attributes:
         x: (n,) where.
         y: (n,) what.
@@ -112,6 +114,8 @@ class Observations:
 class Posterior:
     """f at m points, given the observations: mean + factor·z with z ~ N(0, I).
 
+    Source: eq 15, its covariance put right (docs/method.md).
+
     Attributes:
         mean: (m,).
         factor: (m, r), a square root of the covariance.
@@ -131,7 +135,10 @@ class Posterior:
 
 
 class Regression:
-    """The posterior over the weights, ready to be asked at any points."""
+    """The posterior over the weights, ready to be asked at any points.
+
+    Source: eqs 13 and 15, as least squares in weights.
+    """
 
     def __init__(self, features: Features, seen: Observations) -> None:
         """Condition on what was seen.

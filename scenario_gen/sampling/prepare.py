@@ -239,11 +239,7 @@ def _model(
             )
         lateral = lateral_covariance_root(path, room, config)
         longitudinal = longitudinal_covariance_root(times, nominal.anchor, config)
-        qp = SpeedProfileQP(_rescaled(nominal.qp.knots, stretch), config, nominal.qp.bounds)
+        knots = replace(nominal.qp.knots, knot=nominal.qp.knots.knot * stretch)
+        qp = SpeedProfileQP(knots, config, nominal.qp.bounds)
         vehicles.append(VehicleModel(vehicle, path, nominal.anchor, lateral, longitudinal, room, qp))
     return Prepared(CandidateModel(tuple(vehicles), warp, slide), tuple(sentences))
-
-
-def _rescaled(knots: SpeedKnots, stretch: float) -> SpeedKnots:
-    """The same knots, times `stretch`."""
-    return replace(knots, knot=knots.knot * stretch) if stretch != 1.0 else knots

@@ -17,8 +17,9 @@
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import itertools
+from typing import Any
 
 import numpy as np
 
@@ -128,11 +129,13 @@ def sample_scenarios(
     seed: int = 0,
     waits: tuple[Wait, ...],
     request: Request = Request(),
-    progress: Progress | None = None,
-    cancelled: Cancelled | None = None,
-    found: OnValid | None = None,
+    progress: Progress = lambda *_: None,
+    cancelled: Cancelled = lambda: False,
+    found: OnValid = lambda *_: None,
 ) -> ScenarioSet:
     """Draw candidates until `count` are valid or the budget is spent.
+
+    Source: paper III-C.
 
     Args:
         encounter: the template.
@@ -164,12 +167,12 @@ def sample_scenarios(
     if prepared.model is None:
         made = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), track)
     else:
-        take = None if found is None else lambda scenario: found(scenario, asked, track)
-        loop = _Loop(Sampler(prepared.model, seed, road.frame_id), check, count, progress, cancelled, take)
+        sampler = Sampler(prepared.model, seed, road.frame_id)
+        loop = _Loop(sampler, check, count, progress, cancelled, lambda scenario: found(scenario, asked, track))
         loop.run(config.attempts * count)
         sentences = (*prepared.adaptations, *loop.adaptations)
         made = ScenarioSet(count, loop.scenarios(), loop.candidates, loop.refused, sentences, track)
-    if request.moves and not made.scenarios and not (cancelled and cancelled()):
+    if request.moves and not made.scenarios and not cancelled():
         causes = ", ".join(f"{number} × {cause.value}" for cause, number in made.refused.most_common())
         more = f"; {'; '.join(made.adaptations)}" if made.adaptations else ""
         raise RefusedError(f"none of {made.candidates} candidate(s) with the asked states is valid ({causes}{more})")
@@ -194,26 +197,22 @@ def regenerate(
     return None if prepared.model is None else Sampler(prepared.model, seed, road.frame_id).scenario(index)
 
 
+@dataclass
 class _Loop:
     """The account of one request."""
 
-    def __init__(
-        self,
-        sampler: Sampler,
-        check: Check,
-        count: int,
-        progress: Callable[[int, int, int], None] | None,
-        cancelled: Callable[[], bool] | None,
-        found: Callable[[Scenario], None] | None,
-    ) -> None:
-        self.sampler, self.check, self.count = sampler, check, count
-        self.progress, self.cancelled, self.found = progress, cancelled, found
-        self.kept: list[Scenario] = []  # the first KEPT
-        self.index = array("q")  # of all that are valid
-        self.refused: Counter[Cause] = Counter()
-        self.candidates = 0
-        self.damped = 0
-        self.adaptations: list[str] = []
+    sampler: Sampler
+    check: Check
+    count: int
+    progress: Progress
+    cancelled: Cancelled
+    found: Callable[[Scenario], None]
+    kept: list[Scenario] = field(default_factory=list)  # the first KEPT
+    index: Any = field(default_factory=lambda: array("q"))  # of all that are valid
+    refused: Counter[Cause] = field(default_factory=Counter)
+    candidates: int = 0
+    damped: int = 0
+    adaptations: list[str] = field(default_factory=list)
 
     def run(self, budget: int) -> None:
         """Judge the levels by their first candidates, then stay with the first that is good enough, or the best."""
@@ -236,10 +235,7 @@ class _Loop:
         return LazyScenarios(self.sampler.redraw, np.array(self.index, dtype=np.int64), BLOCK)
 
     def _done(self, budget: int) -> bool:
-        return len(self.index) >= self.count or self.candidates >= budget or self._cancelled()
-
-    def _cancelled(self) -> bool:
-        return bool(self.cancelled and self.cancelled())
+        return len(self.index) >= self.count or self.candidates >= budget or self.cancelled()
 
     def _blocks(self, level: int) -> Iterator[tuple[Batch, list[int]]]:
         for number in itertools.count():
@@ -248,12 +244,12 @@ class _Loop:
     def _spend(self, blocks: Iterator[tuple[Batch, list[int]]], most: int) -> tuple[int, int]:
         """Check up to `most` candidates, whole blocks at a time; how many were seen, and how many of them were valid."""
         seen = good = 0
-        while seen < most and len(self.index) < self.count and not self._cancelled():
+        while seen < most and len(self.index) < self.count and not self.cancelled():
             batch, index = next(blocks)
             drawn = batch.scenarios(self.sampler.seed, index, self.sampler.frame_id)
             verdicts = iter(self.check([s for s in drawn if s is not None]))
             for number, scenario, damping in zip(index, drawn, batch.damping, strict=True):
-                if seen == most or len(self.index) == self.count or self._cancelled():
+                if seen == most or len(self.index) == self.count or self.cancelled():
                     break
                 seen += 1
                 self.damped += damping < 1.0
@@ -263,12 +259,10 @@ class _Loop:
                     self.index.append(number)
                     if len(self.kept) < KEPT:
                         self.kept.append(scenario)
-                    if self.found:
-                        self.found(scenario)
+                    self.found(scenario)
                 else:
                     self.refused[verdict.violations[0].cause if verdict else Cause.SPEED_PROFILE] += 1
-            if self.progress:
-                self.progress(len(self.index), self.count, self.candidates + seen)
+            self.progress(len(self.index), self.count, self.candidates + seen)
         self.candidates += seen
         return seen, good
 
@@ -286,5 +280,5 @@ class _Loop:
             self.adaptations.append(
                 f"{self.damped} of {self.candidates} candidates have a clock nearer to the template's, to be drivable"
             )
-        if self.cancelled and self.cancelled():
+        if self.cancelled():
             self.adaptations.append("cancelled")

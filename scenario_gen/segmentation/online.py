@@ -28,7 +28,7 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.segmentation.features import POSITION_FLOOR, SPEED_FLOOR, STAND_SPEED, without_spikes
 from scenario_gen.segmentation.library import PrimitiveLibrary
 from scenario_gen.segmentation.segment_classes import FinishedSegment, SegmentClasses
@@ -38,7 +38,7 @@ UNJUDGED = 2  # samples at the end that may be outliers: nothing after them says
 
 
 @dataclass(frozen=True)
-class OnlineConfig:
+class OnlineConfig(Parameters):
     """How the online segmenter decides."""
 
     window: float = parameter(30.0, "past that is kept at most", unit="s", low=5.0, high=600.0)
@@ -49,9 +49,6 @@ class OnlineConfig:
         1e-6, "probability with which noise alone looks like a changepoint", low=1e-12, high=0.5, was="chance_alone"
     )
     min_segment: float = parameter(0.5, "least distance between changepoints", unit="s", low=0.2, high=10.0)
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ import numpy as np
 
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import InputError
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.segmentation.descriptions import describe_segments
 from scenario_gen.segmentation.features import driving_features, paper_features, without_outliers
 from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
@@ -35,7 +35,7 @@ DRIVING_SAMPLER = SamplerConfig(weight=0.5, chains=3, sweeps=90)
 
 
 @dataclass(frozen=True)
-class SegmentationConfig:
+class SegmentationConfig(Parameters):
     """How an encounter is cut into primitives."""
 
     preset: str = parameter(
@@ -65,9 +65,6 @@ class SegmentationConfig:
     )
     turn_noise: float = parameter(0.4, "differences of lateral acceleration that mean nothing", unit="m/s²", low=0.0, high=5.0)
     sampler: SamplerConfig = DRIVING_SAMPLER
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 DEFAULT = SegmentationConfig()

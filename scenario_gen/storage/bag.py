@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A bag of one or several files as raw messages in order of their stamps."""
+"""Any rosbag2 bag, MCAP or SQLite, of one or several files, as raw messages in order of their stamps."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import heapq
 import io
 from pathlib import Path
@@ -30,24 +30,26 @@ from scenario_gen.errors import guarded, InputError
 from scenario_gen.storage.config import Allowance, BagConfig
 from scenario_gen.storage.files import files_of, METADATA
 from scenario_gen.storage.mcap import McapFile, open_mcap
+from scenario_gen.storage.metadata import quality_of
 from scenario_gen.storage.records import DamagedError
 from scenario_gen.storage.sqlite import open_sqlite, SqliteFile
+from scenario_gen.types.qos import Quality
 
 COPIED = 1 << 20  # bytes at a time
 
 
 @dataclass(frozen=True)
-class StoredTopic:
-    """A topic of one file: name, type, offered QoS profiles as YAML, number of messages."""
+class BagTopic:
+    """A topic of a bag: its full name, type, what its (first) publisher offered, and its number of messages."""
 
     name: str
     type: str
-    qos: str
+    quality: Quality
     count: int
 
 
 @dataclass(frozen=True)
-class StoredMessage:
+class BagMessage:
     """A message as it lies in the bag: CDR bytes and the time it was logged, nanoseconds."""
 
     topic: str
@@ -67,28 +69,19 @@ class StoredBag:
         self._compression = compression
         self._allowance = allowance
 
-    def topics(self) -> list[StoredTopic]:
-        """Return the topics of every file; one that is in several comes several times.
+    def topics(self) -> tuple[BagTopic, ...]:
+        """Return the topics, sorted by name; of one that is in several files the first one's, with the messages of all.
 
         Raises:
             InputError: a file is damaged.
         """
-        found = []
-        for file, storage in self._files:
-            if isinstance(storage, SqliteFile):
-                found += [StoredTopic(t.name, t.type, t.qos, t.count) for t in storage.topics]
-                continue
-            with _place(file):
-                storage.complete()
-                for channel in storage.channels.values():
-                    schema = storage.schemas.get(channel.schema_id)
-                    if schema is None:
-                        raise DamagedError(0, f"the type of topic {shown(channel.topic)} is missing (schema {channel.schema_id})")
-                    count = (storage.counts or {}).get(channel.id, 0)
-                    found.append(StoredTopic(channel.topic, schema.name, channel.metadata.get("offered_qos_profiles", ""), count))
-        return found
+        found: dict[str, BagTopic] = {}
+        for name, kind, qos, count in (entry for file, storage in self._files for entry in _listed(file, storage)):
+            topic = found.get(name) or BagTopic(name, kind, quality_of(qos), 0)
+            found[name] = replace(topic, count=topic.count + count)
+        return tuple(found[name] for name in sorted(found))
 
-    def messages(self, wanted: Callable[[str, str], bool] = lambda _topic, _type: True) -> Iterator[StoredMessage]:
+    def messages(self, wanted: Callable[[str, str], bool] = lambda _topic, _type: True) -> Iterator[BagMessage]:
         """Yield the messages of the topics that are `wanted`, by name and type, in order of their stamps; of all files together.
 
         Raises:
@@ -98,7 +91,7 @@ class StoredBag:
             self._allowance.hold(len(message.data))
             yield message
 
-    def _of_file(self, file: Path, storage: McapFile | SqliteFile, wanted: Callable[[str, str], bool]) -> Iterator[StoredMessage]:
+    def _of_file(self, file: Path, storage: McapFile | SqliteFile, wanted: Callable[[str, str], bool]) -> Iterator[BagMessage]:
         if isinstance(storage, SqliteFile):
             topics = {topic.id: (topic.name, topic.type, topic.encoding) for topic in storage.topics}
             logged = storage.messages(_of(topics, wanted, file))
@@ -110,7 +103,7 @@ class StoredBag:
             logged = _strictly(file, storage.in_order(set(own))) if own else iter(())
         for stamp, number, data in logged:
             name, kind, _ = topics[number]
-            yield StoredMessage(name, kind, self._whole(data, file), stamp)
+            yield BagMessage(name, kind, self._whole(data, file), stamp)
 
     def _whole(self, data: bytes, file: Path) -> bytes:
         """Return a message, decompressed where the bag compresses each by itself."""
@@ -123,6 +116,21 @@ class StoredBag:
             raise InputError(f"{file}: a message decompresses to more than bag.most_chunk_bytes ({most})")
         self._allowance.unpack(len(whole))
         return whole
+
+
+def _listed(file: Path, storage: McapFile | SqliteFile) -> Iterator[tuple[str, str, str, int]]:
+    """Yield name, type, offered QoS profiles as YAML and number of messages of each topic of a file."""
+    if isinstance(storage, SqliteFile):
+        yield from ((topic.name, topic.type, topic.qos, topic.count) for topic in storage.topics)
+        return
+    with _place(file):
+        storage.complete()
+        for channel in storage.channels.values():
+            if channel.schema_id not in storage.schemas:
+                raise DamagedError(0, f"the type of topic {shown(channel.topic)} is missing (schema {channel.schema_id})")
+            count = (storage.counts or {}).get(channel.id, 0)
+            kind = storage.schemas[channel.schema_id].name
+            yield channel.topic, kind, channel.metadata.get("offered_qos_profiles", ""), count
 
 
 def _type(storage: McapFile, schema_id: int) -> str:
@@ -224,3 +232,44 @@ def _unpacked(file: Path, stack: ExitStack, allowance: Allowance) -> Path:
                 return target
             allowance.unpack(len(block))
             whole.write(block)
+
+
+@contextmanager
+def within(path: Path) -> Iterator[None]:
+    """Name the bag in errors about what lies in it: a decoder knows the topic only.
+
+    Raises:
+        InputError: as raised inside, with the bag's name.
+    """
+    try:
+        yield
+    except InputError as error:
+        if str(path) in str(error):
+            raise
+        raise InputError(f"{path}: {error}") from error
+
+
+def bag_topics(path: Path, config: BagConfig = BagConfig()) -> tuple[BagTopic, ...]:
+    """Return the topics of a bag, sorted by name.
+
+    Args:
+        path: a bag's folder, or one of its files.
+        config: what is read at most.
+
+    Raises:
+        InputError: the bag is missing, damaged or empty of metadata.
+    """
+    with open_bag(path, config) as bag:
+        return bag.topics()
+
+
+def read_messages(
+    path: Path, wanted: Callable[[str], bool] = lambda _: True, config: BagConfig = BagConfig()
+) -> Iterator[BagMessage]:
+    """Yield the messages of the topics that are `wanted`, in the order they were logged; those of all files of a bag together.
+
+    Raises:
+        InputError: the bag is missing or damaged, or larger than `config` allows.
+    """
+    with open_bag(path, config) as bag:
+        yield from bag.messages(lambda topic, _: wanted(topic))

@@ -17,7 +17,7 @@
 from dataclasses import dataclass
 
 from scenario_gen.errors import InputError
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 
 MESSAGE_BYTES = 256  # what a message costs beside its own bytes
 FOUND_BYTES = 1024  # what finding a message in a chunk counts for: time, where a few bytes hold very many messages
@@ -25,7 +25,7 @@ SHRINK = 100  # times that a file may grow by decompression before it is suspect
 
 
 @dataclass(frozen=True)
-class BagConfig:
+class BagConfig(Parameters):
     """Bounds of reading a bag, so that a small damaged or malicious file cannot take all memory."""
 
     most_bytes: int = parameter(
@@ -37,9 +37,6 @@ class BagConfig:
         low=1,
         high=2**31 - 1,
     )
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 class Allowance:

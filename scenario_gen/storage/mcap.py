@@ -14,12 +14,11 @@
 
 """A whole MCAP file, read strictly: what is damaged is an error."""
 
-from array import array
 from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 import heapq
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from mcap.opcode import Opcode
 import numpy as np
@@ -36,6 +35,7 @@ from scenario_gen.storage.records import (
     LATEST,
     MAGIC,
     MESSAGE,
+    Messages,
     read_channel,
     read_chunk_head,
     read_contents,
@@ -69,37 +69,13 @@ class ChunkBlock:
         return read_contents(decompress(data, self.head, allowance), self.head.records.start, allowance)
 
 
-@dataclass
-class LooseBlock:
+class LooseBlock(Messages):
     """Messages outside of chunks, one after the other in the file."""
-
-    stamps: Any = field(default_factory=lambda: array("Q"))
-    channel_ids: Any = field(default_factory=lambda: array("H"))
-    starts: Any = field(default_factory=lambda: array("Q"))
-    lengths: Any = field(default_factory=lambda: array("Q"))
 
     @property
     def start_ns(self) -> int:
         """Its first stamp."""
         return int(min(self.stamps))
-
-    def add(self, file: BinaryIO, record: Record) -> None:
-        """Take note of a message.
-
-        Raises:
-            DamagedError: it is none.
-        """
-        file.seek(record.start)
-        head = file.read(MESSAGE.size)
-        if record.length < MESSAGE.size or len(head) < MESSAGE.size:
-            raise DamagedError(record.start, f"a message record of {record.length} bytes")
-        channel, _, stamp, _ = MESSAGE.unpack(head)
-        if stamp >= LATEST:
-            raise DamagedError(record.start, f"a message is logged at {stamp} ns, later than a stamp can be")
-        self.stamps.append(stamp)
-        self.channel_ids.append(channel)
-        self.starts.append(record.start + MESSAGE.size)
-        self.lengths.append(record.length - MESSAGE.size)
 
 
 Block = ChunkBlock | LooseBlock
@@ -132,7 +108,8 @@ class McapFile:
                 raise DamagedError(record.start, f"a message of {record.length} bytes; bag.most_chunk_bytes is {most}")
             last = self.blocks[-1] if self.blocks else None
             loose = last if isinstance(last, LooseBlock) else LooseBlock()
-            loose.add(self.file, record)
+            self.file.seek(record.start)
+            loose.add(self.file.read(MESSAGE.size), record.start, record.length, record.start)
             if loose is not last:
                 self.blocks.append(loose)
         elif record.opcode == Opcode.SCHEMA:
@@ -174,30 +151,25 @@ class McapFile:
             DamagedError: the block is damaged; not if `strict` is false and only its end is.
         """
         if isinstance(block, ChunkBlock):
-            contents: Contents | LooseBlock = block.contents(self.file, self.allowance)
-            data = contents.data if isinstance(contents, Contents) else b""
-            if strict and isinstance(contents, Contents) and contents.damage:
+            contents = block.contents(self.file, self.allowance)
+            if strict and contents.damage:
                 raise DamagedError(block.head.records.start, contents.damage)
+            found: Messages = contents
         else:
-            contents, data = block, b""
-        order = np.argsort(np.frombuffer(contents.stamps, dtype=np.uint64), kind="stable") if contents.stamps else ()
+            found = block
+        order = np.argsort(np.frombuffer(found.stamps, dtype=np.uint64), kind="stable") if found.stamps else ()
         for k in order:
-            stamp, channel, start, length = (
-                a[k] for a in (contents.stamps, contents.channel_ids, contents.starts, contents.lengths)
-            )
+            stamp, channel, start, length = (a[k] for a in (found.stamps, found.channel_ids, found.starts, found.lengths))
             if stamp < block.start_ns and strict:
                 raise DamagedError(start, f"a message is logged at {stamp} ns, before its chunk's start at {block.start_ns} ns")
             if wanted is not None and channel not in wanted:
                 continue
-            if isinstance(block, LooseBlock):
-                self.allowance.unpack(length)
-                yield (
-                    stamp,
-                    channel,
-                    content(self.file, Record(Opcode.MESSAGE, start, length), self.allowance.config.most_chunk_bytes),
-                )
+            if isinstance(block, ChunkBlock):
+                yield stamp, channel, contents.data[start : start + length]
             else:
-                yield stamp, channel, data[start : start + length]
+                self.allowance.unpack(length)
+                record = Record(Opcode.MESSAGE, start, length)
+                yield stamp, channel, content(self.file, record, self.allowance.config.most_chunk_bytes)
 
     def in_order(self, wanted: Collection[int] | None, *, strict: bool = True) -> Iterator[Logged]:
         """Yield messages in order of their stamps, those of one stamp in the order of the file."""

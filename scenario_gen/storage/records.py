@@ -225,16 +225,38 @@ def read_chunk_head(data: bytes, record: Record) -> ChunkHead:
 
 
 @dataclass
-class Contents:
-    """The records of a chunk: what lies in it, and for each message its stamp, channel and place in `data`."""
+class Messages:
+    """The messages of a block: for each its stamp, its channel and where its bytes lie."""
 
-    data: bytes
-    schemas: list[Schema] = field(default_factory=list)
-    channels: list[Channel] = field(default_factory=list)
     stamps: Any = field(default_factory=lambda: array("Q"))
     channel_ids: Any = field(default_factory=lambda: array("H"))
     starts: Any = field(default_factory=lambda: array("Q"))
     lengths: Any = field(default_factory=lambda: array("Q"))
+
+    def add(self, head: bytes, start: int, length: int, offset: int) -> None:
+        """Take note of a message record that begins with `head`, at `start`; `offset` is its place in the file, for messages.
+
+        Raises:
+            DamagedError: it is none.
+        """
+        if length < MESSAGE.size or len(head) < MESSAGE.size:
+            raise DamagedError(offset, f"a message record of {length} bytes")
+        channel, _, stamp, _ = MESSAGE.unpack(head)
+        if stamp >= LATEST:
+            raise DamagedError(offset, f"a message is logged at {stamp} ns, later than a stamp can be")
+        self.stamps.append(stamp)
+        self.channel_ids.append(channel)
+        self.starts.append(start + MESSAGE.size)
+        self.lengths.append(length - MESSAGE.size)
+
+
+@dataclass
+class Contents(Messages):
+    """The records of a chunk; its messages lie in `data`."""
+
+    data: bytes = b""
+    schemas: list[Schema] = field(default_factory=list)
+    channels: list[Channel] = field(default_factory=list)
     damage: str = ""  # what ended the reading before the end of the chunk
 
 
@@ -286,7 +308,7 @@ def read_contents(raw: bytes, offset: int, allowance: Allowance) -> Contents:
     Raises:
         InputError: the bag as a whole has too many messages.
     """
-    found, at, end = Contents(raw), 0, len(raw)
+    found, at, end = Contents(data=raw), 0, len(raw)
     try:
         while at < end:
             if end - at < HEAD.size:
@@ -296,15 +318,7 @@ def read_contents(raw: bytes, offset: int, allowance: Allowance) -> Contents:
             if opcode == 0 or length > end - at:
                 raise DamagedError(offset, f"at byte {at - HEAD.size} of a chunk's {end} no whole record begins")
             if opcode == Opcode.MESSAGE:
-                if length < MESSAGE.size:
-                    raise DamagedError(offset, f"a message record of {length} bytes in a chunk")
-                channel, _, stamp, _ = MESSAGE.unpack_from(raw, at)
-                if stamp >= LATEST:
-                    raise DamagedError(offset, f"a message in a chunk is logged at {stamp} ns, later than a stamp can be")
-                found.stamps.append(stamp)
-                found.channel_ids.append(channel)
-                found.starts.append(at + MESSAGE.size)
-                found.lengths.append(length - MESSAGE.size)
+                found.add(raw[at : at + MESSAGE.size], at, length, offset)
             elif opcode == Opcode.SCHEMA:
                 found.schemas.append(read_schema(raw[at : at + length], offset))
             elif opcode == Opcode.CHANNEL:

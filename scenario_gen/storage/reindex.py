@@ -32,7 +32,7 @@ from scenario_gen.storage.mcap import Logged, McapFile
 from scenario_gen.storage.metadata import profiles
 from scenario_gen.storage.records import Channel, DamagedError, Schema
 from scenario_gen.storage.salvage import Gap, Salvage, salvage
-from scenario_gen.storage.writer import AtomicBag, BagWriter
+from scenario_gen.storage.writer import atomic_bag, BagWriter
 
 REINDEXED = Kind("reindexed bag")
 MOST_LINES = 20  # of what was lost, on a terminal
@@ -85,7 +85,7 @@ def reindex(folder: Path, target: Path, config: BagConfig = BagConfig()) -> Rein
         raise InputError(f"{folder}: no .mcap file here; name the folder of a recorded bag")
     with ExitStack() as stack:
         found = _salvaged(files, config, stack)
-        with AtomicBag(target, REINDEXED, [folder]) as bag:
+        with atomic_bag(target, REINDEXED, [folder]) as bag:
             saved, undescribed = _write(bag, found, _types(found, folder))
             if not saved:
                 gaps = [gap for _, part in found for gap in part.gaps]

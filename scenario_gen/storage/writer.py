@@ -14,8 +14,8 @@
 
 """A bag as rosbag2 (Jazzy) writes it: MCAP files of raw CDR messages, and metadata.yaml."""
 
-from collections.abc import Iterable
-from contextlib import ExitStack, suppress
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -191,37 +191,20 @@ class BagWriter:
         self.close()
 
 
-class AtomicBag:
-    """A bag that is there whole or not at all, in the place of nothing or of an earlier one of the same kind."""
+@contextmanager
+def atomic_bag(folder: Path, kind: Kind = WRITTEN, inputs: Iterable[Path] = (), **options: Any) -> Iterator[BagWriter]:
+    """Give a bag to write that is there whole or not at all, in the place of nothing or of an earlier one of the same kind.
 
-    def __init__(self, folder: Path, kind: Kind = WRITTEN, inputs: Iterable[Path] = (), **options: Any) -> None:
-        """Prepare the bag.
+    Args:
+        folder: where it will be.
+        kind: of result; only an earlier one of that kind is replaced.
+        inputs: what is read for it, and may not lie in `folder`.
+        options: BagWriter's.
 
-        Args:
-            folder: where it will be.
-            kind: of result; only an earlier one of that kind is replaced.
-            inputs: what is read for it, and may not lie in `folder`.
-            options: BagWriter's.
-        """
-        self._folder, self._options = replaced_folder(folder, kind, inputs), options
-
-    def __enter__(self) -> BagWriter:
-        """Begin it.
-
-        Raises:
-            InputError: `folder` is there and may not be replaced, or its place cannot be written.
-        """
-        with ExitStack() as stack:
-            partial = stack.enter_context(self._folder)
-            partial.rmdir()  # the writer makes its own
-            writer = stack.enter_context(BagWriter(partial, **self._options))
-            self._stack = stack.pop_all()
-        return writer
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        """Put it to its place, unless the body failed.
-
-        Raises:
-            InputError: the disk is full, or fails.
-        """
-        self._stack.__exit__(kind, error, trace)
+    Raises:
+        InputError: `folder` is there and may not be replaced, its place cannot be written, or the disk is full, or fails.
+    """
+    with replaced_folder(folder, kind, inputs) as partial:
+        partial.rmdir()  # the writer makes its own
+        with BagWriter(partial, **options) as writer:
+            yield writer

@@ -73,6 +73,8 @@ class FrenetTracks:
 def to_frenet(tracks: tuple[Track, ...]) -> FrenetTracks:
     """Express tracks in path coordinates.
 
+    Source: Frenet coordinates of traffic (Werling et al. 2010).
+
     Raises:
         RefusedError: a vehicle turns as at a junction, or crosses the others' road.
     """

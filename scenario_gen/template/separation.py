@@ -53,6 +53,8 @@ def _reach(vehicle: Vehicle, turned: Floats) -> Floats:
 def footprint_gap(a: Vehicle, poses_a: Floats, b: Vehicle, poses_b: Floats) -> tuple[Floats, Floats]:
     """Signed gap of two oriented footprints by the separating-axis theorem.
 
+    Source: separating axes (Gottschalk, Lin & Manocha 1996).
+
     Args:
         a: first footprint.
         poses_a: (T, 3).

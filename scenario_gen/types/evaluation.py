@@ -30,54 +30,39 @@ Better = Literal["lower", "higher", ""]
 TEXT = {"type": "string", "maxLength": 10_000}
 METRIC_KEYS = ("id", "label", "unit", "better", "group", "meaning")
 NUMBER_OR_NULL = {"anyOf": [NUMBER, {"type": "null"}]}
-SCHEMA = {
-    "type": "object",
-    "required": [
-        *("encounter", "road", "vehicles", "duration_s", "changepoints"),
-        *("confidence_level", "resamples", "seed", "metrics", "rows"),
-    ],
-    "properties": {
-        "encounter": TEXT,
-        "road": TEXT,
-        "vehicles": {"type": "array", "items": TEXT},
-        "duration_s": {**NUMBER, "minimum": 0.0},
-        "changepoints": COUNT,
-        "confidence_level": {**NUMBER, "exclusiveMinimum": 0.0, "exclusiveMaximum": 1.0},
-        "resamples": COUNT,
-        "seed": COUNT,
-        "metrics": {
-            "type": "array",
-            "items": {
+
+
+def _object(**properties: Any) -> dict[str, Any]:
+    """Return the schema of an object that has all these properties."""
+    return {"type": "object", "required": list(properties), "properties": properties}
+
+
+def _list(items: Any) -> dict[str, Any]:
+    return {"type": "array", "items": items}
+
+
+SCHEMA = _object(
+    encounter=TEXT,
+    road=TEXT,
+    vehicles=_list(TEXT),
+    duration_s={**NUMBER, "minimum": 0.0},
+    changepoints=COUNT,
+    confidence_level={**NUMBER, "exclusiveMinimum": 0.0, "exclusiveMaximum": 1.0},
+    resamples=COUNT,
+    seed=COUNT,
+    metrics=_list(_object(**{**dict.fromkeys(METRIC_KEYS, TEXT), "better": {"enum": ["lower", "higher", ""]}})),
+    rows=_list(
+        _object(
+            name=TEXT,
+            samples=COUNT,
+            notes=_list(TEXT),
+            values={
                 "type": "object",
-                "required": list(METRIC_KEYS),
-                "properties": {
-                    **dict.fromkeys(("id", "label", "unit", "group", "meaning"), TEXT),
-                    "better": {"enum": ["lower", "higher", ""]},
-                },
+                "additionalProperties": _object(value=NUMBER_OR_NULL, low=NUMBER_OR_NULL, high=NUMBER_OR_NULL),
             },
-        },
-        "rows": {
-            "type": "array",
-            "items": {
-                "type": "object",
-                "required": ["name", "samples", "notes", "values"],
-                "properties": {
-                    "name": TEXT,
-                    "samples": COUNT,
-                    "notes": {"type": "array", "items": TEXT},
-                    "values": {
-                        "type": "object",
-                        "additionalProperties": {
-                            "type": "object",
-                            "required": ["value", "low", "high"],
-                            "properties": dict.fromkeys(("value", "low", "high"), NUMBER_OR_NULL),
-                        },
-                    },
-                },
-            },
-        },
-    },
-}
+        )
+    ),
+)
 """Of the JSON that `to_json` writes."""
 TEMPLATE = "template"
 """Name of the row that `evaluate` adds: the recorded encounter itself."""

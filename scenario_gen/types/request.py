@@ -22,7 +22,7 @@ import numpy as np
 
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.names import vehicle_index
 
@@ -32,7 +32,7 @@ _FORM = "id: x y yaw [speed]"
 
 
 @dataclass(frozen=True)
-class Request:
+class Request(Parameters):
     """What one request asks for."""
 
     ego: str = parameter("", "id of the vehicle that is left out for a planner under test; its track is given instead")
@@ -42,7 +42,7 @@ class Request:
     goals: str = parameter("", f"end states, likewise `{_FORM}`", unit="m, rad, m/s")
 
     def __post_init__(self) -> None:
-        check(self)
+        super().__post_init__()
         for name in ENDS:
             self.states(name)
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.arrays import Bools, canonical_poses, Floats, frozen
+from scenario_gen.arrays import Bools, canonical_poses, Floats, frozen, Ints
 from scenario_gen.errors import InputError
 
 FINEST, COARSEST = 0.001, 10.0  # metres of a cell: nothing is seen of a vehicle in larger ones
@@ -63,3 +63,15 @@ class Road:
             raise InputError(
                 f"road {self.name!r} has origin {self.origin}; at most {FARTHEST:g} m from the frame's origin are read"
             )
+
+    def cells(self, points: Floats) -> tuple[Ints, Ints, Bools]:
+        """Return rows and columns (...) of the cells nearest to points (..., 2) [m], and whether the points lie on the grid."""
+        cell = np.floor((points - self.origin) / self.resolution).astype(np.int64)
+        height, width = self.drivable.shape
+        column, row = np.clip(cell[..., 0], 0, width - 1), np.clip(cell[..., 1], 0, height - 1)
+        return row, column, np.asarray((cell[..., 0] == column) & (cell[..., 1] == row))
+
+    def drivable_at(self, points: Floats) -> Bools:
+        """Return whether points (..., 2) [m] lie in drivable cells; none beyond the grid does."""
+        row, column, inside = self.cells(points)
+        return np.asarray(inside & self.drivable[row, column])

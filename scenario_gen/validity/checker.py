@@ -63,19 +63,7 @@ class Checker:
         """
         self.road, self.asked, self.conflicts, self.waits = road, asked, conflicts, waits
         self.limits = limits or Limits()
-        one = self.limits
-        self._limits = np.array(
-            (
-                one.max_speed,
-                one.max_acceleration,
-                one.max_deceleration,
-                one.max_lateral_acceleration,
-                one.max_curvature,
-                one.slip,
-                one.slip_share,
-                one.acceleration_tolerance,
-            )
-        )
+        self._limits = np.array([getattr(self.limits, name) for name in dynamics.LIMITS])
         if road is not None:
             self._clearance, self._blocked = clearance_in_cells(road), inside.blocked_before(road.drivable)
             self._grid = np.array((*road.origin, road.resolution))

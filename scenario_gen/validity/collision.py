@@ -117,6 +117,8 @@ def first_contacts(
 ) -> None:
     """Fill `out` (N (N - 1) / 2, 3) with status, time [s] and gap [m] of the first contact of each pair i < j.
 
+    Source: separating axes (Gottschalk, Lin & Manocha 1996), swept.
+
     Args:
         time: (T,) seconds.
         control: (N, T - 1, 4, 2) control points, metres.

@@ -57,7 +57,10 @@ def control_points(time: Floats, position: Floats, heading: Floats, speed: Float
 
 @kernel(inline=True)
 def blossom(b: Floats, c: int, r: float, s: float, t: float) -> float:
-    """Blossom [m] of the cubic with control points b (4, 2), coordinate c, at (r, s, t): de Casteljau with three parameters."""
+    """Blossom [m] of the cubic with control points b (4, 2), coordinate c, at (r, s, t): de Casteljau with three parameters.
+
+    Source: Ramshaw 1989.
+    """
     d0, d1, d2 = b[0, c] + (b[1, c] - b[0, c]) * r, b[1, c] + (b[2, c] - b[1, c]) * r, b[2, c] + (b[3, c] - b[2, c]) * r
     e0, e1 = d0 + (d1 - d0) * s, d1 + (d2 - d1) * s
     return float(e0 + (e1 - e0) * t)
@@ -65,7 +68,10 @@ def blossom(b: Floats, c: int, r: float, s: float, t: float) -> float:
 
 @kernel(inline=True)
 def stretch(b: Floats, u0: float, u1: float, out: Floats) -> None:
-    """Write the control points [m] of the part of `b` (4, 2) between u0 and u1 into `out` (4, 2)."""
+    """Write the control points [m] of the part of `b` (4, 2) between u0 and u1 into `out` (4, 2).
+
+    Source: de Casteljau by blossoms (Ramshaw 1989).
+    """
     for c in range(2):
         out[0, c] = blossom(b, c, u0, u0, u0)
         out[1, c] = blossom(b, c, u0, u0, u1)
@@ -75,6 +81,11 @@ def stretch(b: Floats, u0: float, u1: float, out: Floats) -> None:
 
 TURN_ROUNDING = 1e-4  # rad, change of heading that a vehicle may show without having moved
 SLACK = 1e-6  # rounding of a value that keeps exactly to its limit
+LIMITS = (
+    *("max_speed", "max_acceleration", "max_deceleration", "max_lateral_acceleration", "max_curvature"),
+    *("slip", "slip_share", "acceleration_tolerance"),
+)
+"""Of `Limits`, those that `worst_excess` takes."""
 
 
 class Check(IntEnum):
@@ -151,8 +162,7 @@ def worst_excess(
         heading: (N, T) rad.
         speed: (N, T) m/s.
         acceleration: (N, T) m/s².
-        limits: max_speed, max_acceleration, max_deceleration, max_lateral_acceleration, max_curvature, slip, slip_share,
-            acceleration_tolerance.
+        limits: those that LIMITS names, in its order.
         out: one row per `Check`.
     """
     top, speeding, braking, lateral, curvature = limits[0], limits[1], limits[2], limits[3], limits[4]

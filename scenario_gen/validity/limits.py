@@ -16,11 +16,11 @@
 
 from dataclasses import dataclass
 
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 
 
 @dataclass(frozen=True)
-class Limits:
+class Limits(Parameters):
     """Limits of the checker. Speed and heading are linear between samples, position is the cubic of `Scenario`."""
 
     max_speed: float = parameter(45.0, "highest speed", unit="m/s", low=0.0)
@@ -55,6 +55,3 @@ class Limits:
     time_resolution: float = parameter(
         1e-6, "what cannot be proven over an interval this short is refused", unit="s", low=1e-9, high=1.0
     )
-
-    def __post_init__(self) -> None:
-        check(self)

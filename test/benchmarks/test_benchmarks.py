@@ -28,7 +28,7 @@ from benchmarks.row import Row
 
 ROOT = Path(__file__).resolve().parents[2]
 WITH_ROS = "messages"
-CHEAP = ("evaluation", "planning")
+CHEAP = ("evaluation",)
 pytestmark = pytest.mark.spread
 
 

@@ -19,9 +19,6 @@ from pathlib import Path
 import subprocess
 import sys
 
-import matplotlib
-from matplotlib import pyplot
-
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
@@ -35,6 +32,9 @@ def test_the_script_generates_from_the_bundled_log_without_ros():
 
 
 def test_the_notebook_was_executed_and_runs(capsys):
+    import matplotlib
+    from matplotlib import pyplot
+
     matplotlib.use("agg")
     cells = [cell for cell in json.loads((EXAMPLES / "tour.ipynb").read_text())["cells"] if cell["cell_type"] == "code"]
     assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))

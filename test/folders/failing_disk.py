@@ -25,7 +25,7 @@ from typing import Any
 import pytest
 
 from scenario_gen.folders import Kind, replaced_folder, write_text
-from scenario_gen.storage.writer import AtomicBag
+from scenario_gen.storage.writer import atomic_bag
 
 KIND = Kind("test")
 TEXT = b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00"
@@ -35,7 +35,7 @@ LOOKS = ("scandir", "listdir", "stat", "lstat")
 
 def write_bag(target: Path, messages: int) -> None:
     """Write a bag of so many messages, whole or not at all."""
-    with AtomicBag(target, KIND, chunk_bytes=100) as bag:
+    with atomic_bag(target, KIND, chunk_bytes=100) as bag:
         bag.add_topic("/t", "std_msgs/msg/String")
         for k in range(messages):
             bag.write("/t", TEXT, k)

@@ -89,7 +89,7 @@ CASES = {
     "bag": (write_bag, True, True),
 }
 LATER_TOO = CASES if LONG else ("exchange",)
-KILLED = [name for name in CASES if name != "bag"] if LONG else ["exchange", "nothing_there"]
+KILLED = [name for name in CASES if name != "bag"] if LONG else ["exchange"]
 
 
 @pytest.mark.parametrize(("name", "kind"), [*((name, "once") for name in CASES), *((name, "from_then_on") for name in LATER_TOO)])

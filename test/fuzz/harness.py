@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 import contextlib
 from dataclasses import asdict, dataclass, field
 import faulthandler
+import gc
 import importlib
 import json
 import mmap
@@ -177,6 +178,7 @@ def over_time(_signal: int, _frame: object) -> None:
 def child(target: Target, seeds: Sequence[bytes], first: int, last: int, progress: mmap.mmap, pipe: int) -> None:
     """Execute inputs `first` to before `last`; write the number of each before it runs, and failures to the pipe."""
     warnings.simplefilter("ignore")
+    gc.freeze()  # to look for garbage in what the parent has loaded would copy all of it
     faulthandler.disable()  # pytest's: the parent says what happened
     signal.signal(signal.SIGPROF, over_time)
     size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
@@ -262,7 +264,7 @@ def watch(pid: int, progress: mmap.mmap, until: float) -> tuple[int, str]:
         time.sleep(0.01)
 
 
-def fuzz(target: Target, state: Path, executions: int, seconds: float) -> Record:
+def fuzz(target: Target, state: Path, executions: int, seconds: float, seeds: Sequence[bytes] | None = None) -> Record:
     """Fuzz a target until it has had so many executions or so much time, those of earlier runs on `state` included.
 
     Args:
@@ -270,13 +272,14 @@ def fuzz(target: Target, state: Path, executions: int, seconds: float) -> Record
         state: folder that keeps progress and the inputs that failed.
         executions: at most so many.
         seconds: at most so long (real time; ends after the execution that runs).
+        seeds: its corpus, where that has been made already.
 
     Returns:
         What was done so far.
     """
     state.mkdir(parents=True, exist_ok=True)
     record = load(state, target.name)
-    seeds = corpus(target)
+    seeds = corpus(target) if seeds is None else seeds
     while record.executions < executions and record.seconds < seconds:
         started = time.monotonic()
         last = min(record.executions + BATCH, executions)

@@ -50,7 +50,7 @@ from scenario_gen.review.regenerate import regenerate_scenario
 from scenario_gen.review.validation import validate_bag
 from scenario_gen.roads import build_road
 from scenario_gen.segmentation import assign, build_library, PrimitiveLibrary
-from scenario_gen.storage.messages import bag_topics, read_messages
+from scenario_gen.storage.bag import bag_topics, read_messages
 from scenario_gen.storage.metadata import qos_yaml
 from scenario_gen.storage.reindex import reindex
 from scenario_gen.storage.writer import BagWriter

@@ -30,7 +30,7 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
 from msg_conventions.ego import encode_state
 from msg_conventions.tracks import encode_tracks
-from msg_conventions.tracks import TYPE as TRACKS
+from msg_conventions.trajectory import TYPE as TRACKS
 from scenario_gen.errors import ScenarioGenError
 from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams
 from scenario_gen.logs.bag import read_streams, read_tracks, Topic, USED

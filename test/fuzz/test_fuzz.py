@@ -20,12 +20,13 @@ import pytest
 
 pytestmark = pytest.mark.spread
 TARGETS = targets()
-DAMAGED = 400 if LONG else 20
+DAMAGED = 400 if LONG else 10
 
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_nothing_but_errors_of_ours_comes_out(name, tmp_path):
-    executions = len(corpus(TARGETS[name])) + DAMAGED
-    record = fuzz(TARGETS[name], tmp_path, executions, seconds=600.0)
+    seeds = corpus(TARGETS[name])
+    executions = len(seeds) + DAMAGED
+    record = fuzz(TARGETS[name], tmp_path, executions, seconds=600.0, seeds=seeds)
     assert record.executions == executions
     assert not record.failures, "\n".join(f"{f.signature}: {f.message} ({tmp_path / f.file})" for f in record.failures.values())

@@ -26,7 +26,7 @@ import unittest
 import pytest
 from skips import NO_LAUNCH
 
-from scenario_gen.storage.messages import bag_topics
+from scenario_gen.storage.bag import bag_topics
 
 launch_testing = pytest.importorskip("launch_testing", reason=NO_LAUNCH)
 actions = pytest.importorskip("launch.actions", reason=NO_LAUNCH)

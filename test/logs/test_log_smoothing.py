@@ -21,7 +21,7 @@ import pytest
 from scipy.optimize import minimize
 
 from scenario_gen.logs import LogConfig
-from scenario_gen.logs.cleaning import Track
+from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import fit_path, Motion, smooth_piece, standing, straight_path, white_equivalent
 
 CONFIG = LogConfig()
@@ -94,7 +94,8 @@ def drive(speed, noise, seed=0, rate=10.0, sensor=1.0):
     place = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 / rate)])
     stamps = (np.arange(len(speed)) / rate * 1e9).astype(np.int64)
     fix = np.column_stack([place, np.zeros(len(speed))]) + rng.normal(0.0, noise, (len(speed), 2))
-    return place, Track("v", stamps, fix, np.full(len(speed), np.nan), stamps, speed * sensor, 4.8, 1.9)
+    rows = np.arange(len(speed))
+    return place, Observations("v", stamps, fix, rows, np.full(len(speed), np.nan), stamps, speed * sensor, rows, 4.8, 1.9)
 
 
 def test_standing_is_still_and_keeps_its_heading():

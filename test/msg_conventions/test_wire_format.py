@@ -26,7 +26,7 @@ import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
-from msg_conventions import changepoints, diagnostics, ego, paths, pictures, roads, scenario_info, scenarios, tracks
+from msg_conventions import changepoints, diagnostics, ego, paths, pictures, roads, scenario_info, scenarios, tracks, trajectory
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates
@@ -39,10 +39,10 @@ def _messages():
     for seed, frame in ((1, "map"), (2, "m"), (3, "longer"), (4, "framexx")):
         n = 2 + seed % 3
         template, parts = encounter(seed, n), segmentation(seed, k=seed - 1)
-        yield tracks.TYPE, tracks.encode_tracks(template)
-        yield changepoints.TYPE, changepoints.encode_changepoints(template, parts)
+        yield trajectory.TYPE, tracks.encode_tracks(template)
+        yield trajectory.TYPE, changepoints.encode_changepoints(template, parts)
         yield changepoints.POSTERIOR_TYPE, changepoints.encode_posterior(template, parts)
-        yield scenarios.TYPE, scenarios.encode_scenario(scenario(seed, n), 17)
+        yield trajectory.TYPE, scenarios.encode_scenario(scenario(seed, n), 17)
         state = np.array([1.5, -2.5, 3.0, 8.25])
         yield ego.STATE_TYPE, ego.encode_state(state, f"vehicle_{'x' * seed}", frame, 17)
         yield paths.TYPE, paths.encode_route(route(seed), ANCHORS, frame)

@@ -15,10 +15,8 @@
 """A ROS domain of its own for each module, a client in it, and nodes as their executables start them."""
 
 from collections.abc import Iterator
-import os
-import subprocess
-import sys
 
+from node_server import Forked, start_nodes
 import pytest
 from suite_processes import Client
 
@@ -43,15 +41,9 @@ def start(domain):
     """Start a node as its executable does; what is still running at the end is killed."""
     started = []
 
-    def run(node: str, *more: str, **parameters: object) -> "subprocess.Popen[str]":
+    def run(node: str, *more: str, **parameters: object) -> Forked:
         words = [*more, *(word for name, value in parameters.items() for word in ("-p", f"{name}:={value}"))]
-        process = subprocess.Popen(
-            [sys.executable, "-m", "scenario_gen.nodes.start", node, "--ros-args", *words],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env=os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"},
-        )
+        process = start_nodes("start", node, "--ros-args", *words, ROS_DOMAIN_ID=str(domain))
         started.append(process)
         return process
 

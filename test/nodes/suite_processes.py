@@ -19,10 +19,11 @@ from collections.abc import Iterable, Iterator
 import json
 import os
 from pathlib import Path
-import subprocess
 import sys
 import threading
 import time
+
+from node_server import start_nodes
 
 from scenario_gen.nodes.domain import this_host_only
 
@@ -45,13 +46,8 @@ class Processes:
             for node, arguments in nodes.items()
         ]
         (folder / "suite.json").write_text(json.dumps(specification))
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "scenario_gen.nodes.forked", str(folder / "suite.json")],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env=os.environ | {"ROS_DOMAIN_ID": str(domain), "RCUTILS_COLORIZED_OUTPUT": "0", "ROS_LOG_DIR": str(folder)},
-        )
+        environment = {"ROS_DOMAIN_ID": str(domain), "RCUTILS_COLORIZED_OUTPUT": "0", "ROS_LOG_DIR": str(folder)}
+        self.process = start_nodes("forked", str(folder / "suite.json"), **environment)
         assert json.loads(self.process.stdout.readline())["event"] == "loaded"
         started = [json.loads(self.process.stdout.readline()) for _ in nodes]
         self.pids = {event["node"]: event["pid"] for event in started}

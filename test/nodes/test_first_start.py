@@ -53,9 +53,13 @@ def test_a_node_answers_while_kernels_are_compiled_and_ends_when_asked(segmenter
     client.hear("/diagnostics")
     state = client.call(GetState, "/segmenter/get_state", GetState.Request())
     assert state.current_state.id == State.PRIMARY_STATE_UNCONFIGURED
-    (status,) = decode_diagnostics(client.wait("/diagnostics")[0])[1]
-    assert status.name == "/segmenter: state" and status.message.startswith("kernels: ")
-    assert status.message.endswith("s; once per machine")
+
+    def told() -> list[str]:
+        statuses = [status for data in list(client.heard["/diagnostics"]) for status in decode_diagnostics(data)[1]]
+        return [status.message for status in statuses if status.name == "/segmenter: state" and "kernels: " in status.message]
+
+    client.until(told, "how many kernels are there")
+    assert told()[0].startswith("kernels: ") and told()[0].endswith("s; once per machine")
     activate = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_ACTIVATE))
     assert not client.call(ChangeState, "/segmenter/change_state", activate).success  # what cannot be is refused, no more
     configure = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_CONFIGURE))

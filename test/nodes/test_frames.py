@@ -26,7 +26,7 @@ from msg_conventions.scenarios import encode_scenario
 from msg_conventions.tracks import encode_tracks
 from msg_conventions.trajectory import decode
 from scenario_gen.recordings.write import write_recording
-from scenario_gen.storage.messages import bag_topics
+from scenario_gen.storage.bag import bag_topics
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 
@@ -149,6 +149,6 @@ def _counted(client, topic):
 
 
 def _logged(bag, number):
-    from scenario_gen.storage.messages import read_messages
+    from scenario_gen.storage.bag import read_messages
 
     return [message.stamp_ns for message in read_messages(bag, lambda name: name.endswith("scenarios"))][number]

@@ -22,6 +22,7 @@ import sys
 from types import SimpleNamespace
 from unittest import mock
 
+from node_server import start_nodes
 import pytest
 from suite_processes import RESOURCES, ROOT
 import yaml
@@ -147,7 +148,7 @@ def test_what_cannot_be_is_refused_before_a_process_starts(given, said):
 @pytest.mark.dds
 @pytest.mark.parametrize("composed", ["false", "true"])
 def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(domain, client, tmp_path, composed):
-    """Real processes, started as launch_ros starts them; the file has both kinds of sections, of which ROS takes the last."""
+    """Processes with the arguments that launch_ros gives them; the file has both kinds of sections: ROS takes the last."""
     from lifecycle_msgs.srv import GetState
     from rcl_interfaces.srv import GetParameters
     from rclpy.parameter import parameter_value_to_python
@@ -160,13 +161,8 @@ def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(domai
     nodes = launched(params=str(file), ego="21202", namespace=space, autostart="false", composed=composed)
     wanted = [node for node in nodes if node.executable in ("suite", "gp_sampler", "road_server")]
     some = ["--nodes", "gp_sampler,road_server"] if composed == "true" else []
-    processes = [
-        subprocess.Popen(
-            [sys.executable, "-m", "scenario_gen.nodes.start", node.executable, *some, *words(node)],
-            env=os.environ | {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(tmp_path)},
-        )
-        for node in wanted
-    ]
+    where = {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(tmp_path)}
+    processes = [start_nodes("start", node.executable, *some, *words(node), **where) for node in wanted]
     try:
 
         def values(node: str, *names: str) -> list[object]:

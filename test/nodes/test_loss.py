@@ -21,6 +21,7 @@ import subprocess
 import sys
 
 from lengths import LONG
+from node_server import Forked, start_nodes
 import numpy as np
 import pytest
 from suite_processes import Client, Processes, RESOURCES
@@ -31,8 +32,8 @@ from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, 
 from msg_conventions.scenario_info import encode_info, scenario_entry
 from msg_conventions.scenarios import digest, encode_scenario
 from scenario_gen.cli import app
+from scenario_gen.storage.bag import bag_topics, read_messages
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import bag_topics, read_messages
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Scenario
 
@@ -138,14 +139,8 @@ def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, clie
         hanging.wait()
 
 
-def _recorder(domain: int, bag: Path) -> "subprocess.Popen[str]":
-    return subprocess.Popen(
-        [sys.executable, "-m", "scenario_gen.nodes.start", "recorder", "--ros-args", "-p", f"bag:={bag}"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        env=os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"},
-    )
+def _recorder(domain: int, bag: Path) -> Forked:
+    return start_nodes("start", "recorder", "--ros-args", "-p", f"bag:={bag}", ROS_DOMAIN_ID=str(domain))
 
 
 def _scenario(k: int) -> Scenario:

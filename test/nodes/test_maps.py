@@ -26,7 +26,7 @@ from suite_processes import Client, whole_chain
 from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.hashes import decode_hashes, hash_of
 from scenario_gen.review.validation import validate_bag
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 
 pytestmark = pytest.mark.dds
 LOADS = 10 if LONG else 2

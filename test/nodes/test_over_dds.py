@@ -26,7 +26,7 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario, digest, encode_scenario
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 
 pytestmark = pytest.mark.dds
 LOG = RESOURCES / "synthetic_c"

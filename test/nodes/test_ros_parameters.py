@@ -15,11 +15,9 @@
 """ROS parameters as the tools of ROS give them: numbers for texts, whole numbers for real ones, what they dumped."""
 
 from dataclasses import dataclass, field
-import os
-import subprocess
-import sys
 
 from hypothesis import given, strategies
+from node_server import start_nodes
 import pytest
 import rclpy
 from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_value_to_python
@@ -107,17 +105,10 @@ def test_every_node_loads_what_was_dumped_of_it(domain, client, tmp_path):
         "autostart": "false",
     }
     words = [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "scenario_gen.nodes.start", "suite", "--namespace", "/a", "--ros-args", *words],
-        env=os.environ | {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(tmp_path)},
-    )
-    player = subprocess.Popen(
-        [
-            *(sys.executable, "-m", "scenario_gen.nodes.start", "player", "--ros-args"),
-            *("-r", "__ns:=/a", "-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "paused:=true"),
-        ],
-        env=os.environ | {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(tmp_path)},
-    )
+    where = {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(tmp_path)}
+    process = start_nodes("start", "suite", "--namespace", "/a", "--ros-args", *words, **where)
+    bag = ("-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "paused:=true")
+    player = start_nodes("start", "player", "--ros-args", "-r", "__ns:=/a", *bag, **where)
     try:
         for name in ("gp_sampler", "log_player", "road_server", "segmenter", "planner", "evaluator", "recorder", "player"):
             node = f"/a/{name}"

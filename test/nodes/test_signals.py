@@ -20,10 +20,11 @@ import subprocess
 import sys
 import time
 
+from node_server import Forked, start_nodes
 import pytest
 from suite_processes import RESOURCES
 
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 
 pytestmark = pytest.mark.dds
 
@@ -38,15 +39,19 @@ def _started(node: str, domain: int, *arguments: str) -> "subprocess.Popen[str]"
     )
 
 
+def _forked(node: str, domain: int, *arguments: str) -> Forked:
+    return start_nodes("start", node, "--ros-args", *arguments, ROS_DOMAIN_ID=str(domain))
+
+
 ENDS = {"once": (signal.SIGINT,), "twice": (signal.SIGINT, signal.SIGINT), "terminated": (signal.SIGTERM,)}
 
 
 def test_a_recorder_closes_its_bag(domain, tmp_path):
     """Three recorders of one player, each ended in its own way."""
-    player = _started("player", domain, "-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "rate:=50.0", "-p", "loop:=true")
+    player = _forked("player", domain, "-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "rate:=50.0", "-p", "loop:=true")
     recording = ("-p", "topics:=/?vehicle_.*", "-p", "compress:=false")
     recorders = {
-        name: _started("recorder", domain, "-r", f"__node:={name}", "-p", f"bag:={tmp_path / name}", *recording) for name in ENDS
+        name: _forked("recorder", domain, "-r", f"__node:={name}", "-p", f"bag:={tmp_path / name}", *recording) for name in ENDS
     }
     try:
         deadline = time.monotonic() + 180.0
@@ -81,6 +86,42 @@ def test_ctrl_c_while_the_libraries_load(domain):
     assert process.returncode in (0, 130, -2)
 
 
+STUCK = """
+from scenario_gen.interrupts import hear
+hear()
+import ctypes
+from scenario_gen.nodes import process
+from rclpy.node import Node
+process.ENDING = 1.0
+class Stuck(Node):
+    def __init__(self, namespace):
+        super().__init__("stuck", namespace=namespace)
+    def autostart(self):
+        print("ready", flush=True)
+    def close(self):
+        print("closed")
+    def destroy_node(self):
+        ctypes.PyDLL(None).sleep(600)
+process.run_nodes([Stuck], ["stuck"])
+"""
+
+
+def test_a_node_ends_when_dds_waits_for_itself_holding_the_lock_of_python(domain):
+    """What it had to keep is kept, and where it was stuck is said."""
+    environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
+    process = subprocess.Popen(
+        [sys.executable, "-c", STUCK], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment
+    )
+    try:
+        assert process.stdout is not None and process.stdout.readline() == "ready\n"
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=120.0)
+    finally:
+        process.kill()
+    assert process.returncode == 1
+    assert output.startswith("closed\nTimeout") and "in destroy_node" in output, output
+
+
 def test_a_bad_start_is_one_message_and_exit_code_2(domain, tmp_path):
     (tmp_path / "text.mcap").write_text("no bag")
     for node, arguments, words in (
@@ -88,6 +129,8 @@ def test_a_bad_start_is_one_message_and_exit_code_2(domain, tmp_path):
         ("player", ("-p", f"bag:={tmp_path / 'text.mcap'}"), "text.mcap"),
         ("recorder", ("-p", f"bag:={tmp_path}"), "exists"),
     ):
-        output, _ = _started(node, domain, *arguments).communicate(timeout=120.0)
+        process = _forked(node, domain, *arguments)
+        output, _ = process.communicate(timeout=120.0)
+        assert process.returncode == 2
         assert words in output
         assert "Traceback" not in output, output

@@ -14,12 +14,10 @@
 
 """Whole suites, each composed in one process: the same scenarios, and no suite hears another one's."""
 
-import os
 import signal
-import subprocess
-import sys
 import time
 
+from node_server import start_nodes
 import pytest
 from suite_processes import Client, RESOURCES
 
@@ -57,16 +55,12 @@ def suites(tmp_path_factory, domains):
             "seed": seed,
         }
         words = [word for key, value in values.items() for word in ("-p", f"{key}:={value}")]
-        running[name] = subprocess.Popen(
-            [sys.executable, "-m", "scenario_gen.nodes.start", "suite", "--namespace", namespace, "--ros-args", *words],
-            stdout=(folder / f"{name}.log").open("w"),
-            stderr=subprocess.STDOUT,
-            env=os.environ | {"ROS_DOMAIN_ID": str(domains[domain]), "ROS_LOG_DIR": str(folder)},
-        )
-    yield running, folder
+        where = {"ROS_DOMAIN_ID": str(domains[domain]), "ROS_LOG_DIR": str(folder)}
+        running[name] = start_nodes("start", "suite", "--namespace", namespace, "--ros-args", *words, **where)
+    yield running
     for process in running.values():
         process.kill()
-        process.wait()
+        process.communicate()
 
 
 @pytest.mark.dds
@@ -97,13 +91,13 @@ def test_each_suite_makes_its_own_scenarios_and_none_meets_another(suites, domai
 @pytest.mark.dds
 @pytest.mark.parametrize("name", SUITES)
 def test_every_signal_ends_a_suite_without_a_traceback(suites, name):
-    running, folder = suites
-    process, signals = running[name], SUITES[name][-1]
+    process, signals = suites[name], SUITES[name][-1]
     for number in signals:
         process.send_signal(number)
         time.sleep(0.05)
-    assert process.wait(180.0) == 0
-    assert "Traceback" not in (folder / f"{name}.log").read_text()
+    output, _ = process.communicate(180.0)
+    assert process.returncode == 0
+    assert "Traceback" not in output
 
 
 def test_nodes_are_chosen_by_name():

@@ -167,4 +167,4 @@ def test_colcon_test_runs_pytest_and_reports(colcon):
     result = run("test-result", "--test-result-base", base / "build", "--all")
     assert result.returncode == 0
     found = re.search(r"Summary: (\d+) tests, 0 errors, 0 failures, (\d+) skipped", result.stdout)
-    assert found is not None and int(found[1]) > 100, result.stdout
+    assert found is not None and int(found[1]) > 10, result.stdout

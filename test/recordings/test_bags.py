@@ -41,7 +41,7 @@ from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import InputError
 from scenario_gen.recordings.read import read_scenario_set
 from scenario_gen.recordings.write import write_recording
-from scenario_gen.storage.messages import bag_topics, read_messages
+from scenario_gen.storage.bag import bag_topics, read_messages
 from scenario_gen.storage.reindex import reindex
 from scenario_gen.storage.writer import BagWriter, Split
 from scenario_gen.types.encounter import Vehicle

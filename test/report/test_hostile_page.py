@@ -20,7 +20,7 @@ from hashlib import sha256
 from html.parser import HTMLParser
 import re
 
-from browser_tab import chromium, DESKTOP, Tab
+from browser_tab import DESKTOP, Tab
 from evaluation_worlds import report_case
 import pytest
 
@@ -139,12 +139,6 @@ def test_the_policy_names_each_script_and_allows_no_other(pages, name):
 def test_the_policy_depends_on_nothing_of_the_log():
     policies = {Elements(render(report)).policy for report in (ReportInput([report_case(2)]), hostile_report())}
     assert len(policies) == 1
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as instance:
-        yield instance
 
 
 class Watched(Tab):

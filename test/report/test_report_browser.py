@@ -17,18 +17,12 @@
 from base64 import b64decode
 import io
 
-from browser_tab import chromium, DESKTOP, PHONE, Tab
+from browser_tab import DESKTOP, PHONE, Tab
 from evaluation_worlds import ego_case, report_case
 from PIL import Image
 import pytest
 
 from scenario_gen.report.page import ReportInput, write_report
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as instance:
-        yield instance
 
 
 @pytest.fixture(scope="module")

@@ -54,7 +54,7 @@ def test_the_paper_grid_is_used_and_the_given_ends_are_met(case):
 def test_the_stop_is_kept_with_changepoints_and_lost_without(case):
     assert case.stop_speed[WITH] < 0.2 and case.stop_speed[WITHOUT] > 1.0
     for kind in ("e_position", "e_speed"):
-        assert case.similarity[WITH].values[kind].high < 0.5 * case.similarity[WITHOUT].values[kind].low
+        assert case.similarity[WITH][kind].high < 0.5 * case.similarity[WITHOUT][kind].low
     assert UNIFORM in case.similarity
     assert case.off_road[WITH] == 0.0
 
@@ -88,7 +88,7 @@ def test_the_page_has_four_figures_with_claims_and_asks_for_nothing(case, tmp_pa
     assert "default-src 'none'" in own and "http" not in own.replace("http-equiv", "")
     document = json.loads((tmp_path / "one" / "reproduce.json").read_text())
     figures = {figure["figure"]: figure for figure in document["cases"][0]["figures"]}
-    assert figures[5]["values"]["e_speed with changepoints"] == pytest.approx(case.similarity[WITH].values["e_speed"].value)
+    assert figures[5]["values"]["e_speed with changepoints"] == pytest.approx(case.similarity[WITH]["e_speed"].value)
     assert figures[4]["holds"] is True
 
 

@@ -14,7 +14,7 @@
 
 """The page of the paper's figures in Chromium: no errors, no requests, all figures drawn, nothing wider than a phone."""
 
-from browser_tab import chromium, DESKTOP, PHONE, Tab
+from browser_tab import DESKTOP, PHONE, Tab
 from evaluation_worlds import crossing
 import pytest
 
@@ -23,12 +23,6 @@ from scenario_gen.logs.synthetic import bundled
 from scenario_gen.reproduce import run_case, write_page
 
 FIGURES = 4
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as instance:
-        yield instance
 
 
 @pytest.fixture(scope="module")

@@ -43,7 +43,7 @@ class Given:
         return PipelineConfig(fitting=self.fitting, planning=self.planning, sampling=self.sampling, limits=self.limits)
 
 
-def answer(given, request, *, count, cancelled=None):
+def answer(given, request, *, count, cancelled=lambda: False):
     """Return what comes of a request; the nearest possible one is looked for where it cannot be had."""
     asked = (given.encounter, given.segmentation, given.road, given.config, request)
     request.ego_of(given.encounter)

@@ -27,7 +27,7 @@ from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.nearest import ImpossibleError
 from scenario_gen.types.request import Request
 
-COUNT = 5 if LONG else 2
+COUNT = 5 if LONG else 1
 pytestmark = pytest.mark.spread
 
 
@@ -126,7 +126,7 @@ def test_a_goal_too_far_for_the_scale(chain, plain):
 
 
 def test_a_goal_too_far_for_the_time(chain, plain):
-    slow = replace(chain, sampling=replace(chain.sampling, max_acceleration=0.6, max_stretch=0.0))
+    slow = replace(chain, sampling=replace(chain.sampling, max_acceleration=0.6 if LONG else 0.8, max_stretch=0.0))
     texts = {"starts": state(plain, "start", 0, speed=0.0), "goals": state(plain, "end", 0, ahead=10.0)}
     error = refused(slow, **texts)
     assert "cannot drive" in str(error)

@@ -20,7 +20,7 @@ from dataclasses import replace
 from functools import partial
 import io
 
-from browser_tab import chromium, DESKTOP, PHONE, Tab
+from browser_tab import DESKTOP, PHONE, Tab
 from evaluation_worlds import report_case
 import numpy as np
 from PIL import Image
@@ -37,12 +37,12 @@ from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.recordings.read import read_recording
 from scenario_gen.recordings.write import write_recording
 from scenario_gen.report.page import render, ReportInput, write_report
-from scenario_gen.review.evaluation import bag_results, evaluate_bag
+from scenario_gen.review.evaluation import bag_results
 from scenario_gen.roads import build_road
 from scenario_gen.segmentation import segment
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 from scenario_gen.storage.metadata import qos_yaml
-from scenario_gen.storage.writer import AtomicBag
+from scenario_gen.storage.writer import atomic_bag
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import Cause, ScenarioSet
 from scenario_gen.validity import Limits
@@ -61,7 +61,7 @@ def real_run():
 def test_the_figures_survive_the_bag(tmp_path):
     cases = [report_case(6), report_case(4, "second")]
     bag = write_recording(tmp_path / "run", {"/case_1": cases[0], "/case_2": cases[1]})
-    found = evaluate_bag(bag, QUICK)
+    found = [result.evaluation for result in bag_results(bag, QUICK)]
     assert [evaluation.encounter for evaluation in found] == ["run/case_1", "run/case_2"]
     for evaluation, case in zip(found, cases, strict=True):
         assert evaluation.changepoints == 2
@@ -76,7 +76,7 @@ def test_the_intervals_survive_it_too_where_candidates_were_refused(tmp_path):
     case = report_case(6)
     numbered = [replace(s, index=k) for s, k in zip(case.generated.scenarios, (1, 2, 5, 8, 9, 3), strict=True)]
     case = replace(case, generated=replace(case.generated, scenarios=tuple(numbered)))
-    (found,) = evaluate_bag(write_recording(tmp_path / "run", case), QUICK)
+    (found,) = (one.evaluation for one in bag_results(write_recording(tmp_path / "run", case), QUICK))
     measure = partial(evaluate_scenarios, case.encounter, changepoints=len(case.segmentation.changepoints), config=QUICK)
     direct = measure(numbered)
     (row,), (expected,) = ([row for row in e.rows if row.name == "scenarios"] for e in (found, direct))
@@ -92,14 +92,14 @@ def test_a_bag_without_scenarios_is_refused(tmp_path):
     case = report_case(2)
     empty = replace(case, generated=ScenarioSet(0, (), 0))
     with pytest.raises(InputError, match="nothing to compare"):
-        evaluate_bag(write_recording(tmp_path / "run", empty), QUICK)
+        bag_results(write_recording(tmp_path / "run", empty), QUICK)
     with pytest.raises(InputError, match="no such bag"):
-        evaluate_bag(tmp_path / "missing", QUICK)
+        bag_results(tmp_path / "missing", QUICK)
 
 
 def only(bag, folder, topics):
     """Copy the messages of these topics to another bag, as somebody else might have recorded it."""
-    with AtomicBag(folder) as copy:
+    with atomic_bag(folder) as copy:
         for name in topics:
             kind, quality = topic_entry(name)
             copy.add_topic(f"/{name}", kind, qos_yaml(quality))
@@ -137,14 +137,13 @@ def test_the_page_of_our_own_bag_shows_the_template_as_that_of_the_run(tmp_path)
     assert "Fitted to the road" in page and run.segmentation.descriptions[0] in page
 
 
-@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
-def test_that_page_in_a_browser(tmp_path, size):
+def test_that_page_in_a_browser(browser, tmp_path):
     """With fit and without, it loads without errors or requests, draws the routes and is no wider than the screen."""
     bag = write_recording(tmp_path / "run", real_run())
     bare = only(bag, tmp_path / "bare", ("tracks", "scenarios"))
     page = tmp_path / "report.html"
     write_report(page, ReportInput([*bag_results(bag, QUICK), *bag_results(bare, QUICK)]))
-    with chromium() as browser:
+    for size in (DESKTOP, PHONE):
         tab = Tab(browser, page, size)
         routes = tab.page.locator('[data-case="0"] [data-role="routes"]')
         pixels = Image.open(io.BytesIO(b64decode(routes.evaluate("c => c.toDataURL()").partition(",")[2])))
@@ -158,7 +157,7 @@ def test_that_page_in_a_browser(tmp_path, size):
 def test_what_nodes_say_on_one_topic_is_told_apart_by_their_namespaces(tmp_path):
     run = real_run()
     bag = write_recording(tmp_path / "run", {"/here": run})
-    with AtomicBag(tmp_path / "recorded") as copy:
+    with atomic_bag(tmp_path / "recorded") as copy:
         for message in read_messages(bag):
             topic = message.topic.replace("/here/diagnostics", "/diagnostics")
             kind, quality = topic_entry(topic)

@@ -33,9 +33,9 @@ from scenario_gen.review.evaluation import bag_results
 from scenario_gen.review.validation import ALTERED, UNUSABLE, validate_bag
 from scenario_gen.roads import build_road
 from scenario_gen.segmentation import segment
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 from scenario_gen.storage.metadata import qos_yaml
-from scenario_gen.storage.writer import AtomicBag
+from scenario_gen.storage.writer import atomic_bag
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import BoundaryStates
 
@@ -52,7 +52,7 @@ def run():
 def rewritten(bag, target, change, without=()):
     """Copy a bag; `change(k, scenario bytes)` gives the bytes of scenario k."""
     index = 0
-    with AtomicBag(target) as writer:
+    with atomic_bag(target) as writer:
         for message in read_messages(bag):
             if message.topic.rpartition("/")[2] in without:
                 continue
@@ -152,7 +152,7 @@ def several_maps(run, target):
     states = [s + np.array((0.0, 1000.0, 0.0, 0.0)) for s in (run.fit.asked.start, run.fit.asked.end)]
     later = replace(run, road=far, generated=replace(run.generated, scenarios=moved))
     later = replace(later, fit=replace(run.fit, asked=BoundaryStates(*states)))
-    with AtomicBag(target) as writer:
+    with atomic_bag(target) as writer:
         for k, one in enumerate((run, later)):
             for topic, data, stamp in result_messages(one, str(k + 1)):
                 kind, quality = topic_entry(topic)
@@ -196,7 +196,7 @@ def test_a_scenario_without_account_is_held_against_no_map_where_there_are_sever
 
 def without_infos(bag, target, infos):
     """Copy a bag without these messages of `scenarios/info`."""
-    with AtomicBag(target) as writer:
+    with atomic_bag(target) as writer:
         for message in read_messages(bag):
             if not message.topic.endswith("/scenarios/info") or message.data not in infos:
                 kind, quality = topic_entry(message.topic)

@@ -32,8 +32,8 @@ from scenario_gen.results import provenance_of
 from scenario_gen.review.evaluation import bag_results
 from scenario_gen.review.regenerate import regenerate_scenario
 from scenario_gen.review.validation import validate_bag
-from scenario_gen.storage.messages import read_messages
-from scenario_gen.storage.writer import AtomicBag
+from scenario_gen.storage.bag import read_messages
+from scenario_gen.storage.writer import atomic_bag
 
 SINCE = ("road/info", "fit/info")  # topics that came with 0.2
 LOG, ROAD, SEED = bundled("c"), "straight", 7
@@ -55,7 +55,7 @@ def former(tmp_path_factory):
         said = [{names.get(key, key): value for key, value in status.values.items() if "_hash" not in key} for status in statuses]
         return encode_diagnostics([replace(s, values=values) for s, values in zip(statuses, said, strict=True)], stamp)
 
-    with AtomicBag(folder / "former") as bag:
+    with atomic_bag(folder / "former") as bag:
         for message in read_messages(write_recording(folder / "now", result)):
             topic = message.topic.lstrip("/")
             if topic not in SINCE:

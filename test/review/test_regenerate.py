@@ -30,9 +30,9 @@ from scenario_gen.recordings.write import write_recording
 from scenario_gen.results import provenance_of
 from scenario_gen.review.regenerate import regenerate_scenario, write_regenerated
 from scenario_gen.review.validation import validate_bag
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 from scenario_gen.storage.metadata import qos_yaml
-from scenario_gen.storage.writer import AtomicBag
+from scenario_gen.storage.writer import atomic_bag
 from scenario_gen.types.request import Request
 
 LOG, ROAD, SEED = bundled("b"), "t_intersection", 7
@@ -57,7 +57,7 @@ def published(bag, namespace):
 
 def rewritten(bag, target, change):
     """Copy a bag; `change(message)` gives the bytes instead, or None to leave it out."""
-    with AtomicBag(target) as writer:
+    with atomic_bag(target) as writer:
         for message in read_messages(bag):
             data = change(message)
             if data is not None:

@@ -30,7 +30,7 @@ from scenario_gen.roads.clearance import (
     nearest_pose_with_room,
     segments_free,
 )
-from scenario_gen.roads.connectivity import common_component, component_at, components, connected
+from scenario_gen.roads.connectivity import common_component, component_at, components
 from scenario_gen.types.road import Road
 
 
@@ -155,9 +155,9 @@ def test_components_need_the_width():
     drivable[4, 10] = True  # a gap one cell wide
     road = road_of(drivable)
     left, right = np.array([4.5, 4.5]), np.array([15.5, 4.5])
-    assert connected(road, left, right, 0.0)
-    assert connected(road, left, right, 0.49)
-    assert not connected(road, left, right, 0.51)
+    assert common_component(road, left, right, 0.0) is not None
+    assert common_component(road, left, right, 0.49) is not None
+    assert common_component(road, left, right, 0.51) is None
     assert component_at(road, np.array([10.5, 0.5]), 0.0) == 0
     assert components(road, 0.51).max() == 2
 

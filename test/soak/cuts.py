@@ -24,7 +24,7 @@ from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
 from scenario_gen.errors import InputError
-from scenario_gen.storage.messages import read_messages
+from scenario_gen.storage.bag import read_messages
 from scenario_gen.storage.reindex import reindex
 
 

@@ -33,7 +33,7 @@ from figures import Figure
 from suite_processes import Client, Processes, RESOURCES
 
 from scenario_gen.nodes.domain import free_domain
-from scenario_gen.storage.messages import bag_topics
+from scenario_gen.storage.bag import bag_topics
 
 COUNT = int(os.environ.get("SCENARIO_GEN_SOAK_COUNT", "100000"))
 COMPOSED = max(1, COUNT // 10)

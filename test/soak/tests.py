@@ -15,8 +15,7 @@
 """Every test in its long form: all cases, larger counts, every random example."""
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
+from concurrent.futures import as_completed, ThreadPoolExecutor
 import json
 import os
 from pathlib import Path
@@ -28,26 +27,34 @@ from figures import Figure
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def passes(state: Path, name: str) -> bool:
-    """Run one test file; its output stays in `state`."""
+def run_file(state: Path, name: str) -> tuple[str, bool, float]:
+    """Run one test file; its output stays in `state`. Return its name, whether it passes, and the seconds of CPU it took."""
     with (state / f"{name.replace('/', '.')}.log").open("w") as log:
         environment = os.environ | {"SCENARIO_GEN_TESTS": "long"}
-        command = [sys.executable, "-m", "pytest", name]
-        code = subprocess.run(command, cwd=ROOT, env=environment, stdout=log, stderr=log, check=False).returncode
-    return code in (0, 5)  # 5: nothing of it can run here, as test/launch without `launch`
+        process = subprocess.Popen([sys.executable, "-m", "pytest", name], cwd=ROOT, env=environment, stdout=log, stderr=log)
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    # 5: nothing of it can run here, as test/launch without `launch`
+    return name, process.returncode in (0, 5), used.ru_utime + used.ru_stime
 
 
 def run(state: Path) -> Iterator[Figure]:
     """Run every test file, two at a time; those that have passed are not run again."""
     files = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "test").rglob("test_*.py"))
     kept = state / "passed.json"
-    passed: list[str] = json.loads(kept.read_text()) if kept.exists() else []
-    left = [name for name in files if name not in passed]
-    with ThreadPoolExecutor(2) as pool:
-        for name, good in zip(left, pool.map(partial(passes, state), left), strict=True):
+    passed: dict[str, float] = json.loads(kept.read_text()) if kept.exists() else {}
+    pool = ThreadPoolExecutor(2)
+    try:
+        for done in as_completed([pool.submit(run_file, state, name) for name in files if name not in passed]):
+            name, good, seconds = done.result()
             if good:
-                passed.append(name)
+                passed[name] = round(seconds, 1)
                 kept.write_text(json.dumps(passed, indent=2) + "\n")
+    finally:
+        pool.shutdown(cancel_futures=True)  # of a Ctrl-C: the two that run hear it, too
     failed = [name for name in files if name not in passed]
-    seen = f"{len(files) - len(failed)} of {len(files)}" + (f"; not {', '.join(failed)}" if failed else "")
+    took = sum(passed.get(name, 0.0) for name in files)
+    seen = f"{len(files) - len(failed)} of {len(files)}, {took / 60:.0f} min of CPU" + (
+        f"; not {', '.join(failed)}" if failed else ""
+    )
     yield Figure("every test in its long form passes", f"{len(files)} files", seen, not failed)

@@ -29,11 +29,11 @@ from scenario_gen.cli import main
 from scenario_gen.errors import InputError
 from scenario_gen.recordings.template import decode_template
 from scenario_gen.recordings.write import write_recording
-from scenario_gen.review.evaluation import evaluate_bag
+from scenario_gen.review.evaluation import bag_results
 from scenario_gen.review.regenerate import regenerate_scenario
 from scenario_gen.review.validation import UNUSABLE, validate_bag
+from scenario_gen.storage.bag import bag_topics, read_messages
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import bag_topics, read_messages
 from scenario_gen.storage.reindex import reindex
 from scenario_gen.storage.writer import BagWriter
 
@@ -193,7 +193,7 @@ def test_damaged_messages_are_named_or_found(tmp_path, topic, damage):
         assert is_refused(lambda: validate_bag(broken), topic)
     else:
         is_refused(lambda: validate_bag(broken), topic)
-    is_refused(lambda: evaluate_bag(broken))
+    is_refused(lambda: bag_results(broken))
     assert is_refused(lambda: regenerate_scenario(broken, 0))
 
 
@@ -216,7 +216,7 @@ def test_what_no_vehicle_does_is_refused_before_it_takes_memory(tmp_path, topic,
 
     broken = changed(bag, tmp_path / "broken", changed_data)
     with pytest.raises(InputError, match=said):
-        evaluate_bag(broken)
+        bag_results(broken)
 
 
 def test_figures_that_would_fill_the_memory_are_refused(tmp_path):
@@ -229,7 +229,7 @@ def test_figures_that_would_fill_the_memory_are_refused(tmp_path):
         return trajectory.encode(replace(message, position=message.position * np.array([[[1e6]], [[1.0]]])))
 
     with pytest.raises(InputError, match=r"broken: gap from .* no vehicles move so"):
-        evaluate_bag(changed(bag, tmp_path / "broken", far_apart))
+        bag_results(changed(bag, tmp_path / "broken", far_apart))
 
 
 def test_a_fit_of_other_vehicles_is_refused(tmp_path):

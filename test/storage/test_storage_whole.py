@@ -29,8 +29,8 @@ from rosbags.typesys import get_typestore, Stores
 
 from scenario_gen.errors import InputError
 from scenario_gen.recordings.write import write_recording
+from scenario_gen.storage.bag import bag_topics, read_messages
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.messages import bag_topics, read_messages
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 

@@ -22,9 +22,9 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.roads.clearance import clearance_in_cells, to_cells, to_metres
-from scenario_gen.roads.connectivity import component_cells, corner_cells
+from scenario_gen.roads.connectivity import component_cells
 from scenario_gen.routing.search import tree_nodes as trees
 from scenario_gen.routing.search.planner import Budget, BudgetSpentError, check_query, path_length, Plan, Query
 from scenario_gen.routing.search.shortcut import pull_string
@@ -40,7 +40,7 @@ BATCH = 512  # iterations between two looks at the clock
 
 
 @dataclass(frozen=True)
-class RrtStarConnectConfig:
+class RrtStarConnectConfig(Parameters):
     """Settings of RRT*-Connect; lengths in cells, as in the paper."""
 
     step: float = parameter(120.0, "longest new edge (the paper's preset: 5)", unit="cells", low=0.1, high=1e6)
@@ -56,9 +56,6 @@ class RrtStarConnectConfig:
     informed: bool = parameter(True, "sample only where a shorter path can lie, once there is one")
     pull: bool = parameter(True, "pull the path taut at the end (string pulling)")
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 PAPER = RrtStarConnectConfig(step=5.0, zeta=30.0, greedy=False, skip=False, corners=0.0, informed=False, pull=False)
 
@@ -69,8 +66,7 @@ class _Trees:
     def __init__(self, road: Road, query: Query, label: int, config: RrtStarConnectConfig, seed: int) -> None:
         self.clearance = clearance_in_cells(road)
         self.ends = to_cells(road, np.array((query.start, query.goal)))
-        self.free_cells = component_cells(road, query.radius, label)
-        self.corner_cells = corner_cells(road, query.radius, label)
+        self.free_cells, self.corner_cells = component_cells(road, query.radius, label)
         least_gamma = 2.0 * math.sqrt(1.5 * max(len(self.free_cells), 1) / math.pi)  # Karaman & Frazzoli 2011, d = 2
         gamma = config.gamma_factor * least_gamma
         side = max(max(self.clearance.shape) / 8.0, 1.0)
@@ -142,7 +138,10 @@ class _Trees:
 
 
 class RrtStarConnect:
-    """The paper's planner, behind the Protocol of all planners."""
+    """The paper's planner, behind the Protocol of all planners.
+
+    Source: paper III-B and appendix.
+    """
 
     def __init__(self, config: RrtStarConnectConfig = RrtStarConnectConfig()) -> None:
         self.config = config

@@ -87,6 +87,8 @@ def near_nodes(
 ) -> int:  # fmt: skip
     """All nodes of the tree within `reach` of (x, y): ids into `near`, distances [cells] into `gap`, both (NEAR,).
 
+    Source: the near set of Algorithm 2, its radius by eq 10.
+
     Returns how many.
     """
     rows = head.shape[1] // columns
@@ -153,6 +155,8 @@ def release(m: int, link: Links) -> None:
 def settle(m: int, node: Floats, link: Links, counter: Ints, setting: Floats) -> None:
     """If node m is where the trees meet, see if the path through it is the best so far.
 
+    Source: Algorithm 1, line 7.
+
     In cells, arrays as in the module's docstring.
     """
     partner = link[m, PARTNER]
@@ -164,6 +168,8 @@ def settle(m: int, node: Floats, link: Links, counter: Ints, setting: Floats) ->
 @kernel(inline=True)
 def propagate(top: int, node: Floats, link: Links, counter: Ints, setting: Floats) -> None:
     """Pass a lower cost on to all below node `top`: a walk through the subtree that needs no stack.
+
+    Source: Algorithm 5, whose lower cost holds for the whole subtree.
 
     In cells, arrays as in the module's docstring.
     """

@@ -79,6 +79,8 @@ def speed_knots(
 ) -> SpeedKnots:
     """Place the knots of one vehicle.
 
+    Source: paper IV-B, constant acceleration within a primitive, with one knot more.
+
     Args:
         clock: (K + 2,) template times [s] of start, changepoints and end.
         dwells: (K + 1,) True for primitives in which the route does not move.

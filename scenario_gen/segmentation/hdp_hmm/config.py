@@ -19,13 +19,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.arrays import Floats
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 
 GAUSSIAN_DOF = 1000.0
 
 
 @dataclass(frozen=True)
-class SamplerConfig:
+class SamplerConfig(Parameters):
     """The sticky HDP-HMM and its sampler; the defaults suit any series from D = 1 to D = 24."""
 
     emission: str = parameter("gaussian", "what a state emits", choices=("gaussian", "autoregressive"))
@@ -36,10 +36,10 @@ class SamplerConfig:
         low=0,
         high=200,
     )
-    chains: int = parameter(4, "independent chains, each from a start of its own", low=1, high=16)
+    chains: int = parameter(3, "independent chains, each from a start of its own", low=1, high=16)
     sweeps: int = parameter(600, "most Gibbs sweeps of each chain; it ends when the chains agree", low=10, high=100_000)
     r_hat: float = parameter(1.1, "split R-hat below which, on every trace, chains agree; 1: run all sweeps", low=1.0, high=10.0)
-    moves: int = parameter(4, "split or merge moves tried in a sweep", low=0, high=100)
+    moves: int = parameter(3, "split or merge moves tried in a sweep", low=0, high=100)
     dof: float = parameter(
         0.0, "degrees of freedom of Student-t noise; 0: from the data; 1000 or more: Gaussian", low=0.0, high=1e9
     )
@@ -53,14 +53,11 @@ class SamplerConfig:
         0.0, "what one sample counts for, below 1 where neighbours repeat each other; 0: from the data", low=0.0, high=1.0
     )
     gamma_shape: float = parameter(1.0, "shape of γ's Gamma prior", low=1e-3)
-    gamma_rate: float = parameter(0.5, "rate of γ's Gamma prior", low=1e-6)
+    gamma_rate: float = parameter(1.0, "rate of γ's Gamma prior", low=1e-6)
     alpha_kappa_shape: float = parameter(1.0, "shape of the Gamma prior of α+κ", low=1e-3)
     alpha_kappa_rate: float = parameter(0.01, "rate of the Gamma prior of α+κ", low=1e-6)
     rho_a: float = parameter(40.0, "first parameter of ρ's Beta prior, ρ = κ/(α+κ)", low=1e-3)
     rho_b: float = parameter(1.0, "second parameter of ρ's Beta prior", low=1e-3)
-
-    def __post_init__(self) -> None:
-        check(self)
 
     @property
     def hyper(self) -> Floats:

@@ -89,8 +89,8 @@ def unexplained(
 
 START = (1.0, 50.0, 0.9)
 MERGE_ROWS = (40.0, 0.1)
-MEAN_WORTHS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # log-normal beforehand, about 0.1, with a factor of 4.5
-MEAN_ODDS = (-1.2, -0.3, 0.0, -0.3, -1.2, -2.6, -4.7)
+MEAN_WORTHS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)  # log-normal beforehand, about 0.1, with a factor of 4.5
+MEAN_ODDS = (-1.2, -0.3, 0.0, -0.3, -1.2, -2.6)
 EXTRA_DEGREES = (3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 300.0, 1000.0)
 GUESSED_DOF = 5.0  # until the data have said how heavy the noise's tails are
 

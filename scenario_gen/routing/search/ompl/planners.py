@@ -29,7 +29,7 @@ import numpy as np
 
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import needs
-from scenario_gen.parameters import check, parameter
+from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.roads.clearance import clearance_in_cells, to_cells, to_metres
 from scenario_gen.routing.search.planner import Budget, BudgetSpentError, check_query, path_length, Plan, Query
 from scenario_gen.types.road import Road
@@ -38,19 +38,19 @@ GLANCE = 0.05  # [s] between two looks at the child and at the caller's wish to 
 
 
 @dataclass(frozen=True)
-class OmplConfig:
+class OmplConfig(Parameters):
     """Settings of the planners from OMPL."""
 
     step: float = parameter(0.0, "longest new edge; 0: OMPL's own choice", unit="cells", low=0.0, high=1e6)
     simplify: bool = parameter(True, "run OMPL's path simplifier at the end")
     time_limit: float = parameter(30.0, "wall-clock time after which a search is ended by force", unit="s", low=0.1, high=3600.0)
 
-    def __post_init__(self) -> None:
-        check(self)
-
 
 class OmplPlanner:
-    """One of OMPL's planners; `name` is a key of `solve.PLANNERS`."""
+    """One of OMPL's planners; `name` is a key of `solve.PLANNERS`.
+
+    Source: the Open Motion Planning Library (Şucan, Moll & Kavraki 2012).
+    """
 
     def __init__(self, name: str, config: OmplConfig = OmplConfig()) -> None:
         self.name = name
