@@ -20,6 +20,7 @@ from scenario_gen.segmentation.library import assign, Assignment, build_library,
 from scenario_gen.segmentation.live import LiveSegmenter
 from scenario_gen.segmentation.online import Changepoint, OnlineConfig, OnlineSegmenter
 from scenario_gen.segmentation.posterior import Posterior
+from scenario_gen.segmentation.segment_classes import FinishedSegment
 from scenario_gen.segmentation.segmenter import segment, segment_track, SegmentationConfig
 from scenario_gen.segmentation.series import segment_series
 from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
@@ -27,6 +28,7 @@ from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
 __all__ = [
     "Assignment",
     "Changepoint",
+    "FinishedSegment",
     "LiveChangepoints",
     "LiveSegmenter",
     "OnlineConfig",
