@@ -33,6 +33,7 @@ from scenario_gen.segmentation.series import segment_series, usual_distances, wi
 
 Data = Any  # an array (T, D) or what becomes one, or a list of them
 
+DEFAULT = SamplerConfig()
 LEAST_SAMPLES = 4
 USUAL_R_HAT = 1.1  # asked for where `r_hat` = 1 has all sweeps run
 
@@ -89,22 +90,22 @@ class StickyHDPHMM:
     def __init__(
         self,
         *,
-        emission: str = "gaussian",
-        order: int = 1,
-        states: int = 0,
-        chains: int = 4,
-        sweeps: int = 600,
-        r_hat: float = 1.1,
-        moves: int = 4,
-        dof: float = 0.0,
-        mean_weight: float = 0.05,
-        weight: float = 0.0,
-        gamma_shape: float = 1.0,
-        gamma_rate: float = 0.5,
-        alpha_kappa_shape: float = 1.0,
-        alpha_kappa_rate: float = 0.01,
-        rho_a: float = 40.0,
-        rho_b: float = 1.0,
+        emission: str = DEFAULT.emission,
+        order: int = DEFAULT.order,
+        states: int = DEFAULT.states,
+        chains: int = DEFAULT.chains,
+        sweeps: int = DEFAULT.sweeps,
+        r_hat: float = DEFAULT.r_hat,
+        moves: int = DEFAULT.moves,
+        dof: float = DEFAULT.dof,
+        mean_weight: float = DEFAULT.mean_weight,
+        weight: float = DEFAULT.weight,
+        gamma_shape: float = DEFAULT.gamma_shape,
+        gamma_rate: float = DEFAULT.gamma_rate,
+        alpha_kappa_shape: float = DEFAULT.alpha_kappa_shape,
+        alpha_kappa_rate: float = DEFAULT.alpha_kappa_rate,
+        rho_a: float = DEFAULT.rho_a,
+        rho_b: float = DEFAULT.rho_b,
         random_state: int | None = None,
     ) -> None:
         """Take the parameters of `SamplerConfig` and a seed (None: another one at every fit); `fit` checks them."""

@@ -19,6 +19,8 @@ from pathlib import Path
 import subprocess
 import sys
 
+import pytest
+
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
@@ -31,18 +33,19 @@ def test_the_script_generates_from_the_bundled_log_without_ros():
     assert "without vehicle 1: 2; its own track is there" in ran.stdout
 
 
-def test_the_notebook_was_executed_and_runs(capsys):
+@pytest.mark.parametrize(("name", "pictures"), [("tour.ipynb", 2), ("segmentation.ipynb", 0)])
+def test_the_notebook_was_executed_and_runs(name, pictures, capsys):
     import matplotlib
     from matplotlib import pyplot
 
     matplotlib.use("agg")
-    cells = [cell for cell in json.loads((EXAMPLES / "tour.ipynb").read_text())["cells"] if cell["cell_type"] == "code"]
+    cells = [cell for cell in json.loads((EXAMPLES / name).read_text())["cells"] if cell["cell_type"] == "code"]
     assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
     namespace = {}
     for cell in cells:
         shown = "".join("".join(output["text"]) for output in cell["outputs"] if output["output_type"] == "stream")
         assert not [output for output in cell["outputs"] if output["output_type"] == "error"]
-        exec(compile("".join(cell["source"]), "tour.ipynb", "exec"), namespace)
+        exec(compile("".join(cell["source"]), name, "exec"), namespace)
         assert capsys.readouterr().out == shown, "execute the notebook again"
     pyplot.close("all")
-    assert sum("image/png" in output.get("data", {}) for cell in cells for output in cell["outputs"]) == 2
+    assert sum("image/png" in output.get("data", {}) for cell in cells for output in cell["outputs"]) == pictures

@@ -26,6 +26,7 @@ from scipy import stats
 
 from scenario_gen.segmentation import SamplerConfig, segment_series, SegmentationWarning, StickyHDPHMM
 
+pytestmark = pytest.mark.filterwarnings("ignore::scenario_gen.segmentation.SegmentationWarning")
 QUICK = {"chains": 2, "sweeps": 60, "random_state": 1}
 TRUE_MEANS = np.array([[0.0, 0.0], [400.0, -0.3]])
 TRUE_COVARIANCES = np.array([[[900.0, 1.2], [1.2, 0.0064]], [[2500.0, -1.0], [-1.0, 0.0016]]])
