@@ -237,7 +237,7 @@ def _robust() -> list[Row]:
     ]
     for name, values in lost.items():
         rows.append(Row(f"B, {name}: Hamming above that without", max(values), "", "lower", 0.01, "the worst seed"))
-    many = [int(segment_series(gaussian_hmm("many", seed, distance=4.0).x).labels.max()) + 1 for seed in MANY_SEEDS]
+    many = [int(segment_series(gaussian_hmm("M", seed, distance=4.0).x).labels.max()) + 1 for seed in MANY_SEEDS]
     return [*rows, Row("30 states: found", float(np.median(many)), "", "higher", 30.0, f"T 12,000, means 4 apart; {many}")]
 
 
