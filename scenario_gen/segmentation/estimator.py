@@ -217,7 +217,7 @@ class StickyHDPHMM:
         for chain in np.unique(posterior.chain):
             labels[chain] = posterior.samples[posterior.chain == chain]
         groups: dict[str, Any] = {"posterior": {**{name: draws[:, :, i] for i, name in enumerate(TRACE)}, "labels": labels}}
-        options: dict[str, Any] = {"dims": {"labels": ["sample"]}, "coords": {"sample": np.arange(len(posterior.labels))}}
+        options: dict[str, Any] = {"dims": {"labels": ["time"]}, "coords": {"time": np.arange(len(posterior.labels))}}
         if int(arviz.__version__.split(".")[0]) > 0:  # from 1.0 on the groups are one argument
             return arviz.from_dict(groups, **options)
         return arviz.from_dict(**groups, **options)

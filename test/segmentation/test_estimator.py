@@ -256,7 +256,7 @@ def test_to_arviz_has_every_chain(fitted):
     model, x, _ = fitted
     posterior = model.to_arviz().posterior
     draws = len(model.posterior_.trace[0])
-    assert dict(posterior.sizes) == {"chain": 2, "draw": draws, "sample": len(x)}
+    assert dict(posterior.sizes) == {"chain": 2, "draw": draws, "time": len(x)}
     np.testing.assert_array_equal(posterior["rho"].values[1], model.posterior_.trace[1][:, 4])
     rows = posterior["labels"].values.reshape(-1, len(x))
     np.testing.assert_array_equal(rows[(rows >= 0).all(axis=1)], model.posterior_.samples)
