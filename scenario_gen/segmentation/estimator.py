@@ -29,7 +29,7 @@ from scenario_gen.segmentation.estimates import estimate, hidden_channels, mean_
 from scenario_gen.segmentation.hdp_hmm.chain import TRACE
 from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.segmentation.hdp_hmm.smoother import log_densities, smooth
-from scenario_gen.segmentation.series import outlier_bounds, segment_series, without_outliers
+from scenario_gen.segmentation.series import segment_series, usual_distances, without_outliers
 
 Data = Any  # an array (T, D) or what becomes one, or a list of them
 
@@ -151,8 +151,8 @@ class StickyHDPHMM:
             posterior = segment_series(x, config, seed, ends=tuple(ends.tolist()))
         self.posterior_ = posterior
         self.n_features_in_ = x.shape[1]
-        self._bounds = outlier_bounds(np.where(np.isnan(x).all(axis=0), 0.0, x))
-        visible = without_outliers(x, self._bounds)
+        self._usual = usual_distances(np.where(np.isnan(x).all(axis=0), 0.0, x))
+        visible = without_outliers(x, self._usual)
         emissions = estimate(visible, ends, posterior, config)
         self.labels_ = posterior.labels.copy()
         self.changepoints_ = posterior.changepoints
@@ -276,7 +276,7 @@ class StickyHDPHMM:
             )
         used = self.posterior_.channels
         absent = np.isnan(self.means_).all(axis=0)
-        visible = np.where(absent, 0.0, without_outliers(x, self._bounds))
+        visible = np.where(absent, 0.0, without_outliers(x, self._usual))
         with as_value_error():
             problem, rows = regressed(visible, ends, self._config())
         hidden = hidden_channels(problem)[:, used]

@@ -37,6 +37,7 @@ STAND_SPEED = 0.5
 STAND_BLUR = 0.2
 STAND_WINDOW = 0.9
 POSITION_FLOOR, SPEED_FLOOR = 0.5, 0.5
+SPIKE_ROUNDS = 4
 
 
 def _best_window(signals: Sequence[Floats], width: int, degree: int, value: Callable[[list[Floats]], Floats]) -> Floats:
@@ -70,19 +71,22 @@ def _best_window(signals: Sequence[Floats], width: int, degree: int, value: Call
 def without_spikes(values: Floats, floor: float) -> Floats:
     """Replace single samples of values (T, D) that lie far from their neighbours by what lies between these (Hampel's filter).
 
-    Far is six times the usual distance (by its median) from the median of the two samples on either side, and `floor`.
+    Far is six times the usual distance (by its median) from the median of the two samples on either side, and `floor`; of
+    neighbours, the one that is farthest goes first, for it moves the others' medians.
     """
-    if len(values) < 5:
-        return values
-    around = np.stack([values[:-4], values[1:-3], values[3:-1], values[4:]])
-    middle = np.median(around, axis=0)
-    far = np.sqrt(np.square(values[2:-2] - middle).sum(axis=1))
+    t = np.arange(len(values))
     spikes = np.zeros(len(values), np.bool_)
-    spikes[2:-2] = far > np.maximum(6.0 * 1.4826 * np.median(far), floor)
-    if not spikes.any():
-        return values
-    t, kept = np.arange(len(values)), ~spikes
-    return np.column_stack([np.interp(t, t[kept], column[kept]) for column in values.T])
+    for _ in range(SPIKE_ROUNDS if len(values) >= 5 else 0):
+        around = np.stack([values[:-4], values[1:-3], values[3:-1], values[4:]])
+        far = np.zeros(len(values))
+        far[2:-2] = np.sqrt(np.square(values[2:-2] - np.median(around, axis=0)).sum(axis=1))
+        peaks = far >= sliding_window_view(np.pad(far, 2), 5).max(axis=1)
+        new = peaks & (far > np.maximum(6.0 * 1.4826 * np.median(far[2:-2]), floor))
+        if not new.any():
+            break
+        spikes |= new
+        values = np.column_stack([np.interp(t, t[~spikes], column[~spikes]) for column in values.T])
+    return values
 
 
 def without_outliers(encounter: Tracks) -> Tracks:

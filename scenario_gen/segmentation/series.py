@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
@@ -31,7 +32,7 @@ ROOM = 5  # states beyond those that the start found
 FIRST_LOOK = 40
 MOST_FULL = 0.05  # share of a chain's samples that may use all states
 COLLINEAR = 1e-4
-FAR_RANGES = 3.0
+SIDE, FAR = 4, 8.0
 
 
 def segment_series(
@@ -89,7 +90,8 @@ def standardised(x: Floats, known: Floats) -> tuple[Floats, Floats, Ints]:
         (T, D') series, (D',) variance to which each channel is known, and which channels (D',) they are.
     """
     few = (~np.isnan(x)).sum(axis=0) < 2
-    whole = without_outliers(np.where(few, 0.0, x), outlier_bounds(np.where(few, 0.0, x)))
+    whole = np.where(few, 0.0, x)
+    whole = without_outliers(whole, usual_distances(whole))
     spread, centre = np.nanstd(whole, axis=0), np.nanmean(whole, axis=0)
     low, high = np.nanquantile(whole, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
     inner = np.nanstd(np.clip(whole, low, high), axis=0)
@@ -105,26 +107,34 @@ def standardised(x: Floats, known: Floats) -> tuple[Floats, Floats, Ints]:
     return np.ascontiguousarray(scaled), np.square(known[channels] / unit[channels]), channels
 
 
-def outlier_bounds(x: Floats) -> Floats:
-    """(2, D) values beyond which cells of x (T, D) lie far outside the rest of their channel; infinite where most are alike."""
-    low, high = np.nanquantile(x, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
-    reach = np.where(high > low, FAR_RANGES * (high - low), np.inf)
-    return np.stack([low - reach, high + reach])
+def usual_distances(x: Floats) -> Floats:
+    """(D,) usual distance of a sample of x (T, D) from the median of the four before it, or a tenth of the channel's spread."""
+    before, _ = _from_medians(x)
+    with np.errstate(all="ignore"):
+        low, high = np.nanquantile(x, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
+        usual = 1.4826 * np.nanmedian(np.abs(before), axis=0)
+        return np.asarray(np.fmax(usual, 0.1 * np.nanstd(np.clip(x, low, high), axis=0)))
 
 
-def without_outliers(x: Floats, bounds: Floats) -> Floats:
-    """Replace cells of x (T, D) outside `bounds` (2, D) by NaN where they come one or two in a row.
+def without_outliers(x: Floats, usual: Floats) -> Floats:
+    """Replace single cells of x (T, D) by NaN that lie far beyond the medians of the four samples before and the four after.
 
-    What noise with heavy tails cannot be asked to explain (a lost sensor's 10⁶) would still set the scale of all else; what
-    lasts longer is a state, however rare.
+    Far is FAR times `usual` (D,), see `usual_distances`. A lost sensor's 10⁶ would set the scale of all else, and a state of
+    one sample costs less than noise of any tails can explain.
     """
-    far = (x < bounds[0]) | (x > bounds[1])
-    if not far.any():
-        return x
-    near = np.zeros((len(x) + 4, x.shape[1]), np.int64)
-    near[2:-2] = far
-    around = near[:-4] + near[1:-3] + near[2:-2] + near[3:-1] + near[4:]
-    return np.where(far & (around <= 2), np.nan, x)
+    before, after = _from_medians(x)
+    nearest = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
+    return np.where((nearest > FAR * usual) & (usual > 0.0), np.nan, x)
+
+
+def _from_medians(x: Floats) -> tuple[Floats, Floats]:
+    """Distances of x (T, D) from the medians of the four samples before and the four after; NaN where there are none."""
+    gap = np.full((SIDE, x.shape[1]), np.nan)
+    windows = np.sort(sliding_window_view(np.concatenate([gap, x, gap]), SIDE, axis=0), axis=-1)  # NaN come last
+    seen = np.maximum((~np.isnan(windows)).sum(axis=-1, keepdims=True), 1)
+    low, high = (np.take_along_axis(windows, place, axis=-1)[..., 0] for place in ((seen - 1) // 2, seen // 2))
+    median = 0.5 * (low + high)
+    return x - median[: len(x)], x - median[SIDE + 1 :]
 
 
 def independent(x: Floats) -> Ints:

@@ -21,6 +21,7 @@ import pytest
 
 from scenario_gen.errors import InputError
 from scenario_gen.segmentation import SamplerConfig, segment_series
+from scenario_gen.segmentation.posterior import ess, r_hat
 
 
 def two_states(seed: int, dimensions: int = 2) -> tuple[np.ndarray, np.ndarray]:
@@ -139,3 +140,101 @@ def test_probability_within_counts_each_sample_once():
         low, high = max(t - 5, 0), min(t + 6, 480)
         near = [any(low <= c < high and c != 240 for c in np.flatnonzero(np.diff(row)) + 1) for row in posterior.samples]
         assert wide[t] == pytest.approx(np.mean(near))
+
+
+def many_states(seed: int, states: int = 6, dwell: int = 60, visits: int = 3, dimensions: int = 3):
+    """States 6 standard deviations apart, each visited several times."""
+    rng = np.random.default_rng(seed)
+    labels = np.repeat(np.concatenate([rng.permutation(states) for _ in range(visits)]), dwell)
+    means = rng.normal(size=(states, dimensions)) * 6.0
+    return means[labels] + rng.normal(size=(len(labels), dimensions)), labels
+
+
+def found_as_drawn(posterior, labels):
+    """Each state found is one that was drawn, but for 3 % of the samples."""
+    table = np.zeros((posterior.labels.max() + 1, labels.max() + 1))
+    np.add.at(table, (posterior.labels, labels), 1.0)
+    return posterior.labels.max() == labels.max() and table.max(axis=1).sum() >= 0.97 * len(labels)
+
+
+def test_chains_agree_and_say_so():
+    x, labels = many_states(1)
+    posterior = segment_series(x, seed=0)
+    assert found_as_drawn(posterior, labels)
+    assert posterior.r_hat.shape == posterior.ess.shape == (5,)
+    assert posterior.r_hat.max() <= SamplerConfig().r_hat
+    assert posterior.kept.all()
+    assert posterior.ess.min() > 10.0
+    unfinished = segment_series(x, SamplerConfig(sweeps=10, r_hat=1.0001), seed=0)
+    assert unfinished.r_hat.max() > 1.0001
+
+
+def test_r_hat_and_ess_of_known_traces():
+    rng = np.random.default_rng(0)
+    same = [rng.normal(size=(400, 5)) for _ in range(4)]
+    assert np.abs(r_hat(same) - 1.0).max() < 0.02
+    np.testing.assert_allclose(ess(same), 1600.0, rtol=0.3)
+    apart = [trace + 3.0 * k for k, trace in enumerate(same)]
+    assert r_hat(apart).min() > 2.0
+    slow = np.zeros((4, 2000, 5))
+    for t in range(1, 2000):  # an AR(1) series of coefficient 0.9 is worth a nineteenth of its length
+        slow[:, t] = 0.9 * slow[:, t - 1] + rng.normal(size=(4, 5))
+    np.testing.assert_allclose(ess(list(slow)), 8000.0 / 19.0, rtol=0.4)
+    constant = [np.ones((20, 5)), np.ones((20, 5))]
+    np.testing.assert_array_equal(r_hat(constant), 1.0)
+    assert np.isinf(r_hat([constant[0], 2.0 * constant[1]])).all()
+
+
+def test_truncation_grows_until_there_is_room():
+    x, _ = many_states(2, states=26, dwell=25, visits=2)
+    posterior = segment_series(x, seed=0)
+    assert posterior.labels.max() + 1 >= 25
+    assert posterior.states > 26
+    assert not posterior.full
+    few = segment_series(x, SamplerConfig(states=10), seed=0)
+    assert few.full
+    assert few.states == 10
+
+
+def test_channels_that_follow_from_others_change_nothing():
+    x, labels = many_states(3)
+    base = segment_series(x, seed=0)
+    for extra in (2.0 * x[:, 0] - 7.0, x[:, 0] + x[:, 1]):
+        twin = segment_series(np.column_stack([x, extra]), seed=0)
+        np.testing.assert_array_equal(twin.labels, base.labels)
+        np.testing.assert_array_equal(twin.channels, [0, 1, 2])
+    assert found_as_drawn(segment_series(np.column_stack([x[:, 0] + x[:, 1], x]), seed=0), labels)
+
+
+@pytest.mark.parametrize("share", ["cells", "rows"])
+def test_what_was_not_measured_is_left_out(share):
+    x, labels = many_states(4)
+    rng = np.random.default_rng(0)
+    lost = rng.uniform(size=x.shape if share == "cells" else (len(x), 1)) < 0.08
+    posterior = segment_series(np.where(lost, np.nan, x), seed=0)
+    assert found_as_drawn(posterior, labels)
+
+
+def test_heavy_tails_are_told_from_states():
+    x, labels = many_states(5)
+    rng = np.random.default_rng(0)
+    means = np.array([x[labels == k].mean(axis=0) for k in range(6)])
+    heavy = means[labels] + (x - means[labels]) / np.sqrt(rng.chisquare(3.0, size=(len(x), 1)) / 3.0)
+    posterior = segment_series(heavy, seed=0)
+    assert 0.0 < posterior.dof <= 6.0
+    assert found_as_drawn(posterior, labels)
+    assert segment_series(x, seed=0).dof == 0.0
+
+
+@pytest.mark.parametrize("size", [30.0, 1e6])
+def test_single_outliers_are_no_states(size):
+    x, labels = many_states(6)
+    rng = np.random.default_rng(0)
+    x[rng.uniform(size=len(x)) < 0.01] += size
+    assert found_as_drawn(segment_series(x, seed=0), labels)
+
+
+def test_a_sequence_shorter_than_the_order_is_named():
+    x, _ = two_states(7)
+    with pytest.raises(InputError, match="sequence 1 has 3 samples; an autoregressive emission of order 2 needs 4"):
+        segment_series(x, SamplerConfig(emission="autoregressive", order=2), ends=(100, 103, 240))
