@@ -316,7 +316,7 @@ class StickyHDPHMM:
         hidden = np.argwhere(np.isnan(visible) & ~np.isnan(x))
         if len(hidden):
             at = ", ".join(f"sample {t} of channel {i}" for t, i in hidden[:3]) + (", ..." if len(hidden) > 3 else "")
-            found.append(f"{len(hidden)} values far outside the rest of their channel are taken for not measured: {at}")
+            found.append(f"{len(hidden)} values far from those before and after them are taken for not measured: {at}")
         return found
 
 

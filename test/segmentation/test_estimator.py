@@ -170,17 +170,19 @@ def test_heavy_tails_are_students_t():
     rng = np.random.default_rng(4)
     labels = np.repeat([0, 1, 0, 1], 150)
     x = rng.standard_t(3.0, size=(600, 2)) + 6.0 * labels[:, None]
-    with pytest.warns(SegmentationWarning, match="far outside"):
-        model = StickyHDPHMM(**QUICK | {"dof": 3.0}).fit(np.vstack([x, [[1e6, 0.0]]]))
+    lost = x.copy()
+    lost[333, 0] = 1e6
+    with pytest.warns(SegmentationWarning, match="1 values far from .* sample 333 of channel 0"):
+        model = StickyHDPHMM(**QUICK | {"dof": 3.0}).fit(lost)
     assert model.dof_ == 3.0
-    assert np.mean(model.labels_[:600] != labels) < 0.02
+    assert np.mean(model.labels_ != labels) < 0.02
     for k in range(2):
         np.testing.assert_allclose(model.means_[k], 6.0 * k, atol=0.25)
         np.testing.assert_allclose(model.covariances_[k], np.eye(2), atol=0.35)
     one = x[:1]
     at = [stats.multivariate_t(m, c, 3.0).pdf(one) for m, c in zip(model.means_, model.covariances_, strict=True)]
     assert model.score(one) == pytest.approx(np.log(np.dot(model.startprob_, at)))
-    assert np.mean(model.predict(np.vstack([x, [[1e6, 0.0]]])) != model.labels_) < 0.01
+    assert np.mean(model.predict(lost) != model.labels_) < 0.01
 
 
 def test_channels_that_are_left_out_have_means_and_covariances_and_are_named(fitted):
