@@ -185,6 +185,18 @@ def test_heavy_tails_are_students_t():
     assert np.mean(model.predict(lost) != model.labels_) < 0.01
 
 
+@pytest.mark.parametrize("lost", [0, 333, -1])
+def test_a_single_outlier_hides_nothing_wherever_it_is(fitted, lost):
+    model, x, labels = fitted
+    holed = x.copy()
+    holed[lost] = 1e9
+    with pytest.warns(SegmentationWarning, match="2 values far from those before and after"):
+        found = StickyHDPHMM(**QUICK).fit(holed)
+    assert np.mean(found.labels_ != labels) < 0.01
+    np.testing.assert_allclose(found.means_, model.means_, rtol=0.05, atol=0.5)
+    assert np.mean(found.predict(holed) != labels) < 0.01
+
+
 def test_channels_that_are_left_out_have_means_and_covariances_and_are_named(fitted):
     _, x, _ = fitted
     wide = np.column_stack([x, 2.0 * x[:, 0] - 100.0 * x[:, 1] + 7.0, np.full(len(x), 3.0), np.full(len(x), np.nan)])
