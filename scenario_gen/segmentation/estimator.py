@@ -217,7 +217,7 @@ class StickyHDPHMM:
         for chain in np.unique(posterior.chain):
             labels[chain] = posterior.samples[posterior.chain == chain]
         groups: dict[str, Any] = {"posterior": {**{name: draws[:, :, i] for i, name in enumerate(TRACE)}, "labels": labels}}
-        options: dict[str, Any] = {"dims": {"labels": ["sample"]}, "coords": {"sample": np.arange(len(posterior.labels))}}
+        options: dict[str, Any] = {"dims": {"labels": ["time"]}, "coords": {"time": np.arange(len(posterior.labels))}}
         if int(arviz.__version__.split(".")[0]) > 0:  # from 1.0 on the groups are one argument
             return arviz.from_dict(groups, **options)
         return arviz.from_dict(**groups, **options)
@@ -316,7 +316,7 @@ class StickyHDPHMM:
         hidden = np.argwhere(np.isnan(visible) & ~np.isnan(x))
         if len(hidden):
             at = ", ".join(f"sample {t} of channel {i}" for t, i in hidden[:3]) + (", ..." if len(hidden) > 3 else "")
-            found.append(f"{len(hidden)} values far outside the rest of their channel are taken for not measured: {at}")
+            found.append(f"{len(hidden)} values far from those before and after them are taken for not measured: {at}")
         return found
 
 

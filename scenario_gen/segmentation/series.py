@@ -123,6 +123,7 @@ def without_outliers(x: Floats, usual: Floats) -> Floats:
     one sample costs less than noise of any tails can explain.
     """
     before, after = _from_medians(x)
+    before, after = np.where(np.isnan(before), after, before), np.where(np.isnan(after), before, after)  # at the ends: one side
     nearest = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
     return np.where((nearest > FAR * usual) & (usual > 0.0), np.nan, x)
 
