@@ -148,7 +148,7 @@ def ess(traces: list[Floats]) -> Floats:
             rho = 1.0 - (within[i] - lags[:, i] * n / (n - 1)) / total[i]
             pairs = rho[: n // 2 * 2].reshape(-1, 2).sum(axis=1)
             stop = int(np.argmax(pairs < 0.0)) if (pairs < 0.0).any() else len(pairs)
-            result[i] = chains * n / max(2.0 * float(np.minimum.accumulate(pairs[:stop]).sum()) - 1.0, 1.0 / np.log10(chains * n))
+            result[i] = chains * n / max(2.0 * float(np.minimum.accumulate(pairs[:stop]).sum()) - 1.0, 1e-2)
     return result
 
 

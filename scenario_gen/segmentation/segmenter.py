@@ -123,7 +123,8 @@ def segment_track(
 def on_trends(encounter: Tracks, posterior: Posterior, points: Ints, config: SegmentationConfig) -> Ints:
     """Put changepoints (K,) where trends change, see `trends`, and keep the most useful ones up to `max_rate`."""
     trends = Trends.of(encounter.position, encounter.speed, encounter.dt)
-    least, certain = (trends.threshold(config.significance_level**power) for power in (1, 2))
+    chance = config.significance_level
+    least, certain = trends.threshold(chance), trends.threshold(chance * chance)
     reach = round(config.settle / encounter.dt)
     gap = max(2, int(np.ceil(config.min_segment / encounter.dt - 1e-9)))
     most = int(encounter.duration * config.max_rate)

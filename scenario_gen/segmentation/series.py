@@ -155,7 +155,15 @@ def independent(x: Floats) -> Ints:
 
 
 def sample(problem: Problem, config: SamplerConfig, seed: int, ends: Ints, channels: Ints) -> Posterior:
-    """Run the chains until they agree, or for as many sweeps as there may be; with more states if all are used."""
+    """Run the chains until they agree, or for as many sweeps as there may be; with more states if all are used.
+
+    Args:
+        problem: samples and what is known of them.
+        config: model and sampler.
+        seed: any integer.
+        ends: (Q,) index one past the last sample of each sequence.
+        channels: (D',) which channels of the caller's the problem has.
+    """
     first, *seeds = np.random.SeedSequence([seed]).spawn(config.chains + 1)
     start = find_start(problem, config, np.random.Generator(np.random.PCG64(first)))
     streams = [np.random.Generator(np.random.PCG64(stream)) for stream in seeds]

@@ -204,7 +204,7 @@ def block_log_likelihood(
 
 @kernel(inline=True)
 def student(total: Floats, n: int, logdet: float, share: float, power: float, work: Floats) -> None:
-    """Overwrite the squares `total` (BLOCK,) with logdet - power log(1 + share × square), n of them.
+    """Overwrite the first n squares of `total` (B,) with logdet - power log(1 + share × square); work (B,).
 
     The logarithm is 2 artanh((m - 1) / (m + 1)) of the mantissa, a series, which is vectorised; it is right to 1e-13.
     """
@@ -266,7 +266,7 @@ def mean_emission(factor: Floats, n: float, p: int, nu: float, blur: Floats, coe
 
 @kernel(inline=True)
 def regression(factor: Floats, p: int, coef: Floats, i: int) -> None:
-    """Complete row i of coef: from what stands for z there, and the whitening, to -W A's share of it."""
+    """Complete row i of coef (D, M): from what stands for z there, and the whitening, to -W A's share of it."""
     for j in range(i + 1):
         c = coef[i, p + j]
         for q in range(p):

@@ -57,7 +57,7 @@ def merge_gain(n: Ints, i: int, j: int, stay: float, move: float) -> float:
 def joint_marginal(
     outer: Floats, sums: Floats, i: int, j: int, g0: Floats, p: int, nu: float, weight: float, blur: Floats, factor: Floats
 ) -> float:
-    """Log marginal likelihood of the samples of states i and j as one state (of i alone if they are the same)."""
+    """Log marginal likelihood of states i and j as one, or of i alone if they are the same; outer (L, M, M), sums (L, 2)."""
     m = g0.shape[0]
     count, total = sums[i, 0], sums[i, 1]
     joint = outer[i].copy()

@@ -162,7 +162,7 @@ def draw_hidden(state: State, v: Floats, vt: Floats, labels: Ints, coef: Floats,
 
 @kernel(inline=True)
 def log_masses(mass: Floats, power: float, dof: float) -> float:
-    """Log density of the masses, and what they add to the samples' log density: Σ ½ power log mass; up to a constant."""
+    """Log density of mass (T,), and what they add to the samples' log density: Σ ½ power log mass; up to a constant."""
     value = 0.0
     for t in range(len(mass)):
         if mass[t] > 0.0:

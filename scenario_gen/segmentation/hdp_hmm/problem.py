@@ -237,7 +237,7 @@ class Problem:
         return result
 
     def hyper(self, config: SamplerConfig) -> Floats:
-        """Return the hyperpriors as the kernels want them."""
+        """Hyperpriors as the kernels want them (8 + D numbers: see HYPER), (n,)."""
         return np.concatenate([config.hyper, [self.weight, self.dof], self.blur])
 
     def run(

@@ -37,7 +37,7 @@ MOST_LOG_RATIO, CERTAIN, LEAST_PRODUCT = 200.0, 1e150, 1e-150
 
 @kernel(inline=True)
 def members_of(labels: Ints, ends: Ints, i: int, j: int, index: Ints, opens: Ints) -> int:
-    """Fill index with the samples of states i and j, and opens with 1 where a run of them begins; returns how many there are."""
+    """Fill index (T,) with the samples of states i and j, opens (T,) with 1 where a run of them begins; returns how many there are."""
     found = 0
     before = -2
     sequence = 0
@@ -186,7 +186,7 @@ def propose_sides(
 
 @kernel(inline=True)
 def predecessors(n: Ints, k: int) -> int:
-    """Rows, other than k's own, from which state k is entered; at least 1. So many tables it has at least."""
+    """Rows of n (L + 1, L), other than k's own, from which state k is entered; at least 1. So many tables it has at least."""
     found = 0
     for j in range(n.shape[0]):
         if j != k and n[j, k] > 0:
@@ -212,7 +212,7 @@ def draw_shares(state: State, a: float, first: int, second: int, out: Floats) ->
 
 @kernel(inline=True)
 def chosen_state(counts: Ints, number: int, occupied: bool) -> int:
-    """Return state number `number` of those that are occupied (or empty)."""
+    """Return state number `number` of those with counts (L,) above 0, or of the others."""
     for k in range(len(counts)):
         if (counts[k] > 0) == occupied:
             if number == 0:
@@ -253,7 +253,7 @@ def draw_pair(state: State, counts: Ints, splits: bool, pair: Ints) -> bool:
 
 @kernel(inline=True)
 def place_anchors(side: Ints, pair: Ints, splits: bool, anchors: Ints) -> None:
-    """Find the anchors, which `pair` numbers within their states, among the samples of both."""
+    """Find the anchors (2,), which `pair` (4,) numbers within their states, among the samples of both, side (n,)."""
     seen = np.zeros(2, np.int64)
     for r in range(len(side)):
         if side[r] == 0 and seen[0] == pair[2]:

@@ -104,7 +104,7 @@ def log_transitions(n: Ints, total: float, rho: float, beta: Floats) -> float:
 
 @kernel(inline=True)
 def log_concentration(n: Ints, hyper: Floats, beta: Floats, x: float, y: float) -> float:
-    """Log density of x = log(α+κ) and y = logit ρ, given labels and β, π integrated out, up to a constant."""
+    """Log density of x = log(α+κ) and y = logit ρ, given counts n (L + 1, L) and β (L,), π integrated out, up to a constant."""
     total = exact.exp(x)
     rho = 1.0 / (1.0 + exact.exp(-y))
     value = log_transitions(n, total, rho, beta)
@@ -119,7 +119,21 @@ def log_concentration(n: Ints, hyper: Floats, beta: Floats, x: float, y: float) 
 def slice_concentration(
     state: State, n: Ints, hyper: Floats, beta: Floats, x: float, y: float, value: float, along: int
 ) -> tuple[float, float, float]:
-    """One slice-sampling step (Neal 2003, stepping out) in x (along = 0) or y (along = 1); `value` is the density there."""
+    """One slice-sampling step (Neal 2003, stepping out) in x (along = 0) or y (along = 1).
+
+    Args:
+        state: generator.
+        n: (L + 1, L) counts.
+        hyper: (6 or more,) see HYPER.
+        beta: (L,).
+        x: log(α+κ).
+        y: logit ρ.
+        value: `log_concentration` there.
+        along: see above.
+
+    Returns:
+        x and y after the step, and `log_concentration` there.
+    """
     height = value + exact.log(uniform(state))
     here = x if along == 0 else y
     low = here - SLICE_WIDTH * uniform(state)
@@ -148,13 +162,13 @@ def slice_concentration(
 
 @kernel(inline=True)
 def along_density(n: Ints, hyper: Floats, beta: Floats, x: float, y: float, at: float, along: int) -> float:
-    """`log_concentration` with x or y replaced by `at`."""
+    """`log_concentration` of counts n (L + 1, L) and β (L,) with x or y replaced by `at`."""
     return log_concentration(n, hyper, beta, at, y) if along == 0 else log_concentration(n, hyper, beta, x, at)
 
 
 @kernel(inline=True)
 def sample_stickiness(state: State, n: Ints, hyper: Floats, top: Floats, beta: Floats) -> None:
-    """Draw α+κ and ρ given labels and β, with tables and π integrated out, by slices in log(α+κ) and logit ρ.
+    """Draw α+κ and ρ, in top (3,), given counts n (L + 1, L) and β (L,), with tables and π integrated out, by slices in log(α+κ) and logit ρ.
 
     The usual draws given tables (Fox et al. 2011, appendix) move by little: tables nearly determine both.
     """
