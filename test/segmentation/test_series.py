@@ -238,3 +238,15 @@ def test_a_sequence_shorter_than_the_order_is_named():
     x, _ = two_states(7)
     with pytest.raises(InputError, match="sequence 1 has 3 samples; an autoregressive emission of order 2 needs 4"):
         segment_series(x, SamplerConfig(emission="autoregressive", order=2), ends=(100, 103, 240))
+
+
+@pytest.mark.parametrize("missing", [0.15, 0.4])
+def test_what_is_missing_does_not_make_the_rest_look_correlated(missing):
+    """Gaps are filled with lines between neighbours; those once let independent samples count for two thirds."""
+    rng = np.random.default_rng(0)
+    labels = np.repeat([0, 1, 0, 1], 200)
+    x = rng.normal(size=(800, 3)) + 4.0 * labels[:, None]
+    x[rng.random(x.shape) < missing] = np.nan
+    posterior = segment_series(x, seed=1)
+    assert posterior.weight == 1.0
+    assert np.mean(posterior.labels != labels) < 0.01

@@ -232,12 +232,16 @@ def sample_weight(problem: Problem, place: Place, rough: float) -> float:
 
 
 def _autocorrelation(problem: Problem, place: Place) -> float:
-    """Lag-1 autocorrelation of the residuals, mean over channels, from neighbours with one label."""
+    """Lag-1 autocorrelation of the residuals, mean over channels, from neighbours with one label that were both observed."""
     labels = place.labels
     residual = problem.unexplained(place)[0] * np.sqrt(place.mass)[:, None]
     pairs = labels[:-1] == labels[1:]
     pairs[problem.ends[:-1] - 1] = False
     if not pairs.any():
         return 0.0
-    power = np.square(residual).mean(axis=0) + 1e-300
-    return float(np.mean((residual[:-1] * residual[1:])[pairs].mean(axis=0) / power))
+    seen = np.ones(residual.shape, np.bool_)
+    seen[problem.gaps] = ~problem.hidden
+    residual[~seen] = 0.0  # what was filled in repeats its neighbours
+    power = np.square(residual).sum(axis=0) / np.maximum(seen.sum(axis=0), 1) + 1e-300
+    both = (seen[:-1] & seen[1:])[pairs].sum(axis=0)
+    return float(np.mean((residual[:-1] * residual[1:])[pairs].sum(axis=0) / np.maximum(both, 1) / power))
