@@ -168,8 +168,9 @@ def along_density(n: Ints, hyper: Floats, beta: Floats, x: float, y: float, at: 
 
 @kernel(inline=True)
 def sample_stickiness(state: State, n: Ints, hyper: Floats, top: Floats, beta: Floats) -> None:
-    """Draw α+κ and ρ, in top (3,), given counts n (L + 1, L) and β (L,), with tables and π integrated out, by slices in log(α+κ) and logit ρ.
+    """Draw α+κ and ρ, in top (3,), given counts n (L + 1, L) and β (L,), by slices in log(α+κ) and logit ρ.
 
+    Tables and π are integrated out.
     The usual draws given tables (Fox et al. 2011, appendix) move by little: tables nearly determine both.
     """
     x = exact.log(top[1])
