@@ -37,7 +37,7 @@ MOST_LOG_RATIO, CERTAIN, LEAST_PRODUCT = 200.0, 1e150, 1e-150
 
 @kernel(inline=True)
 def members_of(labels: Ints, ends: Ints, i: int, j: int, index: Ints, opens: Ints) -> int:
-    """Fill index (T,) with the samples of states i and j, opens (T,) with 1 where a run of them begins; returns how many there are."""
+    """Fill index (T,) with the samples of states i and j, opens (T,) with 1 where a run of them begins; returns their number."""
     found = 0
     before = -2
     sequence = 0

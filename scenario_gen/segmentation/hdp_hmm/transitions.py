@@ -168,7 +168,7 @@ def along_density(n: Ints, hyper: Floats, beta: Floats, x: float, y: float, at: 
 
 @kernel(inline=True)
 def sample_stickiness(state: State, n: Ints, hyper: Floats, top: Floats, beta: Floats) -> None:
-    """Draw α+κ and ρ, in top (3,), given counts n (L + 1, L) and β (L,), with tables and π integrated out, by slices in log(α+κ) and logit ρ.
+    """Draw α+κ and ρ, in top (3,), given counts n (L + 1, L) and β (L,), π integrated out: slices in log(α+κ) and logit ρ.
 
     The usual draws given tables (Fox et al. 2011, appendix) move by little: tables nearly determine both.
     """
