@@ -76,7 +76,7 @@ class StickyHDPHMM:
         n_features_in_: D.
         means_: (K, D) mean of each state's samples, in X's units.
         covariances_: (K, D, D) Σ of each state's noise. Under Student-t noise it is the scale matrix, of which the
-            covariance is dof_ / (dof_ - 2) times.
+            covariance is `dof_` / (`dof_` - 2) times.
         coefficients_: (K, D, P) regression on z = 1, or (1, x of one sample before, x of two before, ...).
         transitions_: (K, K) probability of the next sample's state.
         startprob_: (K,) probability of a sequence's first state.
