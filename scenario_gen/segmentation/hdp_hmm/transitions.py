@@ -168,11 +168,7 @@ def along_density(n: Ints, hyper: Floats, beta: Floats, x: float, y: float, at: 
 
 @kernel(inline=True)
 def sample_stickiness(state: State, n: Ints, hyper: Floats, top: Floats, beta: Floats) -> None:
-<<<<<<< HEAD
     """Draw α+κ and ρ, in top (3,), given counts n (L + 1, L) and β (L,), by slices in log(α+κ) and logit ρ.
-=======
-    """Draw α+κ and ρ, in top (3,), given counts n (L + 1, L) and β (L,), π integrated out: slices in log(α+κ) and logit ρ.
->>>>>>> 3128ff62c7e5ceeb87421e923732e209d1307a0f
 
     Tables and π are integrated out.
     The usual draws given tables (Fox et al. 2011, appendix) move by little: tables nearly determine both.
