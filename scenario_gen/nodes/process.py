@@ -23,6 +23,7 @@ The kernels of all nodes are loaded, or compiled once per machine, by a thread w
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+import ctypes
 import faulthandler
 import importlib
 import os
@@ -30,7 +31,7 @@ from pathlib import Path
 import pkgutil
 import sys
 import threading
-from time import monotonic
+from time import CLOCK_MONOTONIC, monotonic
 import traceback
 from typing import Any, NoReturn
 
@@ -50,6 +51,8 @@ from scenario_gen.nodes.ros_parameters import help_of, USAGE
 from scenario_gen.nodes.services import ResponseRetry
 
 OFTEN = 5.0  # seconds between two reports of how many kernels are there
+SIGEV_THREAD = 2  # <signal.h>
+TOLD_WITHIN = 0.5  # seconds that writing down where it stood may take
 ENDING = 5.0  # seconds that a node, asked to end, may take to look up, and then to leave its ROS domain
 Maker = Callable[[str | None], Any]
 
@@ -87,7 +90,7 @@ def run_nodes(makers: Sequence[Maker], arguments: Sequence[str] | None = None) -
             code = 1
         end_orderly(lambda: None)  # a Ctrl-C does not disturb the clean end
         end_workers()
-        code = max(code, _end(nodes, executor))
+        code = _end(nodes, executor, code)
     return _leave(code)
 
 
@@ -204,9 +207,8 @@ def _spin(executor: SingleThreadedExecutor, nodes: Sequence[Any]) -> int:
     return max(getattr(node, "exit_code", 0) for node in nodes)
 
 
-def _end(nodes: Sequence[Any], executor: SingleThreadedExecutor) -> int:
-    """Destroy the nodes, whatever one of them says to it; return the exit code."""
-    code = 0
+def _end(nodes: Sequence[Any], executor: SingleThreadedExecutor, code: int) -> int:
+    """Destroy the nodes, whatever one of them says to it; return the exit code, `code` if all goes well."""
     for node in nodes:
         getattr(node, "cancel", list)()  # all at once, so that none is waited for before another is told
     for node in nodes:
@@ -215,7 +217,7 @@ def _end(nodes: Sequence[Any], executor: SingleThreadedExecutor) -> int:
         except (ScenarioGenError, OSError) as error:  # a bag that cannot be closed, say
             code = tell(error)
     _flush()
-    _leave_within(ENDING)  # nothing is lost from here on
+    _leave_within(ENDING, code)  # nothing is lost from here on
     for node in nodes:
         try:
             node.destroy_node()
@@ -230,12 +232,42 @@ def _end(nodes: Sequence[Any], executor: SingleThreadedExecutor) -> int:
     return code
 
 
-def _leave_within(seconds: float) -> None:
-    """End the process after so many seconds whatever it does, with exit code 1 and where it stood on its standard error.
+def _leave_within(seconds: float, code: int = 1) -> None:
+    """End the process after so many seconds whatever it does, with an exit code and where it stood on its standard error.
 
-    DDS was seen to wait for itself for ever, in a call that holds Python's lock; what ends the process here does without it.
+    DDS was seen to wait for itself for ever, in a call that holds Python's lock; what ends the process here does without it: a
+    timer of the system's, whose thread calls `_exit`. Where there is none, the exit code is 1.
     """
-    faulthandler.dump_traceback_later(seconds, exit=True, file=2)
+    try:
+        create, settime, delete = (getattr(ctypes.CDLL(None), f"timer_{name}") for name in ("create", "settime", "delete"))
+    except (AttributeError, OSError):
+        faulthandler.dump_traceback_later(seconds, exit=True, file=2)
+        return
+    faulthandler.dump_traceback_later(seconds, exit=False, file=2)
+    while _timers:
+        delete(_timers.pop())
+    leave = ctypes.cast(ctypes.CDLL(None)._exit, ctypes.c_void_p)
+    timer, event = ctypes.c_void_p(), _TimerEvent(value=code, notify=SIGEV_THREAD, function=leave)
+    if create(CLOCK_MONOTONIC, ctypes.byref(event), ctypes.byref(timer)) == 0:
+        _timers.append(timer)
+        after = int((seconds + TOLD_WITHIN) * 1e9)
+        settime(timer, 0, (ctypes.c_long * 4)(0, 0, after // 10**9, after % 10**9), None)
+
+
+_timers: list[ctypes.c_void_p] = []  # the one that is running
+
+
+class _TimerEvent(ctypes.Structure):
+    """`struct sigevent`: a timer's end calls `function` with `value` in a thread of its own."""
+
+    _fields_ = (
+        ("value", ctypes.c_size_t),
+        ("signal", ctypes.c_int),
+        ("notify", ctypes.c_int),
+        ("function", ctypes.c_void_p),
+        ("attributes", ctypes.c_void_p),
+        ("unused", ctypes.c_char * 32),
+    )
 
 
 def _leave(code: int) -> NoReturn:
