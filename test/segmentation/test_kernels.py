@@ -22,9 +22,10 @@ from scipy.special import gammainccinv
 from scipy.stats import multivariate_normal
 
 from scenario_gen.segmentation.hdp_hmm.chain import update_outer
+from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.segmentation.hdp_hmm.emission import accumulate, BLOCK, block_likelihood, block_log_likelihood
 from scenario_gen.segmentation.hdp_hmm.observed import observed_log_likelihood
-from scenario_gen.segmentation.hdp_hmm.problem import moving_mean, unexplained
+from scenario_gen.segmentation.hdp_hmm.problem import moving_mean, new_top, Place, Prior, Problem, unexplained
 from scenario_gen.segmentation.hdp_hmm.start import kmeans
 from scenario_gen.segmentation.posterior import matched_labels
 from scenario_gen.segmentation.trends import chi2_above
@@ -126,3 +127,13 @@ def test_moving_mean(width):
 @pytest.mark.parametrize(("degrees", "chance"), [(2, 1e-6), (4, 1e-4), (16, 0.3), (48, 1e-9)])
 def test_chi_squared_quantile(degrees, chance):
     assert chi2_above(degrees, chance) == pytest.approx(2.0 * gammainccinv(degrees / 2.0, chance), rel=1e-9)
+
+
+def test_a_chain_goes_on_from_the_labels_it_ended_with():
+    """Also after a single sweep: renumbered, they would no longer belong to the β that goes with them."""
+    x = np.random.default_rng(5).normal(size=(60, 2))
+    config, ends = SamplerConfig(), np.array([60])
+    problem = Problem.build(x, ends, config, np.zeros(2))
+    start = Place(np.repeat([2, 5], 30), problem.observed)
+    place, _, samples, _ = problem.run(config, Prior(np.eye(2), 25.0, 0.1), start, new_top(8), 0, 1, 3)
+    np.testing.assert_array_equal(place.labels, samples[-1])

@@ -18,7 +18,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.kernels import F, F1, F2, I, I1, kernel, OUT1, OUTI1
+from scenario_gen.kernels import F, F1, F2, I, I1, kernel, OUTI1
 from scenario_gen.segmentation.hdp_hmm.emission import accumulate, log_marginal, posterior_factor
 from scenario_gen.segmentation.hdp_hmm.transitions import count_transitions
 
@@ -84,7 +84,7 @@ def best_merge(data: Floats, own: Floats, counts: Ints, n: Ints, stay: float, mo
     return best_i, best_j
 
 
-@kernel(F2, F1, I1, F2, F, F1, I, F, F, OUT1, OUTI1)
+@kernel(F2, F1, I1, F2, F, F1, I, F, F, OUTI1)
 def merge_states(
     v: Floats,
     mass: Floats,
@@ -95,7 +95,6 @@ def merge_states(
     regressors: int,
     stay: float,
     move: float,
-    score: Floats,
     labels: Ints,
 ) -> None:
     """Merge states greedily while the probability of the labels, emissions and transitions integrated out, grows.
@@ -112,7 +111,6 @@ def merge_states(
         regressors: P.
         stay: prior weight of the own state in a transition row.
         move: prior weight of every other one.
-        score: (1,) output, log p(samples | labels).
         labels: (T,) updated; `labels.max() + 1` states.
     """
     m, p = v.shape[1], regressors
@@ -152,6 +150,3 @@ def merge_states(
         for k in range(states):
             data[j, k] = np.nan
             data[k, j] = np.nan
-    score[0] = 0.0
-    for k in range(states):
-        score[0] += own[k]

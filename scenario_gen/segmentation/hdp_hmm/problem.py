@@ -92,6 +92,7 @@ MERGE_ROWS = (40.0, 0.1)
 MEAN_WORTHS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)  # log-normal beforehand, about 0.1, with a factor of 4.5
 MEAN_ODDS = (-1.2, -0.3, 0.0, -0.3, -1.2, -2.6)
 EXTRA_DEGREES = (3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 300.0, 1000.0)
+FIT_RIDGE = 0.05  # K, in its units, where states are only described
 GUESSED_DOF = 5.0  # until the data have said how heavy the noise's tails are
 
 
@@ -223,7 +224,7 @@ class Problem:
         """What the states' regressions leave: (T', D), its (D, D) scatter by mass, and its whitened squares (T',)."""
         d = self.dimensions
         residual, scatter, squares = np.empty((len(self.v), d)), np.empty((d, d)), np.empty(len(self.v))
-        g0 = joint_prior(self.mean, 0.05 * self.precision, np.eye(d))
+        g0 = joint_prior(self.mean, FIT_RIDGE * self.precision, np.eye(d))
         unexplained(self.v, place.mass, place.labels, g0, self.regressors, residual, scatter, squares)
         return residual, scatter, squares
 
@@ -290,17 +291,15 @@ class Problem:
             emissions,
         )
         held = Prior(prior.within, float(extras[chosen[0]]), float(self.worths[chosen[1]]))
-        return Place(compact(samples[-1]) if keep == 1 else samples[-1], mass), held, samples, trace
+        return Place(samples[-1], mass), held, samples, trace
 
-    def merge(self, config: SamplerConfig, prior: Prior, place: Place) -> tuple[float, Ints]:
-        """Merge states greedily under `prior`; returns log p(samples | labels) and the labels (T',)."""
-        merged = place.labels.copy()
-        score = np.zeros(1)
-        d = self.dimensions
+    def merge(self, config: SamplerConfig, prior: Prior, place: Place) -> Place:
+        """Merge states greedily under `prior`; returns where that leads, labels 0 .. K - 1 without gaps."""
+        labels = compact(place.labels)
         g0 = joint_prior(self.mean, prior.worth * self.precision, prior.within * (prior.extra - 1.0))
-        hyper = self.hyper(config)
-        merge_states(self.v, place.mass, self.ends, g0, d + prior.extra, hyper, self.regressors, *MERGE_ROWS, score, merged)
-        return float(score[0]), compact(merged)
+        nu = self.dimensions + prior.extra
+        merge_states(self.v, place.mass, self.ends, g0, nu, self.hyper(config), self.regressors, *MERGE_ROWS, labels)
+        return Place(compact(labels), place.mass)
 
 
 def new_top(states: int) -> Floats:

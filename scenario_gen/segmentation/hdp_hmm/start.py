@@ -23,7 +23,7 @@ from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F2, I, kernel, OUT2, OUTI1
 from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.segmentation.hdp_hmm.problem import compact, moving_mean, new_top, Place, Prior, Problem
-from scenario_gen.segmentation.hdp_hmm.random import State, uniform
+from scenario_gen.segmentation.hdp_hmm.random import pick, State, uniform
 
 
 @kernel(inline=True)
@@ -49,11 +49,7 @@ def spread_centres(state: State, x: Floats, centres: Floats) -> None:
             total = 0.0
             for t in range(samples):
                 total += far[t]
-            left = uniform(state) * total
-            chosen = 0
-            while chosen < samples - 1 and left > far[chosen]:
-                left -= far[chosen]
-                chosen += 1
+            chosen = pick(far, uniform(state) * total, -1)
         for t in range(samples):
             square = 0.0
             for i in range(d):
@@ -172,7 +168,7 @@ def _search(problem: Problem, config: SamplerConfig, clusters: int, rng: np.rand
     for stage, sweeps in enumerate(STAGES):
         top = new_top(max(clusters, place.labels.max() + 1))
         place, held, _, _ = problem.run(config, prior, place, top, sweeps - 1, 1, int(rng.integers(2**62)))
-        place = Place(problem.merge(config, held, place)[1], place.mass)
+        place = problem.merge(config, held, place)
         prior = replace(held, within=problem.within(place))
         if stage == 0:
             chosen = problem
@@ -193,7 +189,7 @@ def other_start(start: Start, config: SamplerConfig, index: int, rng: np.random.
     problem, clusters = start.problem, start.states + MORE_STATES
     place = cluster(problem, clusters, WINDOWS[index % len(WINDOWS)], rng)
     place = problem.run(config, start.prior, place, new_top(clusters), STAGES[1] - 1, 1, int(rng.integers(2**62)))[0]
-    return Place(problem.merge(config, start.prior, place)[1], place.mass)
+    return problem.merge(config, start.prior, place)
 
 
 def tails(problem: Problem, place: Place) -> float:
@@ -207,7 +203,7 @@ def tails(problem: Problem, place: Place) -> float:
         return 0.0
     scale = n * d / max(float(squares.sum()), 1e-300)
     gaussian = 0.5 * n * d * (exact.log(scale) - 1.0)
-    best, chosen = LEAST_GAIN / problem.weight if problem.weight > 0.0 else LEAST_GAIN, 0.0
+    best, chosen = LEAST_GAIN / problem.weight, 0.0
     for dof in DEGREES_OF_FREEDOM:
         c = scale
         for _ in range(30):
