@@ -239,14 +239,15 @@ def _leave_within(seconds: float, code: int = 1) -> None:
     timer of the system's, whose thread calls `_exit`. Where there is none, the exit code is 1.
     """
     try:
-        create, settime, delete = (getattr(ctypes.CDLL(None), f"timer_{name}") for name in ("create", "settime", "delete"))
+        system = ctypes.CDLL(None)
+        create, settime, delete = system.timer_create, system.timer_settime, system.timer_delete
     except (AttributeError, OSError):
         faulthandler.dump_traceback_later(seconds, exit=True, file=2)
         return
     faulthandler.dump_traceback_later(seconds, exit=False, file=2)
     while _timers:
         delete(_timers.pop())
-    leave = ctypes.cast(ctypes.CDLL(None)._exit, ctypes.c_void_p)
+    leave = ctypes.cast(system._exit, ctypes.c_void_p)
     timer, event = ctypes.c_void_p(), _TimerEvent(value=code, notify=SIGEV_THREAD, function=leave)
     if create(CLOCK_MONOTONIC, ctypes.byref(event), ctypes.byref(timer)) == 0:
         _timers.append(timer)

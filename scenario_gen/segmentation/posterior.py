@@ -34,7 +34,7 @@ class Posterior:
         probability: (T,) posterior probability of a changepoint at each sample.
         ends: index one past the last sample of each sequence.
         chain: (S,) chain of each sample.
-        trace: per chain (S', 5), see `_chain.TRACE`.
+        trace: per chain (S', 5), see `hdp_hmm.chain.TRACE`.
         kept: (chains,) which chains the samples are from; the others are stuck in a far less probable place.
         states: weak-limit truncation L that was used.
         full: whether all of them were in use more than now and then, so that more might be.

@@ -93,8 +93,7 @@ def standardised(x: Floats, known: Floats) -> tuple[Floats, Floats, Ints]:
     whole = np.where(few, 0.0, x)
     whole = without_outliers(whole, usual_distances(whole))
     spread, centre = np.nanstd(whole, axis=0), np.nanmean(whole, axis=0)
-    low, high = np.nanquantile(whole, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
-    inner = np.nanstd(np.clip(whole, low, high), axis=0)
+    inner = inner_spread(whole)
     varies = spread > 1e-9 * np.maximum(np.nanmax(np.abs(whole), axis=0), 1e-300)
     unit = np.where(inner > 0.1 * spread, inner, spread)
     unit = np.maximum(unit, known)  # what varies less than it is known shall not be blown up to look like the rest
@@ -107,13 +106,17 @@ def standardised(x: Floats, known: Floats) -> tuple[Floats, Floats, Ints]:
     return np.ascontiguousarray(scaled), np.square(known[channels] / unit[channels]), channels
 
 
+def inner_spread(x: Floats) -> Floats:
+    """(D,) spread of the channels of x (T, D), the farthest 2 % on either side drawn in."""
+    low, high = np.nanquantile(x, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
+    return np.asarray(np.nanstd(np.clip(x, low, high), axis=0))
+
+
 def usual_distances(x: Floats) -> Floats:
     """(D,) usual distance of a sample of x (T, D) from the median of the four before it, or a tenth of the channel's spread."""
     before, _ = _from_medians(x)
     with np.errstate(all="ignore"):
-        low, high = np.nanquantile(x, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
-        usual = 1.4826 * np.nanmedian(np.abs(before), axis=0)
-        return np.asarray(np.fmax(usual, 0.1 * np.nanstd(np.clip(x, low, high), axis=0)))
+        return np.asarray(np.fmax(1.4826 * np.nanmedian(np.abs(before), axis=0), 0.1 * inner_spread(x)))
 
 
 def without_outliers(x: Floats, usual: Floats) -> Floats:

@@ -31,7 +31,7 @@ from scenario_gen.segmentation.hdp_hmm.emission import (
 )
 from scenario_gen.segmentation.hdp_hmm.observed import draw_hidden, draw_masses, log_masses, observed_log_likelihood
 from scenario_gen.segmentation.hdp_hmm.prior import sample_prior, set_prior
-from scenario_gen.segmentation.hdp_hmm.random import State, uniform
+from scenario_gen.segmentation.hdp_hmm.random import pick, State, uniform
 from scenario_gen.segmentation.hdp_hmm.split_merge import split_or_merge
 from scenario_gen.segmentation.hdp_hmm.transitions import count_transitions, log_transitions, sample_transitions
 
@@ -125,19 +125,6 @@ def backward_messages(
                     message[k] = 1.0
             backward_step(w[t], columns, message, t % 2 == 0)
         stop = start
-
-
-@kernel(inline=True)
-def pick(share: Floats, u: float, without: int) -> int:
-    """Return the state at which the running sum of `share` (L,), state `without` left out, passes u."""
-    last = 0
-    for k in range(len(share)):
-        if k != without:
-            last = k
-            u -= share[k]
-            if u <= 0.0:
-                break
-    return last
 
 
 @kernel(inline=True)

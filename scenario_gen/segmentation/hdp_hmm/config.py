@@ -45,7 +45,7 @@ class SamplerConfig(Parameters):
     )
     mean_weight: float = parameter(
         0.05,
-        "prior samples that the mean (or the regression) of a state is worth; a mean more where the states found lie close",
+        "prior samples that the regression of an autoregressive state is worth; a Gaussian state's mean: from the data",
         low=1e-6,
         high=100.0,
     )

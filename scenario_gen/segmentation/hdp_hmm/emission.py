@@ -140,15 +140,10 @@ def draw_emission(state: State, factor: Floats, n: float, p: int, nu: float, coe
         coef[i, p + i] = exact.exp(0.5 * (log_gamma_draw(state, shape) + exact.log(2.0)))
         for j in range(i + 1, d):
             coef[i, p + j] = 0.0
-        for j in range(i, -1, -1):
-            c = coef[i, p + j] / factor[p + j, p + j]
-            coef[i, p + j] = c
-            for q in range(j):
-                coef[i, p + q] -= c * factor[p + j, p + q]
-        logdet += exact.log(coef[i, p + i])
         for q in range(p):
             coef[i, q] = -normal(state)
-        regression(factor, p, coef, i)
+        solve_row(factor, p, coef, i)
+        logdet += exact.log(coef[i, p + i])
     return logdet
 
 
@@ -252,21 +247,21 @@ def mean_emission(factor: Floats, n: float, p: int, nu: float, blur: Floats, coe
     for i in range(d):
         for j in range(d):
             coef[i, p + j] = root if i == j else 0.0
-        for j in range(i, -1, -1):
-            c = coef[i, p + j] / factor[p + j, p + j]
-            coef[i, p + j] = c
-            for q in range(j):
-                coef[i, p + q] -= c * factor[p + j, p + q]
-        shape[0] += exact.log(coef[i, p + i])
         for q in range(p):
             coef[i, q] = 0.0
-        regression(factor, p, coef, i)
+        solve_row(factor, p, coef, i)
+        shape[0] += exact.log(coef[i, p + i])
     shape[1] = blurred(coef, blur)
 
 
 @kernel(inline=True)
-def regression(factor: Floats, p: int, coef: Floats, i: int) -> None:
-    """Complete row i of coef (D, M): from what stands for z there, and the whitening, to -W A's share of it."""
+def solve_row(factor: Floats, p: int, coef: Floats, i: int) -> None:
+    """Turn row i of coef (D, M), (e, u), into (e - u Ly⁻¹ Lyz) Lz⁻¹ and u Ly⁻¹, with the factor (M, M) of a state's G."""
+    for j in range(i, -1, -1):
+        c = coef[i, p + j] / factor[p + j, p + j]
+        coef[i, p + j] = c
+        for q in range(j):
+            coef[i, p + q] -= c * factor[p + j, p + q]
     for j in range(i + 1):
         c = coef[i, p + j]
         for q in range(p):

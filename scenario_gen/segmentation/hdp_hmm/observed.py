@@ -83,9 +83,7 @@ def observed_log_likelihood(
 ) -> None:
     """Fill out (L,) with the log-likelihood of a sample's observed channels, up to a constant; see `block_log_likelihood`."""
     states, d = coef.shape[0], coef.shape[1]
-    seen = 0
-    for i in range(d):
-        seen += 0 if hidden[i] else 1
+    seen = d - hidden.sum()
     if seen == 0:
         for k in range(states):
             out[k] = 0.0
@@ -123,9 +121,7 @@ def draw_masses(
         k = labels[t]
         if mass[t] > 0.0:
             if gap < len(gaps) and gaps[gap] == t:
-                seen = 0
-                for i in range(d):
-                    seen += 0 if hidden[gap, i] else 1
+                seen = d - hidden[gap].sum()
                 total = without_hidden(v[t], hidden[gap], coef[k], factor, shift)[0]
             else:
                 seen = d
@@ -144,9 +140,7 @@ def draw_hidden(state: State, v: Floats, vt: Floats, labels: Ints, coef: Floats,
         t = gaps[r]
         if mass[t] > 0.0:
             without_hidden(v[t], hidden[r], coef[labels[t]], factor, shift)
-            a = 0
-            for i in range(d):
-                a += 1 if hidden[r, i] else 0
+            a = hidden[r].sum()
             for i in range(a):
                 shift[i] = normal(state) / math.sqrt(mass[t]) - shift[i]
             for i in range(a - 1, -1, -1):

@@ -24,7 +24,7 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import kernel
 from scenario_gen.segmentation.hdp_hmm.emission import cholesky, log_marginal, posterior_factor
-from scenario_gen.segmentation.hdp_hmm.random import State, uniform
+from scenario_gen.segmentation.hdp_hmm.random import pick, State, uniform
 
 
 @kernel(inline=True)
@@ -105,9 +105,4 @@ def sample_prior(
         for option in range(len(options)):
             logs[option] = exact.exp(logs[option] - top)
             total += logs[option]
-        u = uniform(state) * total
-        option = 0
-        while option < len(options) - 1 and u > logs[option]:
-            u -= logs[option]
-            option += 1
-        chosen[side] = option
+        chosen[side] = pick(logs, uniform(state) * total, -1)

@@ -73,12 +73,26 @@ def log_gamma_draw(state: State, shape: float) -> float:
 
 
 @kernel(inline=True)
-def log_beta_draw(state: State, a: float, b: float) -> float:
-    """Logarithm of a Beta(a, b) draw."""
+def log_beta_draw(state: State, a: float, b: float) -> tuple[float, float]:
+    """Logarithms of a Beta(a, b) draw and of what it leaves of 1."""
     x = log_gamma_draw(state, a)
     y = log_gamma_draw(state, b)
     top = max(x, y)
-    return x - (top + exact.log(exact.exp(x - top) + exact.exp(y - top)))
+    total = top + exact.log(exact.exp(x - top) + exact.exp(y - top))
+    return x - total, y - total
+
+
+@kernel(inline=True)
+def pick(share: Floats, u: float, without: int) -> int:
+    """Return the entry at which the running sum of `share` (n,), entry `without` left out (-1: none), reaches u."""
+    last = 0
+    for k in range(len(share)):
+        if k != without:
+            last = k
+            u -= share[k]
+            if u <= 0.0:
+                break
+    return last
 
 
 @kernel(inline=True)

@@ -49,9 +49,7 @@ def log_densities(v: Floats, hidden: Bools, coef: Floats, weight: float, dof: fl
         for i in range(d):
             whole += exact.log(coef[k, i, p + i])
         for t in range(len(v)):
-            seen = 0
-            for i in range(d):
-                seen += 0 if hidden[t, i] else 1
+            seen = d - hidden[t].sum()
             if seen == 0:
                 out[t, k] = 0.0
                 continue

@@ -26,7 +26,7 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import kernel
 from scenario_gen.segmentation.hdp_hmm.emission import add_sample, log_marginal, mean_emission, posterior_factor, square
-from scenario_gen.segmentation.hdp_hmm.random import log_gamma_draw, State, uniform
+from scenario_gen.segmentation.hdp_hmm.random import log_beta_draw, State, uniform
 from scenario_gen.segmentation.hdp_hmm.transitions import count_transitions, log_transitions
 
 ROUNDS = 2
@@ -202,15 +202,6 @@ def log_share(a: float, first: int, second: int, log_first: float, log_second: f
 
 
 @kernel(inline=True)
-def draw_shares(state: State, a: float, first: int, second: int, out: Floats) -> None:
-    """Logarithms of the two shares, Beta(a + first, a + second), into out (2,)."""
-    x, y = log_gamma_draw(state, a + first), log_gamma_draw(state, a + second)
-    top = max(x, y)
-    total = top + exact.log(exact.exp(x - top) + exact.exp(y - top))
-    out[0], out[1] = x - total, y - total
-
-
-@kernel(inline=True)
 def chosen_state(counts: Ints, number: int, occupied: bool) -> int:
     """Return state number `number` of those with counts (L,) above 0, or of the others."""
     for k in range(len(counts)):
@@ -351,10 +342,9 @@ def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read fro
     n_after = np.empty_like(n)
     count_transitions(after, ends, n_after)
     a, both = top[0] / n.shape[1], beta[i] + beta[j]
-    shares = np.empty(2)
     here, there = (0 if splits else predecessors(n, j)), (predecessors(n_after, j) if splits else 0)
-    draw_shares(state, a, predecessors(n_after, i), there, shares)
-    gain += log_share(a, predecessors(n_after, i), there, shares[0], shares[1])
+    share_i, share_j = log_beta_draw(state, a + predecessors(n_after, i), a + there)
+    gain += log_share(a, predecessors(n_after, i), there, share_i, share_j)
     gain -= log_share(a, predecessors(n, i), here, exact.log(beta[i] / both), exact.log(beta[j] / both))
     used, right = (counts > 0).sum(), side.sum() if splits else given.sum()
     if splits:
@@ -363,7 +353,7 @@ def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read fro
         gain -= log_pair(found, found - right, right, used - 1, len(counts) - used + 1)
     gain -= log_transitions(n, top[1], top[2], beta)
     keep_i, keep_j = beta[i], beta[j]
-    beta[i], beta[j] = max(both * exact.exp(shares[0]), 1e-100), max(both * exact.exp(shares[1]), 1e-100)
+    beta[i], beta[j] = max(both * exact.exp(share_i), 1e-100), max(both * exact.exp(share_j), 1e-100)
     gain += log_transitions(n_after, top[1], top[2], beta)
     if not splits and gain >= threshold:
         gain += propose_sides(state, v, mass, index, opens, anchors, g0, p, nu, weight, blur, stay, given, True)

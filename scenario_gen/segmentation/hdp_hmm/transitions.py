@@ -211,7 +211,7 @@ def sample_transitions(state: State, n: Ints, hyper: Floats, top: Floats, beta: 
         considered = 0.0
         for k in range(states):
             considered += tables[k]
-        log_eta = log_beta_draw(state, top[0], considered)
+        log_eta = log_beta_draw(state, top[0], considered)[0]
         top[0] = exact.exp(log_gamma_draw(state, hyper[0] + dishes)) / (hyper[1] - log_eta)
     for k in range(states):
         weights[k] = top[0] / states + tables[k]
