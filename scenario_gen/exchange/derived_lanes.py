@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Lanes of a road that has none: along what the scenarios drive, as wide as a lane where the grid leaves room; marked as derived."""
+"""Lanes of a road that has none: along what the scenarios drive, as wide as a lane where the grid leaves room."""
 
 from collections.abc import Sequence
 
@@ -70,7 +70,7 @@ def driven_path(scenario: Scenario, n: int) -> Curve:
         if float(exact.hypot(*(point - kept[-1]))) >= APART:
             kept.append(point)
     if len(kept) < 3:
-        x, y, yaw = *xy[0].tolist(), float(scenario.heading[n, first])
+        (x, y), yaw = xy[0].tolist(), float(scenario.heading[n, first])
         ahead = np.array([0.0, 1.0])
         return Curve(np.column_stack((x + ahead * exact.cos(yaw), y + ahead * exact.sin(yaw), np.full(2, yaw))))
     return Curve.through(np.array(kept))
@@ -124,7 +124,7 @@ def _corners(scenario: Scenario, n: int) -> Floats:
 
 
 def _room(reference: Curve, sign: float, road: Road | None, most: float, run_out: float) -> Floats:
-    """Return (M,) how far [m] the road is drivable to one side of each point, at most `most`; beyond the grid it is taken to be."""
+    """Return (M,) how far [m] the road is drivable to one side of each point, at most `most`; the run-outs are as wide."""
     wide = np.full(len(reference.points), most)
     if road is None:
         return wide

@@ -14,10 +14,10 @@
 
 """The true lanes of the built-in roads: arms, and the ways of a junction, which cover what is drivable and nothing else.
 
-The geometry is that of roads/builtin.py: arms of straight lanes, kerbs rounded by the corner radius r. Every drivable cell lies in lanes. Ways through a
-junction begin and end where the kerbs begin to bend, r beyond the crossing road's edge. A turn over the near corner is bounded by the
-kerb itself on one side; on the other its innermost lane widens to the corner of the two middles, so that no piece of the junction's
-mouth lies between lanes. A turn over the far corner is concentric about that corner's kerb.
+The geometry is that of roads/builtin.py: arms of straight lanes, kerbs rounded by the corner radius r. Every drivable cell lies
+in lanes. Ways through a junction begin and end where the kerbs begin to bend, r beyond the crossing road's edge. A turn over the
+near corner is bounded by the kerb itself on one side; on the other its innermost lane widens to the corner of the two middles, so
+that no piece of the junction's mouth lies between lanes. A turn over the far corner is concentric about that corner's kerb.
 """
 
 from dataclasses import dataclass, replace
@@ -103,7 +103,8 @@ def _straight(crossing: Crossing) -> Strip:
 def _junction(crossing: Crossing) -> LaneMap:
     half = crossing.lanes * crossing.lane_width
     mouth = half + crossing.corner_radius
-    strips, index = [], {}
+    strips: list[Strip] = []
+    index: dict[str, int] = {}
     for name, (outward, reach) in crossing.arms.items():
         far = reach + crossing.run_out
         start = far * np.array([exact.cos(outward), exact.sin(outward)])
@@ -154,8 +155,8 @@ def _far_turn(crossing: Crossing, mouth: float, _half: float) -> Strip:
 def _near_turn(crossing: Crossing, mouth: float, half: float) -> Strip:
     """The turn to the right of one who comes along +x: about the kerb's centre at (-mouth, -mouth), at radius `mouth`.
 
-    The line between left and right is moved out to where the two roads' middles meet, rounded by `bend`. The kerb is drawn in cells,
-    whose corners reach beyond the arc where it is not along them: so does the outermost lane.
+    The line between left and right is moved out to where the two roads' middles meet, rounded by `bend`. The kerb is drawn in
+    cells, whose corners reach beyond the arc where it is not along them: so does the outermost lane.
     """
     bend = 0.9 * half
     angle = np.linspace(_QUARTER, 0.0, ARC_STEPS + 1)
@@ -169,7 +170,7 @@ def _near_turn(crossing: Crossing, mouth: float, half: float) -> Strip:
 
 
 def _reach(angle: float, mouth: float, bend: float) -> float:
-    """Return how far a ray from (-mouth, -mouth) runs until it meets the axes, whose corner is rounded by an arc of radius `bend`."""
+    """Return how far a ray from (-mouth, -mouth) runs until it meets the axes, whose corner is rounded by radius `bend`."""
     cos, sin = float(exact.cos(angle)), float(exact.sin(angle))
     to_axis = mouth / max(cos, sin)
     x, y = -mouth + to_axis * cos, -mouth + to_axis * sin

@@ -21,8 +21,7 @@ from itertools import pairwise
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats, frozen, Ints
-
+from scenario_gen.arrays import Floats, frozen
 
 DECIMALS = 6
 """Of the metres of a lane's edges: rounded, lanes that follow or lie beside each other have the very same points there."""
@@ -63,7 +62,7 @@ class Strip:
         sign = -1.0 if side == "right" else 1.0
         widths = getattr(self, side)
         beside = np.concatenate([self.offset[None], self.offset + sign * np.cumsum(widths, axis=0)])
-        return np.round(np.stack([self.beside(row) for row in beside]), DECIMALS)
+        return frozen(np.round(np.stack([self.beside(row) for row in beside]), DECIMALS))
 
 
 @dataclass(frozen=True)
@@ -202,35 +201,3 @@ def stations(reference: Floats) -> Floats:
     """Return (M,) the length [m] along a polyline (M, 2+) to each of its points."""
     steps = np.diff(reference[:, :2], axis=0)
     return np.concatenate([[0.0], np.cumsum(exact.hypot(steps[:, 0], steps[:, 1]))])
-
-
-def containing(lanes: tuple[Lane, ...], point: Floats, yaw: float) -> Lane | None:
-    """Return the lane whose area holds a point (2,) [m] and whose direction there is nearest to the yaw [rad]; None if none does."""
-    best, least = None, 1.5
-    for lane in lanes:
-        ring = np.concatenate([lane.left, lane.right[::-1]])
-        if not inside(ring, point):
-            continue
-        middle = lane.middle
-        k = int(np.argmin(((middle - point) ** 2).sum(axis=1)))
-        step = middle[min(k + 1, len(middle) - 1)] - middle[max(k - 1, 0)]
-        turn = abs(float(exact.arctan2(*_turned(step, yaw))))
-        if turn < least:
-            best, least = lane, turn
-    return best
-
-
-def _turned(step: Floats, yaw: float) -> tuple[float, float]:
-    """Return sine and cosine, times its length, of the angle of a step (2,) to a yaw."""
-    cos, sin = float(exact.cos(yaw)), float(exact.sin(yaw))
-    return float(step[1] * cos - step[0] * sin), float(step[0] * cos + step[1] * sin)
-
-
-def inside(ring: Floats, point: Floats) -> bool:
-    """Say whether a point (2,) lies in a ring (M, 2), by the number of edges that a ray to the right crosses."""
-    ahead = np.roll(ring, -1, axis=0)
-    rise = (ring[:, 1] > point[1]) != (ahead[:, 1] > point[1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = ring[:, 0] + (point[1] - ring[:, 1]) / (ahead[:, 1] - ring[:, 1]) * (ahead[:, 0] - ring[:, 0])
-    crossed: Ints = np.flatnonzero(rise & (at > point[0]))
-    return len(crossed) % 2 == 1

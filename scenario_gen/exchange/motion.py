@@ -82,7 +82,7 @@ def _presence(scenario: Scenario, time: Floats) -> Ints:
 
 
 def without(scenario: Scenario, index: int) -> tuple[Scenario, Scenario]:
-    """Return a scenario of all vehicles but one, and one of that one from its first to its last instant, both on the same clock."""
+    """Return a scenario of all vehicles but one, and one of that one, both on the same clock."""
     rows = [n for n in range(len(scenario.vehicles)) if n != index]
     return _of(scenario, rows), _of(scenario, [index])
 

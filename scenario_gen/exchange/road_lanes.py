@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The lanes of a bag's road: the true ones of a built-in road, which is drawn again and must be the same grid; else derived ones."""
+"""The lanes of a bag's road: the true ones of a built-in road, drawn again, which must be the same grid; else derived ones."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress

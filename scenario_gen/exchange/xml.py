@@ -62,7 +62,8 @@ def comment(parent: Element, text: str) -> None:
 def serialized(root: Element) -> bytes:
     """Return the document as UTF-8 bytes, indented."""
     ET.indent(root)
-    return ET.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n"
+    document: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return document + b"\n"
 
 
 def read_xml(path: Path, most_bytes: int = MOST_BYTES) -> Element:
