@@ -58,7 +58,7 @@ class Strip:
         return np.column_stack((x - distance * exact.sin(yaw), y + distance * exact.cos(yaw)))
 
     def edges(self, side: str) -> Floats:
-        """Return the edges (lanes + 1, M, 2) [m] of one side's lanes, "right" or "left", from the middle outwards."""
+        """Return the edges (L, M, 2) [m] of one side's L - 1 lanes, "right" or "left", from the middle outwards."""
         sign = -1.0 if side == "right" else 1.0
         widths = getattr(self, side)
         beside = np.concatenate([self.offset[None], self.offset + sign * np.cumsum(widths, axis=0)])

@@ -19,6 +19,7 @@ from contextlib import suppress
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.exchange.derived_lanes import derived_lanes
 from scenario_gen.exchange.junction_lanes import Crossing, crossing_lanes
@@ -81,7 +82,7 @@ def _crossing(road: Road, config: RoadConfig, run_out: float) -> tuple[Crossing,
     arms: dict[str, list[np.ndarray]] = {}
     for poses, inward in ((road.entries, -1.0), (road.exits, 1.0)):
         for x, y, yaw in poses:
-            out = inward * np.array([np.cos(yaw), np.sin(yaw)])
+            out = inward * np.array([exact.cos(yaw), exact.sin(yaw)])
             axis = np.rint(out)
             if np.abs(out - axis).max() > _AXIS:
                 return None
