@@ -20,13 +20,14 @@ from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at
 from scenario_gen.closed_loop.others import react
-from scenario_gen.kernels import B1, F, F1, F2, F3, I, kernel, OUT2, OUTB1
+from scenario_gen.kernels import B, B1, F, F1, F2, F3, I, kernel, OUT2, OUTB1
 
 WINDOW = 5.0  # metres beyond what the ego has moved in which its place on the witness' path is looked for
 BESIDE = 1.5  # metres beside that path at which the ego has left it
 ASKEW = 0.5  # rad against that path, likewise
 HURRY = 1.5  # times the witness' speed at which it is not on it either: it will not do what the witness did
 ON = 0.05  # metres and m/s by which an ego that keeps to its witness differs from it
+HARDER = 0.2  # m/s of a step beyond the strongest braking that are counted
 PUNCTUAL = 0.15  # seconds by which an ego that stands with its witness may be late
 
 
@@ -127,12 +128,12 @@ def advance(
             yield to the ego as the template did, and whether they react at all.
         before: (N, 2) clocks [s] and their rates.
         here: (N,) who is on the scene.
-        after: (N, 3) clocks and rates at the end of the step, and 1 where the order stopped one at once.
+        after: (N, 3) clocks and rates at the end of the step, and 1 where one of the others brakes harder than the strongest.
         vehicles: (N, 4) x, y [m], yaw [rad], speed [m/s] at the end of the step.
         there: (N,) who is on the scene then.
     """
     n, last = motion.shape[0], time[-1]
-    witness = np.empty(3)
+    witness, pose = np.empty(3), np.empty(5)
     locate(now, time, motion[ego], body, before[ego, 0], witness)
     clock, rate = before[:, 0].copy(), before[:, 1].copy()
     new_clock, new_rate, forced = np.empty(n), np.empty(n), np.zeros(n)
@@ -148,21 +149,32 @@ def advance(
     place(time, motion, new_clock, new_rate, vehicles)
     vehicles[ego] = body[:4]
     for i in range(n):
-        after[i, 0], after[i, 1], after[i, 2] = new_clock[i], new_rate[i], 1.0 if forced[i] > 0.0 else 0.0
+        pose_at(time, motion[i], clock[i], pose)
+        lost = rate[i] * pose[3] - vehicles[i, 3]
+        after[i, 0], after[i, 1] = new_clock[i], new_rate[i]
+        after[i, 2] = 1.0 if i != ego and lost > driving[4] * h + HARDER and new_rate[i] < 1.0 else 0.0
         there[i] = i == ego or not (leaves[i] and new_clock[i] >= last)
 
 
+AT = 0.2  # metres before the goal that count as there
+BEYOND = 10.0  # metres beyond it, more than anyone drives in one step
 GOAL_TURN = 1.0  # rad, largest difference of heading at the goal
 
 
-@kernel(F1, F, F2, F2, B1, I)
-def is_over(goal: Floats, beside: float, vehicles: Floats, half: Floats, here: Bools, ego: int) -> bool:
-    """Whether the ego has passed its goal (x, y, yaw, …), or overlaps another; vehicles (N, 4), half sizes (N, 2)."""
-    x, y = vehicles[ego, 0] - goal[0], vehicles[ego, 1] - goal[1]
+@kernel(F1, F, B, F1)
+def at_goal(goal: Floats, beside: float, stays: bool, pose: Floats) -> bool:
+    """Whether a pose (x, y, yaw, …) has passed the goal (likewise) at most `beside` [m] of it, or, if it `stays`, is near it."""
+    x, y = pose[0] - goal[0], pose[1] - goal[1]
+    if stays:
+        return bool(x * x + y * y <= beside * beside)
     c, s = exact.cos(goal[2]), exact.sin(goal[2])
-    turn = (vehicles[ego, 2] - goal[2] + np.pi) % (2.0 * np.pi) - np.pi
-    if x * c + y * s >= -0.2 and abs(y * c - x * s) <= beside and abs(turn) <= GOAL_TURN:
-        return True
+    turn = (pose[2] - goal[2] + np.pi) % (2.0 * np.pi) - np.pi
+    return bool(-AT <= x * c + y * s <= BEYOND and abs(y * c - x * s) <= beside and abs(turn) <= GOAL_TURN)
+
+
+@kernel(F2, F2, B1, I)
+def overlaps(vehicles: Floats, half: Floats, here: Bools, ego: int) -> bool:
+    """Whether the ego overlaps another that is here; vehicles (N, 4) x, y, yaw, speed, half sizes (N, 2)."""
     mine, other = np.empty(7), np.empty(7)
     fill_box(vehicles[ego, 0], vehicles[ego, 1], vehicles[ego, 2], half[ego, 0], half[ego, 1], mine)
     for i in range(vehicles.shape[0]):

@@ -132,7 +132,7 @@ def boxes_meet(a: Floats, b: Floats) -> bool:
     if dx * dx + dy * dy >= reach * reach:
         return False
     cos, sin = abs(a[2] * b[2] + a[3] * b[3]), abs(a[2] * b[3] - a[3] * b[2])
-    return (
+    return bool(
         abs(dx * a[2] + dy * a[3]) < a[4] + b[4] * cos + b[5] * sin
         and abs(dy * a[2] - dx * a[3]) < a[5] + b[4] * sin + b[5] * cos
         and abs(dx * b[2] + dy * b[3]) < b[4] + a[4] * cos + a[5] * sin

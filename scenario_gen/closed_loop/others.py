@@ -77,7 +77,7 @@ def _gap(cells: Floats, cell: float, clock: float, box: Floats, here: Floats) ->
             c, s = cells[first, 2], cells[first, 3]
             if (box[0] - here[0]) * c + (box[1] - here[1]) * s <= 0.0:
                 break
-            return max(cells[k, 7] - start, 0.0), k
+            return float(max(cells[k, 7] - start, 0.0)), k
     return np.inf, -1
 
 
@@ -90,7 +90,7 @@ def _idm(gap: float, u: float, ahead: float, driving: Floats) -> float:
     headway, standstill, a, b = driving[0], driving[1], driving[2], driving[3]
     wanted = standstill + max(0.0, u * headway + u * (u - ahead) / (2.0 * np.sqrt(a * b)))
     share = wanted / max(gap, 0.1)
-    return min(max(a * (share * share - 1.0), 0.0), b)
+    return float(min(max(a * (share * share - 1.0), 0.0), b))
 
 
 @kernel(inline=True)
@@ -140,7 +140,7 @@ def react(  # noqa: PLR0912 - one loop after the other
         rate: (N,) rates of the clocks.
         new_clock: (N,) likewise, one step later.
         new_rate: (N,) likewise.
-        forced: (N,) 1 where the order stopped a vehicle at once.
+        forced: (N,) above 0 where the order stopped a vehicle at once.
     """
     n = clock.shape[0]
     steps = int(np.ceil(FORESEEN / h))
@@ -412,7 +412,7 @@ def _keep_order(
                 if _ordered(h, cell, order, i, j, clock, rate, new_clock, new_rate, forced):
                     continue
                 changed = True
-                if new_rate[i] > new_rate[j] and forced[i] == 0.0:
+                if new_rate[i] > new_rate[j] > 0.0 and forced[i] == 0.0:
                     new_rate[i] = new_rate[j]
                     new_clock[i] = clock[i] + 0.5 * (rate[i] + new_rate[i]) * h
                     if _ordered(h, cell, order, i, j, clock, rate, new_clock, new_rate, forced):
@@ -421,6 +421,6 @@ def _keep_order(
                 for k in range(n):
                     if k not in (i, ego) and here[k]:
                         room = min(room, _limit(order[i, k], cell, clock[k]) - clock[i])
-                new_clock[i] = clock[i] + max(min(0.5 * rate[i] * h, room), 0.0)
+                new_clock[i] = clock[i] + max(min(new_clock[i] - clock[i], room), 0.0)
                 new_rate[i] = 0.0
                 forced[i] = 2.0

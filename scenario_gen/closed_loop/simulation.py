@@ -26,7 +26,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
-from scenario_gen.closed_loop.advance import advance, is_over
+from scenario_gen.closed_loop.advance import advance, at_goal, overlaps
 from scenario_gen.closed_loop.certified import CELL, Certified, certified
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, TEMPLATE
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
@@ -48,7 +48,7 @@ class State:
         here: (N,) whether each is on the scene.
         clock: (N,) certified time [s] at which each one is where it is now; for the ego, on its witness' path.
         rate: (N,) how fast the clocks run; 1 is the certified speed.
-        forced: how many times the order of events has stopped a vehicle at once so far.
+        forced: how many times one of the others has braked harder than the strongest braking so far, to keep the order.
         fault: what was wrong with the last command, "" if nothing.
     """
 
@@ -125,7 +125,7 @@ class Drive:
         here: (N, T) whether each was on the scene.
         clock: (N, T) as in `State`.
         accelerations: (T,) the ego's own [m/s²].
-        forced: how many times the order of events stopped a vehicle at once.
+        forced: how many times one of the others braked harder than the strongest braking, to keep the order.
         faults: what was wrong with commands, by step.
     """
 
@@ -136,6 +136,9 @@ class Drive:
     accelerations: Floats
     forced: int
     faults: tuple[tuple[int, str], ...]
+
+
+WAITS = 1.0  # metres; a witness that drives no farther waits throughout
 
 
 class ClosedLoop:
@@ -174,6 +177,7 @@ class ClosedLoop:
         self._ids = tuple(vehicle.id for vehicle in scenario.vehicles)
         self._others = np.arange(len(self._ids)) != self.certified.ego
         duration = self.certified.duration
+        self._waits = bool(self.certified.cells[self.certified.ego, -1, 7] < WAITS)
         self.last_step = int(np.ceil((duration * config.overtime + 5.0) / config.step))
 
     @property
@@ -266,11 +270,15 @@ class ClosedLoop:
         """Whether a drive ends: at the goal, when the ego overlaps another, or after the time given."""
         if state.step >= self.last_step:
             return True
-        return bool(is_over(self._goal, self.config.goal_width, state.vehicles, self.certified.half, state.here, self.ego))
+        if self.at_goal(state.time, state.vehicles[self.ego]):
+            return True
+        return bool(overlaps(state.vehicles, self.certified.half, state.here, self.ego))
 
-    @property
-    def _goal(self) -> Floats:
-        return np.asarray(self.certified.motion[self.ego, -1])
+    def at_goal(self, time: float, pose: Floats) -> bool:
+        """Whether an ego at a pose (3+,) is at its goal; one whose witness stays where it starts must be there at the end."""
+        if self._waits and time < self.certified.duration - 1e-9:
+            return False
+        return bool(at_goal(self.certified.motion[self.ego, -1], self.config.goal_width, self._waits, pose))
 
     def record(self, states: list[State]) -> Drive:
         """Return the drive of these instants."""
