@@ -102,6 +102,7 @@ def road_data(road: Road) -> dict[str, Any]:
 
 
 def states(source: Encounter | Scenario, frames: int) -> Floats:
+    """Return (N, frames, 4) x, y [m], yaw [rad], speed [m/s] at instants spread evenly from start to end."""
     motion = at_count(source, frames)
     return np.concatenate([motion.position, motion.heading[..., None], motion.speed[..., None]], axis=-1)
 
