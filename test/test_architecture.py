@@ -47,7 +47,7 @@ ORDER = (
     ("nearest",),
     ("pipeline",),
     ("report",),
-    ("review",),
+    ("review", "exchange"),
     ("results", "reproduce"),
     ("closed_loop",),
     ("batch",),
