@@ -226,7 +226,7 @@ def _speeds(rows: Floats, speed: float | None) -> Floats:
     if speed is None:
         start: object = "not-a-knot"
     else:
-        start = ((1, speed * np.array([exact.cos(heading), exact.sin(heading)])), (2, np.zeros(2)))
+        start = ((1, speed * np.array([exact.cos(heading), exact.sin(heading)])), "not-a-knot")
     if speed is None and len(rows) < 4:
         start = "natural"
     with guarded("a spline through the trajectory"):
