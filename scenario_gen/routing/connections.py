@@ -27,7 +27,7 @@ from scenario_gen.types.road import Road
 
 SPACING = 0.2  # [m]
 STRETCHES = (1.0, 1.3, 0.8, 1.6)  # of a Hermite curve's tangents
-WIDEST = 40.0  # [m] radius from which on an arc is no gentler
+WIDEST = 12.0  # [m] radius of an arc: a wider one cuts a junction's corner
 PARALLEL = np.radians(8.0)
 
 
@@ -51,7 +51,7 @@ def candidates(start: Floats, end: Floats, limit: float) -> Iterator[Floats]:
             yield poses
     yield from _by_an_arc(start, end, limit)
     out = np.empty(7)
-    shortest_into(*(float(v) for v in (*start, *end)), 1.0 / limit, out)
+    shortest_into(start[0], start[1], start[2], end[0], end[1], end[2], 1.0 / limit, out)
     yield chained(start, [(float(TURNS[int(out[0]), k]) * limit, float(out[1 + k])) for k in range(3)])
 
 

@@ -41,7 +41,7 @@ def _turned(angle: float) -> float:
 
 
 @kernel(inline=True)
-def shortest(  # noqa: PLR0915
+def shortest(  # noqa: PLR0912
     x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius: float
 ) -> tuple[int, float, float, float]:
     """The shortest curve from pose to pose [any length, rad]: its word and the lengths of its three parts.

@@ -29,6 +29,7 @@ from scenario_gen.roads.connectivity import common_component, component_cells
 from scenario_gen.routing.search import pose_tree as trees
 from scenario_gen.routing.search import tree_nodes as shared
 from scenario_gen.routing.search.planner import BlockedError, Budget, BudgetSpentError, NoWayError, Query
+from scenario_gen.routing.search.pose_path import shorten, trace
 from scenario_gen.routing.search.rrt_star_connect import RrtStarConnect
 from scenario_gen.routing.search.sweep import blocked_before, SWEEP
 from scenario_gen.types.road import Road
@@ -55,7 +56,9 @@ class PoseSearchConfig(Parameters):
     about: float = parameter(0.7, "share of samples about a path that is known, a disc's or the best so far", low=0.0, high=0.95)
     spread: float = parameter(1.0, "how far from it", unit="m", low=0.05, high=20.0)
     yaw_spread: float = parameter(0.4, "and from its heading", unit="rad", low=0.01, high=3.2)
-    shortcuts: int = parameter(150, "pairs of poses between which a shorter curve is tried, whenever a better path is found", low=0)
+    shortcuts: int = parameter(
+        150, "pairs of poses between which a shorter curve is tried, whenever a better path is found", low=0
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,17 +178,17 @@ class _Search:
         return float(self.setting[shared.BEST])
 
     def path(self, shortcuts: int) -> tuple[Floats, float]:
-        """The best path through the trees, shortened: (P, 5) poses, curvature and length of the piece to each; its cost; in cells."""
+        """The best path, shortened: (P, 5) poses, curvature and length of the piece to each; and its cost [cells]."""
         room = 256
         piece = PIECE / self.road.resolution
         while True:
             path = np.empty((room, 5))
-            count = trees.trace(self.node, self.link, self.counter, float(self.setting[trees.TURN]), piece, path)
+            count = trace(self.node, self.link, self.counter, float(self.setting[trees.TURN]), piece, path)
             if count < room // 2:
                 break
             room *= 2
         path[count - 1, :3] = self.ends[1]
-        count = trees.shorten(
+        count = shorten(
             count, shortcuts, piece, self.clearance, self.blocked, self.guide, self.setting, self.random, path
         )  # fmt: skip
         return path[:count].copy(), float(self.setting[trees.LENGTH])

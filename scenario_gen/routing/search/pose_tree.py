@@ -27,7 +27,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.kernels import F, F2, I, I1, I2, kernel, OUT1, OUT2, OUTI1
+from scenario_gen.kernels import F2, I, I1, I2, kernel, OUT1, OUT2, OUTI1
 from scenario_gen.routing.search.dubins import onward, piece, shortest, TURNS
 from scenario_gen.routing.search.sweep import follow, scratch_rows, swept_free
 from scenario_gen.routing.search.tree_nodes import (  # fmt: skip
@@ -35,20 +35,16 @@ from scenario_gen.routing.search.tree_nodes import (  # fmt: skip
     adopt,
     BEST,
     BOUND,
-    CONNECTION,
     COST,
-    COUNTERS,
     EDGE,
     GAMMA,
     GREEDY,
     INFORMED,
     ITERATION,
-    LINK2,
     Links,
     NODES_A,
     NODES_B,
     OUTLINK2,
-    PARENT,
     PARTNER,
     propagate,
     release,
@@ -62,9 +58,9 @@ from scenario_gen.routing.search.tree_samples import Random, RandomState, unifor
 
 YAW, WORD, PART_A, PART_B, PART_C = 4, 5, 6, 7, 8
 COLUMNS = 10
-# further settings, beside those of `tree_nodes`: radius of the arcs, half length and half width of the footprint, distance between
-# two poses that are checked, what is wished for (see `sweep.follow`), share of samples about a known path, their spread sideways
-# [cells] and in heading [rad], cost of the path that was shortened last
+# further settings, beside those of `tree_nodes`: radius of the arcs, half length and half width of the footprint, distance
+# between two poses that are checked, what is wished for (see `sweep.follow`), share of samples about a known path, their spread
+# sideways [cells] and in heading [rad], cost of the path that was shortened last
 TURN, HALF_LENGTH, HALF_WIDTH, SWEEP, WISH, ABOUT, SPREAD, YAW_SPREAD, LENGTH = 11, 12, 13, 14, 15, 19, 20, 21, 22
 SETTINGS = 23
 DIMENSIONS = 4.0  # d of eq 10, of a ball that small Dubins curves reach: along 1, heading 1, sideways 2 (Karaman & Frazzoli 2013)
@@ -74,8 +70,6 @@ GAIN = 1e-6  # [cells] what lowers a cost by less changes nothing
 SAME = 1e-6  # [cells] poses nearer to each other are one
 FINER = np.array([1.0, 0.5, 0.25, 0.125])  # shares of the spread: narrow gaps need samples that are near to the path
 TRIES = 20  # to draw a sample that is free
-
-__all__ = ["ABOUT", "COLUMNS", "COUNTERS", "SETTINGS", "grow", "plant", "shorten", "trace"]
 
 
 @kernel(inline=True)
@@ -309,7 +303,7 @@ def plant(ends: Floats, node: Floats, link: Links, counter: Ints) -> None:
 
 
 @kernel(I, F2, I2, F2, I1, F2, F2, OUT2, OUTLINK2, OUTI1, OUT1, RandomState)
-def grow(
+def grow(  # noqa: PLR0912
     iterations: int, clearance: Floats, blocked: Ints, ends: Floats, free_cells: Ints, about: Floats, guide: Floats,
     node: Floats, link: Links, counter: Ints, setting: Floats, random: Random,
 ) -> None:  # fmt: skip
@@ -372,162 +366,3 @@ def grow(
                 setting[BOUND] = min(setting[BOUND], setting[BEST])
             if known == np.inf:
                 return
-
-
-@kernel(inline=True)
-def _lay(
-    x: float, y: float, yaw: float, word: int, a: float, b: float, c: float, radius: float, spacing: float, path: Floats, k: int
-) -> int:
-    """Write pieces of a curve, at most `spacing` long each, to path[k:]; how many are there now (path's length: no room)."""
-    for part in range(3):
-        length = a if part == 0 else b if part == 1 else c
-        turn = TURNS[word, part]
-        if length < SAME:
-            continue
-        steps = int(np.ceil(length / spacing))
-        h = length / steps
-        for _ in range(steps):
-            if k >= path.shape[0]:
-                return k
-            x, y, yaw = onward(x, y, yaw, turn, h, radius)
-            path[k, 0], path[k, 1], path[k, 2], path[k, 3], path[k, 4] = x, y, yaw, turn / radius, h
-            k += 1
-    return k
-
-
-@kernel(F2, LINK2, I1, F, F, OUT2)
-def trace(node: Floats, link: Links, counter: Ints, radius: float, spacing: float, path: Floats) -> int:
-    """Write the best path into `path` (p, 5): poses x, y, yaw, and curvature and length of the piece that leads to each.
-
-    Args:
-        node: the trees.
-        link: likewise.
-        counter: likewise.
-        radius: of the arcs [cells].
-        spacing: longest piece [cells].
-        path: the answer.
-
-    Returns:
-        How many poses there are; where that is not less than `path` can hold, there are more.
-    """
-    meeting = np.int64(counter[CONNECTION])
-    ours = meeting if meeting < counter[NODES_A] else np.int64(link[meeting, PARTNER])
-    theirs = np.int64(link[ours, PARTNER])
-    chain = np.empty(counter[NODES_A] + 1, dtype=np.int64)
-    count = 0
-    while ours >= 0:
-        chain[count] = ours
-        count += 1
-        ours = np.int64(link[ours, PARENT])
-    root = chain[count - 1]
-    path[0, 0], path[0, 1], path[0, 2], path[0, 3], path[0, 4] = node[root, X], node[root, Y], node[root, YAW], 0.0, 0.0
-    k = 1
-    for step in range(count - 2, -1, -1):
-        m, above = chain[step], chain[step + 1]
-        word = int(node[m, WORD])
-        a, b, c = node[m, PART_A], node[m, PART_B], node[m, PART_C]
-        k = _lay(node[above, X], node[above, Y], node[above, YAW], word, a, b, c, radius, spacing, path, k)
-    while link[theirs, PARENT] >= 0:  # driven the other way round: the last part first, left stays left
-        above = np.int64(link[theirs, PARENT])
-        word = int(node[theirs, WORD])
-        x, y, yaw = node[theirs, X], node[theirs, Y], node[theirs, YAW] + np.pi
-        for part in range(2, -1, -1):
-            length = node[theirs, PART_A + part]
-            turn = -TURNS[word, part]
-            if length < SAME:
-                continue
-            steps = int(np.ceil(length / spacing))
-            for _ in range(steps):
-                if k >= path.shape[0]:
-                    return k
-                x, y, yaw = onward(x, y, yaw, turn, length / steps, radius)
-                path[k, 0], path[k, 1], path[k, 2], path[k, 3], path[k, 4] = x, y, yaw, turn / radius, length / steps
-                k += 1
-        theirs = above
-    return k
-
-
-@kernel(inline=True)
-def _prices(
-    path: Floats, first: int, last: int, clearance: Floats, blocked: Ints, setting: Floats, guide: Floats, price: Floats, low: Floats,
-    high: Floats,
-) -> None:  # fmt: skip
-    """Fill price[first:last], the cost of the piece that leads to each pose of a path."""
-    for k in range(first, last):
-        word = 1 if path[k, 3] < 0.0 else 0
-        a, b = (0.0, path[k, 4]) if path[k, 3] == 0.0 else (path[k, 4], 0.0)
-        _, price[k] = follow(
-            clearance, blocked, path[k - 1, 0], path[k - 1, 1], path[k - 1, 2], word, a, b, 0.0, setting[TURN],
-            setting[HALF_LENGTH], setting[HALF_WIDTH], setting[SWEEP], setting[WISH : WISH + 4], guide, low, high,
-        )  # fmt: skip
-
-
-@kernel(I, I, F, F2, I2, F2, OUT1, RandomState, OUT2)
-def shorten(
-    n: int, tries: int, spacing: float, clearance: Floats, blocked: Ints, guide: Floats, setting: Floats, random: Random,
-    path: Floats,
-) -> int:  # fmt: skip
-    """Put shorter curves between poses of a path, chosen at random; string pulling for cars.
-
-    Source: shortcuts as in Geraerts & Overmars 2007, with Dubins curves.
-
-    Args:
-        n: poses of the path.
-        tries: pairs of poses that are tried.
-        spacing: longest piece [cells].
-        clearance: see `grow`.
-        blocked: likewise.
-        guide: likewise.
-        setting: likewise; setting[BOUND] becomes the path's cost if that is less.
-        random: likewise.
-        path: (p, 5) as `trace` writes it, changed in place; p - n poses of room.
-
-    Returns:
-        The number of poses now.
-    """
-    rows = scratch_rows(setting[HALF_LENGTH], setting[HALF_WIDTH], setting[SWEEP])
-    low, high = np.empty(rows), np.empty(rows)
-    price, fresh = np.zeros(path.shape[0]), np.empty(path.shape)
-    radius = setting[TURN]
-    _prices(path, 1, n, clearance, blocked, setting, guide, price, low, high)
-    for attempt in range(tries):
-        i, j = int(uniform(random) * n), int(uniform(random) * n)
-        if attempt == 0:
-            i, j = 0, n - 1
-        if i > j:
-            i, j = j, i
-        if j - i < 2:
-            continue
-        old = 0.0
-        for k in range(i + 1, j + 1):
-            old += price[k]
-        word, a, b, c = shortest(path[i, 0], path[i, 1], path[i, 2], path[j, 0], path[j, 1], path[j, 2], radius)
-        if a + b + c >= old - 1e-3:
-            continue
-        free, cost = follow(
-            clearance, blocked, path[i, 0], path[i, 1], path[i, 2], word, a, b, c, radius, setting[HALF_LENGTH],
-            setting[HALF_WIDTH], setting[SWEEP], setting[WISH : WISH + 4], guide, low, high,
-        )  # fmt: skip
-        if free < np.inf or cost >= old - 1e-3:
-            continue
-        count = _lay(path[i, 0], path[i, 1], path[i, 2], word, a, b, c, radius, spacing, fresh, 0)
-        grown = count - (j - i)
-        if count >= fresh.shape[0] or n + grown > path.shape[0]:
-            continue
-        fresh[count - 1, 0], fresh[count - 1, 1], fresh[count - 1, 2] = path[j, 0], path[j, 1], path[j, 2]
-        if grown > 0:
-            for k in range(n - 1, j, -1):
-                path[k + grown], price[k + grown] = path[k], price[k]
-        elif grown < 0:
-            for k in range(j + 1, n):
-                path[k + grown], price[k + grown] = path[k], price[k]
-        for k in range(count):
-            path[i + 1 + k] = fresh[k]
-        n += grown
-        _prices(path, i + 1, i + 1 + count, clearance, blocked, setting, guide, price, low, high)
-    total = 0.0
-    for k in range(1, n):
-        total += price[k]
-    setting[BOUND] = min(setting[BOUND], total)
-    setting[LENGTH] = total
-    return n

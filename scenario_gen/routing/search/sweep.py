@@ -14,8 +14,8 @@
 
 """Whether a footprint can follow a curve: the area that it sweeps against the grid, cell by cell; and how much room it leaves.
 
-Between two near poses the convex hull of both footprints, widened by what an arc rises above its chord, is compared with the cells:
-the swept area lies in it, so nothing slips between two poses.
+Between two near poses the convex hull of both footprints, widened by what an arc rises above its chord, is compared with the
+cells: the swept area lies in it, so nothing slips between two poses.
 """
 
 from weakref import WeakKeyDictionary
@@ -25,7 +25,7 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F, F2, I2, kernel, OUT2
-from scenario_gen.roads.clearance import CONTACT
+from scenario_gen.roads.clearance import clearance_in_cells, CONTACT, to_cells
 from scenario_gen.routing.search.dubins import TURNS
 from scenario_gen.types.road import Road
 
@@ -149,7 +149,7 @@ def off_side(x: float, y: float, guide: Floats, left: float, right: float) -> fl
         return 0.0
     yaw = guide[found, 2]
     offset = exact.cos(yaw) * (y - guide[found, 1]) - exact.sin(yaw) * (x - guide[found, 0])
-    return left * offset if offset > 0.0 else -right * offset
+    return float(left * offset if offset > 0.0 else -right * offset)
 
 
 @kernel(inline=True)
@@ -175,7 +175,8 @@ def follow(
         half_length: of the footprint.
         half_width: likewise.
         sweep: largest distance between two poses that are looked at.
-        wish: (4,) room wished for beside the footprint, what its lack costs per length; what a cell left and right of the guide does.
+        wish: (4,) room wished for beside the footprint, what its lack costs per length, what a cell left of the guide costs, and
+            right of it.
         guide: (G, 3) x, y, yaw; none: no side is dearer.
         low: scratch, see `swept_free`.
         high: likewise.
@@ -247,16 +248,17 @@ def check_sweep(clearance: Floats, blocked: Ints, poses: Floats, half_length: fl
 
 
 def sweep_is_free(road: Road, poses: Floats, length: float, width: float) -> Floats:
-    """Return (M, 2): 1 where a footprint can move to each of M near poses (M, 3) from the one before, else 0; and the room [m] beside.
+    """Whether a footprint can move from each of M near poses to the next, and the room beside it.
 
     Args:
         road: the grid.
         poses: x [m], y [m], yaw [rad], some 0.2 m apart or less.
         length: metres along the yaw.
         width: metres across it.
-    """
-    from scenario_gen.roads.clearance import clearance_in_cells, to_cells
 
+    Returns:
+        (M, 2) 1 where the way to the pose from the one before is free, else 0; metres.
+    """
     poses = np.ascontiguousarray(np.reshape(poses, (-1, 3)), dtype=np.float64)
     grid = np.column_stack((to_cells(road, poses[:, :2]), poses[:, 2]))
     out = np.empty((len(poses), 2))
