@@ -137,7 +137,7 @@ def _route(task: _Task) -> Route:
                 f"has no room there on road {task.road.name!r}"
             )
     if task.fitted.stands.all() or exact.hypot(*(anchors[-1] - anchors[0])[:2]) < STANDS:
-        return Route(anchors[:1], np.zeros(len(anchors), dtype=np.int64), np.zeros(1))
+        return Route(anchors[:1], np.zeros(len(anchors), dtype=np.int64), np.zeros(1), joined=0, searched=0)
     waypoints = _waypoints(anchors, task.fitted.stands, task.config.max_curvature)
     if not task.config.drivable:
         return _polyline(task, waypoints)
