@@ -16,6 +16,7 @@
 
 from dataclasses import dataclass
 from itertools import combinations
+import math
 
 import numpy as np
 import shapely
@@ -23,6 +24,7 @@ import shapely
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.presence import together
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,9 @@ class VehicleQuality:
         changed: RMS of measured less published speed [m/s].
         moved: RMS distance between raw and published positions [m].
         moved_most: the largest such distance [m].
+        noise: standard deviation of the fixes [m], as estimated from the track (or as given); how smooth it is follows from it.
+        turned: median difference of recorded and published headings while it moves [rad]; NaN if none is recorded.
+        headings: share of the recorded headings that had a say; the others contradict the way driven, or jump.
     """
 
     id: str
@@ -69,6 +74,9 @@ class VehicleQuality:
     changed: float
     moved: float
     moved_most: float
+    noise: float = math.nan
+    turned: float = math.nan
+    headings: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -83,12 +91,21 @@ class Overlap:
 
 @dataclass(frozen=True)
 class EncounterQuality:
-    """Facts of one encounter that are reported, not repaired."""
+    """Facts of one encounter that are reported, not repaired.
+
+    Attributes:
+        name: the encounter's.
+        vehicles: who is there.
+        seconds: how long it lasts.
+        overlaps: recorded overlaps of footprints.
+        partly: who is there for a part of it: name, and from when to when [s].
+    """
 
     name: str
     vehicles: tuple[str, ...]
     seconds: float
     overlaps: tuple[Overlap, ...]
+    partly: tuple[tuple[str, float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -109,6 +126,10 @@ class Quality:
         out += [vehicle_line(vehicle) for vehicle in self.vehicles]
         for encounter in self.encounters:
             out.append(f"  encounter {encounter.name}: {encounter.seconds:.1f} s of {', '.join(encounter.vehicles)}")
+            if encounter.partly:
+                out.append(
+                    "    vehicle " + ", vehicle ".join(f"{name} from {a:.1f} to {b:.1f} s" for name, a, b in encounter.partly)
+                )
             out += [
                 f"    recorded footprints of {overlap.first} and {overlap.second} overlap {100 * overlap.share:.0f} % of the time"
                 f" (up to {overlap.area:.1f} m²)"
@@ -124,10 +145,15 @@ def vehicle_line(vehicle: VehicleQuality) -> str:
         gaps += f", cut at {vehicle.cut} (up to {vehicle.longest_cut:.1f} s)"
     if vehicle.reversals:
         gaps += f", cut at {vehicle.reversals} reversals"
+    headings = ""
+    if math.isfinite(vehicle.headings):
+        headings = f"; {100.0 * vehicle.headings:.0f} % of its headings used"
+        headings += f", changed by {math.degrees(vehicle.turned):.1f}° (median)" if math.isfinite(vehicle.turned) else ""
     return (
         f"  vehicle {vehicle.id}: {vehicle.fixes} fixes, {vehicle.seconds:.1f} s; {gaps}; speed against position "
         f"{vehicle.speed_before:.2f} → {vehicle.speed_after:.2f} m/s RMS, speeds changed by {vehicle.changed:.2f} m/s, "
-        f"positions by {vehicle.moved:.2f} m RMS (at most {vehicle.moved_most:.1f} m)"
+        f"positions by {vehicle.moved:.2f} m RMS (at most {vehicle.moved_most:.1f} m; noise of the fixes {vehicle.noise:.2f} m)"
+        + headings
     )
 
 
@@ -142,12 +168,13 @@ def footprints(encounter: Encounter, vehicle: int) -> Floats:
 
 
 def find_overlaps(encounter: Encounter) -> tuple[Overlap, ...]:
-    """Return the pairs whose footprints overlap at some sample, with the share of samples and the largest area."""
+    """Return the pairs whose footprints overlap at some sample, with the share of their common samples and the largest area."""
     polygons = [shapely.polygons(footprints(encounter, n)) for n in range(len(encounter.vehicles))]
     found = []
     for a, b in combinations(range(len(polygons)), 2):
         area = shapely.area(shapely.intersection(polygons[a], polygons[b]))
-        share = float((area > 0.0).mean())
+        area = area[together(encounter.present, a, b)]
+        share = float((area > 0.0).mean()) if len(area) else 0.0
         if share > 0.0:
             found.append(Overlap(encounter.vehicles[a].id, encounter.vehicles[b].id, share, float(area.max())))
     return tuple(found)
