@@ -200,7 +200,8 @@ def states(
         pieces: (m, 4, 4) the pieces of a spline, see `SpeedSpline.pieces`.
         speed: (S, m + 3) coefficients [m/s].
         tau: (S, T) template times [s], ascending.
-        pace: (S, T) rate of the sample's clock there; slope: (S, T) 1/s, its derivative.
+        pace: (S, T) rate of the sample's clock there.
+        slope: (S, T) 1/s, its derivative.
         count: (S,) how many of them are asked for.
         out: (S, T, 5) x, y [m], yaw [rad, not unwrapped], speed [m/s], acceleration [m/s²].
     """

@@ -100,9 +100,7 @@ class _Drive:
         for end, since in ((0, clock.grid - clock.grid[0]), (-1, clock.grid[-1] - clock.grid)):
             off = ends[end] - float(line[end])
             line = line + off * np.square(np.maximum(1.0 - since / max(2.0 * abs(off) / _RAMP, 1.0), 0.0))
-        inner = (
-            np.flatnonzero(np.diff(self.path.anchor[:-1], prepend=-1.0)[1:] != 0.0) + 1 if len(times) > 2 else np.zeros(0, int)
-        )
+        inner = 1 + np.flatnonzero(np.diff(self.path.anchor[:-1]) != 0.0)
         return Target(clock.grid, np.maximum(line, 0.0), times[inner], self.path.anchor[inner], ends, self.path.length)
 
     def mean(self, times: Floats, clock: Clock, config: SamplingConfig) -> tuple[Floats, Motion, Bounds] | str:
@@ -196,7 +194,7 @@ def _slowed(drives: Sequence[_Drive], times: Floats, config: SamplingConfig) -> 
     clock = slowed_clock(grid, needs, 1.0 + config.max_stretch)
     if clock.rate.max() < 1.0 + _SAID_PACE:
         return plain, []
-    worst, k = np.unravel_index(int(np.argmax(needs)), (len(needs), len(grid)))
+    worst, k = divmod(int(np.argmax(needs)), len(grid))
     return clock, [
         f"the pace is lowered by up to {100.0 * (1.0 - 1.0 / clock.rate.max()):.0f} % ahead of bends, most for vehicle "
         f"{drives[worst].vehicle.id} at {grid[k]:.1f} s; in all the clock is {clock.time[-1] - grid[-1]:.1f} s longer"
@@ -249,7 +247,7 @@ def _drive(
 
 
 def _at_rest(knots: SpeedKnots, end: float) -> list[tuple[float, float]]:
-    """The parts of stands in which the speed is zero: the joined lines are rounded, so a vehicle leaves a little before theirs."""
+    """The parts of stands in which the speed is zero: lines are rounded, so a vehicle leaves a little before theirs do."""
     rest = []
     for a, b in knots.stretches(knots.still):
         room = max(min(SMOOTHING, 0.5 * (b - a - SHORTEST_WAIT)), 0.0)
@@ -293,14 +291,6 @@ def _model(
     narrow = room < ROOM_SIGMAS * config.lateral_sigma
     if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
         sentences.append(f"{name} varies less across {100.0 * narrow.mean():.0f} % of its route, where the road is narrow")
-    speed = speed_model(
-        spline,
-        mean,
-        motion,
-        bounds,
-        drive.time,
-        drive.speed,
-        config.longitudinal_sigma,
-        min(config.longitudinal_time, _TIME_SHARE * float(times[-1])),
-    )
+    length = min(config.longitudinal_time, _TIME_SHARE * float(times[-1]))
+    speed = speed_model(spline, mean, motion, bounds, drive.time, drive.speed, config.longitudinal_sigma, length)
     return VehicleModel(drive.vehicle, path, lateral_covariance_root(path, room, config), room, speed)

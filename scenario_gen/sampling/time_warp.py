@@ -59,12 +59,8 @@ class Clock:
         p, q = h * self.rate[cell], h * self.rate[cell + 1]
         two, three = 3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q
         value = a + x * (p + x * (two + x * three))
-        return (
-            value,
-            (p + x * (2.0 * two + 3.0 * three * x)) / h,
-            (2.0 * two + 6.0 * three * x) / (h * h),
-            6.0 * three / (h * h * h),
-        )
+        rate, slope = (p + x * (2.0 * two + 3.0 * three * x)) / h, (2.0 * two + 6.0 * three * x) / (h * h)
+        return value, rate, slope, 6.0 * three / (h * h * h)
 
 
 class TimeWarp:
@@ -140,7 +136,8 @@ def template_times(
 
     Args:
         grid: (G,) seconds of the template, evenly spaced.
-        time, rate: (S, G) clocks, see `Clock`.
+        time: (S, G) seconds of the clocks, see `Clock`.
+        rate: (S, G) their rates.
         at: (S, T) scenario times [s], ascending.
         count: (S,) how many of them are asked for.
         tau: (S, T) filled with template times [s].

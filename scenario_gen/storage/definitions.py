@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Message definitions and type hashes: rosbags' Jazzy type store, Autoware's by definition, or an installed package's .msg files."""
+"""Message definitions and type hashes: rosbags' Jazzy type store, Autoware's by definition, an installed package's files."""
 
 from functools import cache
 import os

@@ -98,7 +98,8 @@ def speed_knots(
         time: (T,) the template's samples [s].
         speed: (T,) its speeds [m/s].
         ends: asked speeds [m/s] at start and end.
-        knot_share: where in each primitive a knot lies, as a share of its duration; None for where the template bends, 0 for none.
+        knot_share: where in each primitive a knot lies, as a share of its duration; 0 for none, None for where the template
+            bends.
         creeps: begin and end [s] of the waits in which it rolls on slowly; they become knots.
     """
     cuts, still = _cuts(clock, dwells, waits, ends, creeps)

@@ -182,4 +182,4 @@ def mean_speed(spline: SpeedSpline, target: Target, motion: Motion, bounds: Boun
     solution = solver.solve()
     if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
         return None
-    return np.where(given, value, np.clip(np.array(solution.x[:n]), 0.0, bounds.most))
+    return np.asarray(np.where(given, value, np.clip(np.array(solution.x[:n]), 0.0, bounds.most)))

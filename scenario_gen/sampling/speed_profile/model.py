@@ -123,7 +123,7 @@ def speed_model(
     """
     longer = _spread_length(spline)
     factor = _conditioned(spline, _process(spline, mean, time, speed, sigma, length))
-    unit, n, m = np.eye(spline.size), spline.size, len(spline.breaks)
+    unit, m = np.eye(spline.size), len(spline.breaks)
     free = ~fixed_coefficients(spline, (0.0, 0.0))[0]
     rows = np.vstack([unit[free], motion.acceleration, motion.jerk])
     low = np.concatenate([np.zeros(int(free.sum())), np.full(m, -bounds.braking), np.full(m, -bounds.jerk)])

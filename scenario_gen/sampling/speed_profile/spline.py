@@ -19,6 +19,7 @@ coefficients (de Boor, A Practical Guide to Splines, 2001): coefficients that ar
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -49,7 +50,7 @@ class SpeedSpline:
         """The basis on [start, end] [s] for a vehicle that stands in the intervals `stands` [s], in order and apart."""
         spacing = max(KNOT_SPACING, (end - start) / MOST_KNOTS)
         cuts = sorted({start, end, *(t for stand in stands for t in stand if start < t < end)})
-        inner = [np.linspace(a, b, max(round((b - a) / spacing), 1) + 1)[:-1] for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+        inner = [np.linspace(a, b, max(round((b - a) / spacing), 1) + 1)[:-1] for a, b in pairwise(cuts)]
         breaks = np.append(np.concatenate(inner), end)
         knots = np.concatenate([[start] * DEGREE, breaks, [end] * DEGREE])
         low, high = knots[: -DEGREE - 1], knots[DEGREE + 1 :]
@@ -98,17 +99,16 @@ class SpeedSpline:
     def driven(self, until: Floats) -> Floats:
         """(q, n) metres that each coefficient of 1 m/s drives until times (q,) [s]."""
         at, weight = self._quadrature()
-        whole = (self.design(at.ravel()) * weight.ravel()[:, None]).reshape(*at.shape, self.size).sum(axis=1)
+        whole = self._summed(at, weight)
         before = np.concatenate([np.zeros((1, self.size)), np.cumsum(whole, axis=0)])
         cell = np.clip(np.searchsorted(self.breaks, until, side="right") - 1, 0, len(self.breaks) - 2)
         half = 0.5 * (until - self.breaks[cell])
         points = self.breaks[cell][:, None] + half[:, None] * (1.0 + _GAUSS_X)
-        part = (
-            (self.design(points.ravel()) * (half[:, None] * _GAUSS_W).ravel()[:, None])
-            .reshape(*points.shape, self.size)
-            .sum(axis=1)
-        )
-        return np.asarray(before[cell] + part)
+        return np.asarray(before[cell] + self._summed(points, half[:, None] * _GAUSS_W))
+
+    def _summed(self, at: Floats, weight: Floats) -> Floats:
+        """(q, n) weighted sums of the basis functions over points (q, 4) [s]."""
+        return np.asarray((self.design(at.ravel()).reshape(*at.shape, self.size) * weight[..., None]).sum(axis=1))
 
     def gram(self, derivative: int = 0) -> Floats:
         """(n, n) integrals of products of two basis functions' derivatives."""
