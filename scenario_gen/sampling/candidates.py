@@ -25,7 +25,7 @@ from itertools import pairwise
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats
+from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.sampling.deviations import soft_clipped
 from scenario_gen.sampling.path import BasePath, states
 from scenario_gen.sampling.speed_profile.model import SpeedModel
@@ -90,6 +90,14 @@ class Batch:
     speed: tuple[Floats, ...]
     feasible: Bools
 
+    def present(self) -> Ints:
+        """(S, N, 2) first and last instant of the published grid at which each vehicle is there."""
+        ends = np.stack([v.speed.spline.breaks[[0, -1]] for v in self.vehicles])
+        grid = self.clock.grid
+        cell = np.clip(np.round(ends / (grid[1] - grid[0])).astype(np.int64), 0, len(grid) - 1)
+        at = self.clock.time[:, cell] / DT
+        return np.stack([np.ceil(at[..., 0] - 1e-6), np.floor(at[..., 1] + 1e-6)], axis=-1).astype(np.int64)
+
     def states(self, time: Floats, count: Sequence[int] | None = None) -> Floats:
         """States (N, S, T, 5) x, y [m], yaw [rad, not unwrapped], speed [m/s], acceleration [m/s²] at ascending times (T,) [s].
 
@@ -114,16 +122,15 @@ class Batch:
         count = np.round(self.clock.time[:, -1] / DT).astype(np.int64) + 1
         time = np.round(np.arange(count.max()) * DT, 9)
         out = self.states(time, count.tolist())
-        vehicles = tuple(v.vehicle for v in self.vehicles)
-        return [
-            _scenario(vehicles, time[: count[s]], out[:, s, : count[s]], seed, index[s], frame_id) if ok else None
-            for s, ok in enumerate(self.feasible)
-        ]
-
-
-def _scenario(vehicles: tuple[Vehicle, ...], time: Floats, state: Floats, seed: int, index: int, frame_id: str) -> Scenario:
-    """A scenario from states (N, T, 5)."""
-    return Scenario(vehicles, time, state[..., :2], state[..., 2], state[..., 3], state[..., 4], seed, index, frame_id)
+        vehicles, present = tuple(v.vehicle for v in self.vehicles), self.present()
+        made: list[Scenario | None] = []
+        for s, ok in enumerate(self.feasible):
+            t, (x, y, yaw, speed, acceleration) = time[: count[s]], np.moveaxis(out[:, s, : count[s]], -1, 0)
+            position = np.stack([x, y], axis=-1)
+            made.append(
+                Scenario(vehicles, t, position, yaw, speed, acceleration, seed, index[s], frame_id, present[s]) if ok else None
+            )
+        return made
 
 
 class CandidateModel:

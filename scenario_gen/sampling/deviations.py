@@ -24,7 +24,7 @@ from scenario_gen.sampling.path import BasePath
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.road import Road
 
-LENGTH_SHARE = 1.0 / 3.0  # of the route, at most: what varies more slowly between given ends hardly varies
+LENGTH_SHARE = 0.25  # of the route, at most: what varies more slowly between given ends hardly varies
 SHORTEST_ROUTE = 3.0  # m; a shorter one is driven as planned
 ROOM_SIGMAS = 2.0  # a deviation of so many standard deviations still leaves the footprint on the road
 MAX_ROOM_SIGMAS = 5.0  # more room than so many standard deviations is not looked for

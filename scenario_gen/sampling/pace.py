@@ -24,15 +24,16 @@ import numpy as np
 
 from scenario_gen.arrays import Floats
 from scenario_gen.sampling.time_warp import Clock
+from scenario_gen.types.encounter import Encounter
 
 GRID = 0.1  # s
-MOST_CELLS = 4000
 REACH = 1.5  # s, ahead of a bend and behind it, over which the clock is slowed
 
 
-def template_grid(end: float) -> Floats:
-    """(G,) evenly spaced template times from 0 to `end` [s]."""
-    return np.linspace(0.0, end, min(max(round(end / GRID), 10), MOST_CELLS) + 1)
+def template_grid(encounter: Encounter) -> Floats:
+    """(G,) evenly spaced template times [s], the samples' own among them."""
+    parts = max(round(encounter.dt / GRID), 1)
+    return np.linspace(0.0, encounter.duration, parts * (len(encounter.time) - 1) + 1)
 
 
 def slowed_clock(grid: Floats, needs: Sequence[Floats], most: float) -> Clock:

@@ -78,7 +78,10 @@ class _Drive:
         path: the route.
         knots: what the primitives tell of the template's speed, scaled to the route.
         spline: the basis of its speed.
-        time, speed: (T,) the template's samples [s] and speeds [m/s], scaled to the route.
+        times: (K + 2,) its arrival, the changepoints while it is there, and when it leaves [s].
+        anchor: (K + 2,) arc lengths [m] of their anchors.
+        time: (T,) the template's samples while it is there [s].
+        speed: (T,) its speeds [m/s] there, scaled to the route.
         ends: asked speeds [m/s] at start and end.
         jerk: m/s³ that it keeps to; bend: m/s² sideways above which the pace is lowered.
     """
@@ -87,26 +90,30 @@ class _Drive:
     path: BasePath
     knots: SpeedKnots
     spline: SpeedSpline
+    times: Floats
+    anchor: Floats
     time: Floats
     speed: Floats
     ends: tuple[float, float]
     jerk: float
     bend: float
 
-    def target(self, times: Floats, clock: Clock) -> Target:
-        """What its mean speed should be near to, on this clock; times (K + 2,) of start, changepoints and end [s]."""
-        line = np.interp(clock.grid, self.knots.knot, self.knots.lines)
-        ends = (self.ends[0] * float(clock.rate[0]), self.ends[1] * float(clock.rate[-1]))
-        for end, since in ((0, clock.grid - clock.grid[0]), (-1, clock.grid[-1] - clock.grid)):
+    def target(self, clock: Clock) -> Target:
+        """What its mean speed should be near to, on this clock."""
+        grid = clock.grid[(clock.grid >= self.times[0] - 1e-9) & (clock.grid <= self.times[-1] + 1e-9)]
+        line = np.interp(grid, self.knots.knot, self.knots.lines)
+        rates = clock.at(self.times[[0, -1]])[1]
+        ends = (self.ends[0] * float(rates[0]), self.ends[1] * float(rates[1]))
+        for end, since in ((0, grid - grid[0]), (-1, grid[-1] - grid)):
             off = ends[end] - float(line[end])
             line = line + off * np.square(np.maximum(1.0 - since / max(2.0 * abs(off) / _RAMP, 1.0), 0.0))
-        inner = 1 + np.flatnonzero(np.diff(self.path.anchor[:-1]) != 0.0)
-        return Target(clock.grid, np.maximum(line, 0.0), times[inner], self.path.anchor[inner], ends, self.path.length)
+        inner = 1 + np.flatnonzero(np.diff(self.anchor[:-1]) != 0.0)
+        return Target(grid, np.maximum(line, 0.0), self.times[inner], self.anchor[inner], ends, self.path.length)
 
-    def mean(self, times: Floats, clock: Clock, config: SamplingConfig) -> tuple[Floats, Motion, Bounds] | str:
+    def mean(self, clock: Clock, config: SamplingConfig) -> tuple[Floats, Motion, Bounds] | str:
         """The mean's coefficients on this clock, with what they keep to; or why there are none."""
         spline, rate = self.spline, clock.at(self.spline.breaks)[1:]
-        motion, target = Motion.of(spline, *rate), self.target(times, clock)
+        motion, target = Motion.of(spline, *rate), self.target(clock)
         at, pace = spline.middle, clock.at(spline.middle)[1]
         top = config.max_speed * pace
         for a, b in self.knots.stretches(self.knots.creeping):
@@ -129,8 +136,11 @@ class _Drive:
         """By how much the clock must be slowed at template times (G,) [s], so that bends are driven at ease."""
         if len(self.path.node) == 1:
             return np.ones(len(grid))
-        s, v = (exact.matmul(rows, mean) for rows in (self.spline.driven(grid), self.spline.design(grid)))
-        return np.asarray(v / self._bend_speed(s, self.bend))
+        there = (grid >= self.times[0]) & (grid <= self.times[-1])
+        s, v = (exact.matmul(rows, mean) for rows in (self.spline.driven(grid[there]), self.spline.design(grid[there])))
+        need = np.ones(len(grid))
+        need[there] = v / self._bend_speed(s, self.bend)
+        return need
 
     def _bend_speed(self, s: Floats, limit: float) -> Floats:
         """Speed [m/s] that the route's bends allow at arc lengths (q,) [m]."""
@@ -165,12 +175,12 @@ def prepare(
         raise InputError(f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each")
     waits = [standing_part(encounter, wait) for wait in waits if wait.vehicle != ego]
     drives = [_drive(n, encounter, times, routes[n], asked, waits, config) for n in range(len(encounter.vehicles)) if n != ego]
-    clock, sentences = _slowed(drives, times, config)
+    clock, sentences = _slowed(drives, template_grid(encounter), config)
     reasons: list[str] = []
     left = (1.0 + config.max_stretch) * float(times[-1]) / float(clock.time[-1])
     for stretch in np.linspace(1.0, max(left, 1.0), _STRETCHES if left > 1.0 else 1).tolist():
         stretched = clock_of(clock.grid, stretch * clock.rate)
-        means = [drive.mean(times, stretched, config) for drive in drives]
+        means = [drive.mean(stretched, config) for drive in drives]
         reasons = [f"vehicle {d.vehicle.id} {why}" for d, why in zip(drives, means, strict=True) if isinstance(why, str)]
         if not reasons:
             if stretch > 1.0:
@@ -178,18 +188,17 @@ def prepare(
                 sentences.append(f"clock stretched by {share:.1f} % so that every vehicle can keep to its limits")
             found = [mean for mean in means if not isinstance(mean, str)]
             warp = TimeWarp(stretched, config, least_shares(clock.grid, waits))
-            vehicles = [_model(d, road, times, *mean, config, sentences) for d, mean in zip(drives, found, strict=True)]
+            vehicles = [_model(d, road, *mean, config, sentences) for d, mean in zip(drives, found, strict=True)]
             return Prepared(CandidateModel(tuple(vehicles), warp), tuple(sentences))
     return Prepared(None, (), "; ".join(reasons))
 
 
-def _slowed(drives: Sequence[_Drive], times: Floats, config: SamplingConfig) -> tuple[Clock, list[str]]:
-    """The nominal clock, and what is said of it."""
-    grid = template_grid(float(times[-1]))
+def _slowed(drives: Sequence[_Drive], grid: Floats, config: SamplingConfig) -> tuple[Clock, list[str]]:
+    """The nominal clock on template times (G,) [s], and what is said of it."""
     plain = clock_of(grid, np.ones(len(grid)))
     needs = []
     for drive in drives:
-        mean = drive.mean(times, plain, _without_bends(config))
+        mean = drive.mean(plain, _without_bends(config))
         needs.append(np.ones(len(grid)) if isinstance(mean, str) else drive.need(mean[0], grid))
     clock = slowed_clock(grid, needs, 1.0 + config.max_stretch)
     if clock.rate.max() < 1.0 + _SAID_PACE:
@@ -216,27 +225,33 @@ def _drive(
     config: SamplingConfig,
 ) -> _Drive:
     """Vehicle n on its route; one without length stands throughout, whatever speed is asked."""
-    dwells = route.anchor[:-1] == route.anchor[1:]
+    first, last = encounter.present[n].tolist()
+    here = slice(first, last + 1)
+    time, speed = encounter.time[here], encounter.speed[n, here]
+    own = np.concatenate([[0], 1 + np.flatnonzero((times[1:-1] > time[0]) & (times[1:-1] < time[-1])), [len(times) - 1]])
+    anchor, times = route.anchor[own], np.concatenate([time[:1], times[own[1:-1]], time[-1:]])
+    dwells = anchor[:-1] == anchor[1:]
     path = BasePath.of(route)
-    own, creeps = lengthened(n, waits, creeping=False), lengthened(n, waits, creeping=True)
+    stands, creeps = lengthened(n, waits, creeping=False), lengthened(n, waits, creeping=True)
     ends = (float(asked.start[n, 3]), float(asked.end[n, 3]))
     if dwells.all():
         ends = (0.0, 0.0)
-    speed = encounter.speed[n]
     driven = float(0.5 * encounter.dt * (speed[1:] + speed[:-1]).sum())
     scale = min(path.length / driven, _MOST_SCALE) if driven > 1e-3 else 1.0
-    knots = speed_knots(times, dwells, own, encounter.time, speed, ends, 0.0, creeps)
+    knots = speed_knots(times, dwells, stands, time, speed, ends, 0.0, creeps)
     standing = [v if v > STAND or not still else 0.0 for v, still in zip(ends, knots.still[[0, -1]], strict=True)]
-    spline = SpeedSpline.over(0.0, float(times[-1]), _at_rest(knots, float(times[-1])))
+    spline = SpeedSpline.over(float(times[0]), float(times[-1]), _at_rest(knots, times))
     recorded = [0.0 if still else scale * float(speed[k]) for k, still in zip((0, -1), knots.still[[0, -1]], strict=True)]
-    lines = rounded_lines(spline, knots, encounter.time, scale * speed, (recorded[0], recorded[1]))
+    lines = rounded_lines(spline, knots, time, scale * speed, (recorded[0], recorded[1]))
     jerk, sideways = _largest_jerk(scale * speed, encounter.dt), _largest_sideways(encounter, n)
     return _Drive(
         encounter.vehicles[n],
         path,
         replace(knots, lines=lines),
         spline,
-        encounter.time,
+        times,
+        path.anchor[own],
+        time,
         scale * speed,
         (standing[0], standing[1]),
         config.max_jerk or max(_JERK_SHARE * jerk, _LEAST_JERK),
@@ -246,12 +261,12 @@ def _drive(
     )
 
 
-def _at_rest(knots: SpeedKnots, end: float) -> list[tuple[float, float]]:
+def _at_rest(knots: SpeedKnots, times: Floats) -> list[tuple[float, float]]:
     """The parts of stands in which the speed is zero: lines are rounded, so a vehicle leaves a little before theirs do."""
     rest = []
     for a, b in knots.stretches(knots.still):
         room = max(min(SMOOTHING, 0.5 * (b - a - SHORTEST_WAIT)), 0.0)
-        rest.append((a + room if a > 0.0 else a, b - room if b < end else b))
+        rest.append((a + room if a > times[0] else a, b - room if b < times[-1] else b))
     return rest
 
 
@@ -264,15 +279,19 @@ def _largest_sideways(encounter: Encounter, n: int) -> float:
     """Largest lateral acceleration [m/s²] of the template's vehicle n, over half a second."""
     from scipy.ndimage import uniform_filter1d  # slow to import
 
-    yaw = clean_tracks(encounter)[n].poses[:, 2]
+    first, last = encounter.present[n].tolist()
+    yaw = clean_tracks(encounter)[n].poses[first : last + 1, 2]
     width = 2 * round(0.5 * _SMOOTH / encounter.dt) + 1
-    return float(np.abs(uniform_filter1d(np.gradient(yaw, encounter.dt) * encounter.speed[n], width, mode="nearest")).max())
+    return float(
+        np.abs(
+            uniform_filter1d(np.gradient(yaw, encounter.dt) * encounter.speed[n, first : last + 1], width, mode="nearest")
+        ).max()
+    )
 
 
 def _model(
     drive: _Drive,
     road: Road,
-    times: Floats,
     mean: Floats,
     motion: Motion,
     bounds: Bounds,
@@ -281,7 +300,7 @@ def _model(
 ) -> VehicleModel:
     """The vehicle's model; what was changed for it is added to the sentences."""
     name, path, spline = f"vehicle {drive.vehicle.id}", drive.path, drive.spline
-    slid = float(np.abs(exact.matmul(spline.driven(times), mean) - path.anchor).max()) if len(path.node) > 1 else 0.0
+    slid = float(np.abs(exact.matmul(spline.driven(drive.times), mean) - drive.anchor).max()) if len(path.node) > 1 else 0.0
     if slid > _SAID_SLIDE:
         sentences.append(f"{name} passes changepoints up to {slid:.2f} m from their place")
     jerk = float(np.abs(exact.matmul(motion.jerk, mean)).max())
@@ -291,6 +310,6 @@ def _model(
     narrow = room < ROOM_SIGMAS * config.lateral_sigma
     if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
         sentences.append(f"{name} varies less across {100.0 * narrow.mean():.0f} % of its route, where the road is narrow")
-    length = min(config.longitudinal_time, _TIME_SHARE * float(times[-1]))
+    length = min(config.longitudinal_time, _TIME_SHARE * float(drive.times[-1] - drive.times[0]))
     speed = speed_model(spline, mean, motion, bounds, drive.time, drive.speed, config.longitudinal_sigma, length)
     return VehicleModel(drive.vehicle, path, lateral_covariance_root(path, room, config), room, speed)

@@ -33,7 +33,7 @@ from scenario_gen.sampling.speed_profile.knots import SpeedKnots
 from scenario_gen.sampling.speed_profile.spline import SpeedSpline
 
 SMOOTHING = 0.3  # s, ℓ: kinks of the lines are rounded over about this time
-ANCHOR_WEIGHT = 2.0  # 1/s, w: a changepoint passed 0.5 m from its place weighs as 0.7 m/s too fast for a second
+ANCHOR_WEIGHT = 10.0  # 1/s, w: a changepoint passed 0.5 m from its place weighs as 1.6 m/s too fast for a second
 JERK_PRICE = 20.0  # m s, of each 1 m/s³ above the bound for a second
 
 
@@ -140,7 +140,7 @@ def rounded_lines(spline: SpeedSpline, knots: SpeedKnots, time: Floats, speed: F
 
 def _smoothness(spline: SpeedSpline) -> Floats:
     """(n, n) of the quadratic form ∫ u² + ℓ⁴ u″² dτ."""
-    return spline.gram() + exact.power(SMOOTHING, 4) * spline.gram(2)
+    return np.asarray(spline.gram() + exact.power(SMOOTHING, 4) * spline.gram(2))
 
 
 def mean_speed(spline: SpeedSpline, target: Target, motion: Motion, bounds: Bounds) -> Floats | None:

@@ -89,7 +89,7 @@ class SpeedModel:
             middle, seen = exact.matmul(base, self.rows.T), exact.matmul(coefficients, self.rows.T)
             low, high = self.low * scale, self.high * scale
             matrix = exact.matmul(self.rows, self.factor)
-            sense = np.where(self.order == 1.0, 0, _SOFT).astype(np.intc)
+            sense = np.where(self.order < 3.0, 0, _SOFT).astype(np.intc)
             broken = ((seen < low - _TOLERANCE) | (seen > high + _TOLERANCE)).any(axis=1)
             for s in np.flatnonzero(broken).tolist():
                 x, _, flag, _ = daqp.solve(np.eye(self.size), -z[s], matrix, high[s] - middle[s], low[s] - middle[s], sense)
