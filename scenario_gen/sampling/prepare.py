@@ -51,7 +51,11 @@ _JERK_SHARE, _LEAST_JERK = 1.2, 1.0  # of the template's largest jerk; m/s³
 _BEND_SHARE, _LEAST_BEND = 1.2, 2.0  # of the template's largest lateral acceleration; m/s²
 _SMOOTH = 0.5  # s, over which that is taken
 _TIME_SHARE = 1.0 / 3.0  # of the duration, at most: what varies more slowly between given ends hardly varies
+_FREE_SLIDE = 1.5  # m, by which changepoints may be passed from their place before the clock is stretched
 _SAID_PACE, _SAID_SLIDE, _SAID_JERK = 0.02, 0.3, 0.2  # slowing, m and m/s³ from which on they are said
+
+
+_Mean = tuple[Floats, Motion, Bounds]  # coefficients of a mean speed, and what it keeps to
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +114,7 @@ class _Drive:
         inner = 1 + np.flatnonzero(np.diff(self.anchor[:-1]) != 0.0)
         return Target(grid, np.maximum(line, 0.0), self.times[inner], self.anchor[inner], ends, self.path.length)
 
-    def mean(self, clock: Clock, config: SamplingConfig) -> tuple[Floats, Motion, Bounds] | str:
+    def mean(self, clock: Clock, config: SamplingConfig) -> _Mean | str:
         """The mean's coefficients on this clock, with what they keep to; or why there are none."""
         spline, rate = self.spline, clock.at(self.spline.breaks)[1:]
         motion, target = Motion.of(spline, *rate), self.target(clock)
@@ -131,6 +135,12 @@ class _Drive:
                 return mean, motion, bounds
             most, limit = np.minimum(most, allowed * pace), " through its curves"
         return f"cannot drive its curves within {config.max_lateral_acceleration:g} m/s² sideways in {clock.time[-1]:.1f} s"
+
+    def slid(self, mean: Floats) -> float:
+        """How far [m] from their place the mean passes changepoints, at most."""
+        if len(self.path.node) == 1:
+            return 0.0
+        return float(np.abs(exact.matmul(self.spline.driven(self.times), mean) - self.anchor).max())
 
     def need(self, mean: Floats, grid: Floats) -> Floats:
         """By how much the clock must be slowed at template times (G,) [s], so that bends are driven at ease."""
@@ -176,21 +186,29 @@ def prepare(
     waits = [standing_part(encounter, wait) for wait in waits if wait.vehicle != ego]
     drives = [_drive(n, encounter, times, routes[n], asked, waits, config) for n in range(len(encounter.vehicles)) if n != ego]
     clock, sentences = _slowed(drives, template_grid(encounter), config)
-    reasons: list[str] = []
     left = (1.0 + config.max_stretch) * float(times[-1]) / float(clock.time[-1])
+    best: tuple[float, float, list[_Mean]] | None = None
+    reasons = ""
     for stretch in np.linspace(1.0, max(left, 1.0), _STRETCHES if left > 1.0 else 1).tolist():
-        stretched = clock_of(clock.grid, stretch * clock.rate)
-        means = [drive.mean(stretched, config) for drive in drives]
-        reasons = [f"vehicle {d.vehicle.id} {why}" for d, why in zip(drives, means, strict=True) if isinstance(why, str)]
-        if not reasons:
-            if stretch > 1.0:
-                share = 100.0 * (stretch - 1.0)
-                sentences.append(f"clock stretched by {share:.1f} % so that every vehicle can keep to its limits")
-            found = [mean for mean in means if not isinstance(mean, str)]
-            warp = TimeWarp(stretched, config, least_shares(clock.grid, waits))
-            vehicles = [_model(d, road, *mean, config, sentences) for d, mean in zip(drives, found, strict=True)]
-            return Prepared(CandidateModel(tuple(vehicles), warp), tuple(sentences))
-    return Prepared(None, (), "; ".join(reasons))
+        means = [drive.mean(clock_of(clock.grid, stretch * clock.rate), config) for drive in drives]
+        found = [mean for mean in means if not isinstance(mean, str)]
+        if len(found) < len(means):
+            reasons = "; ".join(f"vehicle {d.vehicle.id} {m}" for d, m in zip(drives, means, strict=True) if isinstance(m, str))
+            continue
+        slid = max(drive.slid(mean[0]) for drive, mean in zip(drives, found, strict=True))
+        if best is None or slid < best[0] - _FREE_SLIDE:
+            best = slid, stretch, found
+        if slid <= _FREE_SLIDE:
+            break
+    if best is None:
+        return Prepared(None, (), reasons)
+    _, stretch, found = best
+    if stretch > 1.0:
+        share = 100.0 * (stretch - 1.0)
+        sentences.append(f"clock stretched by {share:.1f} % so that every vehicle can keep to its limits and its changepoints")
+    warp = TimeWarp(clock_of(clock.grid, stretch * clock.rate), config, least_shares(clock.grid, waits))
+    vehicles = [_model(d, road, *mean, config, sentences) for d, mean in zip(drives, found, strict=True)]
+    return Prepared(CandidateModel(tuple(vehicles), warp), tuple(sentences))
 
 
 def _slowed(drives: Sequence[_Drive], grid: Floats, config: SamplingConfig) -> tuple[Clock, list[str]]:
@@ -300,7 +318,7 @@ def _model(
 ) -> VehicleModel:
     """The vehicle's model; what was changed for it is added to the sentences."""
     name, path, spline = f"vehicle {drive.vehicle.id}", drive.path, drive.spline
-    slid = float(np.abs(exact.matmul(spline.driven(drive.times), mean) - drive.anchor).max()) if len(path.node) > 1 else 0.0
+    slid = drive.slid(mean)
     if slid > _SAID_SLIDE:
         sentences.append(f"{name} passes changepoints up to {slid:.2f} m from their place")
     jerk = float(np.abs(exact.matmul(motion.jerk, mean)).max())

@@ -263,7 +263,10 @@ def test_refusals_are_counted_by_cause_and_levels_are_tried():
     assert max(s.index for s in found.scenarios) >= LEVEL_SIZE
     *head, waits = scene()
     last = found.scenarios[-1]
-    assert regenerate(*head, SamplingConfig(bend_acceleration=5.0), seed=5, index=last.index, waits=waits).position.tobytes() == last.position.tobytes()
+    assert (
+        regenerate(*head, SamplingConfig(bend_acceleration=5.0), seed=5, index=last.index, waits=waits).position.tobytes()
+        == last.position.tobytes()
+    )
 
 
 def test_short_set_is_returned_with_its_account():
