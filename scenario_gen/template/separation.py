@@ -148,7 +148,7 @@ def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sid
 
 
 def _near_pairs(tracks: Sequence[Track], poses: Sequence[Floats], room: float) -> list[tuple[int, int]]:
-    """Pairs (i, j), j < i, that are there together and of which a point of one comes within `room` [m] of a point of the other."""
+    """Pairs (i, j), j < i, that are there together, and whose footprints come within `room` [m] of each other at most."""
     found = []
     for i in range(len(tracks)):
         for j in range(i):
