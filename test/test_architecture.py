@@ -47,8 +47,9 @@ ORDER = (
     ("nearest",),
     ("pipeline",),
     ("report",),
-    ("review",),
+    ("review", "exchange"),
     ("results", "reproduce"),
+    ("closed_loop",),
     ("batch",),
     ("nodes", "demo", "cli", "__main__"),
 )
