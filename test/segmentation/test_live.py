@@ -44,12 +44,14 @@ def test_changepoints_come_soon_with_the_states_there(samples):
     found = found_in(samples)
     at = np.concatenate([f.time_ns for _, f in found]) * 1e-9
     assert np.abs(at - [10.0, 15.0, 25.0, 30.0]).max() <= 0.4
+    assert [int(label) for _, f in found for label in f.label] == [0, 1, 0, 2]  # steady, braking, steady again, accelerating
     assert max(stamp - START - int(f.time_ns[-1]) for stamp, f in found) <= 1.5e9
     for _, f in found:
         assert f.start_ns == START
         index = int(f.time_ns[0]) // TICK
         assert np.array_equal(f.position[:, 0], samples[index].position)
         assert np.abs(f.heading).max() < 0.2
+        assert (f.probability > 0.9).all() and (f.label_probability > 0.5).all() and (f.label_probability <= 1.0).all()
         message = trajectory.decode(encode_live_changepoints(f), "changepoints/live")
         assert np.array_equal(message.time_ns, f.time_ns) and np.array_equal(message.position, f.position)
         assert (message.stamp_ns, message.frame_id) == (START, "local_enu")

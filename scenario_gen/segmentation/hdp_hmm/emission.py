@@ -116,8 +116,9 @@ def log_marginal(factor: Floats, n: float, p: int, nu: float) -> float:
     """
     m = factor.shape[0]
     d = m - p
-    value = log_gammas(0.5 * (nu + n), d) - 0.5 * n * d * LOG_PI
-    return value - d * log_diagonal(factor[:p, :p]) - (nu + n) * log_diagonal(factor[p:, p:])
+    value: float = log_gammas(0.5 * (nu + n), d) - 0.5 * n * d * LOG_PI
+    value -= d * log_diagonal(factor[:p, :p]) + (nu + n) * log_diagonal(factor[p:, p:])
+    return value
 
 
 @kernel(inline=True)

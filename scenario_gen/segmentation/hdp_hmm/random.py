@@ -63,7 +63,8 @@ def next_bits(state: State) -> np.uint64:
     x = state[0]
     x = (x ^ (x >> _S30)) * _MIX1
     x = (x ^ (x >> _S27)) * _MIX2
-    return x ^ (x >> _S31)
+    mixed: np.uint64 = x ^ (x >> _S31)
+    return mixed
 
 
 @kernel(inline=True)
@@ -78,7 +79,7 @@ def normal(state: State) -> float:
     while True:
         bits = next_bits(state)
         layer = np.int64(bits & _LAYER)
-        x = (float(bits >> _S11) + 0.5) * 1.1102230246251565e-16 * EDGES[layer]
+        x: float = (float(bits >> _S11) + 0.5) * 1.1102230246251565e-16 * EDGES[layer]
         if x >= EDGES[layer + 1]:
             if layer == 0:
                 x = beyond(state)

@@ -303,6 +303,32 @@ def place_anchors(side: Ints, pair: Ints, splits: bool, anchors: Ints) -> None:
 
 
 @kernel(inline=True)
+def divided(labels: Ints, index: Ints, side: Ints, i: int, j: int) -> Ints:
+    """(T,) labels with the samples `index` (n,) in state i or j, by their side (n,)."""
+    after = labels.copy()
+    for r in range(len(index)):
+        after[index[r]] = j if side[r] == 1 else i
+    return after
+
+
+@kernel(inline=True)
+def united(labels: Ints, i: int, j: int) -> Ints:
+    """(T,) labels with state j made part of state i."""
+    after = labels.copy()
+    for t in range(len(labels)):
+        if labels[t] == j:
+            after[t] = i
+    return after
+
+
+@kernel(inline=True)
+def sides_of(labels: Ints, index: Ints, j: int, side: Ints) -> None:
+    """Fill side (n,) with 1 where sample `index` (n,) is in state j, else 0."""
+    for r in range(len(index)):
+        side[r] = 1 if labels[index[r]] == j else 0
+
+
+@kernel(inline=True)
 def log_pair(found: int, left: int, right: int, used: int, empty: int) -> float:
     """Logarithm of how often a merge draws a pair and its anchors, over how often the split that undoes it does.
 
@@ -378,9 +404,7 @@ def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read fro
             state, v, mass, index[:found], opens[:found], anchors, whole, total, g0, p, nu, weight, blur, stay, side, False
         )
         fit_sides(v, mass, index[:found], side, whole, total, two_outer, two_sums)
-        after = labels.copy()
-        for r in range(found):
-            after[index[r]] = j if side[r] == 1 else i
+        after = divided(labels, index[:found], side, i, j)
         count_transitions(after, ends, n_after)
     else:
         two_outer[0], two_sums[0] = whole, total
@@ -408,8 +432,7 @@ def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read fro
     gain += log_transitions(n_after, top[1], top[2], beta)
     if not splits and gain >= threshold:
         members_of(labels, ends, i, j, index, opens)
-        for r in range(found):
-            side[r] = 1 if labels[index[r]] == j else 0
+        sides_of(labels, index[:found], j, side)
         place_anchors(side, pair, False, anchors)
         gain += propose_sides(
             state, v, mass, index[:found], opens[:found], anchors, whole, total, g0, p, nu, weight, blur, stay, side, True
@@ -417,11 +440,7 @@ def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read fro
     if not gain >= threshold:
         beta[i], beta[j] = keep_i, keep_j
         return False
-    if splits:
-        labels[:] = after
-    else:
-        for t in range(len(labels)):
-            labels[t] = i if labels[t] == j else labels[t]
+    labels[:] = after if splits else united(labels, i, j)
     n[:] = n_after
     for s in range(2):
         outer[pair[s]], sums[pair[s]] = two_outer[s], two_sums[s]
