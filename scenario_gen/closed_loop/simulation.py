@@ -213,8 +213,8 @@ class ClosedLoop:
         ego = EgoState(*first[self.ego].tolist())
         return State(0, 0.0, ego, first, np.ones(n, dtype=np.bool_), np.zeros(n), np.ones(n))
 
-    def step(self, state: State, asked: Command | Pose | None) -> State:
-        """Return the next instant; `state` stays what it was."""
+    def step(self, state: State, asked: Command | Pose | None, note: str = "") -> State:
+        """Return the next instant; `state` stays what it was. `note` says what else was wrong with what was asked."""
         config, known = self.config, self.certified
         moved = move(state.ego, asked, config)
         ego, n = moved.state, len(self._ids)
@@ -244,7 +244,7 @@ class ClosedLoop:
         )
         clock, rate, forced = after.T
         count = state.forced + int(np.count_nonzero(forced))
-        return State(number, time, ego, vehicles, here, clock, rate, count, moved.fault)
+        return State(number, time, ego, vehicles, here, clock, rate, count, note or moved.fault)
 
     def observe(self, state: State) -> Observation:
         """Return what a planner sees."""
