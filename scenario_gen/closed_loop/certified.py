@@ -130,7 +130,7 @@ def pose_at(time: Floats, motion: Floats, clock: float, out: Floats) -> None:
 
 @kernel(inline=True)
 def boxes_meet(a: Floats, b: Floats) -> bool:
-    """Whether two boxes overlap: each x, y, cos, sin, half length, half width, radius. Source: separating axes."""
+    """Whether two boxes (7,) overlap: each x, y [m], cos, sin, half length, half width, radius [m]. Source: separating axes."""
     dx, dy, reach = b[0] - a[0], b[1] - a[1], a[6] + b[6]
     if dx * dx + dy * dy >= reach * reach:
         return False
@@ -145,7 +145,7 @@ def boxes_meet(a: Floats, b: Floats) -> bool:
 
 @kernel(inline=True)
 def fill_box(x: float, y: float, yaw: float, length: float, width: float, out: Floats) -> None:
-    """Write a box of half sizes `length` and `width` at a pose into `out` (7 or more)."""
+    """Write a box of half sizes `length` and `width` [m] at a pose [m, rad] into `out` (7,), as `boxes_meet` takes it."""
     out[0], out[1], out[2], out[3] = x, y, exact.cos(yaw), exact.sin(yaw)
     out[4], out[5], out[6] = length, width, np.sqrt(length * length + width * width)
 

@@ -31,6 +31,7 @@ from scenario_gen.closed_loop.certified import CELL, Certified, certified
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, TEMPLATE
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
 from scenario_gen.errors import InputError
+from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import Scenario
@@ -277,10 +278,20 @@ class ClosedLoop:
             return True
         if self.at_goal(state.time, state.vehicles[self.ego]):
             return True
+        return self.hit(state)
+
+    def hit(self, state: State) -> bool:
+        """Whether the ego overlaps another at this instant."""
         return bool(overlaps(state.vehicles, self.certified.half, state.here, self.ego))
 
+    def off_road(self, state: State) -> bool:
+        """Whether the ego's footprint covers a cell that is not drivable at this instant; False if no road is known."""
+        length, width = self._sizes[self.ego].tolist()
+        pose = state.vehicles[self.ego, None, :3]
+        return self.road is not None and not bool(footprint_fits(self.road, pose, length, width)[0])
+
     def at_goal(self, time: float, pose: Floats) -> bool:
-        """Whether an ego at a pose (3+,) is at its goal; one whose witness stays where it starts must be there at the end."""
+        """Whether an ego at a pose (3,) of x, y [m], yaw [rad] is at its goal; if the witness waits there, only at the end."""
         if self._waits and time < self.duration - 1e-9:
             return False
         return bool(at_goal(self.certified.motion[self.ego, -1], self.config.goal_width, self._waits, pose))
