@@ -64,6 +64,20 @@ def configured(file: Path | None, assignments: list[str] | None) -> "PipelineCon
     return config
 
 
+def obstructed(config: "PipelineConfig", obstacles: list[str] | None) -> "PipelineConfig":
+    """Return the configuration with more obstacles on its roads.
+
+    Raises:
+        InputError: one is not of the form; the message names it.
+    """
+    from scenario_gen.parameters import updated
+    from scenario_gen.roads.obstacles import read_obstacles
+
+    for text in obstacles or []:
+        read_obstacles(text, "--obstacle")
+    return updated(config, {"road.obstacles": "; ".join(filter(None, [config.road.obstacles, *(obstacles or [])]))})
+
+
 @app.command()
 def parameters() -> None:
     """List every parameter with its default, unit, range and meaning."""
@@ -100,6 +114,10 @@ def generate(
         list[str] | None, typer.Option(help=r"a vehicle's start state, 'id: x y yaw \[speed]', on the road; repeatable")
     ] = None,
     goal: Annotated[list[str] | None, typer.Option(help="a vehicle's end state, likewise; repeatable")] = None,
+    obstacle: Annotated[
+        list[str] | None,
+        typer.Option(help="something in the way, 'x y yaw length width' on the road, e.g. a parked car; repeatable"),
+    ] = None,
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
@@ -111,7 +129,7 @@ def generate(
     cases, refusals = generate_folder(
         out,
         [(log, road)],
-        configured(parameter_file, assignments),
+        obstructed(configured(parameter_file, assignments), obstacle),
         count=count,
         seed=seed,
         encounters=encounter or [],
@@ -312,6 +330,20 @@ def export_scenarios(
     folder = out or bag.resolve().with_name(f"{bag.resolve().name}_{to}")
     made = export_bag(bag, folder, to, config, bag_config, namespace=namespace, indices=index or ())
     say("\n".join((*made.notes, f"{made.scenarios} scenarios: {folder}")))
+
+
+@app.command("import")
+def import_scenario(
+    file: Annotated[Path, typer.Argument(help="a CommonRoad XML file or an OpenSCENARIO XML file with timed polylines")],
+    out: Annotated[Path | None, typer.Option(help="the new table; the file's name with .csv if not given")] = None,
+) -> None:
+    """Make a log of the trajectories in a CommonRoad or OpenSCENARIO file, for `generate` to read."""
+    from scenario_gen.exchange.importing import import_file
+
+    target = out or file.with_suffix(".csv")
+    made = import_file(file, target)
+    rows = sum(len(track.rows) for track in made.tracks)
+    say("\n".join((*made.notes, f"{len(made.tracks)} vehicles, {rows} rows: {target}")))
 
 
 @app.command("reindex")

@@ -30,6 +30,7 @@ from scenario_gen.fitting.junction import has_lanes, place_at_junction
 from scenario_gen.fitting.lanes import place_along_lanes
 from scenario_gen.fitting.placement import Placement
 from scenario_gen.fitting.search import place_by_search
+from scenario_gen.roads.arms import arms_of
 from scenario_gen.template.tracks import clean_tracks, Track
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit
@@ -73,7 +74,7 @@ def fit_template(
     if starts is not None or goals is not None:
         placement, given = place_given(encounter, road, config, starts, goals)
         return finish(encounter, segmentation, road, placement, config, given)
-    return finish(encounter, segmentation, road, _place(encounter, road, config), config)
+    return finish(encounter, segmentation, road, _place(encounter, road.cleared, config), config)
 
 
 def _fit_asked(
@@ -81,7 +82,7 @@ def _fit_asked(
 ) -> Fit:
     starts, goals = (request.rows(end, encounter) for end in ("starts", "goals"))
     refuse_impossible(encounter, road, starts, goals, max_speed)
-    base = _place(encounter, road, config) if np.isnan(starts).any() or np.isnan(goals).any() else None
+    base = _place(encounter, road.cleared, config) if np.isnan(starts).any() or np.isnan(goals).any() else None
     placement, given = place_given(encounter, road, config, starts, goals, base)
     fit = finish(encounter, segmentation, road, placement, config, given)
     refuse_misfits(fit, starts, goals)
@@ -109,7 +110,7 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         reasons.append(f"in its own frame, {error}")
     if own is not None and share >= _AT_HOME:
         return own
-    if has_lanes(road):
+    if has_lanes(road) or len(arms_of(road)) > 1:
         order, reasons = ("lanes", "junction"), []
     elif own is not None and share >= _NEAR_HOME:
         return own
