@@ -20,6 +20,7 @@ import numpy as np
 
 from scenario_gen.arrays import Bools, canonical_poses, Floats, frozen, Ints
 from scenario_gen.errors import InputError
+from scenario_gen.types.lanes import LaneNetwork
 
 FINEST, COARSEST = 0.001, 10.0  # metres of a cell: nothing is seen of a vehicle in larger ones
 FARTHEST = 1e8  # metres from the frame's origin: more than any geodetic grid has
@@ -37,6 +38,7 @@ class Road:
         entries: (E, 3) x, y, yaw: centre of each lane by which traffic comes in, heading into the road.
         exits: (X, 3) x, y, yaw: centre of each lane by which traffic leaves, heading out of the road.
         frame_id: the frame of all poses.
+        lanes: the lanes of a vector map that the grid was drawn from, in the same frame; None: nothing is known of lanes.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Road:
     entries: Floats
     exits: Floats
     frame_id: str = "map"
+    lanes: LaneNetwork | None = None
 
     def __post_init__(self) -> None:
         drivable = np.array(self.drivable, dtype=np.bool_, order="C")
