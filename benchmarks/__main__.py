@@ -72,6 +72,12 @@ def main() -> int:
     parser.add_argument("--list", action="store_true", help="name the benchmarks")
     parser.add_argument("--json", action="store_true", help="end with one JSON object on the last line")
     parser.add_argument("--count", type=int, help="how many, where a benchmark counts something (scenarios to re-check)")
+    parser.add_argument("--cases", type=int, help="naturalness: the first encounters alone, on the corridor, for a look")
+    parser.add_argument("--roads", help="naturalness: names of roads, separated by commas; map: the recording's own")
+    parser.add_argument("--held-out", action="store_true", default=None, help="naturalness: the encounters that are kept apart")
+    parser.add_argument("--details", help="naturalness: a file for the figures of every case, a line of JSON each")
+    parser.add_argument("--pictures", help="naturalness: a folder for pictures of the first ten cases")
+    parser.add_argument("--checkout", help="naturalness: the folder of another checkout to be measured")
     parser.add_argument("--quick", action="store_true", help="next to nothing of each, to see that it runs; figures say nothing")
     arguments = parser.parse_args()
     known = names()
@@ -85,8 +91,8 @@ def main() -> int:
         os.environ[QUICK] = "1"  # before the benchmarks are imported
     for name in known if arguments.name == "all" else [arguments.name]:
         run = importlib.import_module(f"benchmarks.{name}").run
-        counted = arguments.count is not None and "count" in inspect.signature(run).parameters
-        rows: list[Row] = run(arguments.count) if counted else run()
+        given = {key: value for key, value in vars(arguments).items() if value is not None}
+        rows: list[Row] = run(**{key: given[key] for key in inspect.signature(run).parameters if key in given})
         if arguments.json:
             report = {"benchmark": name, "quick": arguments.quick, "rows": [row.document() for row in rows], "machine": machine()}
             print(json.dumps(report, allow_nan=False), flush=True)

@@ -31,7 +31,7 @@ from msg_conventions.trajectory import Trajectory
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import guarded, InputError
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.fit import Fit, FittedVehicle, Loss
 from scenario_gen.types.scenario import BoundaryStates
 
 
@@ -97,13 +97,32 @@ def fit_statuses(fit: Fit, node: str, more: Mapping[str, str] | None = None) -> 
                 "scale": repr(fitted.scale),
                 "moved_m": json.dumps(fitted.moved.tolist()),
                 "stands": json.dumps([bool(value) for value in fitted.stands]),
+                "turned_rad": json.dumps(list(fitted.turned) if np.isfinite(fitted.turned).all() else None),
                 **(more or {}),
             },
         )
         for vehicle, fitted in zip(fit.vehicles, fit.fitted, strict=True)
     )
     notes = {f"note.{k}": note for k, note in enumerate(fit.notes)}
-    return (*per_vehicle, Status(f"{node}: fit", Level.OK, "template fitted to the road", notes | dict(more or {})))
+    lost = {f"lost.{k}": json.dumps([loss.kind, list(loss.vehicles), loss.said]) for k, loss in enumerate(fit.lost)}
+    said = f"template fitted to the road, {len(lost)} things of it are lost" if lost else "template fitted to the road"
+    level = Level.WARN if any(loss.kind != "arm" for loss in fit.lost) else Level.OK
+    return (*per_vehicle, Status(f"{node}: fit", level, said, notes | lost | dict(more or {})))
+
+
+def decode_losses(values: Mapping[str, str]) -> tuple[Loss, ...]:
+    """Return what the planner's status `fit` says is lost; nothing in bags of versions that did not say so.
+
+    Raises:
+        InputError: it is damaged.
+    """
+    found = []
+    for key, text in values.items():
+        if key.startswith("lost."):
+            with guarded(f"fit: {key} is damaged"):
+                kind, vehicles, said = json.loads(text)
+                found.append(Loss(str(kind), tuple(str(vehicle) for vehicle in vehicles), str(said)))
+    return tuple(found)
 
 
 def decode_fitted(anchors: Floats, statuses: Mapping[str, Mapping[str, str]], vehicle: str) -> FittedVehicle:
@@ -122,6 +141,8 @@ def decode_fitted(anchors: Floats, statuses: Mapping[str, Mapping[str, str]], ve
         moved = np.array(json.loads(values["moved_m"]), dtype=np.float64)
         stands = np.array(json.loads(values["stands"]), dtype=np.bool_)
         scale, manoeuvre = float(values["scale"]), values["manoeuvre"]
+        turn = json.loads(values.get("turned_rad", "null")) or (math.nan, math.nan)
+        turned = (float(turn[0]), float(turn[1]))
     if moved.shape != anchors.shape[:1] or stands.ndim != 1 or not np.isfinite(moved).all() or not 0.0 < scale < math.inf:
         raise InputError(f"fit of {vehicle}: damaged")
-    return FittedVehicle(anchors=anchors, moved=moved, stands=stands, scale=scale, manoeuvre=manoeuvre)
+    return FittedVehicle(anchors=anchors, moved=moved, stands=stands, scale=scale, manoeuvre=manoeuvre, turned=turned)

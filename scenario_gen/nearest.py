@@ -27,8 +27,8 @@ from scenario_gen.config import PipelineConfig
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError, ScenarioGenError
 from scenario_gen.fitting import fit_template
-from scenario_gen.fitting.routes import draw_route
 from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room
+from scenario_gen.roads.ways import draw_route
 from scenario_gen.routing import plan_routes
 from scenario_gen.sampling import Cancelled, OnValid, Progress, sample_scenarios
 from scenario_gen.template.interaction import Wait, waits_to_keep

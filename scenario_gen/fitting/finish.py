@@ -21,9 +21,11 @@ import numpy as np
 from scenario_gen.arrays import Bools, Floats, frozen_ints, Ints
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
+from scenario_gen.fitting.kept import find_losses
 from scenario_gen.fitting.placement import Placement
 from scenario_gen.roads.clearance import nearest_pose_with_room
-from scenario_gen.template.tracks import Track
+from scenario_gen.template.manoeuvre import turn_of
+from scenario_gen.template.tracks import clean_tracks, Track
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.road import Road
@@ -31,6 +33,7 @@ from scenario_gen.types.scenario import BoundaryStates
 from scenario_gen.types.segmentation import Segmentation
 
 _STAND_LENGTH = 0.5  # metres
+_PATH_STEP = 0.5  # metres between two poses of a fitted path
 STAND_SPEED = 0.3  # m/s: slower is standing
 
 
@@ -49,7 +52,7 @@ def finish(
     Raises:
         RefusedError: an anchor is farther than `max_move` from the nearest pose with room.
     """
-    last = encounter.speed.shape[1] - 1
+    last, tracks = encounter.speed.shape[1] - 1, clean_tracks(encounter)
     index = frozen_ints(np.concatenate(([0], segmentation.changepoints, [last])))
     notes = list(placement.notes)
     fitted, states = [], []
@@ -77,6 +80,8 @@ def finish(
                 stands=stands,
                 scale=float(placement.scale[i]),
                 manoeuvre=placement.manoeuvre[i],
+                turned=(turn_of(tracks[i]), turn_of(track)),
+                path=_path(track),
             )
         )
         ends = encounter.speed[i, [0, last]] * placement.scale[i]
@@ -86,7 +91,16 @@ def finish(
         ends = np.where(track.still, 0.0, ends)
         states.append(np.column_stack((anchors[[0, -1]], ends)))
     asked = BoundaryStates(start=np.stack([s[0] for s in states]), end=np.stack([s[1] for s in states]))
-    return Fit(encounter.vehicles, tuple(fitted), index, asked, tuple(notes))
+    lost = (*find_losses(encounter, tracks, placement), *placement.unused)
+    return Fit(encounter.vehicles, tuple(fitted), index, asked, tuple(notes), lost)
+
+
+def _path(track: Track) -> Floats:
+    """(M, 3) the placed path from start to end."""
+    if track.still:
+        return track.curve.points[:1]
+    first, last = float(track.progress[0]), float(track.progress[-1])
+    return track.curve.at(np.linspace(first, last, max(int(np.ceil((last - first) / _PATH_STEP)), 1) + 1))
 
 
 def _stands(track: Track, index: Ints) -> Bools:

@@ -25,8 +25,8 @@ from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.fitting.finish import STAND_SPEED
 from scenario_gen.fitting.placement import check_scale, max_repair, Placement, share_with_room
-from scenario_gen.fitting.routes import draw_route
 from scenario_gen.roads.clearance import footprint_fits
+from scenario_gen.roads.ways import draw_route
 from scenario_gen.template.separation import own_paths
 from scenario_gen.template.tracks import clean_tracks, Track
 from scenario_gen.types.encounter import Encounter

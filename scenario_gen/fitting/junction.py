@@ -29,8 +29,8 @@ from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.fitting.placement import check_scale, Equation, equations, find_relations, Placement, Relation, separated
-from scenario_gen.fitting.routes import draw_route, draw_u_turn
 from scenario_gen.roads.clearance import footprint_fits
+from scenario_gen.roads.ways import draw_route, draw_u_turn
 from scenario_gen.template.tracks import Track
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.road import Road

@@ -15,7 +15,7 @@
 """A placement of a template on a road, its scale, and whether it keeps who comes from which side."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -29,6 +29,7 @@ from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room
 from scenario_gen.template.path_crossing import path_crossing
 from scenario_gen.template.separation import separate
 from scenario_gen.template.tracks import Track
+from scenario_gen.types.fit import Loss
 from scenario_gen.types.road import Road
 
 
@@ -42,6 +43,7 @@ class Placement:
         manoeuvre: what each vehicle does on the road.
         moved: (N,) metres by which whole paths were shifted to keep vehicles apart.
         notes: what was decided, in sentences.
+        unused: arms of the road that nobody uses.
     """
 
     tracks: tuple[Track, ...]
@@ -49,6 +51,7 @@ class Placement:
     manoeuvre: tuple[str, ...]
     moved: Floats
     notes: tuple[str, ...]
+    unused: tuple[Loss, ...] = ()
 
 
 def check_scale(scale: float, what: str, config: FittingConfig) -> None:
@@ -66,10 +69,9 @@ def check_scale(scale: float, what: str, config: FittingConfig) -> None:
 def separated(placement: Placement, config: FittingConfig, *, sideways: float) -> Placement:
     """Shift vehicles that come too close on this road, as little as possible."""
     separation = separate(placement.tracks, config.clearance, config.max_move, sideways=sideways)
-    return Placement(
+    return replace(
+        placement,
         tracks=separation.tracks,
-        scale=placement.scale,
-        manoeuvre=placement.manoeuvre,
         moved=placement.moved + separation.moved,
         notes=(*placement.notes, *separation.notes),
     )

@@ -436,10 +436,11 @@ class Namespace:
                 for poses, vehicle in zip(anchors, encounter.vehicles, strict=True)
             )
             routes = tuple(route for _, _, route in decode_routes(messages, encounter, stamps))
+            lost = fits.decode_losses(self.statuses.get("fit", {}))
         except InputError:
             return None, ()
         notes = tuple(text for key, text in self.statuses.get("fit", {}).items() if key.startswith("note."))
-        return Fit(encounter.vehicles, fitted, anchor_index(encounter, changepoints), asked, notes), routes
+        return Fit(encounter.vehicles, fitted, anchor_index(encounter, changepoints), asked, notes, lost), routes
 
 
 def read_scenario_set(path: Path, namespace: str = "", config: BagConfig = BagConfig()) -> ScenarioSet:

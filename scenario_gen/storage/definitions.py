@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Message definitions and type hashes, from rosbags' Jazzy type store or from an installed package's .msg files."""
+"""Message definitions and type hashes: rosbags' Jazzy type store, Autoware's by definition, or an installed package's .msg files."""
 
 from functools import cache
 import os
@@ -22,11 +22,16 @@ from typing import Any
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 
 from scenario_gen.errors import InputError
+from scenario_gen.storage.autoware import DEFINITIONS
 
 
 @cache
-def _store() -> Any:
-    return get_typestore(Stores.ROS2_JAZZY)
+def type_store() -> Any:
+    """Return rosbags' store of Jazzy's types and Autoware's, which decodes messages of them."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for kind, text in DEFINITIONS.items():
+        store.register(get_types_from_msg(text, kind))
+    return store
 
 
 def _register_installed(kind: str) -> None:
@@ -39,7 +44,7 @@ def _register_installed(kind: str) -> None:
         raise InputError(
             f"message type {kind} is unknown: no {package}/msg/{name}.msg on AMENT_PREFIX_PATH; source its workspace"
         )
-    store = _store()
+    store = type_store()
     types = get_types_from_msg(found.read_text(encoding="utf-8"), kind)
     for _constants, fields in types.values():
         for _field, (node, what) in fields:
@@ -51,12 +56,12 @@ def _register_installed(kind: str) -> None:
 
 @cache
 def definition(kind: str) -> tuple[str, str]:
-    """Return the full ros2msg definition text of a type, nested types included, and its RIHS01 hash.
+    """Return the full ros2msg definition text of a type, nested types included, and its RIHS01 hash (REP 2011).
 
     Raises:
         InputError: the type is neither a standard one nor installed.
     """
-    store = _store()
+    store = type_store()
     if kind not in store.fielddefs:
         _register_installed(kind)
     text, _ = store.generate_msgdef(kind, ros_version=2)

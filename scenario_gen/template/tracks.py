@@ -21,16 +21,17 @@ that weighs a path hard to drive least badly against one far from the record. St
 phases collapse to a point, time enters only through u(t), and no sample turns back.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 import math
 
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats, frozen, wrap_angle
+from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.curve import Curve
 from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
+from scenario_gen.types.presence import ALWAYS
 
 _WAVELENGTHS = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)  # metres at which the filter halves an oscillation
 _MAX_CURVATURE = 0.17  # 1/m
@@ -53,6 +54,7 @@ class Track:
         speed: (T,) m/s, as recorded.
         still: True if it stands throughout.
         deviation: largest distance [m] from a recorded position to the cleaned one.
+        present: (2,) first and last sample at which it is there; before and after, progress and speed are those at these.
     """
 
     vehicle: Vehicle
@@ -61,6 +63,11 @@ class Track:
     speed: Floats
     still: bool
     deviation: float
+    present: Ints = field(default_factory=lambda: ALWAYS[:0, 0])
+
+    def __post_init__(self) -> None:
+        if len(self.present) != 2:
+            object.__setattr__(self, "present", frozen_ints([0, len(self.progress) - 1]))
 
     @property
     def travelled(self) -> float:
@@ -102,12 +109,25 @@ def clean_tracks(encounter: Encounter) -> tuple[Track, ...]:
 
 
 def _clean(encounter: Encounter, i: int) -> Track:
-    position, speed = encounter.position[i], encounter.speed[i]
+    """Clean one vehicle's motion while it is there."""
+    first, last = encounter.present[i].tolist()
+    there = slice(first, last + 1)
+    before, after = first, encounter.speed.shape[1] - 1 - last
+    track = _cleaned(encounter, i, encounter.position[i, there], encounter.heading[i, there], encounter.speed[i, there])
+    return replace(
+        track,
+        progress=frozen(np.pad(track.progress, (before, after), mode="edge")),
+        speed=encounter.speed[i],
+        present=frozen_ints([first, last]),
+    )
+
+
+def _cleaned(encounter: Encounter, i: int, position: Floats, heading: Floats, speed: Floats) -> Track:
     claimed = np.concatenate(([0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 * encounter.dt)))
     spread = float(exact.hypot(*np.ptp(position, axis=0)))
     if claimed[-1] < _STILL or spread < _STILL:
         centre = position.mean(axis=0)
-        yaw = float(exact.arctan2(exact.sin(encounter.heading[i]).mean(), exact.cos(encounter.heading[i]).mean()))
+        yaw = float(exact.arctan2(exact.sin(heading).mean(), exact.cos(heading).mean()))
         curve = Curve(np.array([[*centre, yaw], [centre[0] + exact.cos(yaw), centre[1] + exact.sin(yaw), yaw]]))
         deviation = float(exact.hypot(*(position - centre).T).max())
         return Track(encounter.vehicles[i], curve, frozen(np.zeros(len(speed))), speed, True, deviation)
@@ -133,9 +153,7 @@ def _clean(encounter: Encounter, i: int) -> Track:
         curve = _eased(curve)
         progress = share * curve.length
         deviation = float(exact.hypot(*(curve.at(progress)[:, :2] - position).T).max())
-    return Track(
-        encounter.vehicles[i], _aligned(curve, encounter.heading[i], speed, progress), frozen(progress), speed, False, deviation
-    )
+    return Track(encounter.vehicles[i], _aligned(curve, heading, speed, progress), frozen(progress), speed, False, deviation)
 
 
 def _eased(curve: Curve) -> Curve:

@@ -15,15 +15,16 @@
 """An encounter: N vehicles near each other on one clock (paper II-A, eqs 1-2)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from scenario_gen.arrays import canonical_heading, Floats, frozen
+from scenario_gen.arrays import Bools, canonical_heading, Floats, frozen, Ints
 from scenario_gen.errors import InputError
+from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
 
 Derived = TypeVar("Derived")
 
@@ -50,6 +51,8 @@ class Tracks:
         heading: (N, T) rad, counter-clockwise from east, continuous in time (unwrapped).
         speed: (N, T) m/s, >= 0.
         origin: (latitude, longitude) in degrees of the frame's origin, or None if the log came in metres.
+        present: (N, 2) first and last sample at which each vehicle is there; outside of it the arrays hold the nearest value
+            inside, which says nothing of where the vehicle is. Default: everybody throughout.
     """
 
     name: str
@@ -60,6 +63,7 @@ class Tracks:
     heading: Floats
     speed: Floats
     origin: tuple[float, float] | None = None
+    present: Ints = field(default_factory=lambda: ALWAYS)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position", frozen(self.position))
@@ -77,6 +81,14 @@ class Tracks:
         ids = [vehicle.id for vehicle in self.vehicles]
         if len(set(ids)) != n:
             raise InputError(f"encounter {self.name!r}: vehicle ids are not unique: {', '.join(ids)}")
+        object.__setattr__(self, "present", canonical_presence(self.present, n, t, f"encounter {self.name!r}"))
+        if self.present[:, 0].min() > 0 or self.present[:, 1].max() < t - 1:
+            raise InputError(
+                f"encounter {self.name!r}: nobody is present at its first or at its last sample; cut it to its vehicles"
+            )
+        if not always(self.present, t):
+            for name in ("position", "heading", "speed"):
+                object.__setattr__(self, name, frozen(held(getattr(self, name), self.present)))
 
     @property
     def dt(self) -> float:
@@ -92,6 +104,16 @@ class Tracks:
     def duration(self) -> float:
         """Seconds from the first to the last sample."""
         return float(self.time[-1])
+
+    @property
+    def all_present(self) -> bool:
+        """Whether every vehicle is there throughout."""
+        return always(self.present, self.speed.shape[1])
+
+    @cached_property
+    def there(self) -> Bools:
+        """(N, T) whether each vehicle is there at each sample."""
+        return mask(self.present, self.speed.shape[1])
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the fitting answers: where every changepoint stands on the road."""
+"""What the fitting answers: where every changepoint stands on the road, and what of the template's interaction is lost there."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from scenario_gen.arrays import Bools, canonical_poses, Floats, frozen, Ints
 from scenario_gen.types.encounter import Vehicle
@@ -31,6 +33,8 @@ class FittedVehicle:
         stands: (K + 1,) True for the primitives during which the vehicle stands: a dwell, no path.
         scale: factor s of eq 9, template lengths -> road lengths.
         manoeuvre: "straight", "left", "right", "wait" (or "own path" where the template's own path is kept).
+        turned: how far [rad, left positive] the vehicle turns in the template and on the road; NaN where it is not known.
+        path: (M, 3) x, y, yaw of the fitted path from start to end, at most 0.5 m apart; no row where it is not known (a bag).
     """
 
     anchors: Floats
@@ -38,10 +42,28 @@ class FittedVehicle:
     stands: Bools
     scale: float
     manoeuvre: str
+    turned: tuple[float, float] = (float("nan"), float("nan"))
+    path: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "anchors", canonical_poses(self.anchors))
         object.__setattr__(self, "moved", frozen(self.moved))
+        object.__setattr__(self, "path", frozen(self.path))
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Something of the template's interaction that the fitted motion has not, or has otherwise.
+
+    Attributes:
+        kind: "turn", "conflict", "new conflict", "order", "beside" or "arm" (an arm of the road that nobody uses).
+        vehicles: ids of whom it concerns.
+        said: a sentence, with figures.
+    """
+
+    kind: str
+    vehicles: tuple[str, ...]
+    said: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +76,7 @@ class Fit:
         anchor_index: (K + 2,) sample index in the template of each anchor (0, changepoints, T - 1).
         asked: start and end states asked of every scenario (after repair).
         notes: what was decided, in sentences (an entry chosen and why, an anchor moved by how much).
+        lost: what of the template's turns, conflicts and neighbours is lost on this road; none where nothing is.
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -61,3 +84,4 @@ class Fit:
     anchor_index: Ints
     asked: BoundaryStates
     notes: tuple[str, ...]
+    lost: tuple[Loss, ...] = ()

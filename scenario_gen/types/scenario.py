@@ -21,8 +21,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from scenario_gen.arrays import canonical_heading, canonical_poses, Floats, frozen
+from scenario_gen.arrays import Bools, canonical_heading, canonical_poses, Floats, frozen, Ints
 from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +42,7 @@ class Scenario:
         acceleration: (N, T) m/s², longitudinal.
         seed: the request's seed; index: the sample's number within the request.
         frame_id: the road's frame.
+        present: (N, 2) first and last instant at which each vehicle is there, as in `Tracks`; default: everybody throughout.
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -52,17 +54,33 @@ class Scenario:
     seed: int = 0
     index: int = 0
     frame_id: str = "map"
+    present: Ints = field(default_factory=lambda: ALWAYS)
 
     def __post_init__(self) -> None:
         for name in ("position", "speed", "acceleration"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
         object.__setattr__(self, "time", frozen(np.round(self.time, 9)))  # whole nanoseconds, as on the wire
         object.__setattr__(self, "heading", canonical_heading(self.heading))
+        n, t = len(self.vehicles), len(self.time)
+        object.__setattr__(self, "present", canonical_presence(self.present, n, t, f"scenario {self.index}"))
+        if not always(self.present, t):
+            for name in ("position", "heading", "speed", "acceleration"):
+                object.__setattr__(self, name, frozen(held(getattr(self, name), self.present)))
+
+    @property
+    def all_present(self) -> bool:
+        """Whether every vehicle is there throughout."""
+        return always(self.present, len(self.time))
+
+    @property
+    def there(self) -> Bools:
+        """(N, T) whether each vehicle is there at each instant."""
+        return mask(self.present, len(self.time))
 
 
 @dataclass(frozen=True, eq=False)
 class BoundaryStates:
-    """What was asked of the start and the end: (N, 4) each, columns x [m], y [m], yaw [rad], speed [m/s]."""
+    """What was asked of each vehicle's first and last instant: (N, 4) each, columns x [m], y [m], yaw [rad], speed [m/s]."""
 
     start: Floats
     end: Floats

@@ -1,0 +1,177 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Generation for the naturalness benchmark: recorded and generated motion of one encounter on some roads, as plain arrays.
+
+Only names that every version since 665a212 has are used, and nothing of `benchmarks`: run as a script, with another checkout
+on PYTHONPATH, it measures that one. It then reads jobs as JSON from stdin and pickles what they came to, one after another,
+to stdout.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+import json
+import os
+from pathlib import Path
+import pickle
+import subprocess
+import sys
+from time import process_time
+from typing import Any
+
+Arrays = dict[str, Any]
+"""`position` (N, T, 2) [m], `heading` (N, T) [rad], `speed` (N, T) [m/s], `time` (T,) [s]."""
+EVALUATED = ("e_position", "e_speed", "e_heading")
+SEED = 7
+
+
+@dataclass(frozen=True)
+class Job:
+    """One encounter: where it is read from, the roads it is put on, and how many scenarios are made on each."""
+
+    name: str
+    paths: tuple[str, ...]
+    vehicles: tuple[str, ...]
+    start: float
+    end: float
+    roads: tuple[str, ...]
+    own: tuple[bool, ...]
+    count: int
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """What came of a job on one road.
+
+    Attributes:
+        name: of the cut; road: its name; own: whether the road is the template's own (corridor, or the map of the recording).
+        refused: why there is nothing, or "".
+        template: the cleaned record; oracle: the fitted template replayed; samples: the scenarios.
+        sizes: (length, width) [m] of the vehicles.
+        changepoints: K.
+        manoeuvres: of the vehicles, as the fit names them.
+        candidates: drawn for the samples; asked: samples that were asked for.
+        seconds: CPU of the whole of it, with references and evaluation.
+        errors: E by row and metric.
+        said: adaptations and notes of the fit.
+    """
+
+    name: str
+    road: str
+    own: bool
+    refused: str = ""
+    template: Arrays | None = None
+    oracle: Arrays | None = None
+    samples: Sequence[Arrays] = ()
+    sizes: Sequence[tuple[float, float]] = ()
+    changepoints: int = 0
+    manoeuvres: Sequence[str] = ()
+    candidates: int = 0
+    asked: int = 0
+    seconds: float = 0.0
+    errors: dict[str, dict[str, float]] | None = None
+    said: Sequence[str] = ()
+
+
+def made_by(jobs: Sequence[Job], checkout: Path | None = None) -> Iterator[Made]:
+    """Run jobs, with this checkout's code or with another's."""
+    if checkout is None:
+        for job in jobs:
+            yield from run(job)
+        return
+    command = [sys.executable, "-c", f"import runpy; runpy.run_path({str(Path(__file__))!r}, run_name='__main__')"]
+    environment = os.environ | {"PYTHONPATH": str(checkout)}
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, cwd=checkout) as process:
+        if process.stdin is None or process.stdout is None:
+            raise RuntimeError("no pipes")
+        process.stdin.write(json.dumps([vars(job) for job in jobs]).encode())
+        process.stdin.close()
+        while (told := process.stdout.readline()).strip():
+            yield Made(**pickle.loads(process.stdout.read(int(told))))
+        if process.wait():
+            raise RuntimeError(f"{checkout}: generation ended with code {process.returncode}")
+
+
+def run(job: Job) -> Iterator[Made]:
+    """Read the encounter and put it on each of its roads."""
+    from scenario_gen.errors import ScenarioGenError
+    from scenario_gen.logs import LogConfig, read_log
+
+    config = LogConfig(vehicles=",".join(job.vehicles), start=job.start, end=job.end)
+    try:
+        found = read_log([Path(path) for path in job.paths], config).encounters
+    except ScenarioGenError as error:
+        for road, own in zip(job.roads, job.own, strict=True):
+            yield Made(job.name, Path(road).stem, own, str(error))
+        return
+    encounter = max(found, key=lambda one: one.duration)
+    for road, own in zip(job.roads, job.own, strict=True):
+        yield generated(job.name, encounter, road, job.count, own=own)
+
+
+def generated(name: str, encounter: Any, road: str, count: int, *, own: bool) -> Made:
+    """Put one encounter on one road."""
+    from scenario_gen.errors import ScenarioGenError
+    from scenario_gen.evaluation import EvaluationConfig
+    from scenario_gen.pipeline import generate, PipelineConfig
+
+    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
+    started = process_time()
+    try:
+        made: Any = generate(encounter, road, config, count=count, seed=SEED)
+    except ScenarioGenError as error:
+        return Made(name, Path(road).stem, own, str(error), template=arrays(encounter))
+    drawn = made.generated if hasattr(made, "generated") else made.with_changepoints
+    rows = {row.name: {key: made.evaluation.value(row.name, key) for key in EVALUATED} for row in made.evaluation.rows}
+    return Made(
+        name,
+        Path(road).stem,
+        own,
+        "" if len(drawn.scenarios) > 1 else f"{len(drawn.scenarios)} scenarios: {dict(drawn.refused)}",
+        template=arrays(encounter),
+        oracle=arrays(made.oracle),
+        samples=[arrays(scenario) for scenario in drawn.scenarios],
+        sizes=[(vehicle.length, vehicle.width) for vehicle in encounter.vehicles],
+        changepoints=len(made.segmentation.changepoints),
+        manoeuvres=[str(fitted.manoeuvre) for fitted in made.fit.fitted],
+        candidates=int(drawn.candidates),
+        asked=count,
+        seconds=process_time() - started,
+        errors=rows,
+        said=[*map(str, drawn.adaptations), *map(str, made.fit.notes)],
+    )
+
+
+def arrays(motion: Any) -> Arrays:
+    """Return the motion of an encounter or a scenario as plain arrays."""
+    import numpy as np
+
+    return {name: np.array(getattr(motion, name)) for name in ("time", "position", "heading", "speed")}
+
+
+def main() -> None:
+    """Run the jobs of stdin."""
+    out = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what else is printed goes to stderr
+    for row in json.load(sys.stdin):
+        for made in run(Job(**row)):
+            data = pickle.dumps(vars(made))
+            out.write(f"{len(data)}\n".encode())
+            out.write(data)
+            out.flush()
+    out.close()
+
+
+if __name__ == "__main__":
+    main()

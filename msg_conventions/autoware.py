@@ -1,0 +1,125 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Scenario → Autoware's perception and localization outputs (docs/exchange.md has the source of each topic and frame).
+
+PredictedObjects on `/perception/object_recognition/objects`, TrackedObjects on `/perception/object_recognition/tracking/objects`:
+frame: the road's; each object is posed at its shape's centre, z = half its height; twist and acceleration in its own frame; its id
+is the first 16 bytes of the SHA-256 of the vehicle's id. The one predicted path is what the vehicle will do, each `STEP_NS` up to
+`HORIZON_NS` ahead or the end. Odometry of the ego on `/localization/kinematic_state`: frame: the road's, child frame
+`base_link`, the middle of the rear axle on the ground. Covariances are 0: what is said is true. QoS: reliable, volatile, depth 1.
+"""
+
+import hashlib
+
+import numpy as np
+
+from msg_conventions.cdr import CdrWriter
+from msg_conventions.roads import pose_rows
+from scenario_gen.arrays import Floats
+from scenario_gen.types.body import height, is_truck, rear_axle, shifted
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.qos import Quality
+from scenario_gen.types.scenario import Scenario
+
+OBJECTS, TRACKS = "/perception/object_recognition/objects", "/perception/object_recognition/tracking/objects"
+EGO, BASE_LINK = "/localization/kinematic_state", "base_link"
+QUALITY = Quality(depth=1, transient_local=False)
+STEP_NS, HORIZON_NS = 500_000_000, 10_000_000_000
+CAR, TRUCK = 1, 2  # labels of ObjectClassification
+BOUNDING_BOX = 0  # type of Shape
+ORIENTATION_KNOWN = 2  # TrackedObjectKinematics.AVAILABLE
+_NO_COVARIANCE = bytes(36 * 8)
+
+
+def uuid_of(vehicle: Vehicle) -> bytes:
+    """Return the 16 bytes that stand for a vehicle in every message."""
+    return hashlib.sha256(vehicle.id.encode()).digest()[:16]
+
+
+class AutowareEncoder:
+    """Encodes a scenario's instants, one after the other."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Take the scenario; its poses and yaw rates are made ready once."""
+        self.scenario = scenario
+        self.yaw_rate = np.zeros_like(scenario.heading)
+        self.time_ns = np.rint(scenario.time * 1e9).astype(np.int64)
+        self.poses = np.stack([_poses(scenario, n) for n in range(len(scenario.vehicles))])
+        for n, (first, last) in enumerate(scenario.present.tolist()):
+            there = slice(first, last + 1)
+            self.yaw_rate[n, there] = np.gradient(scenario.heading[n, there], scenario.time[there])
+
+    def there(self, k: int) -> list[int]:
+        """Return the vehicles that are present at instant `k`."""
+        return [n for n, (first, last) in enumerate(self.scenario.present.tolist()) if first <= k <= last]
+
+    def predicted_objects(self, k: int, stamp_ns: int) -> bytes:
+        """Return instant `k` as PredictedObjects."""
+        here = self.there(k)
+        writer = CdrWriter().header(stamp_ns, self.scenario.frame_id).pack("I", len(here))
+        for n in here:
+            self._object(writer, n, k)
+            path = self.poses[n, self._ahead(n, k)]
+            writer.pack("I", 1).pack("I", len(path)).align(8).raw(path.tobytes()).stamp(STEP_NS).pack("f", 1.0)
+            self._shape(writer, n)
+        return writer.finish()
+
+    def tracked_objects(self, k: int, stamp_ns: int) -> bytes:
+        """Return instant `k` as TrackedObjects."""
+        here = self.there(k)
+        writer = CdrWriter().header(stamp_ns, self.scenario.frame_id).pack("I", len(here))
+        for n in here:
+            self._object(writer, n, k)
+            writer.pack("B", ORIENTATION_KNOWN, int(self.scenario.speed[n, k] == 0.0))
+            self._shape(writer, n)
+        return writer.finish()
+
+    def odometry(self, k: int, stamp_ns: int, n: int = 0) -> bytes:
+        """Return vehicle `n` at instant `k` as the ego's Odometry."""
+        scenario = self.scenario
+        axle = shifted(scenario.position[n, k], scenario.heading[n, k], -rear_axle(scenario.vehicles[n]))
+        writer = CdrWriter().header(stamp_ns, scenario.frame_id).string(BASE_LINK)
+        writer.pack("d", *pose_rows(np.array([[*axle, scenario.heading[n, k]]]))[0]).raw(_NO_COVARIANCE)
+        return self._twist(writer, n, k).finish()
+
+    def _ahead(self, n: int, k: int) -> list[int]:
+        """Return the instants of the predicted path from `k` on: those at whole steps, while the vehicle is there."""
+        last = int(self.scenario.present[n, 1])
+        wanted = np.arange(self.time_ns[k], min(self.time_ns[last], self.time_ns[k] + HORIZON_NS) + 1, STEP_NS)
+        at = np.minimum(np.searchsorted(self.time_ns, wanted), last)
+        return list(map(int, at))
+
+    def _object(self, writer: CdrWriter, n: int, k: int) -> None:
+        """Append id, existence, class and kinematics."""
+        vehicle = self.scenario.vehicles[n]
+        writer.raw(uuid_of(vehicle)).pack("f", 1.0).pack("I", 1).pack("B", TRUCK if is_truck(vehicle) else CAR).pack("f", 1.0)
+        writer.pack("d", *self.poses[n, k]).raw(_NO_COVARIANCE)
+        self._twist(writer, n, k)
+        writer.pack("d", float(self.scenario.acceleration[n, k]), *[0.0] * 5).raw(_NO_COVARIANCE)
+
+    def _twist(self, writer: CdrWriter, n: int, k: int) -> CdrWriter:
+        speed, rate = float(self.scenario.speed[n, k]), float(self.yaw_rate[n, k])
+        return writer.pack("d", speed, 0.0, 0.0, 0.0, 0.0, rate).raw(_NO_COVARIANCE)
+
+    def _shape(self, writer: CdrWriter, n: int) -> None:
+        vehicle = self.scenario.vehicles[n]
+        writer.pack("B", BOUNDING_BOX).pack("I", 0).pack("d", vehicle.length, vehicle.width, height(vehicle))
+
+
+def _poses(scenario: Scenario, n: int) -> Floats:
+    """Return (T, 7) poses of a vehicle's shape, as on the wire."""
+    rows = pose_rows(np.column_stack([scenario.position[n], scenario.heading[n]]))
+    rows[:, 2] = height(scenario.vehicles[n]) / 2.0
+    return np.ascontiguousarray(rows)

@@ -1,0 +1,133 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Is the manoeuvre kept? Turns, conflicts, who goes first and who is beside whom, of template and fit, over whole paths."""
+
+from itertools import combinations
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Bools, Floats, Ints, wrap_angle
+from scenario_gen.errors import RefusedError
+from scenario_gen.fitting.placement import Placement
+from scenario_gen.template.interaction import Conflict, find_conflicts
+from scenario_gen.template.manoeuvre import in_words, keeps, turn_of
+from scenario_gen.template.tracks import Track
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.fit import Loss
+
+_LONG = 1.0  # s side by side that count
+_NEAREST, _FARTHEST = 1.0, 6.0  # metres sideways between centres of two vehicles that are beside each other
+_SAME_WAY = np.radians(30.0)
+_ENOUGH = 0.5  # share of that time in which they are beside each other on the road, on the same side
+
+
+def refuse_lost_turns(tracks: tuple[Track, ...], placed: tuple[Track, ...], road: str) -> None:
+    """Refuse a placement on which a vehicle does another manoeuvre than in the template.
+
+    Raises:
+        RefusedError: one turns more than 25° differently, or otherwise; with both figures.
+    """
+    for track, other in zip(tracks, placed, strict=True):
+        template, there = turn_of(track), turn_of(other)
+        if not keeps(template, there):
+            raise RefusedError(
+                f"vehicle {track.vehicle.id} {in_words(template)} in the template, and would on road {road} {_otherwise(there)}"
+            )
+
+
+def _otherwise(turn: float) -> str:
+    """As `in_words`, after "would"."""
+    verb, rest = in_words(turn).split(" ", 1)
+    return f"{verb.removesuffix('es') if verb == 'goes' else verb.removesuffix('s')} {rest}"
+
+
+def find_losses(encounter: Encounter, tracks: tuple[Track, ...], placement: Placement) -> tuple[Loss, ...]:
+    """What of the template's interaction the placed motion has not, or has otherwise.
+
+    Args:
+        encounter: the template.
+        tracks: its N cleaned tracks.
+        placement: where they are on the road, sample by sample.
+    """
+    poses = np.stack([track.poses for track in placement.tracks])
+    turns = [
+        Loss("turn", (track.vehicle.id,), f"vehicle {track.vehicle.id} {in_words(a)} in the template, {in_words(b)} on this road")
+        for track, a, b in ((t, turn_of(t), turn_of(p)) for t, p in zip(tracks, placement.tracks, strict=True))
+        if not keeps(a, b)
+    ]
+    own = np.concatenate((encounter.position, encounter.heading[..., None]), axis=-1)
+    return (*turns, *_lost_conflicts(encounter, poses), *_lost_neighbours(encounter, own, poses))
+
+
+def _lost_conflicts(encounter: Encounter, poses: Floats) -> list[Loss]:
+    vehicles, time = encounter.vehicles, encounter.time
+    before = _by_pair(find_conflicts(vehicles, time, encounter.position, encounter.heading))
+    after = _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2]))
+    lost = []
+    for pair in sorted(before.keys() | after.keys()):
+        a, b = (vehicles[k].id for k in pair)
+        if pair not in after:
+            kind = "follow each other" if before[pair].following else "have crossing or merging paths"
+            lost.append(Loss("conflict", (a, b), f"vehicles {a} and {b} {kind} in the template, and do not meet on this road"))
+        elif pair not in before:
+            lost.append(
+                Loss("new conflict", (a, b), f"vehicles {a} and {b} come into conflict on this road, not in the template")
+            )
+        elif before[pair].first != after[pair].first and not before[pair].following:
+            first, second = vehicles[before[pair].first].id, vehicles[before[pair].second].id
+            late = abs(after[pair].entry_second - after[pair].entry_first)
+            lost.append(
+                Loss("order", (a, b), f"vehicle {first} goes before {second} in the template, {late:.1f} s after it on this road")
+            )
+    return lost
+
+
+def _by_pair(conflicts: tuple[Conflict, ...]) -> dict[tuple[int, int], Conflict]:
+    return {(min(c.first, c.second), max(c.first, c.second)): c for c in conflicts}
+
+
+def _lost_neighbours(encounter: Encounter, own: Floats, poses: Floats) -> list[Loss]:
+    lost = []
+    for i, j in combinations(range(len(own)), 2):
+        reach = (encounter.vehicles[i].length + encounter.vehicles[j].length) / 2.0
+        before = _side(own[i], own[j], reach)
+        for side, word in ((1, "left"), (-1, "right")):
+            there: Bools = before == side
+            seconds = float(there.sum()) * encounter.dt
+            if seconds < _LONG:
+                continue
+            kept = float((_side(poses[i], poses[j], reach)[there] == side).mean())
+            if kept < _ENOUGH:
+                a, b = encounter.vehicles[i].id, encounter.vehicles[j].id
+                lost.append(
+                    Loss(
+                        "beside",
+                        (a, b),
+                        f"vehicle {b} is to the {word} of {a} for {seconds:.1f} s in the template, "
+                        f"for {kept * seconds:.1f} s of these on this road",
+                    )
+                )
+    return lost
+
+
+def _side(one: Floats, other: Floats, reach: float) -> Ints:
+    """(T,) 1 where `other` (T, 3) is to the left of `one`, side by side and the same way, -1 to the right, 0 elsewhere."""
+    d = other[:, :2] - one[:, :2]
+    cos, sin = exact.cos(one[:, 2]), exact.sin(one[:, 2])
+    ahead, left = d[:, 0] * cos + d[:, 1] * sin, d[:, 1] * cos - d[:, 0] * sin
+    same = np.abs(wrap_angle(other[:, 2] - one[:, 2])) < _SAME_WAY
+    beside = same & (np.abs(ahead) < reach) & (np.abs(left) > _NEAREST) & (np.abs(left) < _FARTHEST)
+    return np.where(beside, np.sign(left), 0.0).astype(np.int64)

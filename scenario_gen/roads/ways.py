@@ -1,0 +1,197 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Ways across a road, from a lane in to a lane out: a line, a bend whose curvature is continuous, a line.
+
+The bend is a clothoid, an arc and a clothoid. Its curvature is the one that the caller asks for, the template's own; where the
+road has no room for that, gentler and tighter ones are tried in turn. So a route drives as the recorded vehicle did.
+"""
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, frozen, wrap_angle
+from scenario_gen.curve import Curve
+
+Fits = Callable[[Floats], bool]
+
+_STEP = 0.25  # metres
+_PARALLEL = np.radians(8.0)
+_BLENDED = np.radians(35.0)  # a turn by up to this can also be made while changing to the line of the exit
+_RAMP = 1.0 / 3.0  # share of a bend's length on which its curvature rises, and falls again
+_SHORT_RAMP = 0.12
+_TIGHTEST = 0.2  # 1/m
+_LADDER = (1.0, 0.8, 1.25, 0.64, 1.56, 0.5, 1.95, 2.4)  # times the curvature asked for
+_PLAIN = 0.09  # 1/m, where nothing is known of the vehicle
+_LAST = (0.13, 0.155, 0.18, _TIGHTEST)  # 1/m, with short ramps: what a car can just drive
+_STEEPEST_SHIFT = 0.05  # 1/m, curvature of a change of lanes on the way
+_WIDEST_SHIFT = 12.0  # metres sideways
+_TIGHTEST_U_TURN = 6.0  # metres
+
+
+def draw_route(entry: Floats, leave: Floats, fits: Fits, sharpness: float | None = None) -> Curve | None:
+    """The way from an entry pose (3,) x, y [m], yaw [rad] to an exit pose, or None if `fits` allows none.
+
+    Args:
+        entry: where it begins.
+        leave: where it ends.
+        fits: whether poses (M, 3) have room.
+        sharpness: curvature [1/m] that its bend should have.
+
+    Source: clothoid, arc, clothoid, as roads are laid out.
+    """
+    turn = float(wrap_angle(np.asarray(leave[2] - entry[2])))
+    ahead, left = relative(entry, leave[:2])
+    if abs(turn) < _PARALLEL:
+        return _accepted(_beside(entry, ahead, left, turn), fits) if ahead > 1.0 else None
+    if abs(turn) > np.pi - _PARALLEL:
+        return None  # a U-turn: where along the road is for the template to say, see draw_u_turn
+    along_exit = left / exact.sin(turn)  # from the lines' intersection to the exit
+    along_entry = ahead - along_exit * exact.cos(turn)
+    wanted = sharpness or _PLAIN
+    for curvature, ramp in (*((factor * wanted, _RAMP) for factor in _LADDER), *((last, _SHORT_RAMP) for last in _LAST)):
+        if curvature > _TIGHTEST:
+            continue
+        bend = _bend(round(turn, 9), round(curvature, 9), ramp)
+        tangent = float(bend[-1, 1]) / exact.sin(turn)
+        if tangent <= min(along_entry, along_exit) - 0.5:
+            route = _accepted(_joined(entry, along_entry - tangent, bend, along_exit - tangent), fits)
+            if route is not None:
+                return route
+    if abs(turn) < _BLENDED and ahead > 1.0:
+        return _accepted(_beside(entry, ahead, left, turn), fits)
+    return None
+
+
+def draw_u_turn(entry: Floats, leave: Floats, apex: float, fits: Fits) -> Curve | None:
+    """The route between two poses (3,) that drives `apex` metres, makes a half circle and leaves by the lane beside it."""
+    turn = float(wrap_angle(np.asarray(leave[2] - entry[2])))
+    ahead, left = relative(entry, leave[:2])
+    radius = abs(left) / 2.0
+    if abs(turn) < np.pi - _PARALLEL or radius < _TIGHTEST_U_TURN or apex - ahead <= 1.0 or apex <= 1.0:
+        return None
+    half = np.copysign(np.pi, left)
+    angle = np.linspace(0.0, half, int(np.ceil(np.pi * radius / _STEP)) + 1)
+    signed = np.copysign(radius, left)
+    arc = np.column_stack((signed * exact.sin(angle), signed * (1.0 - exact.cos(angle)), angle))
+    return _accepted(_joined(entry, apex, arc, apex - ahead), fits)
+
+
+def relative(pose: Floats, xy: Floats) -> tuple[float, float]:
+    """How far [m] `xy` (2,) lies ahead and to the left of a pose (3,)."""
+    d = xy - pose[:2]
+    cos, sin = exact.cos(pose[2]), exact.sin(pose[2])
+    return float(d[0] * cos + d[1] * sin), float(d[1] * cos - d[0] * sin)
+
+
+def line_between(shape: Curve, entry: Floats, leave: Floats) -> tuple[Curve, float] | None:
+    """The line from one pose (3,) to another that goes straight on, takes the bends of `shape`, and goes straight on again.
+
+    What the shape turns too little or too much, up to 25°, is spread evenly over it.
+
+    Returns:
+        The line, and the arc length [m] on it at which the shape begins; None if the two poses are not so to each other.
+    """
+    own = float(shape.points[-1, 2] - shape.points[0, 2])
+    extra = float(wrap_angle(np.asarray(leave[2] - entry[2] - own)))
+    if abs(extra) > np.radians(25.0):
+        return None
+    bent = _bent(shape, extra)
+    turn = float(bent[-1, 2])
+    ahead, left = relative(entry, leave[:2])
+    if abs(exact.sin(turn)) < 0.05:
+        after = before = (ahead - float(bent[-1, 0])) / 2.0 if exact.cos(turn) > 0.0 else -1.0
+        if abs(left - float(bent[-1, 1]) - after * exact.sin(turn)) > 0.3:
+            return None
+    else:
+        after = (left - float(bent[-1, 1])) / exact.sin(turn)
+        before = ahead - float(bent[-1, 0]) - after * exact.cos(turn)
+    if min(before, after) < -0.05:
+        return None
+    return _joined(entry, max(before, 0.0), bent, max(after, 0.0)), max(before, 0.0)
+
+
+def _bent(shape: Curve, extra: float) -> Floats:
+    """(M, 3) the shape from the origin along x, turned by `extra` [rad] more, evenly."""
+    count = max(int(np.ceil(shape.length / _STEP)), 1)
+    s = np.linspace(0.0, shape.length, count + 1)
+    yaw = np.interp(s, shape.station, shape.points[:, 2])
+    return _integrated(yaw - yaw[0] + extra * s / shape.length, shape.length / count)
+
+
+def _integrated(yaw: Floats, step: float) -> Floats:
+    """(M, 3) poses of a path from the origin whose heading is `yaw` (M,) at equal steps [m]."""
+    middle = (yaw[1:] + yaw[:-1]) / 2.0
+    xy = np.cumsum(step * np.column_stack((exact.cos(middle), exact.sin(middle))), axis=0)
+    return np.column_stack((np.vstack((np.zeros((1, 2)), xy)), yaw))
+
+
+@lru_cache(maxsize=512)
+def _bend(turn: float, curvature: float, ramp: float) -> Floats:
+    """(M, 3) clothoid, arc, clothoid from the origin along x: turns by `turn` [rad], curvature at most `curvature` [1/m]."""
+    length = abs(turn) / (curvature * (1.0 - ramp))
+    count = max(int(np.ceil(length / _STEP)), 8)
+    x = np.linspace(0.0, 1.0, count + 1)
+    rise = np.minimum(np.square(np.minimum(x, ramp)) / (2.0 * ramp) + np.maximum(x - ramp, 0.0), 1.0 - ramp)
+    fall = np.square(np.maximum(x - (1.0 - ramp), 0.0)) / (2.0 * ramp)
+    share = np.where(x > 1.0 - ramp, x - ramp / 2.0 - fall, rise) / (1.0 - ramp)  # of the turn that is made
+    return frozen(_integrated(turn * share, length / count))
+
+
+def _accepted(curve: Curve | None, fits: Fits) -> Curve | None:
+    if curve is None:
+        return None
+    inner = curve.cut(3.0, max(curve.length - 3.0, 3.5), 0.5)  # the first and last footprint reach beyond the road's end
+    return curve if fits(inner.points) else None
+
+
+def _beside(entry: Floats, ahead: float, left: float, turn: float) -> Curve | None:
+    """Straight on, or to a line that is parallel, or nearly so, by a smooth shift in the middle (a polynomial of degree 5)."""
+    slope = float(exact.tan(turn))
+    aside = left - slope * ahead / 2.0  # how far the two lines are apart half-way
+    if abs(left) < 0.05 and abs(turn) < 1e-3:
+        return Curve(np.array([[*entry[:2], entry[2]], [*_placed(entry, np.array([[ahead, left]]))[0], entry[2]]]))
+    reach = max(
+        float(np.sqrt(abs(aside) * 5.7735 / _STEEPEST_SHIFT)),  # the blend's steepest second derivative is 5.7735
+        1.875 * abs(slope) / _STEEPEST_SHIFT,
+    )
+    if abs(left) > _WIDEST_SHIFT + abs(slope) * ahead or reach > ahead - 2.0:
+        return None
+    x = np.linspace(0.0, 1.0, max(int(np.ceil(reach / 0.5)), 4) + 1)
+    first, last = (ahead - reach) / 2.0, (ahead + reach) / 2.0
+    end = left - slope * (ahead - last)
+    cube = exact.power(x, 3)
+    y = end * cube * (10.0 - 15.0 * x + 6.0 * np.square(x)) + slope * reach * cube * (-4.0 + 7.0 * x - 3.0 * np.square(x))
+    along = np.concatenate(([0.0], first + reach * x, [ahead]))
+    return Curve.through(_placed(entry, np.column_stack((along, np.concatenate(([0.0], y, [left]))))))
+
+
+def _placed(pose: Floats, xy: Floats) -> Floats:
+    """Points (M, 2) [m] ahead and left of a pose (3,), in its frame's parent."""
+    cos, sin = exact.cos(pose[2]), exact.sin(pose[2])
+    return np.column_stack((pose[0] + xy[:, 0] * cos - xy[:, 1] * sin, pose[1] + xy[:, 0] * sin + xy[:, 1] * cos))
+
+
+def _joined(entry: Floats, before: float, bend: Floats, after: float) -> Curve:
+    """Straight for `before` metres, the bend (M, 3) given from the origin along x, straight for `after` metres."""
+    points = bend + np.array([before, 0.0, 0.0])
+    turn = float(points[-1, 2])
+    end = points[-1] + np.array([after * exact.cos(turn), after * exact.sin(turn), 0.0])
+    pieces = [np.zeros((1, 3))] if before > 1e-6 else []
+    pieces += [points, end[None]] if after > 1e-6 else [points]
+    local = np.vstack(pieces)
+    return Curve(np.column_stack((_placed(entry, local[:, :2]), entry[2] + local[:, 2])))

@@ -1,0 +1,47 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a vehicle's footprint says of its body: where its rear axle is, what kind it is, how high; for formats that ask."""
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats
+from scenario_gen.types.encounter import Vehicle
+
+REAR_AXLE = 0.3  # of the length, from the footprint's centre back: 1.44 m of a car of 4.8 m
+WHEELBASE = 0.6  # of the length
+TRUCK_LENGTH = 7.0  # metres, from which on a vehicle counts as a truck
+CAR_HEIGHT, TRUCK_HEIGHT = 1.5, 3.2  # metres
+
+
+def is_truck(vehicle: Vehicle) -> bool:
+    """Whether it is so long that it is taken for a truck; logs do not say."""
+    return vehicle.length >= TRUCK_LENGTH
+
+
+def height(vehicle: Vehicle) -> float:
+    """Height in metres, by kind; logs do not say."""
+    return TRUCK_HEIGHT if is_truck(vehicle) else CAR_HEIGHT
+
+
+def rear_axle(vehicle: Vehicle) -> float:
+    """Metres from the footprint's centre back to the middle of the rear axle; logs do not say, so it is a share of the length."""
+    return REAR_AXLE * vehicle.length
+
+
+def shifted(position: Floats, heading: Floats, ahead: float) -> Floats:
+    """Return points (..., 2) [m] that lie `ahead` metres along headings (...) [rad] from positions (..., 2) [m]."""
+    moved = position.copy()
+    moved[..., 0] += ahead * exact.cos(heading)
+    moved[..., 1] += ahead * exact.sin(heading)
+    return moved

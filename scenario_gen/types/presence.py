@@ -1,0 +1,92 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Presence: from which to which sample each vehicle of an encounter or a scenario is there.
+
+A vehicle may arrive late and leave early. Arrays keep their full shape; outside its presence a vehicle's rows hold its first or
+last value there, which says nothing of where it is. So whoever looks at a motion looks at the presence too.
+"""
+
+import numpy as np
+
+from scenario_gen.arrays import Bools, Floats, Ints
+from scenario_gen.errors import InputError
+
+ALWAYS: Ints = np.zeros((0, 2), dtype=np.int64)  # the default of a field `present`: everybody is there throughout
+ALWAYS.setflags(write=False)
+
+
+def canonical_presence(present: Ints, count: int, samples: int, name: str) -> Ints:
+    """Return the presence (N, 2) of `count` vehicles over `samples` instants, `ALWAYS` written out.
+
+    Args:
+        present: (N, 2) first and last sample index of each vehicle, or `ALWAYS`.
+        count: N.
+        samples: T.
+        name: what it belongs to, for the message.
+
+    Raises:
+        InputError: the shape is wrong, or a vehicle has fewer than two samples or lies outside of 0 … T - 1.
+    """
+    if np.shape(present) == (0, 2):
+        return _sealed(np.tile(np.array([0, samples - 1], dtype=np.int64), (count, 1)))
+    made = np.array(present, dtype=np.int64, order="C")
+    if made.shape != (count, 2):
+        raise InputError(f"{name}: presence has shape {made.shape}; {count} rows of first and last sample are needed")
+    bad = np.flatnonzero((made[:, 0] < 0) | (made[:, 1] >= samples) | (made[:, 0] >= made[:, 1]))
+    if len(bad):
+        first, last = made[bad[0]].tolist()
+        raise InputError(
+            f"{name}: row {bad[0]} is present from sample {first} to {last} of {samples}; at least two samples inside are needed"
+        )
+    return _sealed(made)
+
+
+def _sealed(array: Ints) -> Ints:
+    array.setflags(write=False)
+    return array
+
+
+def always(present: Ints, samples: int) -> bool:
+    """Return whether everybody (N, 2) is there at all T `samples`."""
+    return bool((present[:, 0] == 0).all() and (present[:, 1] == samples - 1).all())
+
+
+def held(values: Floats, present: Ints) -> Floats:
+    """Return values (N, T, …) whose rows outside of the presence (N, 2) are the vehicle's first or last value inside of it."""
+    samples = values.shape[1]
+    if always(present, samples):
+        return values
+    at = np.clip(np.arange(samples), present[:, :1], present[:, 1:])
+    rows: Floats = values[np.arange(len(values))[:, None], at]
+    return rows
+
+
+def mask(present: Ints, samples: int) -> Bools:
+    """Return (N, T) whether each vehicle is there at each sample, of presence (N, 2)."""
+    at = np.arange(samples)
+    there: Bools = (at >= present[:, :1]) & (at <= present[:, 1:])
+    return there
+
+
+def together(present: Ints, a: int, b: int) -> slice:
+    """Return the samples at which vehicles `a` and `b` are both there, of presence (N, 2); empty if there is none."""
+    first, last = int(present[[a, b], 0].max()), int(present[[a, b], 1].min())
+    return slice(first, max(last + 1, first))
+
+
+def cut(present: Ints, first: int, last: int) -> Ints:
+    """Return the presence (N, 2) counted within samples `first` to before `last`; a row that is left empty has first > last."""
+    inside: Ints = np.column_stack((np.maximum(present[:, 0] - first, 0), np.minimum(present[:, 1], last - 1) - first))
+    return inside

@@ -1,0 +1,100 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+from hypothesis import given
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from scenario_gen.errors import InputError
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.presence import ALWAYS, canonical_presence, cut, held, mask, together
+from scenario_gen.types.scenario import Scenario
+
+VEHICLES = (Vehicle("a"), Vehicle("b"))
+
+
+@st.composite
+def presences(draw, count=3, samples=9):
+    rows = st.tuples(st.integers(0, samples - 2), st.integers(1, samples - 1)).filter(lambda row: row[0] < row[1])
+    return np.array(draw(st.lists(rows, min_size=count, max_size=count)))
+
+
+def encounter(present=ALWAYS):
+    clock = np.arange(9.0)
+    position = np.stack((np.tile(clock, (2, 1)), np.zeros((2, 9))), axis=-1)
+    return Encounter("test", VEHICLES, 0, 100_000_000, position, np.zeros((2, 9)), np.ones((2, 9)), present=present)
+
+
+@given(presences())
+def test_what_is_held_is_the_value_at_the_nearest_instant_of_presence(present):
+    values = np.arange(27.0).reshape(3, 9)
+    rows = held(values, present)
+    there = mask(present, 9)
+    assert (rows[there] == values[there]).all()
+    for row, own, (first, last) in zip(rows, values, present, strict=True):
+        assert (row[:first] == own[first]).all()
+        assert (row[last:] == own[last]).all()
+
+
+@given(presences())
+def test_two_are_together_where_both_are_there(present):
+    there = mask(present, 9)
+    for a, b in ((0, 1), (0, 2), (1, 2)):
+        assert np.arange(9)[together(present, a, b)].tolist() == np.flatnonzero(there[a] & there[b]).tolist()
+
+
+@given(presences(), st.integers(0, 4), st.integers(5, 9))
+def test_presence_in_a_window_is_that_of_its_samples(present, first, last):
+    there = mask(present, 9)[:, first:last]
+    for (begin, end), row in zip(cut(present, first, last), there, strict=True):
+        assert list(range(begin, end + 1)) == np.flatnonzero(row).tolist()
+
+
+def test_everybody_is_there_by_default():
+    assert encounter().present.tolist() == [[0, 8], [0, 8]]
+    assert encounter().all_present
+
+
+def test_an_encounter_holds_the_edge_values_where_a_vehicle_is_not_there():
+    made = encounter(np.array([[0, 6], [2, 8]]))
+    assert made.position[0, :, 0].tolist() == [0, 1, 2, 3, 4, 5, 6, 6, 6]
+    assert made.position[1, :, 0].tolist() == [2, 2, 2, 3, 4, 5, 6, 7, 8]
+    assert not made.all_present
+    assert made.there.sum() == 14
+
+
+def test_a_scenario_holds_them_too():
+    one = encounter()
+    made = Scenario(VEHICLES, one.time, one.position, one.heading, one.speed, one.speed, present=np.array([[0, 6], [2, 8]]))
+    assert made.position[1, 0, 0] == 2.0
+    assert made.there.sum() == 14
+
+
+@pytest.mark.parametrize(
+    ("present", "said"),
+    [
+        ([[0, 8]], "2 rows"),
+        ([[0, 8], [3, 3]], "row 1 is present from sample 3 to 3 of 9"),
+        ([[0, 9], [0, 8]], "row 0"),
+        ([[-1, 8], [0, 8]], "row 0"),
+        ([[1, 8], [2, 8]], "nobody is present at its first"),
+    ],
+)
+def test_a_presence_that_cannot_be_is_refused(present, said):
+    with pytest.raises(InputError, match=said):
+        encounter(np.array(present))
+    if "nobody" not in said:
+        with pytest.raises(InputError, match=said):
+            canonical_presence(np.array(present), 2, 9, "test")
