@@ -20,6 +20,7 @@ from scenario_gen.errors import InputError
 from scenario_gen.roads.builtin import BUILT_IN, draw, draw_corridor, draw_paper, layout_for
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.nav2 import read_map
+from scenario_gen.roads.vector.read import is_vector_map, vector_road
 from scenario_gen.template.separation import own_paths
 from scenario_gen.template.tracks import clean_tracks
 from scenario_gen.types.encounter import Encounter
@@ -49,6 +50,8 @@ def build_road(name_or_path: str, encounter: Encounter | None = None, config: Ro
         if encounter is None:
             raise InputError("road corridor is drawn around a template; give a log too")
         return draw_corridor(own_paths(encounter).tracks, config)
+    if is_vector_map(name_or_path):
+        return vector_road(name_or_path, None if encounter is None else clean_tracks(encounter), config)
     path = Path(name_or_path)
     if path.suffix.lower() not in (".yaml", ".yml"):
         names = ", ".join((*BUILT_IN, "corridor"))

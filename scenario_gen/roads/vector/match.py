@@ -50,6 +50,7 @@ _ROOM = 1.0  # metres between a footprint and the end of the lanes
 _BLEND = 5.7735  # largest second derivative of x³(10 − 15x + 6x²)
 _SHIFT = 0.02  # 1/m, curvature of a change of lanes
 _FORTH = 25.0  # metres of lanes before and after what is driven
+_SPEEDING = 0.1  # m² per (m/s)² beyond the speed limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +159,7 @@ def match(chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.
             return Match((), math.inf, f"no lane passes where vehicle {track.vehicle.id} would drive")
         courses.append(course)
     courses = _tied(courses, tracks, scale)
-    return judged(courses, tracks, spot)
+    return judged(chains, courses, tracks, spot)
 
 
 def _placed(track: Track, spot: Spot) -> Floats:
@@ -294,7 +295,7 @@ def turned_more(course: Course, track: Track) -> float:
     return float((ends[1, 2] - ends[0, 2]) - (own[1, 2] - own[0, 2]))
 
 
-def judged(courses: Sequence[Course], tracks: Sequence[Track], spot: Spot) -> Match:
+def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], spot: Spot) -> Match:
     """Say how well courses resemble the template, and what is lost."""
     cost, reason = 0.0, ""
     for course, track in zip(courses, tracks, strict=True):
@@ -313,4 +314,13 @@ def judged(courses: Sequence[Course], tracks: Sequence[Track], spot: Spot) -> Ma
         for b in range(a):
             if path_crossing(one, tracks[b]) is not None and not len(crossings(courses[a].curve, courses[b].curve, _CROSS)):
                 reason = reason or f"vehicles {tracks[b].vehicle.id} and {one.vehicle.id} cross in the template, and not on these lanes"
-    return Match(tuple(courses), cost, reason)
+    return Match(tuple(courses), cost + speeding(chains.network, courses, tracks), reason)
+
+
+def speeding(network: LaneNetwork, courses: Sequence[Course], tracks: Sequence[Track]) -> float:
+    """What it counts [m²] that vehicles would drive faster than the highest limit of their lanes."""
+    over = []
+    for course, track in zip(courses, tracks, strict=True):
+        limit = max((network.lanes[k].speed_limit for k in course.lanes), default=math.nan)
+        over.append(max(float(track.speed.max()) - limit, 0.0) if limit > 0.0 else 0.0)
+    return _SPEEDING * float(np.mean(np.square(over)))

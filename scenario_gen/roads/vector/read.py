@@ -24,13 +24,19 @@ from scenario_gen.documents import shown
 from scenario_gen.errors import InputError, of_system
 from scenario_gen.roads.vector.commonroad import read_commonroad
 from scenario_gen.roads.vector.lanelet2 import read_lanelet2
-from scenario_gen.roads.vector.network import extent
+from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.vector.network import extent, part_of
 from scenario_gen.roads.vector.opendrive import read_opendrive
+from scenario_gen.roads.vector.place import best_part
+from scenario_gen.roads.vector.raster import road_of
 from scenario_gen.roads.vector.xml import finite
+from scenario_gen.template.tracks import Track
 from scenario_gen.types.lanes import LaneNetwork
+from scenario_gen.types.road import Road
 
 READERS = {".osm": read_lanelet2, ".xodr": read_opendrive, ".xml": read_commonroad}
 PARTS = ("lanelet", "junction", "box")
+_AROUND = 40.0  # metres around lanes that are asked for
 _NAMED = 12  # ids that a message lists
 
 
@@ -108,3 +114,31 @@ def refuse_unknown_part(name: str, part: str) -> None:
     """
     if part and part.partition("=")[0] not in PARTS:
         raise InputError(f"map {name}: part {shown(part, 40)!r}; choose one of {', '.join(f'#{kind}=…' for kind in PARTS)}")
+
+
+def vector_road(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -> Road:
+    """Return the road of a vector map, or of the part of it that is asked for, or else that suits the template best.
+
+    Args:
+        name: the path, and behind a `#` box=x0,y0,x1,y1, lanelet=ID or junction=ID (several with commas).
+        tracks: of the template; None: the whole map, or what lies around the lanes that are asked for.
+        config: cell size, and the most cells.
+
+    Raises:
+        InputError: the map cannot be read, or has no such part.
+        RefusedError: it is too large to be drawn whole, or has no place for the template.
+    """
+    path, part = split(name)
+    refuse_unknown_part(path.name, part)
+    network = read_network(path)
+    lanes = chosen_lanes(network, part) if part and not part.startswith("box=") else None
+    if part.startswith("box="):
+        box, note = box_of(network, part), f"part {part} of the map"
+    elif tracks is not None:
+        box, note = best_part(network, tracks, lanes)
+    elif lanes:
+        points = np.concatenate([network.lanes[k].outline for k in lanes])
+        box, note = np.stack((points.min(axis=0) - _AROUND, points.max(axis=0) + _AROUND)), f"{_AROUND:g} m around {part}"
+    else:
+        return road_of(network, None, config)
+    return road_of(part_of(network, box, note), box, config)

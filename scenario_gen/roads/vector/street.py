@@ -29,7 +29,7 @@ from scenario_gen.arrays import Floats, wrap_angle
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
-from scenario_gen.roads.vector.match import Chains, changed_curve, Course, Match
+from scenario_gen.roads.vector.match import Chains, changed_curve, Course, Match, speeding
 from scenario_gen.template.frenet import FrenetTracks, to_frenet
 from scenario_gen.template.tracks import Track
 
@@ -149,7 +149,7 @@ def _laid(
         half = track.vehicle.length / 2.0 + _ROOM / 2.0
         if courses[-1].start < half or courses[-1].end + half > curve.length:
             return None
-    return Match(tuple(courses), bend / _STRAIGHT, "")
+    return Match(tuple(courses), bend / _STRAIGHT + speeding(chains.network, courses, tracks), "")
 
 
 def _sides(chains: Chains, axis: Curve, stretch: tuple[float, float], sign: int) -> list[_Side]:
