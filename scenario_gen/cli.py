@@ -235,6 +235,41 @@ def validate(
         raise typer.Exit(1)
 
 
+@app.command("export")
+def export_scenarios(
+    bag: Annotated[Path, typer.Argument(help="a bag with scenarios, ours or not")],
+    to: Annotated[str, typer.Option(help="commonroad, openscenario (with OpenDRIVE) or autoware")],
+    out: Annotated[Path | None, typer.Option(help="folder of the files; BAG_commonroad, … beside the bag if not given")] = None,
+    index: Annotated[
+        list[int] | None, typer.Option(min=0, help="of a scenario, as in scenarios/info (default: all); repeatable")
+    ] = None,
+    namespace: Annotated[str | None, typer.Option(help="only the scenarios of this one")] = None,
+    ego: Annotated[str, typer.Option(help="id of a vehicle that becomes the ego: CommonRoad's planning problem, …")] = "",
+    options: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="run_out, step, goal_length, goal_width, goal_late, following, bag.…, as name=value"),
+    ] = None,
+) -> None:
+    """Write scenarios for other software: CommonRoad, OpenSCENARIO with OpenDRIVE, Autoware; same bag, same bytes."""
+    from scenario_gen.exchange.config import ExportConfig
+    from scenario_gen.exchange.export import export_bag, TARGETS
+    from scenario_gen.parameters import assigned
+    from scenario_gen.storage.config import BagConfig
+
+    if to not in TARGETS:
+        raise InputError(f"--to {to!r} is none of {', '.join(TARGETS)}")
+    config, bag_config = ExportConfig(ego=ego), BagConfig()
+    for option in options or []:
+        if option.startswith("bag."):
+            bag_config = assigned(bag_config, option.removeprefix("bag."))
+        else:
+            config = assigned(config, option)
+    remind(bag)
+    folder = out or bag.resolve().with_name(f"{bag.resolve().name}_{to}")
+    made = export_bag(bag, folder, to, config, bag_config, namespace=namespace, indices=index or ())
+    say("\n".join((*made.notes, f"{made.scenarios} scenarios: {folder}")))
+
+
 @app.command("reindex")
 def save_bag(
     bag: Annotated[Path, typer.Argument(help="folder of a bag that was not closed or is damaged, or one of its MCAP files")],

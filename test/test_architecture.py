@@ -47,7 +47,7 @@ ORDER = (
     ("nearest",),
     ("pipeline",),
     ("report",),
-    ("review",),
+    ("review", "exchange"),
     ("results", "reproduce"),
     ("batch",),
     ("nodes", "demo", "cli", "__main__"),

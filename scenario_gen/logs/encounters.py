@@ -40,6 +40,7 @@ from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, st
 
 TURNED = np.radians(120.0)  # who drives off from a stop this far from where it came from has reversed, or turned on the spot
 MOST_TICKS = 100_000  # of a piece: smoothing takes 3 kB for each
+SHARPEST = 0.4  # 1/m: no car turns sharper, nor by noise on its path
 LEVER = 3.0  # m over which that direction is measured
 PRESENT = 0.6  # a vehicle that is there for less of the interval is left out; for more, it shortens the interval
 INTERACTS = 6.0  # m: the space-time gap below which two vehicles have to do with each other
@@ -87,14 +88,19 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
     back = reversals(track, config)
     cuts = gaps | back | laps(track, config)
     bridged = (seconds > 1.5 * max(usual, config.period)) & ~gaps
-    smoothed = [(part, smooth_piece(part, origin_ns, config)) for part in parts(track, cuts)]
+    whole = parts(track, cuts)
+    smoothed = [leaf for part in whole for leaf in steered(part, origin_ns, config)]
     pieces = [Piece(part, smooth) for part, smooth in smoothed if smooth is not None]
     smooths = [piece.smooth for piece in pieces]
 
+    def joined(name: str) -> Floats:
+        return np.concatenate([np.zeros(0), *(getattr(smooth, name) for smooth in smooths)])
+
     def rms(name: str) -> float:
-        values = np.concatenate([np.zeros(0), *(getattr(smooth, name) for smooth in smooths)])
+        values = joined(name)
         return float(np.sqrt(np.square(values).mean())) if len(values) else 0.0
 
+    turned, used = np.abs(joined("turned")), joined("headings")
     quality = VehicleQuality(
         id=track.id,
         fixes=len(track.fix_ns),
@@ -104,14 +110,34 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
         longest_bridged=float(seconds[bridged].max(initial=0.0)),
         cut=int(gaps.sum()),
         longest_cut=float(seconds[gaps].max(initial=0.0)),
-        reversals=int((back & ~gaps).sum()),
+        reversals=int((back & ~gaps).sum()) + len(smoothed) - len(whole),
         speed_before=rms("before"),
         speed_after=rms("after"),
         changed=rms("changed"),
         moved=rms("moved"),
         moved_most=max((float(smooth.moved.max()) for smooth in smooths), default=0.0),
+        noise=max((smooth.noise for smooth in smooths), default=np.nan),
+        turned=float(np.median(turned)) if len(turned) else np.nan,
+        headings=float(used.mean()) if len(used) else np.nan,
     )
     return pieces, quality
+
+
+def steered(part: Observations, origin_ns: int, config: LogConfig) -> list[tuple[Observations, Smooth | None]]:
+    """Smooth a part of a track, cut wherever its path then turns sharper than a car can.
+
+    Nobody turns on the spot: where a path does, the vehicle reversed in a stop too short to be seen in the fixes.
+    """
+    smooth = smooth_piece(part, origin_ns, config)
+    if smooth is None:
+        return [(part, None)]
+    turn = np.abs(np.diff(smooth.heading)) - SHARPEST * exact.hypot(*np.diff(smooth.position, axis=0).T)
+    if not (turn > 1e-6).any():
+        return [(part, smooth)]
+    at = origin_ns + round((smooth.first + int(np.argmax(turn)) + 0.5) * config.period * 1e9)
+    cuts = np.zeros(len(part.fix_ns) - 1, dtype=bool)
+    cuts[np.clip(np.searchsorted(part.fix_ns, at), 1, len(cuts)) - 1] = True
+    return [leaf for half in parts(part, cuts) for leaf in steered(half, origin_ns, config)]
 
 
 def laps(track: Observations, config: LogConfig) -> Bools:

@@ -16,6 +16,7 @@
 
 from dataclasses import dataclass
 from itertools import combinations
+import math
 
 import numpy as np
 import shapely
@@ -53,6 +54,9 @@ class VehicleQuality:
         changed: RMS of measured less published speed [m/s].
         moved: RMS distance between raw and published positions [m].
         moved_most: the largest such distance [m].
+        noise: standard deviation of the fixes [m], as estimated from the track (or as given); how smooth it is follows from it.
+        turned: median difference of recorded and published headings while it moves [rad]; NaN if none is recorded.
+        headings: share of the recorded headings that had a say; the others contradict the way driven, or jump.
     """
 
     id: str
@@ -69,6 +73,9 @@ class VehicleQuality:
     changed: float
     moved: float
     moved_most: float
+    noise: float = math.nan
+    turned: float = math.nan
+    headings: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -124,10 +131,15 @@ def vehicle_line(vehicle: VehicleQuality) -> str:
         gaps += f", cut at {vehicle.cut} (up to {vehicle.longest_cut:.1f} s)"
     if vehicle.reversals:
         gaps += f", cut at {vehicle.reversals} reversals"
+    headings = ""
+    if math.isfinite(vehicle.headings):
+        headings = f"; {100.0 * vehicle.headings:.0f} % of its headings used"
+        headings += f", changed by {math.degrees(vehicle.turned):.1f}° (median)" if math.isfinite(vehicle.turned) else ""
     return (
         f"  vehicle {vehicle.id}: {vehicle.fixes} fixes, {vehicle.seconds:.1f} s; {gaps}; speed against position "
         f"{vehicle.speed_before:.2f} → {vehicle.speed_after:.2f} m/s RMS, speeds changed by {vehicle.changed:.2f} m/s, "
-        f"positions by {vehicle.moved:.2f} m RMS (at most {vehicle.moved_most:.1f} m)"
+        f"positions by {vehicle.moved:.2f} m RMS (at most {vehicle.moved_most:.1f} m; noise of the fixes {vehicle.noise:.2f} m)"
+        + headings
     )
 
 

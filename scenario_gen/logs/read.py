@@ -32,6 +32,7 @@ from scenario_gen.logs.raw import natural, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
 from scenario_gen.storage.files import files_of
 from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.presence import cut
 
 TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
 SPMD_FIELDS = 19  # of a line; `tables.COLUMNS` names them
@@ -125,29 +126,42 @@ def unmet(vehicles: Sequence[VehicleQuality], met: set[str], config: LogConfig) 
 
 def as_recorded(log: RawLog, config: LogConfig) -> LogResult:
     """Encounters that were recorded as such stay as they are, bit for bit; only the window and the vehicles are chosen."""
-    encounters = tuple(between(encounter, config) for encounter in log.encounters)
-    summary = Quality(log.name, log.rows, (), (), tuple(map(encounter_quality, encounters)), log.notes)
-    return LogResult(encounters, summary)
+    found = [between(encounter, config) for encounter in log.encounters]
+    encounters = tuple(encounter for encounter, _ in found)
+    notes = (*log.notes, *(note for _, said in found for note in said))
+    return LogResult(encounters, Quality(log.name, log.rows, (), (), tuple(map(encounter_quality, encounters)), notes))
 
 
-def between(encounter: Encounter, config: LogConfig) -> Encounter:
-    """Return the encounter in the asked time window and with the asked vehicles.
+def between(encounter: Encounter, config: LogConfig) -> tuple[Encounter, tuple[str, ...]]:
+    """Return the encounter in the asked time window and with the asked vehicles, and who is not there in that window.
 
     Raises:
         InputError: a vehicle is unknown, or fewer than two vehicles or samples are left.
     """
     ids = [vehicle.id for vehicle in encounter.vehicles]
-    rows = [ids.index(name) for name in picked(ids, config, encounter.name)]
+    asked = [ids.index(name) for name in picked(ids, config, encounter.name)]
     if config.start >= encounter.duration:
         raise InputError(f"parameter start is {config.start:g} s, but {encounter.name} is only {encounter.duration:.1f} s long")
     first = math.ceil(config.start / encounter.dt - 1e-9)
     last = math.floor(config.end / encounter.dt + 1e-9) + 1 if config.end else len(encounter.time)
-    return replace(
+    last = min(last, len(encounter.time))
+    inside = cut(encounter.present, first, last)
+    rows = [n for n in asked if inside[n, 1] > inside[n, 0]]
+    notes = tuple(f"vehicle {ids[n]} is left out: it is not there in the asked time" for n in asked if n not in rows)
+    if len(rows) < 2:
+        raise InputError(
+            f"encounter {encounter.name!r}: {len(rows)} of {len(asked)} vehicles are there between {config.start:g} s and "
+            f"{(last - 1) * encounter.dt:g} s; at least 2 are needed: see the parameters start, end and vehicles"
+        )
+    first, last = first + int(inside[rows, 0].min()), first + int(inside[rows, 1].max()) + 1
+    chosen = replace(
         encounter,
         vehicles=tuple(encounter.vehicles[n] for n in rows),
         start_ns=encounter.start_ns + first * encounter.dt_ns,
         **{name: getattr(encounter, name)[rows, first:last] for name in ("position", "heading", "speed")},
+        present=cut(encounter.present[rows], first, last),
     )
+    return chosen, notes
 
 
 def encounter_quality(encounter: Encounter) -> EncounterQuality:

@@ -30,14 +30,14 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, Ints, runs
+from scenario_gen.arrays import Bools, Floats, Ints, runs, wrap_angle
 from scenario_gen.errors import InputError
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.path import fit_path, Headings, headings_of, MOVES, Path, straight_path
 from scenario_gen.logs.raw import Observations
 
 if TYPE_CHECKING:
     from scipy import sparse  # slow to import
-    from scipy.interpolate import BSpline
 
 STANDS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
 STILL = 0.1  # m/s: below this it is not on its way to or from standing
@@ -45,99 +45,10 @@ CREEPS = 1.0  # m: fixes that move further than this while the speed is zero say
 DOUBTED = 3.0  # m/s: a speed that differs more from that of the fixes has no say in the first layout; if most do, in nothing
 MOVED = 0.5  # m: who moves less has no direction of travel
 ROUNDS = 3  # of path and motion in turn
-KNOT = 1.0  # m between knots
-MARGIN = 5.0  # m of path beyond both ends, for fixes that lie there
-STEP = 0.1  # m between the points of the table from parameter to arc length
-CURVATURE = 0.1  # 1/m: spectral density of the curvature, about 0.1 1/m over 10 m
-STEERING = 0.002  # 1/m³: spectral density of the curvature's change, about 0.02 1/m² over 5 m
-CREEP = 0.2  # m: fixes closer together than this share one weight, for GPS noise is no steering
+LEAST_NOISE, MOST_NOISE = 0.1, 1.5  # m: of fixes, as estimated
+ENOUGH = 30  # moving fixes from which their noise can be told
+SETTLES = 0.3  # s at either end of a stand that are left to the motion: a car comes to rest, and starts, without a step
 STRAIGHT = 3.0  # m: a shorter path has no shape of its own
-
-
-@dataclass(frozen=True, eq=False)
-class Path:
-    """The path a vehicle drove: a penalised cubic B-spline by distance driven (P-spline; Eilers & Marx 1996).
-
-    Attributes:
-        curve: position (..., 2) [m] by parameter u, the distance driven as first guessed [m].
-        parameter: (K,) increasing u of a table.
-        length: (K,) the arc length [m] there.
-    """
-
-    curve: "BSpline"
-    parameter: Floats
-    length: Floats
-
-    def project(self, guess: Floats, points: Floats) -> tuple[Floats, Floats]:
-        """Return arc lengths (F,) [m] of the points' feet on the curve, and the points' distances (F,) [m] from it.
-
-        Args:
-            guess: (F,) parameters [m] near the feet.
-            points: (F, 2) [m].
-        """
-        tangent = self.curve(guess, 1)
-        gap = points - self.curve(guess)
-        foot = guess + (gap * tangent).sum(axis=1) / (np.square(tangent)).sum(axis=1)
-        foot = np.clip(foot, self.parameter[0], self.parameter[-1])
-        return np.interp(foot, self.parameter, self.length), exact.hypot(*(points - self.curve(foot)).T)
-
-    def pose(self, arc: Floats) -> tuple[Floats, Floats]:
-        """Return positions (T, 2) [m] and headings (T,) [rad], unwrapped, at arc lengths (T,) [m]."""
-        u = np.interp(arc, self.length, self.parameter)
-        tangent = self.curve(u, 1)
-        return self.curve(u), np.unwrap(exact.arctan2(tangent[:, 1], tangent[:, 0]))
-
-
-def fit_path(place: Floats, points: Floats, weight: Floats, noise: float) -> Path:
-    """Fit a curve to points (F, 2) at distances driven `place` (F,); weights in (0, 1], noise in metres."""
-    from scipy.interpolate import BSpline
-
-    low, high = place.min() - MARGIN, place.max() + MARGIN
-    spans = max(int(np.ceil((high - low) / KNOT)), 4)
-    step = (high - low) / spans
-    knots = low + step * np.arange(-3, spans + 4)
-    spread = np.gradient(place) if len(place) > 1 else np.ones(1)
-    weight = weight * np.clip(np.abs(spread) / CREEP, 0.005, 1.0) / np.square(noise)
-    count = spans + 3
-    band = np.zeros((4, count))
-    right = np.zeros((count, 2))
-    rows = BSpline.design_matrix(np.clip(place, low, high - 1e-9), knots, 3).tocsr()
-    values = rows.data.reshape(-1, 4)
-    start = rows.indices.reshape(-1, 4)[:, 0]
-    for i in range(4):
-        np.add.at(right, start + i, (weight * values[:, i])[:, None] * points)
-        for j in range(i + 1):
-            np.add.at(band[i - j], start + j, weight * values[:, i] * values[:, j])
-    penalise(band, 2, exact.power(step, -3) / CURVATURE)
-    penalise(band, 3, exact.power(step, -5) / STEERING)
-    return tabulate(BSpline(knots, exact.solve_banded(band, right), 3), low, high)
-
-
-def penalise(band: Floats, order: int, weight: float) -> None:
-    """Add weight · ‖differences of that order‖² to a lower band matrix (4, n)."""
-    stencil = np.array({2: [1.0, -2.0, 1.0], 3: [-1.0, 3.0, -3.0, 1.0]}[order])
-    last = band.shape[1] - order
-    for i in range(order + 1):
-        for j in range(i + 1):
-            band[i - j, j : j + last] += weight * stencil[i] * stencil[j]
-
-
-def straight_path(point: Floats, heading: float, low: float, high: float) -> Path:
-    """Return a straight line through `point` (2,) [m] where the distance driven is (low + high) / 2."""
-    from scipy.interpolate import BSpline
-
-    direction = np.array([exact.cos(heading), exact.sin(heading)])
-    ends = np.array([low - MARGIN, high + MARGIN])
-    where = point + (ends - (low + high) / 2.0)[:, None] * direction
-    return tabulate(BSpline(np.repeat(ends, 2), where, 1), ends[0], ends[1])
-
-
-def tabulate(curve: "BSpline", low: float, high: float) -> Path:
-    """Measure the curve's arc length."""
-    u = np.linspace(low, high, int(np.ceil((high - low) / STEP)) + 1)
-    rate = exact.hypot(*curve(u, 1).T)
-    length = low + np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(u))])
-    return Path(curve, u, length)
 
 
 class Motion:
@@ -244,6 +155,9 @@ class Smooth:
         after: (T,) published speed less the speed of the published positions [m/s].
         changed: (S,) measured speed less the published speed [m/s].
         moved: (F,) distance of the raw fixes from the published positions at their stamps [m].
+        noise: standard deviation of the fixes [m], as estimated or as given.
+        turned: (H,) recorded headings less the published ones [rad] where the vehicle moves.
+        headings: (H',) for each recorded heading whether it had a say.
     """
 
     first: int
@@ -254,6 +168,9 @@ class Smooth:
     after: Floats
     changed: Floats
     moved: Floats
+    noise: float
+    turned: Floats
+    headings: Bools
 
 
 def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smooth | None:
@@ -273,26 +190,32 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
     speed = piece.speed
     if not len(speed):
         speed_t, speed = fix_t, raw
-    noise = config.position_noise or estimated_noise(piece.fix)
+    noise = first_noise = config.position_noise or estimated_noise(piece.fix)
     ticks = dt * np.arange(last - first + 1, dtype=np.float64)
     stands = standing(ticks, fix_t, piece.fix, speed_t, speed)
-    motion = Motion(stands, config)
+    motion = Motion(without_ends(stands, round(SETTLES / dt)), config)
     differs = speed - np.interp(speed_t, fix_t, raw)
     deviation = config.speed_noise or float(np.clip(white_equivalent(differs), 0.3, 3.0))
     trusted = len(piece.speed) > 0 and np.median(np.abs(differs)) <= max(DOUBTED, 5.0 * noise)
     measured = [(speed_t, speed, deviation * np.ones(len(speed)), True)] if trusted else []
     guess = layout(ticks, stands, np.interp(ticks, speed_t, speed), np.interp(ticks, fix_t, raw), fix_t)
     weight = np.ones(len(fix_t))
+    headings = None
     for _ in range(ROUNDS):
-        path = path_of(guess, piece, weight, noise)
+        path = path_of(guess, piece, weight, noise, np.gradient(guess, fix_t), headings)
         place, aside = path.project(guess, piece.fix)
         drive = motion.solve([*measured, (fix_t, place, noise / np.sqrt(weight), False)])
         guess = motion.place(drive, fix_t)
+        if not config.position_noise:
+            noise = noise_about(first_noise, np.interp(fix_t, ticks, stands) < 0.5, aside, place - guess)
         weight = np.minimum(1.0, 2.0 * noise / np.maximum(exact.hypot(aside, place - guess), 1e-9))  # Huber's
+        headings = headings_of(piece.heading, path.pose(guess)[1], np.gradient(guess, fix_t))
     place, published = motion.at_ticks(drive)
     position, heading = path.pose(place)
     if np.ptp(place) < MOVED and not np.isfinite(piece.heading).any():
         heading = np.full(len(place), np.nan)
+    known = np.isfinite(piece.heading)
+    rolls = known & (np.gradient(guess, fix_t) > MOVES)
     return Smooth(
         first=first,
         position=position,
@@ -302,7 +225,18 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
         after=published - speed_of_fixes(ticks, position),
         changed=piece.speed - np.interp(speed_t, ticks, published)[: len(piece.speed)],
         moved=exact.hypot(*(piece.fix - path.pose(guess)[0]).T),
+        noise=noise,
+        turned=wrap_angle(piece.heading[rolls] - np.interp(fix_t[rolls], ticks, heading)),
+        headings=known[known] if np.ptp(place) < STRAIGHT else (headings.weight > 0.0)[known] if headings else ~known[known],
     )
+
+
+def without_ends(stands: Bools, ends: int) -> Bools:
+    """Return the stands (T,) shorter by `ends` ticks where the vehicle comes to rest or starts."""
+    kept = np.zeros(len(stands), dtype=bool)
+    for begin, end in runs(stands):
+        kept[begin + ends * (begin > 0) : end - ends * (end < len(stands))] = True
+    return kept
 
 
 def layout(ticks: Floats, stands: Bools, speed: Floats, raw: Floats, seconds: Floats) -> Floats:
@@ -321,7 +255,7 @@ def layout(ticks: Floats, stands: Bools, speed: Floats, raw: Floats, seconds: Fl
     return guess
 
 
-def path_of(guess: Floats, piece: Observations, weight: Floats, noise: float) -> Path:
+def path_of(guess: Floats, piece: Observations, weight: Floats, noise: float, speed: Floats, headings: Headings | None) -> Path:
     """Fit the path; one too short to have a shape is straight, in the recorded heading where there is one.
 
     Args:
@@ -329,10 +263,12 @@ def path_of(guess: Floats, piece: Observations, weight: Floats, noise: float) ->
         piece: the fixes.
         weight: (F,) in (0, 1].
         noise: standard deviation of the fixes [m].
+        speed: (F,) at the fixes [m/s].
+        headings: what the log says of them.
     """
     low, high = float(guess.min()), float(guess.max())
     if high - low >= STRAIGHT:
-        return fit_path(guess, piece.fix, weight, noise)
+        return fit_path(guess, piece.fix, weight, noise, speed, headings)
     known = piece.heading[np.isfinite(piece.heading)]
     if len(known):
         heading = float(exact.arctan2(np.median(exact.sin(known)), np.median(exact.cos(known))))
@@ -364,7 +300,24 @@ def estimated_noise(fix: Floats) -> float:
     square = np.square(lag) - np.square(lag).mean()
     parabola = 1.0 / len(lag) - np.square(lag).mean() * square / np.square(square).sum()  # the fitted parabola's value at lag 0
     residual = fix[half : len(fix) - half] - exact.matmul(sliding_window_view(fix, len(lag), axis=0), parabola)
-    return float(np.clip(max(white_equivalent(residual[:, 0]), white_equivalent(residual[:, 1])), 0.1, 1.5))
+    return float(np.clip(max(white_equivalent(residual[:, 0]), white_equivalent(residual[:, 1])), LEAST_NOISE, MOST_NOISE))
+
+
+def noise_about(guess: float, moves: Bools, aside: Floats, ahead: Floats) -> float:
+    """Return the standard deviation [m] of fixes about the path and motion fitted to them, at most twice the first estimate.
+
+    Without that bound noise and smoothness would drive each other up: what is smoothed away is noise of long memory.
+
+    Args:
+        guess: the first estimate; it stays if few fixes are of a moving vehicle: those of a standing one are often repeated.
+        moves: (F,) whether it moves there.
+        aside: (F,) of the fixes from the path [m].
+        ahead: (F,) of the fixes from the motion along it [m].
+    """
+    if moves.sum() < ENOUGH:
+        return guess
+    seen = max(white_equivalent(aside[moves]), white_equivalent(ahead[moves]))
+    return float(np.clip(seen, LEAST_NOISE, min(2.0 * guess, MOST_NOISE)))
 
 
 def white_equivalent(noise: Floats) -> float:

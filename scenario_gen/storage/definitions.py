@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Message definitions and type hashes: rosbags' Jazzy type store, Autoware's by definition, or an installed package's .msg files."""
+"""Definitions and hashes of types: Jazzy's from rosbags, Autoware's by definition, others from an installed package."""
 
 from functools import cache
 import os

@@ -14,6 +14,8 @@
 
 """Path and motion, each against its definition."""
 
+from dataclasses import replace
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -21,8 +23,10 @@ import pytest
 from scipy.optimize import minimize
 
 from scenario_gen.logs import LogConfig
+from scenario_gen.logs.encounters import pieces_of
+from scenario_gen.logs.path import fit_path, Headings, headings_of, straight_path
 from scenario_gen.logs.raw import Observations
-from scenario_gen.logs.smoothing import fit_path, Motion, smooth_piece, standing, straight_path, white_equivalent
+from scenario_gen.logs.smoothing import Motion, smooth_piece, standing, white_equivalent
 
 CONFIG = LogConfig()
 
@@ -71,7 +75,7 @@ def test_a_path_through_noisy_points_of_an_arc(seed, radius, noise):
     along = np.linspace(0.0, min(60.0, 4.0 * radius), 120)
     angle = along / radius
     truth = radius * np.column_stack([np.sin(angle), 1.0 - np.cos(angle)])
-    path = fit_path(along, truth + rng.normal(0.0, noise, truth.shape), np.ones(120), max(noise, 0.1))
+    path = fit_path(along, truth + rng.normal(0.0, noise, truth.shape), np.ones(120), max(noise, 0.1), np.full(120, 5.0))
     arc, aside = path.project(along, truth)
     assert aside.max() < 0.15 + 1.5 * noise
     np.testing.assert_allclose(np.ptp(arc), np.ptp(along), rtol=0.03)
@@ -132,3 +136,96 @@ def test_coloured_noise_counts_for_more_than_white():
     assert white_equivalent(white) == pytest.approx(1.0, rel=0.03)
     coloured = np.convolve(white, np.ones(5) / np.sqrt(5.0), mode="same")  # autocorrelation time 5
     assert white_equivalent(coloured) == pytest.approx(np.sqrt(5.0), rel=0.08)
+
+
+def test_the_normal_equations_are_those_of_their_rows():
+    """The banded matrix of fixes, headings and penalties against a dense least-squares solution."""
+    from scipy.interpolate import BSpline
+
+    rng = np.random.Generator(np.random.PCG64(6))
+    place = np.sort(rng.uniform(0.0, 12.0, 40))
+    points = np.column_stack((place, np.sin(place / 4.0))) + rng.normal(0.0, 0.05, (40, 2))
+    heading, speed = np.arctan(np.cos(place / 4.0) / 4.0), np.full(40, 3.0)
+    weight = 1.0 / np.square(np.radians(2.0)) * np.ones(40)
+    path = fit_path(place, points, np.ones(40), 0.2, speed, Headings(heading, weight))
+    knots, n = path.curve.t, len(path.curve.c)
+    step, spread = knots[1] - knots[0], np.gradient(place)
+    fixes = BSpline.design_matrix(place, knots, 3).toarray() * np.sqrt(np.clip(spread / 0.2, 0.005, 1.0))[:, None] / 0.2
+    slope = BSpline(knots, np.eye(n), 3)(place, 1) * np.sqrt(weight * np.clip(spread, 0.02, 1.0))[:, None]
+    blocks, right = [], []
+    for axis, across in ((0, -np.sin(heading)), (1, np.cos(heading))):
+        own = [np.zeros_like(fixes), np.zeros_like(fixes)]
+        own[axis] = fixes
+        bent = [np.sqrt(step**-3 * (10.0 + 27.0 / 12.0)) * np.diff(np.eye(n), 2, axis=0)]
+        bent.append(np.sqrt(step**-5 * (500.0 + 243.0)) * np.diff(np.eye(n), 3, axis=0))
+        zeros = [np.zeros_like(rows) for rows in bent]
+        blocks.append(np.vstack([*own, across[:, None] * slope, *(bent + zeros if axis == 0 else zeros + bent)]))
+        right.append(points[:, axis] * np.sqrt(np.clip(spread / 0.2, 0.005, 1.0)) / 0.2)
+    rows = np.hstack(blocks)
+    target = np.zeros(len(rows))
+    target[:80] = np.concatenate(right)
+    best = np.linalg.lstsq(rows, target, rcond=None)[0]
+    np.testing.assert_allclose(path.curve.c.T.ravel(), best, atol=1e-6)
+
+
+def test_noise_of_the_fixes_is_no_lateral_acceleration():
+    """A straight drive at 15 m/s with 0.3 m of noise: before, the path followed it with several m/s²."""
+    speed = np.full(150, 15.0)
+    _, track = drive(speed, noise=0.3, seed=2)
+    smooth = smooth_piece(track, 0, CONFIG)
+    assert np.abs(np.diff(smooth.heading) / 0.1 * smooth.speed[1:]).max() < 0.8
+    assert 0.2 < smooth.noise < 0.4
+    assert np.sqrt(np.square(smooth.moved).mean()) < 0.3 * np.sqrt(2.0) * 1.1
+
+
+def turning(noise, heading_noise):
+    """A car that turns left by 90° at 2 m/s, with a heading sensor; true positions and headings beside the track."""
+    rng = np.random.Generator(np.random.PCG64(8))
+    along = 0.2 * np.arange(120)
+    course = np.clip((along - 6.0) / 6.0, 0.0, np.pi / 2.0)
+    xy = np.cumsum(0.2 * np.column_stack((np.cos(course), np.sin(course))), axis=0)
+    _, track = drive(np.full(120, 2.0), noise=0.0)
+    fix = xy + rng.normal(0.0, noise, xy.shape)
+    return xy, course, replace(track, fix=fix, heading=course + rng.normal(0.0, heading_noise, 120))
+
+
+def test_recorded_headings_are_used_where_a_car_is_slow():
+    _, course, track = turning(1.0, np.radians(1.0))
+    with_them = smooth_piece(track, 0, CONFIG)
+    without = smooth_piece(replace(track, heading=np.full(120, np.nan)), 0, CONFIG)
+    off = [np.sqrt(np.square(np.degrees(smooth.heading - course)).mean()) for smooth in (with_them, without)]
+    assert off[0] < 2.0
+    assert off[1] > 4.0
+    assert with_them.headings.all()
+    assert np.degrees(np.abs(with_them.turned)).max() < 10.0
+
+
+@pytest.mark.parametrize("wrong", [0.0, 2.5])
+def test_headings_that_are_none_have_no_say(wrong):
+    """A default, or one that is always far off; and one that jumps about while the car stands."""
+    _, course, track = turning(0.1, 0.0)
+    heading = np.full(120, wrong) if wrong else np.where(np.arange(120) < 10, -1.5, course)
+    smooth = smooth_piece(replace(track, heading=heading), 0, CONFIG)
+    assert np.degrees(np.abs(smooth.heading - course)).max() < 8.0
+    assert smooth.headings.sum() == (0 if wrong else 110)
+
+
+def test_a_heading_is_weighed_by_its_scatter():
+    rng = np.random.Generator(np.random.PCG64(9))
+    course, speed = np.zeros(200), np.full(200, 5.0)
+    steady = headings_of(course, course, speed)
+    scattered = headings_of(rng.normal(0.0, np.radians(3.0), 200), course, speed)
+    assert np.median(scattered.weight) < steady.weight.min() / 3.0
+    assert headings_of(np.full(200, np.nan), course, speed) is None
+
+
+def test_who_reverses_in_a_short_stop_is_cut_there():
+    along = np.concatenate((0.2 * np.arange(100), np.full(5, 19.8), 19.8 - 0.2 * np.arange(100)))
+    speed = np.abs(np.gradient(along, 0.1))
+    _, track = drive(speed, noise=0.0)
+    aside = np.where(np.arange(205) < 105, 0.0, 0.05 * (np.arange(205) - 105))
+    pieces, quality = pieces_of(replace(track, fix=np.column_stack((along, aside))), 0, CONFIG)
+    assert quality.reversals >= 1
+    for piece in pieces:
+        steps = np.hypot(*np.diff(piece.smooth.position, axis=0).T)
+        assert (np.abs(np.diff(piece.smooth.heading)) <= 0.4 * steps + 1e-6).all()

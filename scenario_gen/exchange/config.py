@@ -1,0 +1,44 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What an export is asked for."""
+
+from dataclasses import dataclass
+
+from scenario_gen.parameters import parameter, Parameters
+
+
+@dataclass(frozen=True)
+class ExportConfig(Parameters):
+    """Parameters of `scenario-gen export`."""
+
+    ego: str = parameter("", "id of a vehicle that becomes the ego: of a set without an ego slot")
+    run_out: float = parameter(
+        50.0,
+        "how far lanes are continued straight on beyond the road, so that a planner sees road ahead",
+        unit="m",
+        low=0.0,
+        high=1000.0,
+    )
+    step: float = parameter(0.1, "time step of a CommonRoad file whose scenario has uneven ones", unit="s", low=0.01, high=1.0)
+    goal_length: float = parameter(6.0, "length of an ego's goal region", unit="m", low=0.5, high=50.0)
+    goal_width: float = parameter(3.5, "width of an ego's goal region", unit="m", low=0.5, high=20.0)
+    goal_late: float = parameter(
+        2.0, "until when an ego may reach its goal, in durations of its track; from the first step on it may", low=1.0, high=10.0
+    )
+    following: str = parameter(
+        "position",
+        "OpenSCENARIO's followingMode: the simulator puts vehicles on the trajectory, or its controllers follow it",
+        choices=("position", "follow"),
+    )

@@ -1,0 +1,137 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Lanes of a road that has none: along what the scenarios drive, as wide as a lane where the grid leaves room."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats
+from scenario_gen.curve import Curve
+from scenario_gen.exchange.lanes import LaneMap, Strip
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import Scenario
+
+STEP = 1.0  # metres between points of a lane
+APART = 0.5  # metres between points of a path that it is laid through
+MARGIN = 0.1  # metres between a footprint and its lane's edge
+SAME_LANE, SAME_WAY = 1.0, 0.35  # metres and rad within which a path lies in another one's lane
+NEAR = 3  # points of a lane on both sides over which it keeps its widest
+
+
+def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: float, run_out: float) -> LaneMap:
+    """Return one lane along each path that is driven, continued straight on at both ends.
+
+    Args:
+        scenarios: of one template on one road, with the same vehicles or fewer; all footprints lie in the lanes.
+        road: whose cells limit a lane's width; None: nothing is known of it.
+        lane_width: metres, where the road is wide enough.
+        run_out: metres by which a lane goes on beyond the first and the last footprint.
+    """
+    paths: dict[str, Curve] = {}
+    for scenario in scenarios:
+        for n, vehicle in enumerate(scenario.vehicles):
+            paths.setdefault(vehicle.id, driven_path(scenario, n))
+    lanes: list[tuple[str, Curve]] = []
+    homes: dict[str, int] = {}
+    for name in sorted(paths, key=lambda one: (-paths[one].length, one)):
+        home = next((k for k, (_, lane) in enumerate(lanes) if _runs_in(paths[name], lane)), None)
+        if home is None:
+            home = len(lanes)
+            lanes.append((name, paths[name]))
+        homes[name] = home
+    strips = []
+    for k, (name, path) in enumerate(lanes):
+        members = {member for member, home in homes.items() if home == k}
+        strips.append(_lane(f"along vehicle {name}", path, members, scenarios, road, lane_width, run_out))
+    origin = "derived: one lane along each path that the scenarios drive; the road itself is a grid without lanes"
+    return LaneMap(tuple(strips), (), "right", origin, derived=True)
+
+
+def driven_path(scenario: Scenario, n: int) -> Curve:
+    """Return the path of a vehicle, points `STEP` apart; of one that stands throughout, a metre ahead of it."""
+    first, last = scenario.present[n].tolist()
+    xy = scenario.position[n, first : last + 1]
+    kept = [xy[0]]
+    for point in xy[1:]:
+        if float(exact.hypot(*(point - kept[-1]))) >= APART:
+            kept.append(point)
+    if len(kept) < 3:
+        (x, y), yaw = xy[0].tolist(), float(scenario.heading[n, first])
+        ahead = np.array([0.0, 1.0])
+        return Curve(np.column_stack((x + ahead * exact.cos(yaw), y + ahead * exact.sin(yaw), np.full(2, yaw))))
+    return Curve.through(np.array(kept))
+
+
+def _runs_in(path: Curve, lane: Curve) -> bool:
+    """Say whether a path lies in the lane along another one, in the same direction."""
+    station, offset = lane.project(path.points[:, :2])
+    turn = path.points[:, 2] - lane.at(station)[:, 2]
+    return bool((np.abs(offset) < SAME_LANE).all() and (exact.cos(turn) > exact.cos(SAME_WAY)).all())
+
+
+def _lane(
+    name: str, path: Curve, members: set[str], scenarios: Sequence[Scenario], road: Road | None, lane_width: float, run_out: float
+) -> Strip:
+    """Return the strip of one lane, which holds every footprint of its members."""
+    corners = np.concatenate([_corners(scenario, n) for scenario in scenarios for n in _rows(scenario, members)])
+    station, offset = path.project(corners)
+    reference = path.cut(float(station.min()) - run_out, float(station.max()) + run_out, STEP)
+    at = np.clip(np.searchsorted(reference.station, station - station.min() + run_out), 1, len(reference.points) - 1)
+    sides = []
+    for sign in (1.0, -1.0):
+        wide = _room(reference, sign, road, lane_width / 2.0, run_out)
+        needed = np.zeros(len(wide))
+        np.maximum.at(needed, at, np.maximum(sign * offset, 0.0) + MARGIN)
+        np.maximum.at(needed, at - 1, np.maximum(sign * offset, 0.0) + MARGIN)
+        padded = np.pad(needed, NEAR)
+        needed = np.max([padded[k : k + len(needed)] for k in range(2 * NEAR + 1)], axis=0)
+        sides.append(np.maximum(wide, needed))
+    left, right = sides
+    return Strip(name, reference.points, left, (left + right)[None], np.zeros((0, len(left))))
+
+
+def _rows(scenario: Scenario, members: set[str]) -> list[int]:
+    return [n for n, vehicle in enumerate(scenario.vehicles) if vehicle.id in members]
+
+
+def _corners(scenario: Scenario, n: int) -> Floats:
+    """Return points (P, 2) of the outline of a vehicle's footprint at every instant at which it is there."""
+    first, last = scenario.present[n].tolist()
+    vehicle = scenario.vehicles[n]
+    x, y = scenario.position[n, first : last + 1].T
+    yaw = scenario.heading[n, first : last + 1]
+    cos, sin = exact.cos(yaw), exact.sin(yaw)
+    found = []
+    for u in (-0.5, 0.0, 0.5):
+        for v in (-0.5, 0.5):
+            along, across = u * vehicle.length, v * vehicle.width
+            found.append(np.column_stack((x + along * cos - across * sin, y + along * sin + across * cos)))
+    return np.concatenate(found)
+
+
+def _room(reference: Curve, sign: float, road: Road | None, most: float, run_out: float) -> Floats:
+    """Return (M,) how far [m] the road is drivable to one side of each point, at most `most`; the run-outs are as wide."""
+    wide = np.full(len(reference.points), most)
+    if road is None:
+        return wide
+    distance = np.arange(0.0, most, road.resolution / 2.0)
+    station = np.repeat(reference.station[:, None], len(distance), axis=1)
+    poses = reference.beside(station, sign * distance[None, :])
+    drivable = road.drivable_at(poses[..., :2])
+    free = np.logical_and.accumulate(drivable, axis=1).sum(axis=1) * road.resolution / 2.0
+    on_run_out = (reference.station < run_out) | (reference.station > reference.length - run_out)
+    return np.where(on_run_out, most, np.minimum(free, most))

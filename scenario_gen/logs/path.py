@@ -1,0 +1,224 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The path a vehicle drove: a penalised spline by distance driven, through its fixes and along its recorded headings.
+
+What is asked of it is what a driver does, and a driver steers in time: so the penalty on the curvature's change grows with the
+speed there (lateral jerk), and less with what the wheels can do at any speed. The noise of fixes and headings, estimated per
+track, says how far the path may be from either.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, Ints, wrap_angle
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline  # slow to import
+
+KNOT = 1.0  # m between knots
+MARGIN = 5.0  # m of path beyond both ends, for fixes that lie there
+STEP = 0.1  # m between the points of the table from parameter to arc length
+CURVATURE = 0.1  # 1/m: spectral density of the curvature, about 0.1 1/m over 10 m
+STEERING = 0.002  # 1/m³: spectral density of the curvature's change, about 0.02 1/m² over 5 m
+LATERAL = 12.0  # m²/s³: spectral density of the lateral acceleration, about 2 m/s² over 3 s
+LATERAL_JERK = 1.0  # m²/s⁵: spectral density of the lateral jerk, about 1 m/s³ over 1 s
+CREEP = 0.2  # m: fixes closer together than this share one weight, for GPS noise is no steering
+SAME_HEADING = 1.0  # m: headings closer together than this share one weight, for their error is one
+STANDING_HEADING = 0.02  # the least weight of a heading: a stand of five seconds says as much as a metre of driving
+HEADING_NOISE = float(np.radians(2.0))  # of a heading sensor at its best, slip included
+NEAR = 5  # samples on either side over which the scatter of headings is taken
+SCATTER = 9.0  # by how much the variance seen between neighbours stands for errors that they share
+MOVES = 1.0  # m/s: faster, a course is known to some degrees
+JUMP = float(np.radians(15.0))  # between two samples: no heading of a car
+CONTRADICTS = float(np.radians(20.0))  # headings that are further off the path are none: a default, or of somebody who reverses
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The path a vehicle drove: a penalised cubic B-spline by distance driven (P-spline; Eilers & Marx 1996).
+
+    Attributes:
+        curve: position (..., 2) [m] by parameter u, the distance driven as first guessed [m].
+        parameter: (K,) increasing u of a table.
+        length: (K,) the arc length [m] there.
+    """
+
+    curve: "BSpline"
+    parameter: Floats
+    length: Floats
+
+    def project(self, guess: Floats, points: Floats) -> tuple[Floats, Floats]:
+        """Return arc lengths (F,) [m] of the points' feet on the curve, and how far left (F,) [m] of it they are.
+
+        Args:
+            guess: (F,) parameters [m] near the feet.
+            points: (F, 2) [m].
+        """
+        tangent = self.curve(guess, 1)
+        gap = points - self.curve(guess)
+        foot = guess + (gap * tangent).sum(axis=1) / (np.square(tangent)).sum(axis=1)
+        foot = np.clip(foot, self.parameter[0], self.parameter[-1])
+        gap, tangent = points - self.curve(foot), self.curve(foot, 1)
+        left = tangent[:, 0] * gap[:, 1] - tangent[:, 1] * gap[:, 0]
+        return np.interp(foot, self.parameter, self.length), np.where(left < 0.0, -1.0, 1.0) * exact.hypot(*gap.T)
+
+    def pose(self, arc: Floats) -> tuple[Floats, Floats]:
+        """Return positions (T, 2) [m] and headings (T,) [rad], unwrapped, at arc lengths (T,) [m]."""
+        u = np.interp(arc, self.length, self.parameter)
+        tangent = self.curve(u, 1)
+        return self.curve(u), np.unwrap(exact.arctan2(tangent[:, 1], tangent[:, 0]))
+
+
+@dataclass(frozen=True, eq=False)
+class Headings:
+    """Recorded headings (F,) [rad] at the fixes, and the weight (F,) [1/rad²] of each, 0 where there is none."""
+
+    value: Floats
+    weight: Floats
+
+
+def fit_path(
+    place: Floats, points: Floats, weight: Floats, noise: float, speed: Floats, headings: Headings | None = None
+) -> Path:
+    """Fit a curve to points.
+
+    It minimises, over the curve c(u) with curvature κ and the speed v(u),
+
+        Σ w |c(u_i) - p_i|² / σ² + Σ w_i (n_i · c'(u_i))²
+        + ∫ κ² (1/CURVATURE + v³/LATERAL) + κ'² (1/STEERING + v⁵/LATERAL_JERK) du
+
+    where n_i is across the recorded heading. With dt = du/v, the parts with v are ∫ (v²κ)² dt and ∫ (v³κ')² dt: lateral
+    acceleration and jerk, each over its spectral density.
+
+    Args:
+        place: (F,) distances driven at the fixes [m], non-decreasing.
+        points: (F, 2) [m].
+        weight: (F,) in (0, 1].
+        noise: standard deviation of the fixes [m].
+        speed: (F,) [m/s].
+        headings: what the log says of them.
+    """
+    from scipy.interpolate import BSpline
+
+    low, high = place.min() - MARGIN, place.max() + MARGIN
+    spans = max(int(np.ceil((high - low) / KNOT)), 4)
+    step = (high - low) / spans
+    knots = low + step * np.arange(-3, spans + 4)
+    spread = np.abs(np.gradient(place)) if len(place) > 1 else np.ones(1)
+    weight = weight * np.clip(spread / CREEP, 0.005, 1.0) / np.square(noise)
+    count = spans + 3
+    band = np.zeros((8, 2 * count))  # x and y of each coefficient in turn
+    right = np.zeros(2 * count)
+    inside = np.clip(place, low, high - 1e-9)
+    rows = BSpline.design_matrix(inside, knots, 3).tocsr()
+    start = 2 * rows.indices.reshape(-1, 4)[:, 0]
+    values = np.asarray(rows.data).reshape(-1, 4)
+    for axis in (0, 1):
+        observe(band, right, start + axis, values, 2, weight, points[:, axis])
+    if headings is not None:
+        lower = BSpline.design_matrix(inside, knots[1:-1], 2).tocsr()
+        slope = np.zeros((len(place), 4))  # of a cubic basis: differences of the quadratic one, which begins at the same span
+        slope[:, 1:] += np.asarray(lower.data).reshape(-1, 3) / step
+        slope[:, :-1] -= np.asarray(lower.data).reshape(-1, 3) / step
+        across = np.column_stack((-exact.sin(headings.value), exact.cos(headings.value)))
+        entries = (slope[:, :, None] * across[:, None, :]).reshape(-1, 8)
+        shared = np.clip(spread / SAME_HEADING, STANDING_HEADING, 1.0)
+        observe(band, right, start, entries, 1, headings.weight * shared, np.zeros(len(place)))
+    for order, floor, moving, power in ((2, CURVATURE, LATERAL, 3), (3, STEERING, LATERAL_JERK, 5)):
+        centre = low + step * (np.arange(count - order) + (order - 2) / 2.0)
+        v = np.interp(centre, place, speed)
+        penalise(band, order, exact.power(step, 1 - 2 * order) * (1.0 / floor + exact.power(v, power) / moving))
+    return tabulate(BSpline(knots, exact.solve_banded(band, right[:, None]).reshape(-1, 2), 3), low, high)
+
+
+def observe(band: Floats, right: Floats, start: Ints, entries: Floats, stride: int, weight: Floats, target: Floats) -> None:
+    """Add Σ weight · (entries · c - target)² to a lower band matrix (8, n) and its right side (n,).
+
+    Args:
+        band: the matrix.
+        right: the right side.
+        start: (F,) first coefficient of each row.
+        entries: (F, E) of each row, `stride` coefficients apart.
+        stride: that distance.
+        weight: (F,).
+        target: (F,).
+    """
+    for i in range(entries.shape[1]):
+        np.add.at(right, start + stride * i, weight * entries[:, i] * target)
+        for j in range(i + 1):
+            np.add.at(band[stride * (i - j)], start + stride * j, weight * entries[:, i] * entries[:, j])
+
+
+def penalise(band: Floats, order: int, weight: Floats) -> None:
+    """Add Σ weight (n - order,) · |differences of that order|² of n points to a lower band matrix (8, 2 n) of x and y in turn."""
+    stencil = np.array({2: [1.0, -2.0, 1.0], 3: [-1.0, 3.0, -3.0, 1.0]}[order])
+    both = np.repeat(weight, 2)
+    for i in range(order + 1):
+        for j in range(i + 1):
+            band[2 * (i - j), 2 * j : 2 * j + len(both)] += both * stencil[i] * stencil[j]
+
+
+def straight_path(point: Floats, heading: float, low: float, high: float) -> Path:
+    """Return a straight line through `point` (2,) [m] where the distance driven is (low + high) / 2."""
+    from scipy.interpolate import BSpline
+
+    direction = np.array([exact.cos(heading), exact.sin(heading)])
+    ends = np.array([low - MARGIN, high + MARGIN])
+    where = point + (ends - (low + high) / 2.0)[:, None] * direction
+    return tabulate(BSpline(np.repeat(ends, 2), where, 1), ends[0], ends[1])
+
+
+def tabulate(curve: "BSpline", low: float, high: float) -> Path:
+    """Measure the curve's arc length."""
+    u = np.linspace(low, high, int(np.ceil((high - low) / STEP)) + 1)
+    rate = exact.hypot(*curve(u, 1).T)
+    length = low + np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(u))])
+    return Path(curve, u, length)
+
+
+def headings_of(heading: Floats, course: Floats, speed: Floats) -> Headings | None:
+    """Weigh recorded headings by their own scatter; what is no heading counts for nothing.
+
+    A car's heading does not jump. So the headings are cut where they do, and a run counts if it agrees with the path where the
+    vehicle moves: a course over ground, taken from two fixes, jumps about where a vehicle is slow, and a default is another run.
+
+    Args:
+        heading: (F,) as recorded [rad], NaN where the log does not say.
+        course: (F,) of the path fitted so far [rad].
+        speed: (F,) [m/s].
+
+    Returns:
+        None if the log says nothing that can be used.
+    """
+    known = np.flatnonzero(np.isfinite(heading))
+    value = heading[known]
+    turn = wrap_angle(np.diff(value))
+    off = np.abs(wrap_angle(value - course[known]))
+    moves = speed[known] > MOVES
+    weight = np.zeros(len(heading))
+    for begin, end in pairwise([0, *(np.flatnonzero(np.abs(turn) > JUMP) + 1).tolist(), len(value)]):
+        own = slice(begin, end)
+        if moves[own].sum() < 3 or np.median(off[own][moves[own]]) > CONTRADICTS:
+            continue
+        square = np.pad(np.square(np.diff(turn[begin : end - 1])) / 6.0, NEAR + 1, mode="edge")
+        scatter = sliding_window_view(square, 2 * NEAR + 1).mean(axis=1)
+        noise = np.sqrt(np.square(HEADING_NOISE) + SCATTER * scatter)
+        weight[known[own]] = np.minimum(1.0, 2.0 * noise / np.maximum(off[own], 1e-9)) / np.square(noise)  # Huber's
+    return Headings(np.where(np.isfinite(heading), heading, 0.0), weight) if weight.any() else None
