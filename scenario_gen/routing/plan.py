@@ -25,6 +25,7 @@ from scenario_gen.arrays import Bools, Floats
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import RefusedError
 from scenario_gen.roads.clearance import clearance_field, footprint_fits
+from scenario_gen.roads.vector.ground import own_ground
 from scenario_gen.routing.config import PlanningConfig
 from scenario_gen.routing.guess import direct, keep_to_side
 from scenario_gen.routing.search.planner import BlockedError, plan_with_retry, Planner, Query
@@ -90,7 +91,7 @@ def plan_routes(road: Road, fit: Fit, config: PlanningConfig = PlanningConfig(),
     """
     planner = make_planner(config)
     tasks = (
-        _Task(road, vehicle, fitted, config, planner, seed + 7919 * n)
+        _Task(own_ground(road, fitted.path, vehicle), vehicle, fitted, config, planner, seed + 7919 * n)
         for n, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True))
     )
     return tuple(_route(task) for task in tasks)

@@ -50,7 +50,9 @@ class Lane:
         object.__setattr__(self, "left", frozen(self.left))
         object.__setattr__(self, "right", frozen(self.right))
         if self.left.shape != self.right.shape or self.left.ndim != 2 or self.left.shape[1] != 2 or len(self.left) < 2:
-            raise InputError(f"lane {self.id}: borders of shapes {self.left.shape} and {self.right.shape}; (M, 2), M >= 2, are needed")
+            raise InputError(
+                f"lane {self.id}: borders of shapes {self.left.shape} and {self.right.shape}; (M, 2), M >= 2, are needed"
+            )
         if not (np.isfinite(self.left).all() and np.isfinite(self.right).all()):
             raise InputError(f"lane {self.id}: a border is not finite")
 

@@ -31,7 +31,9 @@ from scenario_gen.types.lanes import LaneNetwork
 _SKIPPED = frozenset(
     ("obstacle", "staticObstacle", "dynamicObstacle", "environmentObstacle", "phantomObstacle", "planningProblem", "scenarioTags")
 )
-_NOT_FOR_CARS = frozenset(("sidewalk", "crosswalk", "bicycleLane", "busLane", "shoulder", "parking", "border", "railway", "restricted"))
+_NOT_FOR_CARS = frozenset(
+    ("sidewalk", "crosswalk", "bicycleLane", "busLane", "shoulder", "parking", "border", "railway", "restricted")
+)
 _MAX_SPEED = ("274", "274.1", "R2-1", "maxSpeed")  # names and national numbers of the sign
 
 
@@ -74,7 +76,10 @@ def read_commonroad(path: Path) -> LaneNetwork:
                 place=lanelet.place,
             )
         )
-    notes = [f"CommonRoad {root.attributes.get('commonRoadVersion', '?')}: coordinates as they stand, in metres", *_georeference(root)]
+    notes = [
+        f"CommonRoad {root.attributes.get('commonRoadVersion', '?')}: coordinates as they stand, in metres",
+        *_georeference(root),
+    ]
     if left_out:
         notes.append(f"{left_out} lanelets are for others than cars and were left out")
     return network_of(path.stem, drafts, notes)
@@ -105,7 +110,9 @@ def _speed_limit(lanelet: Element, signs: dict[str, float]) -> float:
     own = lanelet.first("speedLimit")
     if own is not None:
         return own.value()
-    return min((signs[ref.get("ref")] for ref in lanelet.all("trafficSignRef") if ref.attributes.get("ref") in signs), default=math.nan)
+    return min(
+        (signs[ref.get("ref")] for ref in lanelet.all("trafficSignRef") if ref.attributes.get("ref") in signs), default=math.nan
+    )
 
 
 def _junctions(root: Element, known: set[str]) -> dict[str, str]:

@@ -147,7 +147,9 @@ def _refs(relation: Element, ways: dict[str, Element]) -> list[str]:
     for role in ("left", "right"):
         members = [member for member in relation.all("member") if member.attributes.get("role") == role]
         if len(members) != 1:
-            raise InputError(f"{relation.place}: lanelet {relation.get('id')} has {len(members)} members with role {role}; one is needed")
+            raise InputError(
+                f"{relation.place}: lanelet {relation.get('id')} has {len(members)} members with role {role}; one is needed"
+            )
         ref = members[0].get("ref")
         if ref not in ways:
             raise InputError(f"{members[0].place}: way {ref} is not in the map")
@@ -176,7 +178,7 @@ def _positions(used: "dict[str, object]", nodes: dict[str, Element], path: Path)
     if local and len(local) < len(used):
         lacking = next(name for name in used if name not in set(local))
         raise InputError(
-            f"{nodes[lacking].place}: node {lacking} has no tags local_x and local_y, but {len(local)} of {len(used)} others have; "
+            f"{nodes[lacking].place}: node {lacking} has no tags local_x and local_y, but {len(local)} of {len(used)} have; "
             "two frames cannot be mixed"
         )
     if local:
@@ -202,7 +204,9 @@ def _positions(used: "dict[str, object]", nodes: dict[str, Element], path: Path)
     metres = local_frame(degrees[:, 0], degrees[:, 1], origin)
     size = float(exact.hypot(*metres.T).max())
     if not size <= _FARTHEST:
-        raise InputError(f"map {path}: its nodes are up to {size / 1000.0:.0f} km from their middle; at most {_FARTHEST / 1000.0:g} are read")
+        raise InputError(
+            f"map {path}: its nodes are up to {size / 1000.0:.0f} km from their middle; at most {_FARTHEST / 1000.0:g} are read"
+        )
     note = f"latitude and longitude in metres east and north of {origin[0]:.7f}, {origin[1]:.7f} (azimuthal equidistant, WGS84)"
     return dict(zip(used, metres, strict=True)), note
 
@@ -284,7 +288,11 @@ def _sign_limit(relation: Element, ways: dict[str, Element]) -> float:
     if tags.get("type") != "regulatory_element" or tags.get("subtype") != "speed_limit":
         return math.nan
     texts = [tags.get("sign_type", ""), tags.get("speed_limit", "")]
-    texts += [_tags(ways[member.get("ref")]).get("subtype", "") for member in relation.all("member") if member.attributes.get("ref") in ways]
+    texts += [
+        _tags(ways[member.get("ref")]).get("subtype", "")
+        for member in relation.all("member")
+        if member.attributes.get("ref") in ways
+    ]
     for text in texts:
         sign = re.fullmatch(r"(?:de)?274(?:\.1)?-([0-9]+)", text)
         speed = float(sign[1]) * _KMH if sign else _speed(text)

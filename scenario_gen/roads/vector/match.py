@@ -29,7 +29,7 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats, wrap_angle
 from scenario_gen.curve import crossings, Curve
 from scenario_gen.roads.vector.search import Spot
-from scenario_gen.template.path_crossing import path_crossing
+from scenario_gen.template.path_crossing import path_crossing, PathCrossing
 from scenario_gen.template.tracks import Track
 from scenario_gen.types.lanes import LaneNetwork
 
@@ -43,6 +43,13 @@ _CAPPED = 100.0  # m²
 _YAW = 20.0  # m² per unit of 1 - cos
 _OWN_TURN = 40.0  # m² per rad²
 _CHANGING = 4  # chains, the most alike, between which a change of lanes is looked for
+_PRIOR, _CROSSED, _BEYOND, _FOLLOWED = (
+    0.5,
+    1.0,
+    0.25,
+    2.0,
+)  # weights: where the place says; crossings driven, or beyond the ends; gaps
+_WORTH = 1.5  # m² that a change of lanes must gain
 _TURN = math.radians(40.0)  # a chain may turn by this much more or less than the vehicle in the template
 _CROSS = math.radians(15.0)  # least angle of a crossing
 _SAME = 2.0  # metres sideways within which two vehicles follow each other
@@ -50,6 +57,7 @@ _ROOM = 1.0  # metres between a footprint and the end of the lanes
 _BLEND = 5.7735  # largest second derivative of x³(10 − 15x + 6x²)
 _SHIFT = 0.02  # 1/m, curvature of a change of lanes
 _FORTH = 25.0  # metres of lanes before and after what is driven
+_LOST = 6.0  # m² of a crossing beyond the recorded ends that is none on the lanes
 _SPEEDING = 0.1  # m² per (m/s)² beyond the speed limit
 
 
@@ -121,7 +129,7 @@ class Chains:
             if lane in before or lane == first:
                 break
             before, reach = (lane, *before), reach + self.length[lane]
-        open_chains = [((first,), self.length[first])]
+        open_chains: list[tuple[tuple[int, ...], float]] = [((first,), self.length[first])]
         for _ in range(_MOST_CHAINS):
             if not open_chains:
                 break
@@ -187,7 +195,7 @@ def _course(chains: Chains, track: Track, spot: Spot, scale: float) -> Course | 
     for one in ranked[:_CHANGING] if not track.still else ():
         for other in ranked[:_CHANGING]:
             change = _change(tried[one][2], tried[other][2])
-            if change is not None and change[1] < cost - 0.25 and _beside(chains.network, one, other):
+            if change is not None and change[1] < cost - _WORTH and _beside(chains.network, one, other):
                 changed = changed_curve(tried[one][1], tried[other][1], poses[change[0], :2])
                 if changed is not None:
                     cost, curve, used = change[1], changed, tuple(dict.fromkeys((*one, *other)))
@@ -249,7 +257,7 @@ def changed_curve(one: Curve, other: Curve, at: Floats) -> Curve | None:
 
 def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[Course]:
     """Shift the beginnings so that crossings and gaps on one lane are as far along as in the template (least squares)."""
-    rows: list[tuple[dict[int, float], float, float]] = [({i: 1.0}, course.start, 0.1) for i, course in enumerate(courses)]
+    rows: list[tuple[dict[int, float], float, float]] = [({i: 1.0}, course.start, _PRIOR) for i, course in enumerate(courses)]
     for a, one in enumerate(tracks):
         for b in range(a):
             two = tracks[b]
@@ -259,8 +267,9 @@ def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[
                 if len(found):
                     want = np.array([courses[a].start + scale * crossing.first, courses[b].start + scale * crossing.second])
                     at = found[int(np.argmin(np.abs(found - want).sum(axis=1)))]
-                    rows.append(({a: 1.0}, float(at[0]) - scale * crossing.first, 1.0))
-                    rows.append(({b: 1.0}, float(at[1]) - scale * crossing.second, 1.0))
+                    weight = _CROSSED if _driven(crossing, one, two) else _BEYOND
+                    rows.append(({a: 1.0}, float(at[0]) - scale * crossing.first, weight))
+                    rows.append(({b: 1.0}, float(at[1]) - scale * crossing.second, weight))
             for first, second in ((a, b), (b, a)):
                 gap = _follows(tracks[first], tracks[second])
                 if gap is None:
@@ -268,7 +277,7 @@ def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[
                 station, offset = courses[second].curve.project(courses[first].curve.at(np.array([courses[first].start]))[:, :2])
                 if abs(float(offset[0])) < _SAME:  # of `first`, its start lies so far along the course of `second`
                     shift = float(station[0]) - courses[first].start
-                    rows.append(({first: 1.0, second: -1.0}, scale * gap - shift, 2.0))
+                    rows.append(({first: 1.0, second: -1.0}, scale * gap - shift, _FOLLOWED))
     matrix, value = np.zeros((len(rows), len(courses))), np.zeros(len(rows))
     for row, (terms, wanted, weight) in enumerate(rows):
         for i, factor in terms.items():
@@ -276,6 +285,11 @@ def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[
         value[row] = weight * wanted
     solution = exact.lstsq(matrix, value)
     return [replace(course, start=float(s)) for course, s in zip(courses, solution, strict=True)]
+
+
+def _driven(crossing: PathCrossing, one: Track, two: Track) -> bool:
+    """Whether both vehicles drive as far as their crossing."""
+    return 0.0 <= crossing.first <= one.travelled and 0.0 <= crossing.second <= two.travelled
 
 
 def _follows(one: Track, two: Track) -> float | None:
@@ -309,11 +323,17 @@ def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], s
         poses = _placed(track, spot)
         fitted = course.curve.at(np.linspace(course.start, course.end, len(poses)))
         miss = np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1])
-        cost += float(np.minimum(miss, _CAPPED).mean() + _YAW * (1.0 - exact.cos(fitted[:, 2] - poses[:, 2])).mean()) / len(tracks)
+        cost += float(np.minimum(miss, _CAPPED).mean() + _YAW * (1.0 - exact.cos(fitted[:, 2] - poses[:, 2])).mean()) / len(
+            tracks
+        )
     for a, one in enumerate(tracks):
-        for b in range(a):
-            if path_crossing(one, tracks[b]) is not None and not len(crossings(courses[a].curve, courses[b].curve, _CROSS)):
-                reason = reason or f"vehicles {tracks[b].vehicle.id} and {one.vehicle.id} cross in the template, and not on these lanes"
+        for b, two in enumerate(tracks[:a]):
+            crossing = path_crossing(one, two)
+            if crossing is None or len(crossings(courses[a].curve, courses[b].curve, _CROSS)):
+                continue
+            cost += _LOST
+            if _driven(crossing, one, two):
+                reason = reason or f"vehicles {two.vehicle.id} and {one.vehicle.id} cross in the template, and not on these lanes"
     return Match(tuple(courses), cost + speeding(chains.network, courses, tracks), reason)
 
 

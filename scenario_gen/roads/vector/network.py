@@ -164,9 +164,8 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
     Raises:
         InputError: no lane is in the box.
     """
-    pieces: list[tuple[int, Floats, Floats, bool, bool]] = []  # lane, borders, whether its begin and its end are there
+    pieces: list[tuple[int, Floats, Floats, bool]] = []  # lane, borders, whether its end is there
     begins: dict[int, int] = {}
-    ends: dict[int, int] = {}
     for k, lane in enumerate(network.lanes):
         last = len(lane.left) - 1
         for first, stop in runs(_inside(lane.centre, box)):
@@ -175,20 +174,22 @@ def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
             if high - low < 1e-6:
                 continue
             at = np.unique(np.concatenate(([low], np.arange(math.ceil(low), math.floor(high) + 1), [high])))
-            borders = [np.column_stack([np.interp(at, np.arange(last + 1), b[:, j]) for j in (0, 1)]) for b in (lane.left, lane.right)]
+            borders = [
+                np.column_stack([np.interp(at, np.arange(last + 1), b[:, j]) for j in (0, 1)]) for b in (lane.left, lane.right)
+            ]
             if low == 0.0:
                 begins[k] = len(pieces)
-            if high == last:
-                ends[k] = len(pieces)
-            pieces.append((k, borders[0], borders[1], low == 0.0, high == last))
+            pieces.append((k, borders[0], borders[1], high == last))
     if not pieces:
-        raise InputError(f"map {network.name}: no lane in the box {box[0, 0]:g},{box[0, 1]:g},{box[1, 0]:g},{box[1, 1]:g}; {extent(network)}")
-    whole = {k: begins[k] for k in begins if ends.get(k) == begins[k]}
+        raise InputError(
+            f"map {network.name}: no lane in the box {box[0, 0]:g},{box[0, 1]:g},{box[1, 0]:g},{box[1, 1]:g}; {extent(network)}"
+        )
+    some = {k: piece for piece, (k, *_) in reversed(list(enumerate(pieces)))}  # of a lane in several pieces, the first
     lanes = []
-    for k, left, right, _, has_end in pieces:
+    for k, left, right, has_end in pieces:
         lane = network.lanes[k]
         after = tuple(begins[other] for other in lane.successors if other in begins) if has_end else ()
-        beside = tuple(whole[other] for other in lane.beside if other in whole)
+        beside = tuple(some[other] for other in lane.beside if other in some)
         lanes.append(replace(lane, left=left, right=right, successors=after, beside=beside))
     return LaneNetwork(network.name, tuple(lanes), (*network.notes, note))
 

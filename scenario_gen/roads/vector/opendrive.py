@@ -73,7 +73,9 @@ def read_opendrive(path: Path) -> LaneNetwork:
     if root.tag != "OpenDRIVE":
         raise InputError(f"{root.place}: the root of an OpenDRIVE map is <OpenDRIVE>")
     header = root.one("header")
-    notes = [f"OpenDRIVE {header.attributes.get('revMajor', '?')}.{header.attributes.get('revMinor', '?')}: {_projection(header)}"]
+    notes = [
+        f"OpenDRIVE {header.attributes.get('revMajor', '?')}.{header.attributes.get('revMinor', '?')}: {_projection(header)}"
+    ]
     roads: dict[str, _Road] = {}
     total = 0.0
     for element in root.all("road"):
@@ -101,7 +103,11 @@ def _projection(header: Element) -> str:
     text = " ".join(reference.text.split()) if reference is not None else ""
     offset = header.first("offset")
     moved = "" if offset is None else f", offset x {offset.number('x', 0.0):g}, y {offset.number('y', 0.0):g} not applied"
-    return f"coordinates as they stand, in metres; " + (f"geoReference {text} is stated, not applied" if text else "no geoReference") + moved
+    return (
+        "coordinates as they stand, in metres; "
+        + (f"geoReference {text} is stated, not applied" if text else "no geoReference")
+        + moved
+    )
 
 
 def _road(element: Element, name: str, line: ReferenceLine) -> _Road:
@@ -115,7 +121,9 @@ def _road(element: Element, name: str, line: ReferenceLine) -> _Road:
     begins = [min(max(section.number("s"), 0.0), line.length) for section in sections]
     for section, begin, end in zip(sections, begins, [*begins[1:], line.length], strict=True):
         breaks = [piece for piece in line.begin.tolist() if begin < piece < end]
-        s = np.unique(np.concatenate((np.linspace(begin, max(end, begin + 1e-3), max(math.ceil((end - begin) / _STEP), 1) + 1), breaks)))
+        s = np.unique(
+            np.concatenate((np.linspace(begin, max(end, begin + 1e-3), max(math.ceil((end - begin) / _STEP), 1) + 1), breaks))
+        )
         road.sections.append(_section(section, begin, s, line.at(s), offset))
     return road
 
@@ -148,7 +156,9 @@ def _lane_id(lane: Element, sign: int) -> int:
     except ValueError:
         number = 0
     if number * sign <= 0:
-        raise InputError(f"{lane.place}: id {lane.get('id')[:20]!r}; whole numbers {'above' if sign > 0 else 'below'} 0 are needed here")
+        raise InputError(
+            f"{lane.place}: id {lane.get('id')[:20]!r}; whole numbers {'above' if sign > 0 else 'below'} 0 are needed here"
+        )
     return number
 
 
@@ -165,7 +175,9 @@ class _Joints:
         """Say what was not believed."""
         if not self.apart:
             return []
-        return [f"{self.apart} links join lanes whose ends are more than {_LINKED:g} m apart and were left out, first at {self.first}"]
+        return [
+            f"{self.apart} links join lanes whose ends are more than {_LINKED:g} m apart and were left out, first at {self.first}"
+        ]
 
     def point(self, end: End) -> Floats:
         """(2,) [m] the middle of a lane at one of its ends."""
@@ -290,7 +302,12 @@ def _draft(road: _Road, k: int, name: int, joints: _Joints, *, along: bool, seco
     beside = []
     for other in (name - 1, name + 1):
         mark = lane if abs(other) > abs(name) else section.lanes.get(other)
-        if other in section.lanes and mark is not None and _forth(road, section.lanes[other], other) == along and _crossable(mark):
+        if (
+            other in section.lanes
+            and mark is not None
+            and _forth(road, section.lanes[other], other) == along
+            and _crossable(mark)
+        ):
             beside.append(_name((road.id, k, other)))
     return Draft(
         id=_name(key) + ("r" if second else ""),

@@ -36,6 +36,7 @@ _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths
 _SPOTS = 15  # placements as one piece, and
 _STREETS = 8  # stretches of road that are looked at closely
 _SCALES = (1.0, 0.9, 1.1)
+_WORST = 40.0  # m²: what resembles the template less is no place for it
 _BESIDE = 12.0  # metres of the map around what is driven, and
 _FORTH = 20.0  # metres of the lanes before and after it
 _SHIFT = 3.0  # metres by which paths may be shifted to be clear of each other
@@ -76,8 +77,8 @@ def placements(
         for spot in spots:
             stop_if_cancelled()
             one = match(chains, tracks, spot, scale)
-            if one.reason:
-                reasons[one.reason] += 1
+            if one.reason or one.cost > _WORST:
+                reasons[one.reason or "vehicles would be too far from where they are in the template"] += 1
             else:
                 matches.append(one)
         for one in sorted(matches, key=lambda one: round(one.cost, 3)):
@@ -85,7 +86,7 @@ def placements(
             yield one, scale
         if found:
             return
-    why = "; ".join(f"{reason} (at {count} of {len(spots)} places)" for reason, count in reasons.most_common(2))
+    why = "; ".join(f"{reason} ({count} of {len(spots) * len(scales)} placements)" for reason, count in reasons.most_common(2))
     raise RefusedError(f"the template fits no place on map {network.name}: {why or 'it has no lanes of its directions'}")
 
 

@@ -14,7 +14,7 @@
 
 """The reference line of an OpenDRIVE road, and the piecewise cubics beside it.
 
-Source: ASAM OpenDRIVE 1.8, chapters "Geometry" (line, arc, spiral, cubic and parametric cubic) and "Lanes" (offset, width, border).
+Source: ASAM OpenDRIVE 1.8, chapters "Geometry" and "Lanes" (offset, width, border).
 """
 
 from dataclasses import dataclass

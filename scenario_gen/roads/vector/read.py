@@ -22,9 +22,9 @@ import numpy as np
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.documents import shown
 from scenario_gen.errors import InputError, of_system
+from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.vector.commonroad import read_commonroad
 from scenario_gen.roads.vector.lanelet2 import read_lanelet2
-from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.vector.network import extent, part_of
 from scenario_gen.roads.vector.opendrive import read_opendrive
 from scenario_gen.roads.vector.place import best_part
@@ -62,7 +62,9 @@ def read_network(path: Path) -> LaneNetwork:
     try:
         status = path.stat()
     except (OSError, ValueError) as error:
-        raise of_system(error, path) if isinstance(error, OSError) else InputError(f"map {shown(str(path))!r}: {error}") from error
+        raise (
+            of_system(error, path) if isinstance(error, OSError) else InputError(f"map {shown(str(path))!r}: {error}")
+        ) from error
     return _read(path, status.st_mtime_ns, status.st_size)
 
 

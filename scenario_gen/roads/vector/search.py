@@ -58,7 +58,9 @@ class Spot:
     def moved(self, points: Floats) -> Floats:
         """Points (P, 2) [m] of the template on the map."""
         cos, sin = exact.cos(self.yaw), exact.sin(self.yaw)
-        return np.column_stack((points[:, 0] * cos - points[:, 1] * sin + self.x, points[:, 0] * sin + points[:, 1] * cos + self.y))
+        return np.column_stack(
+            (points[:, 0] * cos - points[:, 1] * sin + self.x, points[:, 0] * sin + points[:, 1] * cos + self.y)
+        )
 
 
 @lru_cache(maxsize=4)
@@ -138,8 +140,8 @@ def find_spots(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[
             ]
         )
         stop_if_cancelled()
-        for k in np.argsort(cost, kind="stable")[: 4 * _REFINED].tolist():
-            spots.append(Spot(float(cost[k]), float(turn[k]), float(x[k]), float(y[k])))
+        best = np.argsort(cost, kind="stable")[: 4 * _REFINED]
+        spots += [Spot(*row) for row in np.column_stack((cost, turn, x, y))[best].tolist()]
     centre = poses[:, :2].mean(axis=0)
     chosen = _distinct(spots, centre, _REFINED)
     return _distinct([_refined(field, poses, weight, spot) for spot in chosen], centre, _REFINED)
@@ -163,7 +165,7 @@ def _samples(tracks: tuple[Track, ...]) -> tuple[Floats, Floats]:
 
 def _anchors(tracks: tuple[Track, ...]) -> list[Floats]:
     """Poses of the template that are laid onto lanes: where paths cross, and the begin, middle and end of the longest paths."""
-    found = []
+    found: list[Floats] = []
     for a, one in enumerate(tracks):
         for two in tracks[:a]:
             crossing = path_crossing(one, two)
@@ -177,7 +179,9 @@ def _anchors(tracks: tuple[Track, ...]) -> list[Floats]:
 def _costs(field: _Field, poses: Floats, weight: Floats, turn: Floats, x: Floats, y: Floats) -> Floats:
     """Costs (M,) [m²] of placements."""
     cos, sin = exact.cos(turn)[:, None], exact.sin(turn)[:, None]
-    points = np.stack((poses[:, 0] * cos - poses[:, 1] * sin + x[:, None], poses[:, 0] * sin + poses[:, 1] * cos + y[:, None]), axis=-1)
+    points = np.stack(
+        (poses[:, 0] * cos - poses[:, 1] * sin + x[:, None], poses[:, 0] * sin + poses[:, 1] * cos + y[:, None]), axis=-1
+    )
     return np.asarray((field.squared(points, poses[:, 2] + turn[:, None]) * weight).sum(axis=1))
 
 

@@ -29,13 +29,15 @@ from scenario_gen.arrays import Floats, wrap_angle
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
-from scenario_gen.roads.vector.match import Chains, changed_curve, Course, Match, speeding
+from scenario_gen.roads.vector.match import Chains, changed_curve, Course, Match, speeding, turned_more
 from scenario_gen.template.frenet import FrenetTracks, to_frenet
 from scenario_gen.template.tracks import Track
 
 _ROOM = 1.0  # metres between a footprint and the end of the road
 _FORTH = 25.0  # metres of road before and after what is driven, where it has them
 _TRIED = 40  # roads, the straightest first
+_TURN = math.radians(60.0)  # a road may turn by this much more or less than the vehicles in the template
+_APART = 2.2  # metres between the middles of oncoming lanes, at least
 _ASIDE = 18.0  # metres between a road's outermost lanes
 _STRAIGHT = 0.02  # rad/m: how much of the cost is the road's bending: (rad/m)² are counted against this
 _PARALLEL = math.radians(20.0)
@@ -79,7 +81,7 @@ def along_streets(chains: Chains, tracks: tuple[Track, ...], lanes: Sequence[int
 
 
 def _axes(chains: Chains, span: float, lanes: Sequence[int] | None) -> Iterator[tuple[float, tuple[int, ...], float]]:
-    """Chains of lanes that are long enough: how much they bend [rad/m, the mean], the lanes, where the straightest stretch begins."""
+    """Chains of lanes that are long enough: their mean bend [rad/m], the lanes, where the straightest stretch begins."""
     for first in range(len(chains.network.lanes)) if lanes is None else lanes:
         chain = _straight_on(chains, first, span)
         curve = chains.curve(chain)
@@ -147,8 +149,14 @@ def _laid(
         progress = np.zeros(len(along)) if track.still else (along - along[0]) * sign
         courses.append(Course(used, curve, float(begin[0]), np.maximum.accumulate(progress)))
         half = track.vehicle.length / 2.0 + _ROOM / 2.0
-        if courses[-1].start < half or courses[-1].end + half > curve.length:
+        if courses[-1].start < half or courses[-1].end + half > curve.length or abs(turned_more(courses[-1], track)) > _TURN:
             return None
+    offsets = [
+        [sides[int(k)].offset for k in frenet.lane[frenet.direction == sign].ravel()]
+        for sign, sides in ((1, ahead), (-1, against))
+    ]
+    if any(abs(a - b) < _APART for a in offsets[0] for b in offsets[1]):
+        return None  # one lane for both directions
     return Match(tuple(courses), bend / _STRAIGHT + speeding(chains.network, courses, tracks), "")
 
 
