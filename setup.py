@@ -20,7 +20,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "scenario_gen"
-NODES = ("segmenter", "planner", "gp_sampler", "road_server", "log_player", "evaluator", "recorder", "player", "suite")
+NODES = ("segmenter", "planner", "gp_sampler", "road_server", "log_player", "evaluator", "recorder", "player", "traffic", "suite")
 
 # ROS itself comes from a Jazzy installation, or from wheels as an extra.
 

@@ -14,7 +14,8 @@
 
 """Road ⇄ `map` (nav_msgs/OccupancyGrid) and `road/entries`, `road/exits` (geometry_msgs/PoseArray).
 
-Map: 0 free, 100 occupied, -1 unknown; a cell is drivable if it is known and below 65 (nav2's occupied threshold).
+Map: 0 free, 100 occupied, 99 occupied by something that stands on the road (an obstacle), -1
+unknown; a cell is drivable if it is known and below 65 (nav2's occupied threshold).
 `info.origin` is the lower-left corner of cell (0, 0), not rotated; row 0 is the lowest y. Entries head into the road, exits out
 of it. Stamp: that of the template the road was made for, or 0 for one that suits any. QoS: reliable, transient_local, depth 1.
 The road's name does not travel: nothing is computed from it.
@@ -31,7 +32,7 @@ from scenario_gen.types.road import Road
 
 MAP_TYPE = "nav_msgs/msg/OccupancyGrid"
 POSES_TYPE = "geometry_msgs/msg/PoseArray"
-OCCUPIED = 100
+OCCUPIED, OBSTRUCTED = 100, 99
 OCCUPIED_FROM = 65
 
 
@@ -63,7 +64,10 @@ def encode_map(road: Road, stamp_ns: int) -> bytes:
     origin = [*road.origin, 0.0, 0.0, 0.0, 0.0, 1.0]
     writer = CdrWriter().header(stamp_ns, road.frame_id).stamp(stamp_ns).pack("f", road.resolution).pack("I", width, height)
     writer.pack("d", *origin).pack("I", road.drivable.size)
-    return writer.raw(np.where(road.drivable, 0, OCCUPIED).astype(np.int8).tobytes()).finish()
+    cells = np.where(road.drivable, 0, OCCUPIED).astype(np.int8)
+    if road.obstructed is not None:
+        cells[road.obstructed] = OBSTRUCTED
+    return writer.raw(cells.tobytes()).finish()
 
 
 def encode_poses(poses: Floats, frame_id: str, stamp_ns: int) -> bytes:
@@ -115,6 +119,7 @@ def decode_map(data: bytes, entries: bytes | None = None, exits: bytes | None = 
     road = Road(
         name=name,
         drivable=((cells >= 0) & (cells < OCCUPIED_FROM)).reshape(height, width),
+        obstructed=(cells == OBSTRUCTED).reshape(height, width) if (cells == OBSTRUCTED).any() else None,
         resolution=resolution,
         origin=origin[:2],
         entries=ends[0],

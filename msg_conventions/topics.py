@@ -16,7 +16,7 @@
 
 import re
 
-from msg_conventions import changepoints, diagnostics, ego, frames, paths, pictures, roads, trajectory
+from msg_conventions import changepoints, diagnostics, driving, ego, frames, paths, pictures, roads, trajectory
 from scenario_gen.types.qos import Quality
 
 FIX_TYPE = "sensor_msgs/msg/NavSatFix"
@@ -27,6 +27,7 @@ LATCHED = Quality()
 MANY = Quality(depth=1000)
 MANY_HEARD = Quality(depth=1000, keep_all=True)  # by who must not lose any: paced publishers then wait for it
 STREAM = Quality(depth=1000, transient_local=False)
+LIVE = Quality(depth=100, transient_local=False)
 
 TOPICS: dict[str, tuple[str, Quality]] = {
     "map": (roads.MAP_TYPE, LATCHED),
@@ -47,6 +48,17 @@ TOPICS: dict[str, tuple[str, Quality]] = {
     "ego/start": (ego.STATE_TYPE, LATCHED),
     "ego/goal": (ego.STATE_TYPE, LATCHED),
     "ego/track": (trajectory.TYPE, LATCHED),
+    "vehicle_*/odom": (driving.ODOMETRY_TYPE, LIVE),
+    "traffic/markers": (pictures.MARKERS_TYPE, LIVE),
+    "traffic/local_map": (roads.MAP_TYPE, Quality(depth=1, transient_local=False)),
+    "ego/route": (paths.TYPE, LATCHED),
+    "ego/cmd_vel": (driving.TWIST_TYPE, LIVE),
+    "ego/cmd_vel_stamped": (TWIST_TYPE, LIVE),
+    "ego/trajectory": (trajectory.TYPE, LIVE),
+    "ego/path": (paths.TYPE, LIVE),
+    "ego/odom": (driving.ODOMETRY_TYPE, LIVE),
+    "verdicts": (diagnostics.TYPE, MANY),
+    "clock": (driving.CLOCK_TYPE, Quality(depth=10, transient_local=False)),
     "scenarios": (trajectory.TYPE, MANY),
     "scenarios/info": (diagnostics.TYPE, MANY),
     "markers": (pictures.MARKERS_TYPE, LATCHED),

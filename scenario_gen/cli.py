@@ -64,6 +64,20 @@ def configured(file: Path | None, assignments: list[str] | None) -> "PipelineCon
     return config
 
 
+def obstructed(config: "PipelineConfig", obstacles: list[str] | None) -> "PipelineConfig":
+    """Return the configuration with more obstacles on its roads.
+
+    Raises:
+        InputError: one is not of the form; the message names it.
+    """
+    from scenario_gen.parameters import updated
+    from scenario_gen.roads.obstacles import read_obstacles
+
+    for text in obstacles or []:
+        read_obstacles(text, "--obstacle")
+    return updated(config, {"road.obstacles": "; ".join(filter(None, [config.road.obstacles, *(obstacles or [])]))})
+
+
 @app.command()
 def parameters() -> None:
     """List every parameter with its default, unit, range and meaning."""
@@ -100,6 +114,10 @@ def generate(
         list[str] | None, typer.Option(help=r"a vehicle's start state, 'id: x y yaw \[speed]', on the road; repeatable")
     ] = None,
     goal: Annotated[list[str] | None, typer.Option(help="a vehicle's end state, likewise; repeatable")] = None,
+    obstacle: Annotated[
+        list[str] | None,
+        typer.Option(help="something in the way, 'x y yaw length width' on the road, e.g. a parked car; repeatable"),
+    ] = None,
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
@@ -111,7 +129,7 @@ def generate(
     cases, refusals = generate_folder(
         out,
         [(log, road)],
-        configured(parameter_file, assignments),
+        obstructed(configured(parameter_file, assignments), obstacle),
         count=count,
         seed=seed,
         encounters=encounter or [],
@@ -232,6 +250,50 @@ def validate(
         for sentence, count in one.left_out.items():
             say(f"  not applicable to {count}: {sentence}")
     if any(one.invalid for one in found):
+        raise typer.Exit(1)
+
+
+@app.command()
+def drive(
+    bag: Annotated[Path, typer.Argument(help="a bag of this suite with scenarios")],
+    planner: Annotated[str, typer.Option(help="MODULE:CLASS of the planner, e.g. scenario_gen.closed_loop.planners:IdmFollower")],
+    ego: Annotated[str, typer.Option(help="id of the vehicle in whose place it drives; the first if not given")] = "",
+    count: Annotated[int, typer.Option(min=0, help="scenarios at most; 0: all")] = 0,
+    workers: Annotated[int, typer.Option(min=0, help="processes; 0: one for each core")] = 0,
+    out: Annotated[Path, typer.Option(help="folder of drives.json, junit.xml and drives.html")] = Path("out/drives"),
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="a parameter of the drive (step, policy, …) or a bar (bars.collisions, …), as name=value"),
+    ] = None,
+) -> None:
+    """Test a planner in closed loop in every scenario of a bag; exit code 1 if a bar is not kept."""
+    from rich.table import Table
+
+    from scenario_gen.closed_loop.command import drive_bag
+    from scenario_gen.terminal import progress_bars
+
+    remind(bag)
+    with progress_bars() as advance:
+        result = drive_bag(
+            bag,
+            planner,
+            ego=ego,
+            count=count,
+            workers=workers,
+            out=out,
+            assignments=assignments or [],
+            progress=lambda done, total: advance(planner, done, total),
+        )
+    table = Table("drives", planner)
+    for name, rate in result.found.items():
+        table.add_row(name, str(rate))
+    say(table, wrap=True)
+    for outcome in result.worst:
+        say(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
+    for path in result.written:
+        say(str(path))
+    if result.broken:
+        say("bars not kept: " + "; ".join(result.broken))
         raise typer.Exit(1)
 
 

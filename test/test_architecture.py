@@ -49,6 +49,7 @@ ORDER = (
     ("report",),
     ("review", "exchange"),
     ("results", "reproduce"),
+    ("closed_loop",),
     ("batch",),
     ("nodes", "demo", "cli", "__main__"),
 )

@@ -74,7 +74,7 @@ def fit_template(
     if starts is not None or goals is not None:
         placement, given = place_given(encounter, road, config, starts, goals)
         return finish(encounter, segmentation, road, placement, config, given)
-    return finish(encounter, segmentation, road, _place(encounter, road, config), config)
+    return finish(encounter, segmentation, road, _place(encounter, road.cleared, config), config)
 
 
 def _fit_asked(
@@ -82,7 +82,7 @@ def _fit_asked(
 ) -> Fit:
     starts, goals = (request.rows(end, encounter) for end in ("starts", "goals"))
     refuse_impossible(encounter, road, starts, goals, max_speed)
-    base = _place(encounter, road, config) if np.isnan(starts).any() or np.isnan(goals).any() else None
+    base = _place(encounter, road.cleared, config) if np.isnan(starts).any() or np.isnan(goals).any() else None
     placement, given = place_given(encounter, road, config, starts, goals, base)
     fit = finish(encounter, segmentation, road, placement, config, given)
     refuse_misfits(fit, starts, goals)

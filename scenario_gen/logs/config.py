@@ -62,8 +62,12 @@ class LogConfig(Parameters):
     travel: float = parameter(5.0, "distance that at least one vehicle of an encounter covers", unit="m", low=0.0, high=1000.0)
     standstill: float = parameter(10.0, "when all stand longer than this, the encounter is over", unit="s", low=1.0, high=600.0)
     max_vehicles: int = parameter(
-        4, "largest number of vehicles in an encounter cut from a longer log", low=2, high=64, was="most_vehicles"
+        12, "largest number of vehicles in an encounter cut from a longer log", low=2, high=64, was="most_vehicles"
     )
+    min_presence: float = parameter(
+        3.0, "shortest time for which a vehicle is there that arrives late or leaves early", unit="s", low=0.5, high=600.0
+    )
+    whole: bool = parameter(True, "cut an encounter to the time in which all its vehicles are there")
     size_limit: int = parameter(256, "largest log that is read, counted decompressed", unit="MiB", low=1, high=1_000_000)
     row_limit: int = parameter(2_000_000, "most rows or messages of a log", low=1)
     vehicle_limit: int = parameter(10_000, "most vehicles of a log", low=2)

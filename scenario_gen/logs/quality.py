@@ -24,6 +24,7 @@ import shapely
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.presence import together
 
 
 @dataclass(frozen=True)
@@ -90,12 +91,21 @@ class Overlap:
 
 @dataclass(frozen=True)
 class EncounterQuality:
-    """Facts of one encounter that are reported, not repaired."""
+    """Facts of one encounter that are reported, not repaired.
+
+    Attributes:
+        name: the encounter's.
+        vehicles: who is there.
+        seconds: how long it lasts.
+        overlaps: recorded overlaps of footprints.
+        partly: who is there for a part of it: name, and from when to when [s].
+    """
 
     name: str
     vehicles: tuple[str, ...]
     seconds: float
     overlaps: tuple[Overlap, ...]
+    partly: tuple[tuple[str, float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -116,6 +126,10 @@ class Quality:
         out += [vehicle_line(vehicle) for vehicle in self.vehicles]
         for encounter in self.encounters:
             out.append(f"  encounter {encounter.name}: {encounter.seconds:.1f} s of {', '.join(encounter.vehicles)}")
+            if encounter.partly:
+                out.append(
+                    "    vehicle " + ", vehicle ".join(f"{name} from {a:.1f} to {b:.1f} s" for name, a, b in encounter.partly)
+                )
             out += [
                 f"    recorded footprints of {overlap.first} and {overlap.second} overlap {100 * overlap.share:.0f} % of the time"
                 f" (up to {overlap.area:.1f} m²)"
@@ -154,12 +168,13 @@ def footprints(encounter: Encounter, vehicle: int) -> Floats:
 
 
 def find_overlaps(encounter: Encounter) -> tuple[Overlap, ...]:
-    """Return the pairs whose footprints overlap at some sample, with the share of samples and the largest area."""
+    """Return the pairs whose footprints overlap at some sample, with the share of their common samples and the largest area."""
     polygons = [shapely.polygons(footprints(encounter, n)) for n in range(len(encounter.vehicles))]
     found = []
     for a, b in combinations(range(len(polygons)), 2):
         area = shapely.area(shapely.intersection(polygons[a], polygons[b]))
-        share = float((area > 0.0).mean())
+        area = area[together(encounter.present, a, b)]
+        share = float((area > 0.0).mean()) if len(area) else 0.0
         if share > 0.0:
             found.append(Overlap(encounter.vehicles[a].id, encounter.vehicles[b].id, share, float(area.max())))
     return tuple(found)

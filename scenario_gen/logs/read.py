@@ -26,9 +26,10 @@ import numpy as np
 from scenario_gen.errors import guarded, InputError, needs
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.config import LogConfig, picked
-from scenario_gen.logs.encounters import distances, find_groups, Group, Piece, pieces_of
+from scenario_gen.logs.encounters import Piece, pieces_of
+from scenario_gen.logs.groups import distances, find_groups, Group
 from scenario_gen.logs.quality import Dropped, EncounterQuality, find_overlaps, Quality, VehicleQuality
-from scenario_gen.logs.raw import natural, RawLog
+from scenario_gen.logs.raw import natural, Observations, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
 from scenario_gen.storage.files import files_of
 from scenario_gen.types.encounter import Encounter, Vehicle
@@ -95,7 +96,9 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     groups, notes = find_groups(pieces, config)
     if not groups:
         raise InputError(no_meeting(log, pieces, config))
-    notes += unmet(vehicles, {pieces[m].track.id for group in groups for m in group.members}, config)
+    notes += unmet(
+        vehicles, unusable(log, tracks, config), {pieces[m].track.id for group in groups for m in group.members}, config
+    )
     encounters = []
     for k, group in enumerate(groups):
         name = log.name if len(groups) == 1 else f"{log.name}-{k + 1:0{len(str(len(groups)))}d}"
@@ -113,14 +116,22 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     return LogResult(tuple(encounters), summary)
 
 
-def unmet(vehicles: Sequence[VehicleQuality], met: set[str], config: LogConfig) -> tuple[str, ...]:
-    """Say who is in no encounter, and whose measured speeds were not believed."""
+def unusable(log: RawLog, tracks: Sequence[Observations], config: LogConfig) -> list[str]:
+    """Return the vehicles of a log of which fewer than two positions were left."""
+    asked = picked([vehicle.id for vehicle in log.vehicles], config, log.name)
+    return sorted(set(asked) - {track.id for track in tracks}, key=natural)
+
+
+def unmet(vehicles: Sequence[VehicleQuality], nowhere: list[str], met: set[str], config: LogConfig) -> tuple[str, ...]:
+    """Say who is in no encounter, who has no positions, and whose measured speeds were not believed."""
     doubted = [v.id for v in vehicles if v.changed > DOUBTED]
     left = [v for v in vehicles if v.id not in met]
     if len(left) > config.max_vehicles:
         said = [f"{len(left)} of {len(vehicles)} vehicles are in no encounter: {', '.join(v.id for v in left)}"]
     else:
         said = [f"vehicle {v.id} is in no encounter: there for {v.seconds:.1f} s" for v in left]
+    if nowhere:
+        said.append(f"fewer than two usable positions: vehicle {', '.join(nowhere)}")
     return (*said, *(f"vehicle {name}: its measured speeds contradict its positions and are not used" for name in doubted))
 
 
@@ -167,7 +178,13 @@ def between(encounter: Encounter, config: LogConfig) -> tuple[Encounter, tuple[s
 def encounter_quality(encounter: Encounter) -> EncounterQuality:
     """The facts of an encounter."""
     ids = tuple(vehicle.id for vehicle in encounter.vehicles)
-    return EncounterQuality(encounter.name, ids, encounter.duration, find_overlaps(encounter))
+    last = len(encounter.time) - 1
+    partly = tuple(
+        (name, float(encounter.time[begin]), float(encounter.time[end]))
+        for name, (begin, end) in zip(ids, encounter.present.tolist(), strict=True)
+        if (begin, end) != (0, last)
+    )
+    return EncounterQuality(encounter.name, ids, encounter.duration, find_overlaps(encounter), partly)
 
 
 def make_encounter(
@@ -182,10 +199,11 @@ def make_encounter(
     members = [pieces[m] for m in group.members]
     notes = []
     position, heading, speed = [], [], []
-    for piece in members:
-        position.append(piece.position(group.first, group.last))
-        speed.append(piece.speed(group.first, group.last))
-        facing = piece.smooth.heading[group.first - piece.first : group.last - piece.first]
+    for piece, (first, last) in zip(members, group.spans, strict=True):
+        at = np.clip(np.arange(group.first, group.last), first, last - 1) - piece.first
+        position.append(piece.smooth.position[at])
+        speed.append(piece.smooth.speed[at])
+        facing = piece.smooth.heading[at]
         if np.isnan(facing).any():
             notes.append(f"vehicle {piece.track.id} never moves and its heading is not recorded: taken as east")
             facing = np.zeros(len(facing))
@@ -200,6 +218,7 @@ def make_encounter(
         heading=np.array(heading),
         speed=np.array(speed),
         origin=origin,
+        present=np.array(group.spans) - group.first - np.array([0, 1]),
     )
     return encounter, tuple(notes)
 

@@ -76,6 +76,7 @@ log_player = partial(start, "log_player")
 evaluator = partial(start, "evaluator")
 recorder = partial(start, "recorder")
 player = partial(start, "player")
+traffic = partial(start, "traffic")
 suite = partial(start, "suite")
 
 if __name__ == "__main__":

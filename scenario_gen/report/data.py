@@ -51,7 +51,7 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
         "row": case.row,
         "vehicles": [{"id": v.id, "length": _short(v.length), "width": _short(v.width)} for v in case.encounter.vehicles],
         "left_out": [n for n, known in enumerate(ids) if known not in case.evaluation.vehicles],
-        "road": _road(case.road) if case.road else None,
+        "road": road_data(case.road) if case.road else None,
         "template": _template(case.encounter, case.segmentation, frames),
         "fit": _fit(case.fit, case.routes) if case.fit else [],
         "arms": {name: _trajectories(group, frames, ids, egos.get(name)) for name, group in arms.items() if group},
@@ -85,7 +85,7 @@ def _short(value: float, digits: int = 3) -> float:
     return round(float(value), digits)
 
 
-def _road(road: Road) -> dict[str, Any]:
+def road_data(road: Road) -> dict[str, Any]:
     """Return the grid with cells merged until its longer side has at most MAX_CELLS; a merged cell is drivable by majority."""
     factor = max(1, -(-max(road.drivable.shape) // MAX_CELLS))
     height, width = (-(-side // factor) for side in road.drivable.shape)
@@ -101,7 +101,8 @@ def _road(road: Road) -> dict[str, Any]:
     }
 
 
-def _states(source: Encounter | Scenario, frames: int) -> Floats:
+def states(source: Encounter | Scenario, frames: int) -> Floats:
+    """Return (N, frames, 4) x, y [m], yaw [rad], speed [m/s] at instants spread evenly from start to end."""
     motion = at_count(source, frames)
     return np.concatenate([motion.position, motion.heading[..., None], motion.speed[..., None]], axis=-1)
 
@@ -119,8 +120,8 @@ def _whole(scenario: Scenario, frames: int, ids: Sequence[str], ego: Scenario | 
 
     Without such a track it is drawn where the first vehicle is, underneath it.
     """
-    own = {vehicle.id: state for vehicle, state in zip(scenario.vehicles, _states(scenario, frames), strict=True)}
-    track = next(iter(own.values())) if ego is None else _states(ego, frames)[0]
+    own = {vehicle.id: state for vehicle, state in zip(scenario.vehicles, states(scenario, frames), strict=True)}
+    track = next(iter(own.values())) if ego is None else states(ego, frames)[0]
     return np.stack([own.get(known, track) for known in ids])
 
 
@@ -130,7 +131,7 @@ def _template(encounter: Encounter, segmentation: Segmentation, frames: int) -> 
     probability = segmentation.changepoint_probability
     padded = np.append(probability, np.zeros(-len(probability) % step)).reshape(-1, step)
     return {
-        "states": pack(_states(encounter, frames)[None]),
+        "states": pack(states(encounter, frames)[None]),
         "durations": [_short(encounter.duration)],
         "bounds": [_short(encounter.time[i]) for i in bounds],
         "labels": [int(segmentation.labels[i]) for i in bounds[:-1]],

@@ -33,13 +33,14 @@ from plotly.offline import get_plotlyjs
 from scenario_gen.types.evaluation import formatted
 
 
-def render_page(template: str, scripts: Sequence[str], data: Any, **values: Any) -> str:
+def render_page(template: str, scripts: Sequence[str], data: Any, *, plotly: bool = True, **values: Any) -> str:
     """Return a page as text; the same input gives the same bytes.
 
     Args:
         template: name of a Jinja template among the assets.
         scripts: names of scripts among the assets, in the order in which they run, after plotly.js.
         data: what the scripts draw, put into the page as JSON; all numbers finite.
+        plotly: whether the scripts need plotly.js, which is 4 MB.
         **values: what else the template asks for.
     """
     assets = files("scenario_gen.report") / "assets"
@@ -55,7 +56,7 @@ def render_page(template: str, scripts: Sequence[str], data: Any, **values: Any)
         undefined=jinja2.StrictUndefined,
     )
     environment.filters["estimate"] = lambda value, unit="", bounds=True: formatted(value, unit, bounds=bounds)
-    texts = [get_plotlyjs(), *map(asset, scripts)]
+    texts = [*([get_plotlyjs()] if plotly else ()), *map(asset, scripts)]
     return environment.get_template(template).render(
         css=Markup(asset("report.css")),
         policy=Markup(content_policy(texts)),

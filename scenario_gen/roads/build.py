@@ -20,7 +20,8 @@ from scenario_gen.errors import InputError
 from scenario_gen.roads.builtin import BUILT_IN, draw, draw_corridor, draw_paper, layout_for
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.nav2 import read_map
-from scenario_gen.roads.vector.read import is_vector_map, vector_road
+from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
+from scenario_gen.roads.vector.read import is_vector_map, READERS, vector_road
 from scenario_gen.template.separation import own_paths
 from scenario_gen.template.tracks import clean_tracks
 from scenario_gen.types.encounter import Encounter
@@ -28,17 +29,23 @@ from scenario_gen.types.road import Road
 
 
 def build_road(name_or_path: str, encounter: Encounter | None = None, config: RoadConfig = RoadConfig()) -> Road:
-    """Return the road `name_or_path`.
+    """Return the road `name_or_path`, with the obstacles of `config` drawn into it.
 
     Args:
-        name_or_path: `straight`, `t_intersection`, `four_way`, `corridor`, or the path of a nav2 map_server YAML.
-        encounter: the template, to which built-in roads are sized (None: plain sizes); `corridor` cannot do without.
+        name_or_path: `straight`, `t_intersection`, `four_way`, `corridor`, or the path of a nav2 map_server YAML, or of a
+            vector map (.osm, .xodr, .xml), of which `#box=x0,y0,x1,y1`, `#lanelet=ID` or `#junction=ID` chooses a part.
+        encounter: the template, to which built-in roads are sized (None: plain sizes), and for which the best place on a vector
+            map is searched; `corridor` cannot do without.
         config: how it is drawn.
 
     Raises:
-        InputError: no such road, or a map that cannot be used.
+        InputError: no such road, a map that cannot be used, or an obstacle that stands nowhere on it.
         RefusedError: `corridor`, and the recorded vehicles overlap so far that they cannot be told apart.
     """
+    return with_obstacles(_bare_road(name_or_path, encounter, config), read_obstacles(config.obstacles))
+
+
+def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfig) -> Road:
     if name_or_path in BUILT_IN:
         if config.paper:
             if name_or_path == "four_way":
@@ -55,5 +62,6 @@ def build_road(name_or_path: str, encounter: Encounter | None = None, config: Ro
     path = Path(name_or_path)
     if path.suffix.lower() not in (".yaml", ".yml"):
         names = ", ".join((*BUILT_IN, "corridor"))
-        raise InputError(f"road {name_or_path!r} is neither one of {names} nor the path of a map_server YAML file")
+        kinds = f"a map_server YAML file or a vector map ({', '.join(READERS)})"
+        raise InputError(f"road {name_or_path!r} is neither one of {names} nor the path of {kinds}")
     return read_map(path, config)

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 from scenario_gen.errors import RefusedError
 from scenario_gen.parameters import parameter, Parameters
+from scenario_gen.roads.obstacles import read_obstacles
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,14 @@ class RoadConfig(Parameters):
     max_cells: int = parameter(
         25_000_000, "most cells of a road that is drawn, or pixels of a map that is read", low=1, high=80_000_000
     )
+    obstacles: str = parameter(
+        "", "what stands in the way, rectangles `x y yaw length width` in the road's frame, parted by `;`", unit="m, rad"
+    )
     image_outside_folder: bool = parameter(False, "read also a map's image that lies outside the folder of its YAML file")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        read_obstacles(self.obstacles)
 
 
 def refuse_too_many_cells(name: str, width: int, height: int, config: RoadConfig) -> None:

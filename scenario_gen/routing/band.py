@@ -22,7 +22,7 @@ from scenario_gen.kernels import F, F1, F2, I, kernel, OUT1, OUT2
 PINNED = 1e15
 STRONG = 1e4  # no weight grows beyond this
 DAMPING = 0.05
-MARGIN_WEIGHT = 5.0  # weight of an obstacle that is only nearer than the margin
+WISH_WEIGHT = 5.0  # weight of an obstacle that is only nearer than wished for
 CURVATURE_THRESHOLD = 0.9  # share of the curvature limit up to which bending is not made dearer
 
 
@@ -85,17 +85,17 @@ def _bending(points: Floats, ends: Floats, spacing: float, i: int) -> tuple[floa
     return (before_x - 2.0 * points[i, 0] + after_x) / square, (before_y - 2.0 * points[i, 1] + after_y) / square
 
 
-@kernel(I, F2, F, F2, F1, F2, F1, F2, F1, F1, F, F, F, F, OUT1, OUT1, OUT2)
+@kernel(I, F2, F, F2, F1, F2, F1, F2, F1, F2, F1, F, F, F, OUT1, OUT1, OUT2)
 def relax(
     steps: int, field: Floats, resolution: float, reference: Floats, hold: Floats, anchor: Floats, pull: Floats,
-    ends: Floats, disc: Floats, need: Floats, margin: float, spacing: float, bend: float, limit: float,
+    ends: Floats, disc: Floats, need: Floats, wish: Floats, spacing: float, bend: float, limit: float,
     stiff: Floats, push: Floats, points: Floats,
 ) -> None:  # fmt: skip
     """Relax a band of M >= 6 points between two fixed poses; lengths in metres from the grid's corner.
 
     Minimises the sum over its points of hold |p - reference|^2 + pull |p - anchor|^2 + stiff bend (|p''|^2 + 2 |p'''|^2)
-    + push (need - clearance)^2, the last for each disc of the footprint that comes too near to an obstacle. The headings at
-    the ends enter through a mirrored point beyond each end, so that the band may bend there as anywhere.
+    + push (need or wish - clearance)^2, the last for each disc of the footprint that comes too near to an obstacle. The headings
+    at the ends enter through a mirrored point beyond each end, so that the band may bend there as anywhere.
 
     Args:
         steps: how many least-squares problems to solve, each linearised about the one before.
@@ -107,8 +107,8 @@ def relax(
         pull: (M,) its weight, 0 where there is no anchor.
         ends: (2, 2) unit vectors of the headings at the first and the last point.
         disc: (D,) offsets along the heading of the discs that cover the footprint.
-        need: (M,) clearance that each disc's centre should have.
-        margin: the part of `need` that is only wished for: it pushes, but ever more strongly only where more is missing.
+        need: (M, D) clearance that each disc's centre must have: where it lacks, the push becomes ever stronger.
+        wish: (M,) clearance that they should have: it only pushes.
         spacing: distance between two points.
         bend: weight of bending [m^4].
         limit: largest curvature wanted [1/m].
@@ -140,21 +140,14 @@ def relax(
                     x, y = points[i, 0] + disc[k] * tx / norm, points[i, 1] + disc[k] * ty / norm
                     room, gx, gy = _clearance_at(field, x / resolution, y / resolution)
                     slope = np.sqrt(gx * gx + gy * gy)
-                    if room < need[i] and slope > 1e-9:
-                        away = (need[i] - room) / slope
+                    wanted = need[i, k] if room < need[i, k] else wish[i]
+                    if room < wanted and slope > 1e-9:
+                        away = (wanted - room) / slope
                         row[0], row[1], row[2] = -disc[k] / norm, 1.0, disc[k] / norm
-                        missing = (need[i] - margin - room) / need[i]
-                        _add(
-                            matrix,
-                            right,
-                            i - 1,
-                            row,
-                            3,
-                            push[i] if missing > 0.0 else MARGIN_WEIGHT,
-                            x + away * gx,
-                            y + away * gy,
-                        )
-                        worst = max(worst, missing)
+                        weight = push[i] if room < need[i, k] else WISH_WEIGHT
+                        _add(matrix, right, i - 1, row, 3, weight, x + away * gx, y + away * gy)
+                        if room < need[i, k]:
+                            worst = max(worst, (need[i, k] - room) / need[i, k])
                 push[i] = min(push[i] * (1.0 + worst), STRONG)
         for side in range(2):  # the ends: position, and heading through the mirrored point
             i, inner = (0, 1) if side == 0 else (n - 1, n - 2)

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 
 from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.routing.search.ompl.planners import OmplConfig
+from scenario_gen.routing.search.pose_planner import PoseSearchConfig
 from scenario_gen.routing.search.rrt_star_connect import RrtStarConnectConfig
 
 
@@ -36,7 +37,15 @@ class PlanningConfig(Parameters):
     # A car's turning circle of 10.5 to 11 m between kerbs is one of 4.4 m radius for its centre; the checker allows 0.25.
     max_curvature: float = parameter(0.225, "largest curvature of a route", unit="1/m", low=0.01, high=2.0)
     spacing: float = parameter(0.5, "largest distance between two points of a route", unit="m", low=0.05, high=0.5)
+    keep_side: float = parameter(
+        0.05,
+        "price of a metre driven a metre beside a leg's direct line, threefold towards oncoming traffic; 0: no side is dearer",
+        unit="1/m",
+        low=0.0,
+        high=10.0,
+    )
     traffic_side: str = parameter("right", "the side of the road to keep to", choices=("right", "left"))
 
     rrt_star_connect: RrtStarConnectConfig = field(default_factory=RrtStarConnectConfig)
+    pose: PoseSearchConfig = field(default_factory=PoseSearchConfig)
     ompl: OmplConfig = field(default_factory=OmplConfig)

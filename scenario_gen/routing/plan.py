@@ -15,7 +15,7 @@
 """The planning stage: one route per vehicle through its fitted anchors."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import itertools
 
 import numpy as np
@@ -24,11 +24,20 @@ from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import RefusedError
-from scenario_gen.roads.clearance import clearance_field, footprint_fits
+from scenario_gen.roads.clearance import clearance_field, footprint_fits, nearest_pose_with_room
 from scenario_gen.roads.vector.ground import own_ground
 from scenario_gen.routing.config import PlanningConfig
-from scenario_gen.routing.guess import direct, keep_to_side
-from scenario_gen.routing.search.planner import BlockedError, plan_with_retry, Planner, Query
+from scenario_gen.routing.connections import candidates, direct
+from scenario_gen.routing.search.planner import (  # fmt: skip
+    BlockedError,
+    Budget,
+    BudgetSpentError,
+    NoWayError,
+    plan_with_retry,
+    Planner,
+    Query,
+)
+from scenario_gen.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect, Wishes
 from scenario_gen.routing.search.rrt_star_connect import RrtStarConnect
 from scenario_gen.routing.smooth import Curve, Guess, monotone_matching, smooth, Targets
 from scenario_gen.types.encounter import Vehicle
@@ -41,6 +50,15 @@ CLOSE = 0.3  # [m] anchors nearer to each other than this are one waypoint
 SHORTEST = 0.1  # [m] what a moving primitive covers at least, else it is a dwell
 SHARP = np.deg2rad(100.0)  # a waypoint farther off the heading than this lies behind
 SOFT_WEIGHT = 0.1  # weight of an anchor that is no waypoint
+FIRMNESS = ((1.0, 12), (10.0, 12), (100.0, 12), (1000.0, 24))  # by which a guess is held, ever more firmly, and rounds for each
+DIRECT_HOLD, PATH_HOLD = 0.3, 0.1
+GUIDE_STRIDE = 10  # poses of a guide that are left out between two
+AGAINST, ASIDE = 3.0, 1.0  # how dear it is to leave a leg's direct line towards oncoming traffic, and the other way
+LACK = 1.0  # price of a metre without the room wished for, beside the metre itself
+ROOMY = 0.05  # [m] more on every side than a footprint needs
+TIGHTEST = 0.97  # share of the largest curvature that a search may use: smoothing needs some
+EASE, FARTHEST = 0.15, 1.0  # [m] room around a waypoint that is eased, and how far it may be moved
+PATIENCE = 20  # times the iterations in which a search goes on for a first path
 SLACK = 1.5  # how much more curvature than allowed a waypoint may ask for before it is softened
 
 
@@ -91,10 +109,21 @@ def plan_routes(road: Road, fit: Fit, config: PlanningConfig = PlanningConfig(),
     """
     planner = make_planner(config)
     tasks = (
-        _Task(own_ground(road, fitted.path, vehicle), vehicle, fitted, config, planner, seed + 7919 * n)
+        _Task(road, vehicle, fitted, config, planner, seed + 7919 * n)
         for n, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True))
     )
-    return tuple(_route(task) for task in tasks)
+    return tuple(_on_own_lanes(task) for task in tasks)
+
+
+def _on_own_lanes(task: _Task) -> Route:
+    """The route on the vehicle's own lanes, where lanes are known; on the whole road where none is on them (an obstacle)."""
+    ground = own_ground(task.road, task.fitted.path, task.vehicle)
+    if ground is not task.road:
+        try:
+            return _route(replace(task, road=ground))
+        except RefusedError:
+            pass
+    return _route(task)
 
 
 def deviations(route: Route, fitted: FittedVehicle) -> Floats:
@@ -120,21 +149,76 @@ def _route(task: _Task) -> Route:
                 f"has no room there on road {task.road.name!r}"
             )
     if task.fitted.stands.all() or exact.hypot(*(anchors[-1] - anchors[0])[:2]) < STANDS:
-        return Route(anchors[:1], np.zeros(len(anchors), dtype=np.int64), np.zeros(1))
+        return Route(anchors[:1], np.zeros(len(anchors), dtype=np.int64), np.zeros(1), joined=0, searched=0)
     waypoints = _waypoints(anchors, task.fitted.stands, task.config.max_curvature)
     if not task.config.drivable:
         return _polyline(task, waypoints)
+    legs, waypoints, left_out = _legs(task, waypoints)
     weights = _weights(anchors, waypoints)
     targets = Targets(anchors[weights > 0.0, :2], weights[weights > 0.0])
+    guess, searched = _joined([leg.guess for leg in legs]), len([leg for leg in legs if leg.searched])
     curve: Curve | None = None
-    for direct_allowed in (True, False):
+    for firmness, rounds in FIRMNESS:
         stop_if_cancelled()
-        guess = _joined([_leg(task, a, b, direct_allowed) for a, b in itertools.pairwise(waypoints)])
-        curve = smooth(task.road, task.vehicle, anchors[0], anchors[-1], targets, guess, task.config)
+        held = Guess(guess.points, guess.hold * firmness)
+        curve = smooth(task.road, task.vehicle, anchors[0], anchors[-1], targets, held, task.config, rounds)
         if curve.curvature <= task.config.max_curvature and not len(curve.off_road):
-            return _sampled(task, curve.poses, curve.length)
+            route = _sampled(task, curve.poses, curve.length)
+            return replace(route, joined=len(legs) - searched, searched=searched, left_out=left_out)
     assert curve is not None
     raise RefusedError(_reason(task, curve))
+
+
+@dataclass(frozen=True, eq=False)
+class _Leg:
+    """The way between two waypoints, free for the footprint, and whether it had to be searched for."""
+
+    guess: Guess
+    searched: bool
+
+
+def _legs(task: _Task, waypoints: list[int]) -> tuple[list[_Leg], list[int], tuple[int, ...]]:
+    """A leg between each two neighbouring waypoints, the waypoints, and those left out because no free way leads through them.
+
+    A waypoint between that cannot be passed as it stands (one at the road's edge that heads off it, say) is eased first.
+
+    Raises:
+        RefusedError: there is no way from start to end.
+    """
+    kept, legs, eased = list(waypoints), list[_Leg](), set[int]()
+    poses = task.anchors.copy()
+    k = 0
+    while k < len(kept) - 1:
+        stop_if_cancelled()
+        try:
+            legs.append(_leg(task, kept[k], kept[k + 1], poses, last=len(kept) == 2))
+            k += 1
+            continue
+        except RefusedError:
+            if len(kept) == 2:
+                raise
+        ends = [w for w in (kept[k], kept[k + 1]) if w not in (kept[0], kept[-1])]
+        hard = next((w for w in ends if w not in eased), None)
+        if hard is None:
+            hard = ends[-1]
+            at = kept.index(hard)
+            kept.remove(hard)
+        else:
+            at = kept.index(hard)
+            eased.add(hard)
+            poses[hard] = _eased(task, poses[kept[at - 1]], poses[hard], poses[kept[at + 1]])
+        k = min(k, at - 1)  # what led to it is to be found anew
+        del legs[k:]
+    return legs, kept, tuple(w for w in waypoints if w not in kept)
+
+
+def _eased(task: _Task, before: Floats, pose: Floats, after: Floats) -> Floats:
+    """A pose (3,) near to `pose` that heads from the waypoint before to the one after it, with some room around it."""
+    onward = (after - before)[:2]
+    turned = np.array([pose[0], pose[1], exact.arctan2(onward[1], onward[0])])
+    length, width = task.vehicle.length + 2.0 * EASE, task.vehicle.width + 2.0 * EASE
+    found = nearest_pose_with_room(task.road, turned, length, width, FARTHEST)
+    return pose if found is None else found[0]
 
 
 def _waypoints(anchors: Floats, stands: Bools, limit: float) -> list[int]:
@@ -176,14 +260,54 @@ def _weights(anchors: Floats, waypoints: list[int]) -> Floats:
     return weight
 
 
-def _leg(task: _Task, a: int, b: int, direct_allowed: bool) -> Guess:
-    """The first guess from anchor a to anchor b."""
-    start, end, config = task.anchors[a], task.anchors[b], task.config
-    radius = _radius(task, start, end)
-    if direct_allowed and (curve := direct(task.road, start, end, radius, config.max_curvature)) is not None:
-        return curve
-    path = _searched(task, a, b, radius)
-    return keep_to_side(task.road, path, radius + config.margin, config.traffic_side)
+def _leg(task: _Task, a: int, b: int, poses: Floats, *, last: bool) -> _Leg:
+    """The way from anchor a to anchor b, at `poses` (A, 3): a direct curve, else one that is searched for; `last`: patiently."""
+    start, end, config = poses[a], poses[b], task.config
+    curve = direct(task.road, task.vehicle, start, end, config.max_curvature)
+    if curve is not None:
+        return _Leg(Guess(curve[:, :2], np.full(len(curve), DIRECT_HOLD)), searched=False)
+    points = (
+        _searched_poses(task, a, b, start, end, PATIENCE if last else 1)[:, :2]
+        if config.planner == "rrt_star_connect"
+        else _searched(task, a, b)
+    )
+    return _Leg(Guess(points, np.full(len(points), PATH_HOLD)), searched=True)
+
+
+def _searched_poses(task: _Task, a: int, b: int, start: Floats, end: Floats, patience: int) -> Floats:
+    """A path (P, 3) from anchor a to anchor b, at `start` and `end` (3,), in the vehicle's own space.
+
+    First with a little more room than it needs, which the smoothing can use; else with what there is.
+    """
+    config, vehicle = task.config, task.vehicle
+    guide = next(candidates(start, end, config.max_curvature))[::GUIDE_STRIDE]
+    left, right = (AGAINST, ASIDE) if config.traffic_side == "right" else (ASIDE, AGAINST)
+    wishes = Wishes(config.margin, LACK, guide, config.keep_side * left, config.keep_side * right)
+    planner = PoseRrtStarConnect(config.pose)
+    where = f"between {task.name(a)} and {task.name(b)}"
+    limit = TIGHTEST * config.max_curvature
+    error: RefusedError | None = None
+    for extra in (ROOMY, 0.0):
+        query = PoseQuery(start, end, vehicle.length + 2.0 * extra, vehicle.width + 2.0 * extra, limit)
+        try:
+            try:
+                return planner.plan(task.road, query, Budget(config.iterations), task.seed + a, wishes).poses
+            except BudgetSpentError:
+                if extra or patience == 1:
+                    raise
+                budget = Budget(patience * config.iterations, first=True)
+                return planner.plan(task.road, query, budget, task.seed + a, wishes).poses
+        except NoWayError as reason:
+            error = RefusedError(f"{where}: {reason}")
+        except BudgetSpentError:
+            error = RefusedError(
+                f"no drivable route for vehicle {vehicle.id} on road {task.road.name!r} {where}: none with a curvature of at "
+                f"most {limit:.3f} 1/m was found in {patience * config.iterations} iterations; planning.iterations allows more"
+            )
+        except BlockedError as reason:  # of the larger footprint: the anchors themselves have room
+            error = RefusedError(f"{task.name(a if reason.end == 'start' else b)} is blocked: {reason}")
+    assert error is not None
+    raise error
 
 
 def _radius(task: _Task, start: Floats, end: Floats) -> float:
@@ -193,9 +317,10 @@ def _radius(task: _Task, start: Floats, end: Floats) -> float:
     return max(min(0.5 * task.vehicle.width + task.config.margin, room), 0.0)
 
 
-def _searched(task: _Task, a: int, b: int, radius: float) -> Floats:
-    """The planner's path (P, 2) from anchor a to anchor b."""
-    query = Query(task.anchors[a, :2], task.anchors[b, :2], radius)
+def _searched(task: _Task, a: int, b: int) -> Floats:
+    """The geometric planner's path (P, 2) from anchor a to anchor b, for a disc as wide as the vehicle."""
+    start, end = task.anchors[a], task.anchors[b]
+    query = Query(start[:2], end[:2], _radius(task, start, end))
     try:
         return plan_with_retry(task.planner, task.road, query, task.config.iterations, task.seed + a).path
     except BlockedError as error:
@@ -256,7 +381,7 @@ def _stops(task: _Task, length: Floats, poses: Floats) -> Floats:
 
 def _polyline(task: _Task, waypoints: list[int]) -> Route:
     """The planner's bare path through the waypoints: shortest, with corners; only its ends have the asked headings."""
-    legs = [_searched(task, a, b, _radius(task, task.anchors[a], task.anchors[b])) for a, b in itertools.pairwise(waypoints)]
+    legs = [_searched(task, a, b) for a, b in itertools.pairwise(waypoints)]
     path = np.concatenate([legs[0]] + [leg[1:] for leg in legs[1:]])
     edge = np.diff(path, axis=0)
     at = np.concatenate(([0.0], np.cumsum(exact.hypot(*edge.T))))

@@ -27,10 +27,11 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints, wrap_angle
-from scenario_gen.roads.clearance import clearance_field, footprint_fits
+from scenario_gen.roads.clearance import clearance_field
 from scenario_gen.routing.band import relax
 from scenario_gen.routing.config import PlanningConfig
 from scenario_gen.routing.search.planner import path_length
+from scenario_gen.routing.search.sweep import sweep_is_free
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.road import Road
 
@@ -92,9 +93,16 @@ class Curve:
 
 
 def smooth(
-    road: Road, vehicle: Vehicle, start: Floats, end: Floats, targets: Targets, guess: Guess, config: PlanningConfig
+    road: Road,
+    vehicle: Vehicle,
+    start: Floats,
+    end: Floats,
+    targets: Targets,
+    guess: Guess,
+    config: PlanningConfig,
+    rounds: int = ROUNDS,
 ) -> Curve:
-    """Draw a curve from `start` to `end` (poses (3,)) near the interior `targets`.
+    """Draw a curve from `start` to `end` (poses (3,)) near the interior `targets` and near a guess that is free.
 
     Source: elastic bands (Quinlan & Khatib 1993).
 
@@ -110,14 +118,15 @@ def smooth(
     stiff, push = np.ones(len(points)), np.full(len(points), 5.0)
     field = clearance_field(road)
     curve: Curve | None = None
-    for round_ in range(ROUNDS):
+    for round_ in range(rounds):
         spacing = path_length(points) / (len(points) - 1)
         anchor, pull = _assigned(points, targets)
-        need = _needed(road, disc, cover + config.margin, start, end, spacing, len(points))
+        need = np.minimum(_room(road, guess.points, disc), cover)
+        wish = _wished(road, disc, cover + config.margin, start, end, spacing, len(points))
         before, points = points, np.ascontiguousarray(points - road.origin)
         relax(
             STEPS, field, road.resolution, guess.points - road.origin, guess.hold, anchor - road.origin, pull, headings,
-            disc, need, config.margin, spacing, BEND, config.max_curvature, stiff, push, points,
+            disc, need, wish, spacing, BEND, config.max_curvature, stiff, push, points,
         )  # fmt: skip
         points = points + road.origin
         still = np.abs(points - before).max() < 0.02
@@ -134,16 +143,24 @@ def smooth(
     return curve
 
 
+def _room(road: Road, points: Floats, disc: Floats) -> Floats:
+    """Clearance (G, D) [m] of the discs of a footprint along a polyline (G, 2) [m]."""
+    tangent = np.gradient(points, axis=0)
+    tangent /= np.maximum(exact.hypot(*tangent.T), 1e-9)[:, None]
+    row, column, inside = road.cells(points[:, None] + disc[None, :, None] * tangent[:, None])
+    return np.where(inside, clearance_field(road)[row, column], 0.0)
+
+
 def _ahead(pose: Floats) -> Floats:
     """Unit vector of a pose's heading."""
     return np.array([exact.cos(pose[2]), exact.sin(pose[2])])
 
 
-def _needed(road: Road, disc: Floats, need: float, start: Floats, end: Floats, spacing: float, count: int) -> Floats:
-    """Clearance wanted along the band (count,): what there is at its ends, rising from there by 5 cm per metre to `need`."""
+def _wished(road: Road, disc: Floats, wish: float, start: Floats, end: Floats, spacing: float, count: int) -> Floats:
+    """Clearance wanted along the band (count,): what there is at its ends, rising from there by 5 cm per metre to `wish`."""
     field = clearance_field(road)
     along = np.arange(count) * spacing
-    wanted = np.full(count, need)
+    wanted = np.full(count, wish)
     for pose, distance in ((start, along), (end, along[::-1])):
         row, column, _ = road.cells(pose[:2] + disc[:, None] * _ahead(pose))
         wanted = np.minimum(wanted, field[row, column].min() + TAPER * distance)
@@ -161,7 +178,7 @@ def verified(road: Road, vehicle: Vehicle, points: Floats, start: Floats, end: F
     turned = np.abs(wrap_angle(np.diff(poses[:, 2]))) / np.maximum(exact.hypot(*np.diff(poses[:, :2], axis=0).T), 1e-6)
     bend[1:] = np.maximum(bend[1:], turned)  # a cusp on a straight line has no curvature, but turns round
     poses[0], poses[-1] = start, end
-    fits = footprint_fits(road, poses, vehicle.length, vehicle.width)
+    fits = sweep_is_free(road, poses, vehicle.length, vehicle.width)[:, 0] > 0.0
     return Curve(spline, float(knots[-1]), float(bend.max()), poses[np.argmax(bend), :2], poses[~fits])
 
 

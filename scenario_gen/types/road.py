@@ -14,7 +14,8 @@
 
 """A target road: what is drivable, and where traffic comes in and goes out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -39,6 +40,7 @@ class Road:
         exits: (X, 3) x, y, yaw: centre of each lane by which traffic leaves, heading out of the road.
         frame_id: the frame of all poses.
         lanes: the lanes of a vector map that the grid was drawn from, in the same frame; None: nothing is known of lanes.
+        obstructed: (H, W) bool; cells that would be drivable, but for something that stands there. None: nothing does.
     """
 
     name: str
@@ -49,11 +51,16 @@ class Road:
     exits: Floats
     frame_id: str = "map"
     lanes: LaneNetwork | None = None
+    obstructed: Bools | None = None
 
     def __post_init__(self) -> None:
         drivable = np.array(self.drivable, dtype=np.bool_, order="C")
         drivable.setflags(write=False)
         object.__setattr__(self, "drivable", drivable)
+        if self.obstructed is not None:
+            obstructed = np.array(self.obstructed, dtype=np.bool_, order="C")
+            obstructed.setflags(write=False)
+            object.__setattr__(self, "obstructed", obstructed)
         object.__setattr__(self, "resolution", float(np.float32(self.resolution)))
         object.__setattr__(self, "origin", frozen(self.origin))
         object.__setattr__(self, "entries", canonical_poses(np.reshape(self.entries, (-1, 3))))
@@ -66,6 +73,13 @@ class Road:
             raise InputError(
                 f"road {self.name!r} has origin {self.origin}; at most {FARTHEST:g} m from the frame's origin are read"
             )
+
+    @cached_property
+    def cleared(self) -> "Road":
+        """The same road with nothing in the way; itself, if nothing is."""
+        if self.obstructed is None:
+            return self
+        return replace(self, drivable=self.drivable | self.obstructed, obstructed=None)
 
     def cells(self, points: Floats) -> tuple[Ints, Ints, Bools]:
         """Return rows and columns (...) of the cells nearest to points (..., 2) [m], and whether the points lie on the grid."""

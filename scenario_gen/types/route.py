@@ -27,11 +27,17 @@ class Route:
         points: (M, 3) x [m], y [m], yaw [rad, unwrapped]; at most 0.5 m apart, no two equal; M = 1 if it stands throughout.
         anchor: (K + 2,) index into `points` of each anchor, non-decreasing; equal neighbours are a dwell.
         length: (M,) arc length [m] from the start to each point.
+        joined: legs between waypoints that a direct curve joined at once; None where it is not known (a bag).
+        searched: legs that were searched for; likewise.
+        left_out: anchors that no free way leads through, so that the route passes them as near as it may.
     """
 
     points: Floats
     anchor: Ints
     length: Floats
+    joined: int | None = None
+    searched: int | None = None
+    left_out: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", canonical_poses(self.points, continuous=True))

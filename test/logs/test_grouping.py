@@ -14,6 +14,8 @@
 
 """Who belongs to an encounter, and for how long."""
 
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from log_builders import save
 import numpy as np
 import pandas as pd
@@ -21,6 +23,7 @@ import pytest
 
 from scenario_gen.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs.groups import Group, part_of
 
 
 def car(name, begin, end, x, y, vx=0.0, vy=0.0):
@@ -36,7 +39,8 @@ def groups(tmp_path, *cars, **options):
 
 
 def test_a_vehicle_that_is_there_for_most_of_it_shortens_the_encounter(tmp_path):
-    found, quality = groups(tmp_path, car("1", 0, 10, 0, 0, 8), car("2", 0, 10, 0, 4, 8), car("3", 0, 7, 20, 0, 8))
+    cars = (car("1", 0, 10, 0, 0, 8), car("2", 0, 10, 0, 4, 8), car("3", 0, 7, 20, 0, 8))
+    found, quality = groups(tmp_path, *cars, whole=True)
     assert found == [("1,2,3", 7.0)]
     assert quality.notes == ("vehicle 3 shortens its encounter to 7.0 of 10.0 s",)
 
@@ -45,6 +49,72 @@ def test_a_vehicle_that_is_there_for_little_is_left_out(tmp_path):
     found, quality = groups(tmp_path, car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0, 4, 20, 0, 8))
     assert found == [("1,2", 20.0)]
     assert quality.notes == ("vehicle 3 is in no encounter: there for 4.0 s",)
+
+
+def presence(tmp_path, *cars, **options):
+    result = read_log(save(pd.concat(cars), tmp_path), LogConfig(whole=False, **options))
+    return [{v.id: tuple(row) for v, row in zip(e.vehicles, e.present.tolist(), strict=True)} for e in result.encounters], result
+
+
+def test_a_vehicle_may_arrive_late_and_leave_early(tmp_path):
+    cars = car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 8, 20, 20, 0, 8), car("4", 5, 9, 20, 4, 8)
+    (found,), result = presence(tmp_path, *cars)
+    assert found == {"1": (0, 200), "2": (0, 200), "3": (80, 200), "4": (50, 90)}
+    (encounter,) = result.encounters
+    assert encounter.position[2, 80] == pytest.approx([84.0, 0.0], abs=0.1)
+    assert (encounter.position[3, 91:] == encounter.position[3, 90]).all()
+    assert "vehicle 3 is there from 8.0 to 20.0 s of 20.0 s" in result.quality.notes
+    assert any("vehicle 4 from 5.0 to 9.0 s" in line for line in result.quality.lines())
+
+
+def test_who_comes_nearer_than_100_m_arrives_then(tmp_path):
+    (found,), _ = presence(tmp_path, car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0, 20, 250, 8, -8))
+    assert found["1"] == found["2"] == (0, 200)
+    assert found["3"] == pytest.approx((94, 200), abs=2)  # 250 m at 16 m/s
+
+
+def test_a_moment_at_the_edge_shortens_the_encounter(tmp_path):
+    (found,), result = presence(tmp_path, car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0.8, 20, 20, 0, 8))
+    assert set(found.values()) == {(0, 192)}
+    assert not result.quality.notes
+
+
+def test_nobody_is_left_out_in_silence(tmp_path):
+    cars = [car(str(k), 0, 10, 12 * k, 0, 10) for k in range(4)] + [car("brief", 0, 2, 0, 4, 10), car("far", 0, 10, 9e3, 0, 1)]
+    _, result = presence(tmp_path, *cars)
+    assert result.quality.notes == tuple(
+        f"vehicle {name} is in no encounter: there for {seconds} s" for name, seconds in (("brief", "2.0"), ("far", "10.0"))
+    )
+    _, result = presence(tmp_path, *cars, max_vehicles=3)
+    assert any("left out of an encounter of 3 vehicles (max_vehicles)" in note for note in result.quality.notes)
+    once = pd.DataFrame({"t_s": [0.0], "vehicle_id": "once", "x_m": 0.0, "y_m": 0.0, "speed_mps": 1.0})
+    _, result = presence(tmp_path, *cars, once)
+    assert "fewer than two usable positions: vehicle once" in result.quality.notes
+
+
+def test_a_part_of_a_group_keeps_who_is_there_for_long_enough():
+    group = Group((3, 5, 8), 0, 300, ((0, 300), (0, 120), (95, 300)))
+    part, left = part_of(group, 0, 100, LogConfig())
+    assert part == Group((3, 5), 0, 100, ((0, 100), (0, 100)))
+    assert left == [(8, (95, 100))]
+    part, left = part_of(group, 90, 300, LogConfig())
+    assert part == Group((3, 8), 90, 300, ((90, 300), (95, 300)))
+    assert left == [(5, (90, 120))]
+
+
+@given(st.lists(st.tuples(st.integers(0, 8), st.integers(1, 20), st.integers(-60, 60)), min_size=2, max_size=6))
+@settings(max_examples=10, deadline=None, derandomize=True)
+def test_everybody_is_in_an_encounter_or_named(tmp_path_factory, cars):
+    tracks = [car(f"v{k}", begin, begin + lasts, x - 8 * begin, 3.5 * k, 8) for k, (begin, lasts, x) in enumerate(cars)]
+    try:
+        _, result = presence(tmp_path_factory.mktemp("log"), *tracks)
+    except InputError:
+        return  # nobody meets
+    inside = {vehicle.id for encounter in result.encounters for vehicle in encounter.vehicles}
+    said = " ".join(result.quality.notes)
+    assert all(f"v{k}" in inside or f"v{k}" in said for k in range(len(cars)))
+    for encounter in result.encounters:
+        assert (np.diff(encounter.present, axis=1) * encounter.dt >= 3.0).all()
 
 
 def test_proximity_bounds_the_encounter(tmp_path):
@@ -91,7 +161,7 @@ def test_in_a_busy_log_only_those_who_interact_meet(tmp_path):
         car("5", 0, 10, 0, 25),
         car("6", 0, 10, 8, 25),
     ]
-    found, _ = groups(tmp_path, *cars)
+    found, _ = groups(tmp_path, *cars, max_vehicles=4)
     assert found == [("1,2", 10.0), ("3,4", 10.0)]
 
 

@@ -1,0 +1,185 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One step of the closed loop, compiled: where the ego is on its witness' path, how the others react, where all are then."""
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Bools, Floats
+from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at
+from scenario_gen.closed_loop.others import react
+from scenario_gen.kernels import B, B1, F, F1, F2, F3, I, kernel, OUT2, OUTB1
+
+WINDOW = 5.0  # metres beyond what the ego has moved in which its place on the witness' path is looked for
+BESIDE = 1.5  # metres beside that path at which the ego has left it
+ASKEW = 0.5  # rad against that path, likewise
+HURRY = 1.5  # times the witness' speed at which it is not on it either: it will not do what the witness did
+ON = 0.05  # metres and m/s by which an ego that keeps to its witness differs from it
+HARDER = 0.2  # m/s of a step beyond the strongest braking that are counted
+PUNCTUAL = 0.15  # seconds by which an ego that stands with its witness may be late
+
+
+@kernel(inline=True)
+def locate(now: float, time: Floats, motion: Floats, body: Floats, before: float, out: Floats) -> None:
+    """Write the ego's clock on its witness' path, the rate at which it runs, and whether it is on that path (1 or 0).
+
+    Args:
+        now: seconds.
+        time: (T,) of the scenario.
+        motion: (T, 6) of the witness, as in `Certified`.
+        body: (6,) the ego, as in `EgoState`.
+        before: its clock one step ago [s]; it never runs back.
+        out: (3,).
+    """
+    pose, last = np.empty(5), time[-1]
+    pose_at(time, motion, now, pose)
+    out[0], out[1], out[2] = before, 1.0, 1.0
+    if before <= now <= last and exact.hypot(body[0] - pose[0], body[1] - pose[1]) < ON:
+        out[0] = now
+    else:
+        way, best, at, step = 0.0, np.inf, before, 0.05
+        pose_at(time, motion, before, pose)
+        x, y = pose[0], pose[1]
+        reach = exact.hypot(body[0] - x, body[1] - y) + WINDOW
+        t = before
+        while t <= last and way <= reach:
+            pose_at(time, motion, t, pose)
+            way += exact.hypot(pose[0] - x, pose[1] - y)
+            x, y = pose[0], pose[1]
+            gap = exact.hypot(body[0] - x, body[1] - y)
+            if gap < best - 1e-6 or (gap < best + 1e-6 and t <= now):
+                best, at = min(gap, best), t
+            t += step
+        pose_at(time, motion, at, pose)
+        if pose[3] > 0.5:
+            along = (body[0] - pose[0]) * exact.cos(pose[2]) + (body[1] - pose[1]) * exact.sin(pose[2])
+            at += min(max(along / pose[3], -step), step)
+        out[0] = min(max(at, before), last)
+    pose_at(time, motion, out[0], pose)
+    c, s = exact.cos(pose[2]), exact.sin(pose[2])
+    turn = (body[2] - pose[2] + np.pi) % (2.0 * np.pi) - np.pi
+    aside = abs((body[1] - pose[1]) * c - (body[0] - pose[0]) * s)
+    if abs(body[3] - pose[3]) < ON:
+        out[1] = 1.0 if pose[3] > 0.3 or out[0] >= now - PUNCTUAL else 0.0
+    elif pose[3] > 0.3:
+        out[1] = body[3] / pose[3]
+    else:
+        out[1] = 1.0 if body[3] > 0.1 else 0.0
+    if aside > BESIDE or abs(turn) > ASKEW or out[1] > HURRY:
+        out[2] = 0.0
+
+
+@kernel(inline=True)
+def place(time: Floats, motion: Floats, clock: Floats, rate: Floats, out: Floats) -> None:
+    """Write x, y [m], yaw [rad], speed [m/s] (N, 4) of motions (N, T, 6) at their clocks (N,) [s], running at rates (N,)."""
+    pose = np.empty(5)
+    for i in range(out.shape[0]):
+        pose_at(time, motion[i], clock[i], pose)
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = pose[0], pose[1], pose[2], pose[3] * rate[i]
+
+
+@kernel(F, F, F1, F3, F2, B1, F3, F, F3, I, F1, F1, F2, B1, OUT2, OUT2, OUTB1)
+def advance(
+    h: float,
+    now: float,
+    time: Floats,
+    motion: Floats,
+    half: Floats,
+    leaves: Bools,
+    cells: Floats,
+    cell: float,
+    order: Floats,
+    ego: int,
+    body: Floats,
+    driving: Floats,
+    before: Floats,
+    here: Bools,
+    after: Floats,
+    vehicles: Floats,
+    there: Bools,
+) -> None:
+    """Move everyone one step on.
+
+    Args:
+        h: step [s].
+        now: time at its end [s].
+        time: (T,) of the scenario [s].
+        motion: (N, T, 6) as in `Certified`.
+        half: (N, 2) half lengths and widths [m].
+        leaves: (N,) as in `Certified`.
+        cells: (N, K, 8) as in `Certified`.
+        cell: length of a cell [s].
+        order: (N, N, K) as in `Certified`.
+        ego: index of the ego's witness.
+        body: (6,) the ego at the end of the step, as in `EgoState`.
+        driving: (7,) headway [s], standstill gap [m], acceleration, comfortable and strongest braking [m/s²], whether the others
+            yield to the ego as the template did, and whether they react at all.
+        before: (N, 2) clocks [s] and their rates.
+        here: (N,) who is on the scene.
+        after: (N, 3) clocks and rates at the end of the step, and 1 where one of the others brakes harder than the strongest.
+        vehicles: (N, 4) x, y [m], yaw [rad], speed [m/s] at the end of the step.
+        there: (N,) who is on the scene then.
+    """
+    n, last = motion.shape[0], time[-1]
+    witness, pose = np.empty(3), np.empty(5)
+    locate(now, time, motion[ego], body, before[ego, 0], witness)
+    clock, rate = before[:, 0].copy(), before[:, 1].copy()
+    new_clock, new_rate, forced = np.empty(n), np.empty(n), np.zeros(n)
+    if driving[6] > 0.0:
+        yields = driving[5] > 0.0
+        react(
+            h, time, motion, half, cells, cell, order, ego, body, witness, yields, driving, here,
+            clock, rate, new_clock, new_rate, forced,
+        )  # fmt: skip
+    else:
+        new_clock[:], new_rate[:] = min(now, last), 1.0
+    new_clock[ego], new_rate[ego] = witness[0], witness[1]
+    place(time, motion, new_clock, new_rate, vehicles)
+    vehicles[ego] = body[:4]
+    for i in range(n):
+        pose_at(time, motion[i], clock[i], pose)
+        lost = rate[i] * pose[3] - vehicles[i, 3]
+        after[i, 0], after[i, 1] = new_clock[i], new_rate[i]
+        after[i, 2] = 1.0 if i != ego and lost > driving[4] * h + HARDER and new_rate[i] < 1.0 else 0.0
+        there[i] = i == ego or not (leaves[i] and new_clock[i] >= last)
+
+
+AT = 0.2  # metres before the goal that count as there
+BEYOND = 10.0  # metres beyond it, more than anyone drives in one step
+GOAL_TURN = 1.0  # rad, largest difference of heading at the goal
+
+
+@kernel(F1, F, B, F1)
+def at_goal(goal: Floats, beside: float, stays: bool, pose: Floats) -> bool:
+    """Whether a pose (x, y, yaw, …) has passed the goal (likewise) at most `beside` [m] of it, or, if it `stays`, is near it."""
+    x, y = pose[0] - goal[0], pose[1] - goal[1]
+    if stays:
+        return bool(x * x + y * y <= beside * beside)
+    c, s = exact.cos(goal[2]), exact.sin(goal[2])
+    turn = (pose[2] - goal[2] + np.pi) % (2.0 * np.pi) - np.pi
+    return bool(-AT <= x * c + y * s <= BEYOND and abs(y * c - x * s) <= beside and abs(turn) <= GOAL_TURN)
+
+
+@kernel(F2, F2, B1, I)
+def overlaps(vehicles: Floats, half: Floats, here: Bools, ego: int) -> bool:
+    """Whether the ego overlaps another that is here; vehicles (N, 4) x, y, yaw, speed, half sizes (N, 2)."""
+    mine, other = np.empty(7), np.empty(7)
+    fill_box(vehicles[ego, 0], vehicles[ego, 1], vehicles[ego, 2], half[ego, 0], half[ego, 1], mine)
+    for i in range(vehicles.shape[0]):
+        if i != ego and here[i]:
+            fill_box(vehicles[i, 0], vehicles[i, 1], vehicles[i, 2], half[i, 0], half[i, 1], other)
+            if boxes_meet(mine, other):
+                return True
+    return False

@@ -1,0 +1,193 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is known of a scenario before it is driven: its motion by the clock of its certificate, and the order of its events.
+
+Every vehicle i has a clock τ_i: it is where the certified scenario has it at time τ_i. All clocks equal and running is the
+certified execution; a vehicle that is held up has a clock that runs more slowly. For two vehicles the certificate says that no
+collision lies on τ_i = τ_j. A collision at τ_i > τ_j is at a place that j passed first: i may come there only when j has gone.
+So `order[i, j]` says how far the clock of i may go for each clock of j, and it may always go as far as that of j
+(docs/closed_loop.md).
+Source: priorities in the coordination space, Gregoire, Bonnabel & de La Fortelle 2014, on clocks instead of path lengths.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Bools, Floats, frozen
+from scenario_gen.errors import InputError
+from scenario_gen.kernels import F, F1, F2, F3, kernel, OUT3
+from scenario_gen.types.scenario import Scenario
+
+CELL = 0.1  # seconds of a certified clock that are taken together
+ROOM = 0.05  # metres by which the box of a cell is larger than its ends ask for: what bends between them, and a little distance
+STANDS = 0.5  # m/s; who is slower at the end of a scenario stands there, who is faster leaves the scene
+
+
+@dataclass(frozen=True, eq=False)
+class Certified:
+    """A scenario as the closed loop needs it; N vehicles, T instants, K cells of the clock.
+
+    Attributes:
+        scenario: the certified scenario, the witness of the ego among its vehicles.
+        ego: index of the ego's witness.
+        motion: (N, T, 6) x, y [m], yaw [rad], speed [m/s], velocity x, y [m/s] at the scenario's instants.
+        half: (N, 2) half lengths and widths [m].
+        cells: (N, K, 8) of each cell of the clock: the box that holds the footprint throughout (centre x, y [m], cos and sin of
+            its yaw, half length, half width [m], radius [m]), and the way driven [m] at its start.
+        order: (N, N, K) `order[i, j, k]`: clock [s] that vehicle i may not pass while the clock of j is in cell k, unless that
+            of j is there, too; inf if nothing is in its way.
+        leaves: (N,) whether a vehicle leaves the scene when its certified motion ends.
+    """
+
+    scenario: Scenario
+    ego: int
+    motion: Floats
+    half: Floats
+    cells: Floats
+    order: Floats
+    leaves: Bools
+
+    @property
+    def duration(self) -> float:
+        """Length of the scenario [s]."""
+        return float(self.scenario.time[-1])
+
+
+def certified(scenario: Scenario, ego: int | str) -> Certified:
+    """Prepare a scenario for being driven, with one of its vehicles, by index or id, as the ego's witness.
+
+    Raises:
+        InputError: it has no such vehicle, or starts at another time than 0.
+    """
+    ids = [vehicle.id for vehicle in scenario.vehicles]
+    if isinstance(ego, str):
+        if ego not in ids:
+            raise InputError(f"scenario {scenario.index} has no vehicle {ego!r} to be the ego; it has {', '.join(ids)}")
+        ego = ids.index(ego)
+    if not 0 <= ego < len(ids):
+        raise InputError(f"scenario {scenario.index} has no vehicle number {ego} to be the ego; it has {len(ids)}")
+    time = scenario.time
+    if len(time) < 2 or time[0] != 0.0:
+        raise InputError(f"scenario {scenario.index} must start at 0 s and have two samples at least")
+    speed, yaw = scenario.speed, scenario.heading
+    velocity = speed[..., None] * np.stack([exact.cos(yaw), exact.sin(yaw)], axis=-1)
+    motion = frozen(np.concatenate([scenario.position, yaw[..., None], speed[..., None], velocity], axis=2))
+    half = frozen([(0.5 * vehicle.length, 0.5 * vehicle.width) for vehicle in scenario.vehicles])
+    n, count = len(ids), int(np.ceil(time[-1] / CELL - 1e-9))
+    cells, order = np.empty((n, count, 8)), np.empty((n, n, count))
+    fill_cells(time, motion, half, CELL, cells)
+    fill_order(cells, CELL, order)
+    leaves = np.asarray(speed[:, -1] >= STANDS)
+    return Certified(scenario, ego, motion, half, frozen(cells), frozen(order), leaves)
+
+
+@kernel(inline=True)
+def pose_at(time: Floats, motion: Floats, clock: float, out: Floats) -> None:
+    """Write x, y, yaw, speed, acceleration of one vehicle's motion (T, 6) at a clock [s] into `out` (5,).
+
+    Position is the cubic of `Scenario`, heading and speed are linear between two instants; beyond the ends it stays there.
+    """
+    last = time.shape[0] - 1
+    t = min(max(clock, 0.0), time[last])
+    low, high = 0, last
+    guess = int(t / time[last] * last)  # most clocks are even
+    if guess < last and time[guess] <= t <= time[guess + 1]:
+        low, high = guess, guess + 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if time[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    h = time[high] - time[low]
+    u = (t - time[low]) / h
+    w = 1.0 - u
+    a, b = motion[low], motion[high]
+    blend = u * u * (3.0 - 2.0 * u)
+    out[0] = a[0] + blend * (b[0] - a[0]) + h * u * w * (w * a[4] - u * b[4])
+    out[1] = a[1] + blend * (b[1] - a[1]) + h * u * w * (w * a[5] - u * b[5])
+    out[2] = a[2] + u * (b[2] - a[2])
+    out[3] = a[3] + u * (b[3] - a[3])
+    out[4] = (b[3] - a[3]) / h
+
+
+@kernel(inline=True)
+def boxes_meet(a: Floats, b: Floats) -> bool:
+    """Whether two boxes overlap: each x, y, cos, sin, half length, half width, radius. Source: separating axes."""
+    dx, dy, reach = b[0] - a[0], b[1] - a[1], a[6] + b[6]
+    if dx * dx + dy * dy >= reach * reach:
+        return False
+    cos, sin = abs(a[2] * b[2] + a[3] * b[3]), abs(a[2] * b[3] - a[3] * b[2])
+    return bool(
+        abs(dx * a[2] + dy * a[3]) < a[4] + b[4] * cos + b[5] * sin
+        and abs(dy * a[2] - dx * a[3]) < a[5] + b[4] * sin + b[5] * cos
+        and abs(dx * b[2] + dy * b[3]) < b[4] + a[4] * cos + a[5] * sin
+        and abs(dy * b[2] - dx * b[3]) < b[5] + a[4] * sin + a[5] * cos
+    )
+
+
+@kernel(inline=True)
+def fill_box(x: float, y: float, yaw: float, length: float, width: float, out: Floats) -> None:
+    """Write a box of half sizes `length` and `width` at a pose into `out` (7 or more)."""
+    out[0], out[1], out[2], out[3] = x, y, exact.cos(yaw), exact.sin(yaw)
+    out[4], out[5], out[6] = length, width, np.sqrt(length * length + width * width)
+
+
+@kernel(F1, F3, F2, F, OUT3)
+def fill_cells(time: Floats, motion: Floats, half: Floats, cell: float, out: Floats) -> None:
+    """Fill `out` (N, K, 8) as in `Certified`, from the motion (N, T, 6), half sizes (N, 2) [m] and the cells' length [s].
+
+    The box stands at the middle pose, is longer and wider by what the ends ask for, by what the turn adds, and by ROOM.
+    """
+    a, b, m = np.empty(5), np.empty(5), np.empty(5)
+    for i in range(out.shape[0]):
+        way = 0.0
+        for k in range(out.shape[1]):
+            start, end = k * cell, min((k + 1) * cell, time[-1])
+            pose_at(time, motion[i], start, a)
+            pose_at(time, motion[i], end, b)
+            pose_at(time, motion[i], 0.5 * (start + end), m)
+            c, s = exact.cos(m[2]), exact.sin(m[2])
+            ahead = max(abs((a[0] - m[0]) * c + (a[1] - m[1]) * s), abs((b[0] - m[0]) * c + (b[1] - m[1]) * s))
+            aside = max(abs((a[1] - m[1]) * c - (a[0] - m[0]) * s), abs((b[1] - m[1]) * c - (b[0] - m[0]) * s))
+            turn = max(abs(a[2] - m[2]), abs(b[2] - m[2]))
+            length = half[i, 0] + ahead + half[i, 1] * turn + ROOM
+            width = half[i, 1] + aside + half[i, 0] * turn + ROOM
+            fill_box(m[0], m[1], m[2], length, width, out[i, k])
+            out[i, k, 7] = way
+            way += exact.hypot(m[0] - a[0], m[1] - a[1]) + exact.hypot(b[0] - m[0], b[1] - m[1])
+
+
+@kernel(F3, F, OUT3)
+def fill_order(cells: Floats, cell: float, out: Floats) -> None:
+    """Fill `out` (N, N, K) with `order` of `Certified`, from the cells (N, K, 8) and their length [s].
+
+    For each cell k of j the first cell l >= k of i whose boxes meet, at whose start i must wait; then the least over all later k,
+    for what j has not passed yet it may still come to. The price of taking cells together is waiting a little farther away.
+    """
+    n, count = cells.shape[0], cells.shape[1]
+    for i in range(n):
+        for j in range(n):
+            least = np.inf
+            for k in range(count - 1, -1, -1):
+                if i != j:
+                    last = count if least == np.inf else min(count, int(least / cell + 0.5))
+                    for l in range(k, last):  # noqa: E741 - the next letter
+                        if boxes_meet(cells[j, k], cells[i, l]):
+                            least = l * cell
+                            break
+                out[i, j, k] = least

@@ -1,0 +1,84 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The work of `scenario-gen drive`: a bag and a planner's name in, a folder of verdicts out."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+import os
+from pathlib import Path
+
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.results import write_drives
+from scenario_gen.closed_loop.trials import Bars, broken_bars, Outcome, Rate, rates, read_trials, run_trials
+from scenario_gen.parameters import assigned
+
+WORST = 5  # drives that the terminal names
+
+
+@dataclass(frozen=True)
+class DriveCommandConfig:
+    """The parameters of the command: those of a drive, and the bars."""
+
+    drive: ClosedLoopConfig = field(default_factory=ClosedLoopConfig)
+    bars: Bars = field(default_factory=Bars)
+
+
+@dataclass(frozen=True, eq=False)
+class DriveResult:
+    """What a planner came to: rates, the bars that were not kept, the worst drives that failed, and the files written."""
+
+    found: dict[str, Rate]
+    broken: Sequence[str]
+    worst: Sequence[Outcome]
+    written: Sequence[Path]
+
+
+def drive_bag(
+    bag: Path,
+    planner: str,
+    *,
+    ego: str = "",
+    count: int = 0,
+    workers: int = 0,
+    out: Path,
+    assignments: Sequence[str] = (),
+    progress: Callable[[int, int], None] = lambda *_: None,
+) -> DriveResult:
+    """Drive a planner through the scenarios of a bag and write what it came to.
+
+    Args:
+        bag: of this suite.
+        planner: MODULE:CLASS.
+        ego: id of the vehicle in whose place it drives.
+        count: scenarios at most; 0: all.
+        workers: processes; 0: one for each core.
+        out: folder of the results.
+        assignments: parameters as name=value; those of a drive without prefix, those of the bars as bars.name.
+        progress: told how many are done of how many.
+
+    Raises:
+        InputError: bag, planner or a parameter is wrong; the message names it.
+    """
+    config = DriveCommandConfig()
+    for assignment in assignments:
+        config = assigned(config, assignment if assignment.startswith(("bars.", "drive.")) else f"drive.{assignment}")
+    trials = read_trials(bag, ego, count)
+    outcomes = run_trials(trials, planner, config.drive, workers or os.cpu_count() or 1, progress)
+    found = rates(outcomes)
+    broken = broken_bars(found, config.bars)
+    failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
+    worst = sorted(failed, key=lambda outcome: outcome.verdict.severity, reverse=True)[:WORST]
+    written = write_drives(out, outcomes, trials, planner, config.drive, broken, [bag])
+    return DriveResult(found, broken, worst, tuple(written.values()))

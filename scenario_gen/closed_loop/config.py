@@ -1,0 +1,55 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The parameters of a drive in closed loop."""
+
+from dataclasses import dataclass
+
+from scenario_gen.parameters import parameter, Parameters
+
+REPLAY, REACTIVE = "replay", "reactive"
+TEMPLATE, NEVER = "template", "never"
+
+
+@dataclass(frozen=True)
+class ClosedLoopConfig(Parameters):
+    """How the others drive, what the ego's body can do, when a drive ends, and what the verdict counts."""
+
+    step: float = parameter(0.1, "time between two decisions", unit="s", low=0.005, high=0.5)
+    policy: str = parameter(
+        REACTIVE,
+        "the others replay what was certified, or react to the ego on their certified paths",
+        choices=(REPLAY, REACTIVE),
+    )
+    yield_to_ego: str = parameter(
+        TEMPLATE,
+        "at conflicts the others wait for the ego as in the template, or never (they still brake for what is in their way)",
+        choices=(TEMPLATE, NEVER),
+    )
+    headway: float = parameter(1.2, "time gap that reactive vehicles keep (IDM)", unit="s", low=0.0, high=5.0)
+    standstill_gap: float = parameter(2.0, "gap at which they stop behind another (IDM)", unit="m", low=0.0, high=20.0)
+    acceleration: float = parameter(2.0, "with which they take up their certified speed again", unit="m/s²", low=0.1, high=10.0)
+    comfortable_braking: float = parameter(3.0, "with which they slow down where that suffices", unit="m/s²", low=0.1, high=10.0)
+    strongest_braking: float = parameter(8.0, "with which they brake at most for the ego", unit="m/s²", low=0.5, high=12.0)
+    ego_acceleration: float = parameter(4.0, "the ego's strongest speeding up", unit="m/s²", low=0.1, high=20.0)
+    ego_braking: float = parameter(9.0, "the ego's strongest braking", unit="m/s²", low=0.1, high=20.0)
+    ego_speed: float = parameter(45.0, "the ego's highest speed", unit="m/s", low=0.1, high=100.0)
+    ego_curvature: float = parameter(0.2, "the ego's sharpest turn", unit="1/m", low=0.001, high=2.0)
+    ego_curvature_rate: float = parameter(
+        0.3, "how fast the ego's curvature changes: the rate of its steering", unit="1/(m s)", low=0.001, high=20.0
+    )
+    overtime: float = parameter(1.5, "a drive ends after so many times the scenario's duration, and 5 s", low=1.0, high=10.0)
+    goal_width: float = parameter(2.0, "the goal is passed within this distance beside it", unit="m", low=0.1, high=50.0)
+    horizon: float = parameter(8.0, "longest time to collision that is counted", unit="s", low=0.1, high=60.0)
+    hard_braking: float = parameter(4.0, "braking that is counted as hard", unit="m/s²", low=0.1, high=20.0)

@@ -1,0 +1,129 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Planners of our own, to start from and to compare with: one that keeps its distance, and one that looks at nobody."""
+
+from dataclasses import dataclass, field
+import math
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats
+from scenario_gen.closed_loop.ego import Command, EgoState
+from scenario_gen.closed_loop.simulation import Observation, Task
+from scenario_gen.curve import Curve
+
+SPEED_GAIN = 1.0  # 1/s, acceleration per m/s that is missing
+
+
+class RouteFollower:
+    """Steers along the route towards a point ahead of the ego (pure pursuit, Coulter 1992)."""
+
+    def reset(self, task: Task) -> None:
+        """Take the route in."""
+        self.task = task
+        self.route = Curve.through(task.route[:, :2]) if len(task.route) > 2 else None
+        self._near = 0.0
+
+    def steer(self, ego: EgoState) -> tuple[float, float]:
+        """Return the curvature to drive [1/m], and the ego's station on the route [m]."""
+        if self.route is None:
+            return 0.0, 0.0
+        around = np.linspace(self._near - 2.0, self._near + 8.0, 41)
+        poses = self.route.at(around)
+        self._near = float(around[np.argmin(exact.hypot(poses[:, 0] - ego.x, poses[:, 1] - ego.y))])
+        ahead = min(max(0.8 * ego.speed, 3.0), 15.0)
+        x, y, _ = self.route.at(self._near + ahead).tolist()
+        dx, dy = x - ego.x, y - ego.y
+        c, s = float(exact.cos(ego.yaw)), float(exact.sin(ego.yaw))
+        return 2.0 * (dy * c - dx * s) / max(dx * dx + dy * dy, 1e-6), self._near
+
+
+@dataclass
+class ConstantSpeed(RouteFollower):
+    """Follows its route at one speed and looks at nobody: the bad one. `speed` [m/s], or that of the start if it is higher."""
+
+    speed: float = 8.0
+
+    def act(self, observation: Observation) -> Command:
+        """Steer, and keep the speed."""
+        ego = observation.ego
+        curvature, _ = self.steer(ego)
+        wanted = max(self.speed, float(self.task.start[3]))
+        return Command(SPEED_GAIN * (wanted - ego.speed), curvature)
+
+
+@dataclass
+class IdmFollower(RouteFollower):
+    """Follows its route and keeps its distance to whoever is on it, or will be if all go straight on (IDM).
+
+    Source: intelligent driver model, Treiber, Hennecke & Helbing 2000. `speed` [m/s] is driven on a free and straight way.
+    """
+
+    speed: float = 10.0
+    headway: float = 1.5  # s
+    standstill: float = 3.0  # m
+    acceleration: float = 1.5  # m/s²
+    braking: float = 2.5  # m/s²
+    lateral: float = 2.5  # m/s², in bends
+    foresight: float = 4.0  # s, for which others are expected to go straight on
+    room: float = 0.5  # m beside the ego that it keeps free
+    _instants: Floats = field(default_factory=lambda: np.arange(0.0, 4.01, 0.5), repr=False)
+
+    def act(self, observation: Observation) -> Command:
+        """Steer, and brake for the nearest."""
+        ego = observation.ego
+        curvature, station = self.steer(ego)
+        wanted = self.speed
+        if self.route is not None:
+            bend = np.diff(self.route.at(station + np.arange(0.0, 21.0, 4.0))[:, 2]) / 4.0
+            sharpest = float(np.abs(bend).max())
+            wanted = min(wanted, math.sqrt(self.lateral / max(sharpest, 1e-6)))
+            if self.task.goal[3] < 0.5:  # the witness stands at its goal
+                wanted = min(wanted, math.sqrt(2.0 * self.braking * max(self.route.length - station, 0.0)) + 0.3)
+        over = ego.speed / max(wanted, 0.1)
+        free = max(1.0 - over * over, -self.braking / self.acceleration)  # to be too fast alone is no reason to brake hard
+        gap, ahead = self._nearest(observation, station)
+        closing = ego.speed * (ego.speed - ahead) / (2.0 * math.sqrt(self.acceleration * self.braking))
+        share = (self.standstill + max(0.0, ego.speed * self.headway + closing)) / max(gap, 0.1)
+        return Command(max(self.acceleration * (free - share * share), -self.task.config.ego_braking), curvature)
+
+    def _nearest(self, seen: Observation, station: float) -> tuple[float, float]:
+        """Return gap [m] and speed along the route [m/s] of who is, or comes, next on the route; infinity and 0 if nobody does.
+
+        One that comes from aside counts where it comes onto the route, as long as it does so before the ego has passed there.
+        """
+        if self.route is None or not len(seen.ids):
+            return math.inf, 0.0
+        nearest, speed = math.inf, 0.0
+        own = 0.5 * self.task.vehicle.length
+        direction = np.stack([exact.cos(seen.others[:, 2]), exact.sin(seen.others[:, 2])], axis=1)
+        when = self._instants[self._instants <= self.foresight]
+        places = seen.others[:, None, :2] + (seen.others[:, None, 3:4] * when[:, None]) * direction[:, None]
+        at, aside = self.route.project(places.reshape(-1, 2))
+        turn = self.route.at(at)[:, 2].reshape(len(seen.ids), -1) - seen.others[:, 2:3]
+        along, across = np.abs(exact.cos(turn)), np.abs(exact.sin(turn))
+        length, width = 0.5 * seen.sizes[:, 0:1], 0.5 * seen.sizes[:, 1:2]
+        gap = at.reshape(along.shape) - station - own - length * along - width * across
+        beside = np.abs(aside.reshape(along.shape)) - 0.5 * self.task.vehicle.width - length * across - width * along
+        for k in range(len(seen.ids)):
+            same_way = float(exact.cos(turn[k, 0]))
+            for m, time in enumerate(when.tolist()):
+                on = beside[k, m] < self.room and gap[k, m] > -own
+                if on and (m == 0 or (same_way < 0.7 and seen.ego.speed * time < gap[k, m] + 4.0 * own)):
+                    if gap[k, m] < nearest:
+                        nearest, speed = float(gap[k, m]), float(seen.others[k, 3]) * max(same_way, 0.0)
+                    break
+        return max(nearest, 0.0), speed

@@ -1,0 +1,146 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a test of a planner leaves: JSON, JUnit's XML and a page, in one folder; the same drives give the same bytes."""
+
+from collections.abc import Mapping, Sequence
+import json
+import math
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.trials import Outcome, Rate, rates, Trial
+from scenario_gen.folders import replaced_folder, write_text
+from scenario_gen.folders.marker import Kind
+from scenario_gen.parameters import flatten
+from scenario_gen.report.data import FRAME_PERIOD, MAX_FRAMES, pack, road_data, states
+from scenario_gen.report.html import render_page
+
+JSON, JUNIT, PAGE = "drives.json", "junit.xml", "drives.html"
+DRIVEN = Kind("driven")
+MOST_DRAWN = 100
+"""Drives that the page replays, the worst first; its table lists all."""
+
+
+def document(outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig) -> dict[str, Any]:
+    """Return all verdicts and their summary as JSON's types."""
+    return {
+        "planner": planner,
+        "parameters": {name: value for name, (_, value) in flatten(config).items()},
+        "summary": {name: _rate(rate) for name, rate in rates(outcomes).items()},
+        "drives": [{"name": outcome.name} | outcome.verdict.document() for outcome in outcomes],
+    }
+
+
+def _rate(rate: Rate) -> dict[str, Any]:
+    share = rate.share
+    return {"count": rate.count, "of": rate.of, "share": share.value, "low": share.low, "high": share.high}
+
+
+def as_json(outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig) -> str:
+    """Return `document` as text; no time of day and no name of a machine is in it."""
+    return json.dumps(document(outcomes, planner, config), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def as_junit(outcomes: Sequence[Outcome], planner: str) -> str:
+    """Return one test case per scenario, as JUnit's XML; a collision, leaving the road or missing the goal is a failure."""
+    failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
+    lasted = math.fsum(outcome.verdict.duration for outcome in outcomes)
+    suite = ElementTree.Element(
+        "testsuite", name=planner, tests=str(len(outcomes)), failures=str(len(failed)), errors="0", time=f"{lasted:.3f}"
+    )
+    for outcome in outcomes:
+        verdict = outcome.verdict
+        case = ElementTree.SubElement(
+            suite, "testcase", classname=planner, name=f"scenario {outcome.name}", time=f"{verdict.duration:.3f}"
+        )
+        if not verdict.passed:
+            kind = "collision" if verdict.collision else "off_road" if not math.isnan(verdict.off_road) else "goal"
+            ElementTree.SubElement(case, "failure", type=kind, message=verdict.sentence())
+        said = ElementTree.SubElement(case, "system-out")
+        said.text = json.dumps(verdict.document(), ensure_ascii=False)
+    ElementTree.indent(suite)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(suite, encoding="unicode") + "\n"
+
+
+def as_page(
+    outcomes: Sequence[Outcome], trials: Sequence[Trial], planner: str, config: ClosedLoopConfig, broken: Sequence[str] = ()
+) -> str:
+    """Return the page: the summary, all verdicts, the worst first, and replays of the worst."""
+    order = sorted(range(len(outcomes)), key=lambda k: (*(-value for value in outcomes[k].verdict.severity), k))
+    drawn = order[:MOST_DRAWN]
+    roads = {id(trials[k].road): trials[k].road for k in drawn}
+    place = {key: number for number, key in enumerate(roads)}
+    data = {
+        "roads": [road_data(road) if road is not None else None for road in roads.values()],
+        "drives": [_drawing(outcomes[k], trials[k], place[id(trials[k].road)]) for k in drawn],
+    }
+    rows = [(number if number < len(drawn) else None, outcomes[k]) for number, k in enumerate(order)]
+    return render_page(
+        "drives.html.j2",
+        ("scene.js", "drives.js"),
+        data,
+        plotly=False,
+        planner=planner,
+        found=rates(outcomes),
+        rows=rows,
+        broken=broken,
+        parameters={name: value for name, (_, value) in flatten(config).items()},
+    )
+
+
+def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:
+    drive, verdict = outcome.drive, outcome.verdict
+    motion = drive.motion
+    frames = max(2, min(MAX_FRAMES, int(np.ceil(verdict.duration / FRAME_PERIOD)) + 1))
+    gone = [float(motion.time[here][-1]) if here.any() else 0.0 for here in drive.here]
+    witness = trial.scenario
+    return {
+        "name": outcome.name,
+        "sentence": verdict.sentence(),
+        "road": road,
+        "ego": drive.ego,
+        "vehicles": [{"id": v.id, "length": round(v.length, 3), "width": round(v.width, 3)} for v in motion.vehicles],
+        "motion": {"states": pack(states(motion, frames)[None]), "durations": [round(verdict.duration, 3)]},
+        "witness": [
+            [round(x, 2), round(y, 2)] for x, y in witness.position[drive.ego, :: max(1, len(witness.time) // 100)].tolist()
+        ],
+        "gone": [round(time, 3) for time in gone],
+        "hit": round(verdict.collision.time, 3) if verdict.collision else None,
+    }
+
+
+def write_drives(
+    out: Path,
+    outcomes: Sequence[Outcome],
+    trials: Sequence[Trial],
+    planner: str,
+    config: ClosedLoopConfig,
+    broken: Sequence[str] = (),
+    inputs: Sequence[Path] = (),
+) -> Mapping[str, Path]:
+    """Write JSON, JUnit's XML and the page to a folder; return their paths.
+
+    Raises:
+        InputError: the folder may not be replaced, or not be written.
+    """
+    with replaced_folder(out, DRIVEN, inputs) as folder:
+        write_text(folder / JSON, as_json(outcomes, planner, config))
+        write_text(folder / JUNIT, as_junit(outcomes, planner))
+        write_text(folder / PAGE, as_page(outcomes, trials, planner, config, broken))
+    return {name: out / name for name in (JSON, JUNIT, PAGE)}

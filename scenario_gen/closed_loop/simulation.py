@@ -1,0 +1,307 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The closed loop: a certified scenario, an ego in the place of one of its vehicles, and one step after the other.
+
+`ClosedLoop` holds what does not change; `State` is one instant; `step` gives the next and changes nothing. So a drive can be
+repeated, branched and searched, and two drives with the same commands are the same, bit for bit.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Bools, Floats
+from scenario_gen.closed_loop.advance import advance, at_goal, overlaps
+from scenario_gen.closed_loop.certified import CELL, Certified, certified
+from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, TEMPLATE
+from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
+from scenario_gen.errors import InputError
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import Scenario
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """One instant of a drive; N vehicles, the ego in its witness' place.
+
+    Attributes:
+        step: how many steps there were before.
+        time: seconds from the scenario's start.
+        ego: the ego.
+        vehicles: (N, 4) x, y [m], yaw [rad], speed [m/s] of all.
+        here: (N,) whether each is on the scene.
+        clock: (N,) certified time [s] at which each one is where it is now; for the ego, on its witness' path.
+        rate: (N,) how fast the clocks run; 1 is the certified speed.
+        forced: how many times one of the others has braked harder than the strongest braking so far, to keep the order.
+        fault: what was wrong with the last command, "" if nothing.
+    """
+
+    step: int
+    time: float
+    ego: EgoState
+    vehicles: Floats
+    here: Bools
+    clock: Floats
+    rate: Floats
+    forced: int = 0
+    fault: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What a planner is given before it starts.
+
+    Attributes:
+        vehicle: the ego's identity and footprint.
+        start: (4,) x, y [m], yaw [rad], speed [m/s].
+        goal: (4,) likewise: where the witness ends.
+        route: (M, 3) x, y [m], yaw [rad] of a way from start to goal that can be driven: the witness' path, without its speeds.
+        road: what is drivable, if it is known.
+        step: time between two decisions [s].
+        config: the body's limits among the rest.
+    """
+
+    vehicle: Vehicle
+    start: Floats
+    goal: Floats
+    route: Floats
+    road: Road | None
+    step: float
+    config: ClosedLoopConfig
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What a planner sees at one instant: the ego, and the M others that are on the scene.
+
+    Attributes:
+        time: seconds from the scenario's start.
+        ego: the ego.
+        ids: of the others.
+        others: (M, 4) x, y [m], yaw [rad], speed [m/s]; (x, y) is the footprint's centre.
+        sizes: (M, 2) length and width [m].
+    """
+
+    time: float
+    ego: EgoState
+    ids: tuple[str, ...]
+    others: Floats
+    sizes: Floats
+
+
+class Planner(Protocol):
+    """What is tested: told its task, then asked at every step what to do next."""
+
+    def reset(self, task: Task) -> None:
+        """Begin a new drive."""
+
+    def act(self, observation: Observation) -> Command | Pose | None:
+        """Return what the ego does until the next step; None brakes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """One drive from start to end; N vehicles, T instants.
+
+    Attributes:
+        motion: all vehicles, the ego in its witness' place, as they drove: a scenario like the certified one.
+        ego: its index.
+        here: (N, T) whether each was on the scene.
+        clock: (N, T) as in `State`.
+        accelerations: (T,) the ego's own [m/s²].
+        forced: how many times one of the others braked harder than the strongest braking, to keep the order.
+        faults: what was wrong with commands, by step.
+    """
+
+    motion: Scenario
+    ego: int
+    here: Bools
+    clock: Floats
+    accelerations: Floats
+    forced: int
+    faults: tuple[tuple[int, str], ...]
+
+
+WAITS = 1.0  # metres; a witness that drives no farther waits throughout
+
+
+class ClosedLoop:
+    """A scenario that can be driven."""
+
+    def __init__(
+        self, scenario: Scenario, ego: int | str, road: Road | None = None, config: ClosedLoopConfig = ClosedLoopConfig()
+    ) -> None:
+        """Prepare.
+
+        Args:
+            scenario: certified, the ego's witness among its vehicles.
+            ego: index or id of the witness.
+            road: what it drives on, if it is known.
+            config: the parameters.
+
+        Raises:
+            InputError: the scenario has no such vehicle, or the road is in another frame.
+        """
+        if road is not None and road.frame_id != scenario.frame_id:
+            raise InputError(f"scenario {scenario.index} is in frame {scenario.frame_id!r}, its road in {road.frame_id!r}")
+        self.certified: Certified = certified(scenario, ego)
+        self.road, self.config = road, config
+        self._driving = np.array(
+            (
+                config.headway,
+                config.standstill_gap,
+                config.acceleration,
+                config.comfortable_braking,
+                config.strongest_braking,
+                float(config.yield_to_ego == TEMPLATE),
+                float(config.policy == REACTIVE),
+            )
+        )
+        self._sizes = 2.0 * self.certified.half
+        self._ids = tuple(vehicle.id for vehicle in scenario.vehicles)
+        self._others = np.arange(len(self._ids)) != self.certified.ego
+        duration = self.certified.duration
+        self._waits = bool(self.certified.cells[self.certified.ego, -1, 7] < WAITS)
+        self.last_step = int(np.ceil((duration * config.overtime + 5.0) / config.step))
+
+    @property
+    def scenario(self) -> Scenario:
+        """The certified scenario."""
+        return self.certified.scenario
+
+    @property
+    def ego(self) -> int:
+        """Index of the ego."""
+        return self.certified.ego
+
+    def task(self) -> Task:
+        """Return what a planner is told beforehand."""
+        motion, ego = self.certified.motion, self.ego
+        way = motion[ego, :, :3]
+        moved = exact.hypot(*np.diff(way[:, :2], axis=0).T) > 1e-3
+        route = way[np.concatenate([[True], moved])]
+        return Task(
+            self.scenario.vehicles[ego],
+            motion[ego, 0, :4],
+            motion[ego, -1, :4],
+            route,
+            self.road,
+            self.config.step,
+            self.config,
+        )
+
+    def start(self) -> State:
+        """Return the first instant: everyone, the ego too, is where the certified scenario begins."""
+        first = self.certified.motion[:, 0, :4].copy()
+        n = len(first)
+        ego = EgoState(*first[self.ego].tolist())
+        return State(0, 0.0, ego, first, np.ones(n, dtype=np.bool_), np.zeros(n), np.ones(n))
+
+    def step(self, state: State, asked: Command | Pose | None, note: str = "") -> State:
+        """Return the next instant; `state` stays what it was. `note` says what else was wrong with what was asked."""
+        config, known = self.config, self.certified
+        moved = move(state.ego, asked, config)
+        ego, n = moved.state, len(self._ids)
+        number = state.step + 1
+        time = number * config.step
+        before, after = np.empty((n, 2)), np.empty((n, 3))
+        before[:, 0], before[:, 1] = state.clock, state.rate
+        vehicles, here = np.empty((n, 4)), np.empty(n, dtype=np.bool_)
+        advance(
+            config.step,
+            time,
+            known.scenario.time,
+            known.motion,
+            known.half,
+            known.leaves,
+            known.cells,
+            CELL,
+            known.order,
+            self.ego,
+            np.array(ego),
+            self._driving,
+            before,
+            state.here,
+            after,
+            vehicles,
+            here,
+        )
+        clock, rate, forced = after.T
+        count = state.forced + int(np.count_nonzero(forced))
+        return State(number, time, ego, vehicles, here, clock, rate, count, note or moved.fault)
+
+    def observe(self, state: State) -> Observation:
+        """Return what a planner sees."""
+        seen = self._others & state.here
+        ids = tuple(name for name, there in zip(self._ids, seen.tolist(), strict=True) if there)
+        return Observation(state.time, state.ego, ids, state.vehicles[seen], self._sizes[seen])
+
+    def drive(self, planner: Planner, ended: Callable[[State], bool] | None = None) -> Drive:
+        """Drive with a planner until it is over.
+
+        Args:
+            planner: what is tested.
+            ended: says when to stop; by default at the goal, at a collision (of instants only) or after the time given.
+        """
+        planner.reset(self.task())
+        states = [self.start()]
+        over = ended or self.over
+        while not over(states[-1]):
+            states.append(self.step(states[-1], planner.act(self.observe(states[-1]))))
+        return self.record(states)
+
+    def over(self, state: State) -> bool:
+        """Whether a drive ends: at the goal, when the ego overlaps another, or after the time given."""
+        if state.step >= self.last_step:
+            return True
+        if self.at_goal(state.time, state.vehicles[self.ego]):
+            return True
+        return bool(overlaps(state.vehicles, self.certified.half, state.here, self.ego))
+
+    def at_goal(self, time: float, pose: Floats) -> bool:
+        """Whether an ego at a pose (3+,) is at its goal; one whose witness stays where it starts must be there at the end."""
+        if self._waits and time < self.certified.duration - 1e-9:
+            return False
+        return bool(at_goal(self.certified.motion[self.ego, -1], self.config.goal_width, self._waits, pose))
+
+    def record(self, states: list[State]) -> Drive:
+        """Return the drive of these instants."""
+        vehicles = np.stack([state.vehicles for state in states], axis=1)
+        speed, step = vehicles[..., 3], self.config.step
+        scenario = self.scenario
+        motion = Scenario(
+            scenario.vehicles,
+            np.arange(len(states), dtype=np.float64) * step,
+            vehicles[..., :2],
+            vehicles[..., 2],
+            speed,
+            np.diff(speed, axis=1, prepend=speed[:, :1]) / step,
+            scenario.seed,
+            scenario.index,
+            scenario.frame_id,
+        )
+        return Drive(
+            motion,
+            self.ego,
+            np.stack([state.here for state in states], axis=1),
+            np.stack([state.clock for state in states], axis=1),
+            np.array([state.ego.acceleration for state in states]),
+            states[-1].forced,
+            tuple((state.step, state.fault) for state in states if state.fault),
+        )

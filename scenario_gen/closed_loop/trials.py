@@ -1,0 +1,217 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Many drives of one planner: from a bag or from scenarios, in parallel, with the same results for any number of workers."""
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+import importlib
+import math
+import multiprocessing
+from pathlib import Path
+import sys
+from typing import Any
+
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
+from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
+from scenario_gen.errors import InputError, ScenarioGenError
+from scenario_gen.evaluation.bootstrap import wilson
+from scenario_gen.parameters import parameter, Parameters
+from scenario_gen.recordings.read import INFO, read_recording, SCENARIOS
+from scenario_gen.storage.bag import within
+from scenario_gen.storage.config import BagConfig
+from scenario_gen.types.evaluation import Interval
+from scenario_gen.types.names import token
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import Scenario
+
+MakePlanner = Callable[[], Planner]
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One scenario to be driven: its name for people, the scenario with the witness of the ego in it, and the road if known."""
+
+    name: str
+    scenario: Scenario
+    ego: int | str
+    road: Road | None
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What one trial came to."""
+
+    name: str
+    verdict: DriveVerdict
+    drive: Drive
+
+
+@dataclass(frozen=True)
+class Bars(Parameters):
+    """What a planner must keep to pass."""
+
+    collisions: float = parameter(0.0, "largest share of drives with a collision", low=0.0, high=1.0)
+    off_road: float = parameter(0.0, "largest share of drives that leave the road", low=0.0, high=1.0)
+    goals: float = parameter(0.0, "smallest share of drives that reach the goal", low=0.0, high=1.0)
+    at_fault: float = parameter(0.0, "largest share of drives in which the ego itself ran into another", low=0.0, high=1.0)
+
+
+def find_planner(name: str) -> MakePlanner:
+    """Return what makes a planner, named MODULE:CLASS; modules of the current folder are found, too.
+
+    Raises:
+        InputError: there is no such module or class.
+    """
+    module, colon, attribute = name.partition(":")
+    if not colon or not module or not attribute:
+        raise InputError(f"--planner {name}: write it as MODULE:CLASS, e.g. scenario_gen.closed_loop.planners:IdmFollower")
+    if str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))
+    try:
+        found: Any = importlib.import_module(module)
+        for part in attribute.split("."):
+            found = getattr(found, part)
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"--planner {name}: {error}") from error
+    if not callable(found):
+        raise InputError(f"--planner {name}: that is no class; a planner has reset(task) and act(observation)")
+    return found  # type: ignore[no-any-return]
+
+
+def read_trials(bag: Path, ego: str = "", count: int = 0, config: BagConfig = BagConfig()) -> list[Trial]:
+    """Return the scenarios of a bag, in order, each on its road.
+
+    Args:
+        bag: of this suite.
+        ego: id of the vehicle in whose place the ego drives; the first of each scenario if "".
+        count: how many at most; all if 0.
+        config: how much is read at most.
+
+    Raises:
+        InputError: the bag is damaged, holds no scenario, or one has no vehicle `ego`; the message lists those it has.
+    """
+    trials: list[Trial] = []
+    with within(bag):
+        for namespace in read_recording(bag, config, ("map", SCENARIOS, INFO)).namespaces.values():
+            for k in range(len(namespace.hashes)):
+                if count and len(trials) >= count:
+                    break
+                stamp, scenario = namespace.scenario(k)
+                ids = [vehicle.id for vehicle in scenario.vehicles]
+                wanted = ids[0] if not ego else next((one for one in ids if ego in (one, token(one))), "")
+                if not wanted:
+                    where = f"{namespace.where(SCENARIOS)}, scenario {scenario.index}"
+                    raise InputError(f"{where}: no vehicle {ego!r} to be the ego; it has {', '.join(ids)}")
+                road = namespace.road_of(namespace.entry(k), stamp)
+                name = f"{namespace.name or '/'} {scenario.index}" if namespace.name else str(scenario.index)
+                trials.append(Trial(name, scenario, wanted, road))
+    if not trials:
+        raise InputError(f"{bag}: no topic `scenarios` in any namespace; there is nothing to drive in")
+    return trials
+
+
+def run_trials(
+    trials: Sequence[Trial],
+    planner: MakePlanner | str,
+    config: ClosedLoopConfig = ClosedLoopConfig(),
+    workers: int = 1,
+    progress: Callable[[int, int], None] = lambda *_: None,
+) -> list[Outcome]:
+    """Drive every trial with a planner of its own, and judge it; results are in the order of the trials.
+
+    Args:
+        trials: what is driven.
+        planner: makes a planner, or its name as MODULE:CLASS; with several workers, a name or what can be pickled.
+        config: the parameters.
+        workers: processes.
+        progress: told how many are done, and how many there are.
+
+    Raises:
+        InputError: the planner is not found, or fails; the message names the scenario.
+    """
+    if isinstance(planner, str):
+        find_planner(planner)  # what is wrong with it is said before there are processes
+    tasks = [(trial, planner, config) for trial in trials]
+    outcomes: list[Outcome] = []
+    if workers <= 1:
+        results: Iterator[Outcome] = map(_run, tasks)
+        return _gathered(results, outcomes, len(trials), progress)
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        return _gathered(pool.map(_run, tasks, chunksize=4), outcomes, len(trials), progress)
+
+
+def _gathered(
+    results: Iterator[Outcome], outcomes: list[Outcome], total: int, progress: Callable[[int, int], None]
+) -> list[Outcome]:
+    for outcome in results:
+        outcomes.append(outcome)
+        progress(len(outcomes), total)
+    return outcomes
+
+
+def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
+    trial, planner, config = task
+    made = (find_planner(planner) if isinstance(planner, str) else planner)()
+    loop = ClosedLoop(trial.scenario, trial.ego, trial.road, config)
+    try:
+        drive = loop.drive(made)
+    except ScenarioGenError:
+        raise
+    except Exception as error:
+        raise InputError(f"scenario {trial.name}: the planner failed: {type(error).__name__}: {error}") from error
+    return Outcome(trial.name, judge(loop, drive), drive)
+
+
+LEVEL = 0.95  # of the intervals
+
+
+@dataclass(frozen=True)
+class Rate:
+    """How many of the drives, and the share with its 95 % interval (Wilson 1927)."""
+
+    count: int
+    of: int
+    share: Interval
+
+    def __str__(self) -> str:
+        low, high = 100.0 * self.share.low, 100.0 * self.share.high
+        return f"{self.count} of {self.of} ({100.0 * self.share.value:.1f} %, {low:.1f} to {high:.1f} %)"
+
+
+def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
+    """Return how often what happened: collisions, at_fault (the ego itself ran into another), off_road, goals."""
+    verdicts = [outcome.verdict for outcome in outcomes]
+    hits = [v.collision for v in verdicts if v.collision is not None]
+    counts = {
+        "collisions": len(hits),
+        "at_fault": len([hit for hit in hits if hit.ran is not Runner.OTHER]),
+        "off_road": len([v for v in verdicts if not math.isnan(v.off_road)]),
+        "goals": len([v for v in verdicts if not math.isnan(v.goal)]),
+    }
+    return {name: Rate(count, len(verdicts), wilson(count, len(verdicts), LEVEL)) for name, count in counts.items()}
+
+
+def broken_bars(found: dict[str, Rate], bars: Bars) -> list[str]:
+    """Return a sentence for each bar that was not kept."""
+    said = []
+    for name, wanted in asdict(bars).items():
+        value = found[name].share.value
+        if (value < wanted) if name == "goals" else (value > wanted):
+            side = "at least" if name == "goals" else "at most"
+            said.append(f"{name}: {100 * value:.1f} %; {side} {100 * wanted:.1f} % is asked")
+    return said

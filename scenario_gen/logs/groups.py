@@ -1,0 +1,323 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Who is together: groups of vehicles and the time that each is there.
+
+A *pair interval* is a time in which two vehicles are nearer than `proximity`, for at least `min_presence` seconds; those longer
+than `max_duration` are cut.
+A group grows from the strongest pair interval of `min_duration` or more, whose time is its own, and is joined by vehicles that
+are near a member for at least `min_presence` of its seconds, up to `max_vehicles`: each is there for the time in which it is
+recorded and near, so it may arrive late and leave early. Then the pairs inside the group are used up, and the next begins.
+In a log of few vehicles (as cut by a person) every pair interval counts, and a vehicle joins that meets any member. In a longer
+one only those count in which somebody moves and the two interact (places and times come close, `space_time_gap`: they
+cross, follow, merge or pass), and a vehicle joins that so meets at least half of the members that it is together with.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, runs
+from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.encounters import Piece
+
+MOST = 0.6  # with `whole`, a vehicle that is there for less of the time is left out; for more, it shortens the time
+EDGE = 1.0  # s by which a group is rather shortened than joined late or left early
+SHARED = 0.5  # of the members that a vehicle is together with, it interacts with at least so many, in a log of many vehicles
+INTERACTS = 6.0  # m: the space-time gap below which two vehicles have to do with each other
+LAG = 2.0  # m/s: what a second between two vehicles at the same place is worth in metres
+APART = 1.0  # s that a pair may be out of range within one pair interval
+REST = 2.0  # s of a long standstill that stay with the encounter before or after it
+
+
+@dataclass(frozen=True)
+class PairInterval:
+    """Pieces `i` and `j` are near each other from tick `first` to before tick `last`; a smaller gap interacts more."""
+
+    i: int
+    j: int
+    first: int
+    last: int
+    gap: float
+
+
+@dataclass(frozen=True)
+class Group:
+    """Pieces that make an encounter, from tick `first` to before tick `last`.
+
+    Attributes:
+        spans: for each member from which to before which tick it is there.
+    """
+
+    members: tuple[int, ...]
+    first: int
+    last: int
+    spans: tuple[tuple[int, int], ...]
+
+
+@dataclass
+class Growing:
+    """A group while it grows: the ticks of its encounter, and of each member."""
+
+    first: int
+    last: int
+    spans: dict[int, tuple[int, int]]
+    notes: list[str] = field(default_factory=list)
+
+    def done(self) -> Group:
+        """Return the group, its members in order."""
+        members = tuple(sorted(self.spans))
+        return Group(members, self.first, self.last, tuple(self.spans[m] for m in members))
+
+
+def find_groups(pieces: Sequence[Piece], config: LogConfig) -> tuple[tuple[Group, ...], tuple[str, ...]]:
+    """Return the encounters in order of time, and notes on vehicles that were left out or shortened one."""
+    few = len({piece.track.id for piece in pieces}) <= config.max_vehicles
+    pairs = find_pair_intervals(pieces, config, few=few)
+    groups, notes = [], []
+    while seeds := [pair for pair in pairs if pair.last - pair.first > ticks(config.min_duration, config)]:
+        seed = min(seeds, key=lambda m: (m.gap, m.first - m.last, m.first, m.i, m.j))
+        group, remarks = grow(seed, pairs, pieces, config, few=few)
+        whole, left = split(group, pieces, config)
+        groups += whole
+        notes += [*remarks, *left] if whole else []
+        pairs = left_over(pairs, group, config)
+    groups.sort(key=lambda group: (group.first, group.last, group.members))
+    return tuple(groups), tuple(notes)
+
+
+def find_pair_intervals(pieces: Sequence[Piece], config: LogConfig, *, few: bool) -> list[PairInterval]:
+    """Return all pair intervals of two different vehicles; with `few` vehicles each has gap 0."""
+    found = []
+    order = sorted(range(len(pieces)), key=lambda i: pieces[i].first)
+    least = shortest(config)
+    for a, i in enumerate(order):
+        for j in order[a + 1 :]:
+            if pieces[j].first > pieces[i].last - least:
+                break
+            if pieces[i].track.id == pieces[j].track.id:
+                continue
+            begin = max(pieces[i].first, pieces[j].first)
+            for low, high in runs(distances(pieces[i], pieces[j]) < config.proximity, ticks(APART, config)):
+                for first, last in windows(begin + low, begin + high, config):
+                    gap = 0.0 if few else space_time_gap(pieces[i], pieces[j], first, last, config)
+                    if last - first >= least and gap <= INTERACTS:
+                        found.append(PairInterval(min(i, j), max(i, j), first, last, gap))
+    return found
+
+
+def windows(first: int, last: int, config: LogConfig) -> list[tuple[int, int]]:
+    """Cut a long pair interval at whole multiples of `max_duration` on the common clock, so that all who meet are cut alike."""
+    longest, least = ticks(config.max_duration, config), ticks(config.min_duration, config) + 1
+    if last - first <= longest:
+        return [(first, last)]
+    inside = [edge for edge in range(longest, last, longest) if first + least <= edge <= last - least]
+    return list(pairwise([first, *inside, last]))
+
+
+def shortest(config: LogConfig) -> int:
+    """Return the fewest ticks for which a pair meets: of one that makes an encounter, or of one that joins it."""
+    return ticks(config.min_duration if config.whole else min(config.min_presence, config.min_duration), config) + 1
+
+
+def ticks(seconds: float, config: LogConfig) -> int:
+    """Seconds as a number of ticks."""
+    return round(seconds / config.period)
+
+
+def distances(a: Piece, b: Piece) -> Floats:
+    """Distances (T,) [m] of two pieces at their common ticks; empty where they have none."""
+    first = max(a.first, b.first)
+    last = max(min(a.last, b.last), first)
+    return exact.hypot(*(a.position(first, last) - b.position(first, last)).T)
+
+
+def driven(piece: Piece, first: int, last: int, config: LogConfig) -> float:
+    """Distance [m] that a piece drives from tick `first` to before tick `last`."""
+    return float(piece.speed(first, last).sum() * config.period)
+
+
+def space_time_gap(a: Piece, b: Piece, first: int, last: int, config: LogConfig) -> float:
+    """How close two vehicles come in place and time: min over t, t' of |a(t) - b(t')| + LAG |t - t'|, in metres.
+
+    Two of whom neither drives `travel` metres have nothing to do with each other: infinite.
+    """
+    if max(driven(piece, first, last, config) for piece in (a, b)) < config.travel:
+        return float("inf")
+    every = max(ticks(0.3, config), 1)
+    time = np.arange(first, last, every) * config.period
+    at_a, at_b = a.position(first, last)[::every], b.position(first, last)[::every]
+    apart = exact.hypot(at_a[:, None, 0] - at_b[None, :, 0], at_a[:, None, 1] - at_b[None, :, 1])
+    return float((apart + LAG * np.abs(time[:, None] - time[None, :])).min())
+
+
+def grow(
+    seed: PairInterval, pairs: list[PairInterval], pieces: Sequence[Piece], config: LogConfig, *, few: bool
+) -> tuple[Group, list[str]]:
+    """Grow a group from the strongest pair interval, `seed`; the notes say who meets it and is not in it, and why."""
+    group = Growing(seed.first, seed.last, dict.fromkeys((seed.i, seed.j), (seed.first, seed.last)))
+    refused: set[int] = set()
+    while candidates := joining(group, refused, pairs, pieces, few=few):
+        spans = {other: common_span(other, group, pieces, config) for other in candidates}
+        best = min(candidates, key=lambda other: (spans[other][0] - spans[other][1], min(candidates[other]), other))
+        if len(group.spans) >= config.max_vehicles:
+            left = sorted({pieces[other].track.id for other in candidates})
+            group.notes.append(f"left out of an encounter of {len(group.spans)} vehicles (max_vehicles): {', '.join(left)}")
+            break
+        refused.add(best)
+        if not few and not meets_enough(best, spans[best], len(candidates[best]), group):
+            continue
+        take(group, best, spans[best], pieces[best].track.id, config)
+    settle(group, pieces, config)
+    return group.done(), group.notes
+
+
+def joining(
+    group: Growing, refused: set[int], pairs: list[PairInterval], pieces: Sequence[Piece], *, few: bool
+) -> dict[int, list[float]]:
+    """Return who meets a member while the group lasts, and the gaps to those that it meets [m]."""
+    here = {pieces[m].track.id for m in group.spans}
+    found: dict[int, list[float]] = {}
+    for pair in pairs:
+        if not few and (pair.first >= group.last or pair.last <= group.first):
+            continue
+        for inside, other in ((pair.i, pair.j), (pair.j, pair.i)):
+            if inside in group.spans and other not in refused and pieces[other].track.id not in here:
+                found.setdefault(other, []).append(pair.gap)
+    return found
+
+
+def meets_enough(other: int, span: tuple[int, int], met: int, group: Growing) -> bool:
+    """Return whether a vehicle interacts with enough of the members that it is together with."""
+    together = [m for m, own in group.spans.items() if m != other and own[0] < span[1] and span[0] < own[1]]
+    return met >= SHARED * len(together)
+
+
+def take(group: Growing, other: int, span: tuple[int, int], name: str, config: LogConfig) -> None:
+    """Let a vehicle join for `span`, or say why not."""
+    begin, end = span
+    lasts = group.last - group.first
+    near = f"near for {seconds(begin, end, config)} of {seconds(group.first, group.last, config)} s"
+    if not config.whole:
+        if end - begin > ticks(config.min_presence, config):
+            group.spans[other] = span
+        elif end > begin:
+            group.notes.append(f"vehicle {name} is left out: {near} (min_presence)")
+        return
+    if (end - begin) < MOST * lasts or end - begin < ticks(config.min_duration, config) + 1:
+        if end > begin:
+            group.notes.append(f"vehicle {name} is left out: {near} (whole)")
+        return
+    if end - begin < lasts:
+        group.notes.append(
+            f"vehicle {name} shortens its encounter to {seconds(begin, end, config)} of "
+            f"{seconds(group.first, group.last, config)} s"
+        )
+    group.first, group.last = begin, end
+    group.spans = dict.fromkeys((*group.spans, other), span)
+
+
+def settle(group: Growing, pieces: Sequence[Piece], config: LogConfig) -> None:
+    """Shorten a group rather than have a vehicle come a moment late or go a moment early; say who still does."""
+    edge = ticks(EDGE, config)
+    first = max(begin for begin, _ in group.spans.values() if begin <= group.first + edge)
+    last = min(end for _, end in group.spans.values() if end >= group.last - edge)
+    if last - first > ticks(config.min_duration, config):
+        group.first, group.last = first, last
+        group.spans = {m: (max(begin, first), min(end, last)) for m, (begin, end) in group.spans.items()}
+    for m, (begin, end) in group.spans.items():
+        if (begin, end) != (group.first, group.last):
+            group.notes.append(
+                f"vehicle {pieces[m].track.id} is there from {seconds(group.first, begin + 1, config)} to "
+                f"{seconds(group.first, end, config)} s of {seconds(group.first, group.last, config)} s"
+            )
+
+
+def seconds(first: int, last: int, config: LogConfig) -> str:
+    """Length of an interval of ticks, for people."""
+    return f"{max(last - first - 1, 0) * config.period:.1f}"
+
+
+def common_span(other: int, group: Growing, pieces: Sequence[Piece], config: LogConfig) -> tuple[int, int]:
+    """The longest stretch of a group's time in which piece `other` is near a member that is there."""
+    piece = pieces[other]
+    flags = np.zeros(group.last - group.first, dtype=bool)
+    for member, (first, last) in group.spans.items():
+        begin = max(piece.first, pieces[member].first)
+        close = distances(piece, pieces[member]) < config.proximity
+        low, high = max(begin, first), min(begin + len(close), last)
+        if high > low:
+            flags[low - group.first : high - group.first] |= close[low - begin : high - begin]
+    spans = runs(flags, ticks(APART, config))
+    begin, end = max(spans, key=lambda span: span[1] - span[0], default=(0, 0))
+    return group.first + begin, group.first + end
+
+
+def split(group: Group, pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Group], list[str]]:
+    """Cut a group where all stand for long, and into equal parts where it lasts too long; keep the parts with motion.
+
+    Returns:
+        The parts, and notes on members that are there for too little of one.
+    """
+    stands = np.ones(group.last - group.first, dtype=bool)
+    for m, (first, last) in zip(group.members, group.spans, strict=True):
+        stands[first - group.first : last - group.first] &= pieces[m].speed(first, last) < 0.1
+    rest, busy = ticks(REST, config), np.ones(len(stands), dtype=bool)
+    for begin, end in runs(stands):
+        if end - begin > ticks(config.standstill, config):
+            busy[begin + rest : end - rest] = False
+    found, notes = [], []
+    for begin, end in runs(busy):
+        parts = max(int(np.ceil((end - begin - 1) * config.period / config.max_duration - 1e-9)), 1)
+        edges = np.linspace(begin, end - 1, parts + 1).round().astype(int)
+        for low, high in pairwise(edges.tolist()):
+            part, left = part_of(group, group.first + low, group.first + high + 1, config)
+            if len(part.members) < 2 or part.last - part.first <= ticks(config.min_duration, config):
+                continue
+            spans = zip(part.members, part.spans, strict=True)
+            if max(driven(pieces[m], *span, config) for m, span in spans) >= config.travel:
+                found.append(part)
+                notes += [
+                    f"vehicle {pieces[m].track.id} is left out of a part of {seconds(part.first, part.last, config)} s: "
+                    f"there for {seconds(*span, config)} s (min_presence)"
+                    for m, span in left
+                ]
+    return found, notes
+
+
+def part_of(group: Group, first: int, last: int, config: LogConfig) -> tuple[Group, list[tuple[int, tuple[int, int]]]]:
+    """Return a part of a group, with those who are there long enough, and who is there for less, with their ticks."""
+    spans = {m: (max(own[0], first), min(own[1], last)) for m, own in zip(group.members, group.spans, strict=True)}
+    kept = {m: own for m, own in spans.items() if own == (first, last) or own[1] - own[0] > ticks(config.min_presence, config)}
+    left = [(m, own) for m, own in spans.items() if m not in kept and own[1] > own[0]]
+    if kept:
+        first, last = min(begin for begin, _ in kept.values()), max(end for _, end in kept.values())
+    return Group(tuple(kept), first, last, tuple(kept.values())), left
+
+
+def left_over(pairs: list[PairInterval], group: Group, config: LogConfig) -> list[PairInterval]:
+    """Return what remains of the pair intervals when those inside the group are used up."""
+    least = shortest(config)
+    remaining = []
+    for pair in pairs:
+        if pair.i not in group.members or pair.j not in group.members:
+            remaining.append(pair)
+            continue
+        for first, last in ((pair.first, min(pair.last, group.first)), (max(pair.first, group.last), pair.last)):
+            if last - first >= least:
+                remaining.append(PairInterval(pair.i, pair.j, first, last, pair.gap))
+    return remaining

@@ -1,0 +1,402 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""traffic: drives the vehicles of a scenario around a planner's ego, in real time or in lock-step, and judges the planner.
+
+Scenarios come from a bag, or, without one, live from `scenarios` and `map`. The ego takes the place of one vehicle and is steered
+by `ego/cmd_vel`, `ego/cmd_vel_stamped`, `ego/trajectory`, `ego/path` or `ego/odom`; what came last counts. The drive begins with
+the first of them. `~/next`, `~/reset`, `~/pause`, `~/resume`, and `~/step` in lock-step: one step for each call, which waits
+for a command that came after the step before, so that a client that answers each step with one command gets the same drive again.
+Topics, frames and units: msg_conventions/driving.py. What is wrong with the ego stands on /diagnostics and in the verdict.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from msg_conventions import driving
+from msg_conventions.diagnostics import encode_diagnostics, Level, Status
+from msg_conventions.ego import encode_state
+from msg_conventions.frames import encode_frames
+from msg_conventions.paths import encode_path
+from msg_conventions.roads import decode_map
+from msg_conventions.scenarios import decode_scenario
+from msg_conventions.topics import vehicle_topic
+from scenario_gen.arrays import Floats
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.ego import Command, Pose
+from scenario_gen.closed_loop.local_map import local_map
+from scenario_gen.closed_loop.results import as_json, as_junit
+from scenario_gen.closed_loop.simulation import ClosedLoop, State
+from scenario_gen.closed_loop.tracking import of_twist, Track
+from scenario_gen.closed_loop.trials import Outcome, read_trials, Trial
+from scenario_gen.closed_loop.verdict import judge
+from scenario_gen.errors import InputError, ScenarioGenError
+from scenario_gen.folders import write_text
+from scenario_gen.nodes.diagnostics import NodeDiagnostics
+from scenario_gen.nodes.ros_parameters import ConfigParameters
+from scenario_gen.nodes.topics import create_publisher, create_subscription, publish
+from scenario_gen.parameters import parameter, Parameters
+from scenario_gen.types.names import tokens
+from scenario_gen.types.road import Road
+
+INPUTS = ("ego/cmd_vel", "ego/cmd_vel_stamped", "ego/trajectory", "ego/path", "ego/odom")
+OUTPUTS = ("/clock", "/tf", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
+LOOK_AROUND = 10  # steps between two looks at who commands the ego
+GRID_EVERY = 0.2  # seconds of the drive between two local maps
+FIRST_STAMP = 1_000_000_000  # ns of a drive's clock at its start: a time of 0 means that none is known
+
+
+@dataclass(frozen=True)
+class Config(Parameters):
+    """The node's parameters; those of a drive are called drive.step, drive.policy and so on."""
+
+    bag: str = parameter("", "bag with scenarios; empty: they come live from `scenarios` and `map`")
+    ego: str = parameter("", "id of the vehicle in whose place the ego drives; empty: the first of each scenario")
+    index: int = parameter(0, "number of the first scenario, from 0, in the order of the bag", low=0)
+    rate: float = parameter(1.0, "how many times as fast as real time", low=0.01, high=1000.0)
+    lock_step: bool = parameter(False, "go one step for each call of ~/step, and not by a clock")
+    wait_for_ego: bool = parameter(True, "begin a drive with the ego's first command; else it brakes until one comes")
+    silence: float = parameter(0.5, "a command older than this is no command, and the ego brakes", unit="s", low=0.01)
+    patience: float = parameter(5.0, "in lock-step, wait so long for a command, in real time", unit="s", low=0.01)
+    follow_on: bool = parameter(True, "go on with the next scenario when one is over")
+    results: str = parameter("", "folder for drives.json and junit.xml, written anew after each drive; empty: none")
+    drive: ClosedLoopConfig = field(default_factory=ClosedLoopConfig)
+
+
+@dataclass(frozen=True, eq=False)
+class Heard:
+    """A command: which step of the drive was the last when it came, its stamp [ns, 0: none], and what it gives at an instant."""
+
+    topic: str
+    step: int
+    stamp_ns: int
+    ask: Callable[[State], Command | Pose | None]
+    fault: str = ""
+
+
+class Traffic(Node):  # type: ignore[misc]
+    """Drives one scenario after the other."""
+
+    def __init__(self, namespace: str | None = None) -> None:
+        self._together = ReentrantCallbackGroup()  # a call of ~/step waits for a command, which another callback takes
+        super().__init__("traffic", namespace=namespace)
+        self.parameters = ConfigParameters(self, Config())
+        self.diagnostics = NodeDiagnostics(self, self._report)
+        self._trials: list[Trial] = []
+        self._at = self.config.index
+        self._loop: ClosedLoop | None = None
+        self._states: list[State] = []
+        self._heard: Heard | None = None
+        self._waiting: Future | None = None
+        self._paused = False
+        self._sources: list[str] = []
+        self._outcomes: list[Outcome] = []
+        self._road: Road | None = None
+        self._verdict = ""
+        self._out = {topic: create_publisher(self, topic) for topic in OUTPUTS}
+        self._odometry: dict[str, Any] = {}
+        for topic in INPUTS:
+            create_subscription(self, topic, lambda data, topic=topic: self._hear(topic, data))
+        for name, action in (("next", self._next), ("reset", self._reset), ("pause", self._pause), ("resume", self._resume)):
+            self.create_service(Trigger, f"~/{name}", lambda _, response, action=action: self._answer(action, response))
+        self.create_service(Trigger, "~/step", self._serve_step)
+
+    @property
+    def default_callback_group(self) -> ReentrantCallbackGroup:
+        """Reentrant; see above."""
+        return self._together
+
+    @property
+    def config(self) -> Config:
+        """The parameters in effect."""
+        return self.parameters.config  # type: ignore[no-any-return]
+
+    def autostart(self) -> None:
+        """Read the bag, or listen for scenarios, and begin.
+
+        Raises:
+            InputError: the bag cannot be read, or has no such vehicle or scenario.
+        """
+        config = self.config
+        if config.bag:
+            self._trials = read_trials(Path(config.bag), config.ego)
+            if config.index >= len(self._trials):
+                raise InputError(f"parameter index is {config.index}; {config.bag} has {len(self._trials)} scenarios, from 0")
+            self._load(config.index)
+        else:
+            create_subscription(self, "map", self._take_map)
+            create_subscription(self, "scenarios", self._take_scenario)
+        if not config.lock_step:
+            period = config.drive.step / config.rate
+            self.create_timer(period, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    # --- scenarios --------------------------------------------------------------------------------------------
+
+    def _take_map(self, data: bytes) -> None:
+        try:
+            self._road = decode_map(data)[1]
+        except InputError as error:
+            self._say(Level.ERROR, str(error), "map")
+
+    def _take_scenario(self, data: bytes) -> None:
+        try:
+            _, scenario = decode_scenario(data, index=len(self._trials))
+            ego = self.config.ego or scenario.vehicles[0].id
+            road = self._road if self._road is not None and self._road.frame_id == scenario.frame_id else None
+            self._trials.append(Trial(str(len(self._trials)), scenario, ego, road))
+            if self._loop is None and len(self._trials) > self._at:
+                self._load(self._at)
+        except InputError as error:
+            self._say(Level.ERROR, str(error), "scenarios")
+
+    def _load(self, number: int) -> None:
+        """Begin a scenario.
+
+        Raises:
+            InputError: it has no such vehicle.
+        """
+        trial = self._trials[number]
+        self._loop = ClosedLoop(trial.scenario, trial.ego, trial.road, self.config.drive)
+        self._at, self._states, self._heard, self._verdict = number, [self._loop.start()], None, ""
+        scenario, ego = self._loop.scenario, self._loop.ego
+        self._names = tokens(vehicle.id for vehicle in scenario.vehicles)
+        self._children = tuple(f"vehicle_{name}" for name in self._names)
+        for name in self._names:
+            if name not in self._odometry:
+                self._odometry[name] = create_publisher(self, vehicle_topic(name, "odom"))
+        task = self._loop.task()
+        stamps = np.full(len(task.route), FIRST_STAMP, dtype=np.int64)
+        self._publish("ego/goal", encode_state(task.goal, self._children[ego], scenario.frame_id, FIRST_STAMP))
+        self._publish("ego/route", encode_path(task.route, stamps, scenario.frame_id, FIRST_STAMP))
+        self._tell()
+        self._report()
+
+    # --- the ego ----------------------------------------------------------------------------------------------
+
+    def _hear(self, topic: str, data: bytes) -> None:
+        """Take a command; whatever is wrong with it, the node lives on."""
+        if self._loop is None:
+            return
+        try:
+            heard = self._understood(topic, data, self._loop)
+        except (InputError, ScenarioGenError) as error:
+            heard = Heard(topic, self._states[-1].step, 0, lambda _: None, str(error))
+        if heard.fault:
+            self._say(Level.WARN, heard.fault, "ego")
+        self._heard = heard
+        if self._waiting is not None and not self._waiting.done():
+            self._waiting.set_result(None)
+
+    def _understood(self, topic: str, data: bytes, loop: ClosedLoop) -> Heard:
+        """Return what a message asks.
+
+        Raises:
+            InputError: it is damaged, or in another frame.
+        """
+        step, period = self._states[-1].step, loop.config.step
+        frame, own = loop.scenario.frame_id, (self._children[loop.ego], "base_link", "")
+        if topic.startswith("ego/cmd_vel"):
+            stamp, said, speed, rate = driving.decode_twist(data, topic, stamped=topic.endswith("stamped"))
+            if said not in own and said != frame:
+                raise InputError(f"{topic}: frame {said!r} is not the ego's; {', '.join(map(repr, own[:2]))} are")
+            return Heard(topic, step, stamp, lambda state: of_twist(state.ego, speed, rate, period))
+        if topic == "ego/odom":
+            stamp, said, state = driving.decode_odometry(data, topic)
+            pose = Pose(*state[:4].tolist())
+            asked: Callable[[State], Command | Pose | None] = lambda _: pose  # noqa: E731
+        else:
+            decode = driving.decode_trajectory if topic == "ego/trajectory" else driving.decode_timed_path
+            way = decode(data, topic)
+            stamp, said = 0, way.frame_id  # its times say for when it is; it may be old
+            track = Track.of((way.time_ns - FIRST_STAMP) * 1e-9, way.poses)
+            asked = lambda state: track.command(state.ego, state.time, period)  # noqa: E731
+        if said != frame:
+            raise InputError(f"{topic}: frame {said!r} is not that of the scenario, {frame!r}")
+        return Heard(topic, step, stamp, asked)
+
+    def _command(self, state: State) -> tuple[Command | Pose | None, str]:
+        """Return what is asked of the ego now, and what is wrong with it."""
+        heard = self._heard
+        if heard is None:
+            return None, ""
+        if heard.fault:
+            return None, heard.fault
+        old = (state.step - heard.step) * self.config.drive.step
+        if heard.stamp_ns:
+            old = max(old, self._stamp(state) * 1e-9 - heard.stamp_ns * 1e-9)
+        way = heard.topic in ("ego/trajectory", "ego/path")
+        if old > self.config.silence and not way:
+            return None, f"{heard.topic}: the last command is {old:.1f} s old"
+        if state.step % LOOK_AROUND == 0:
+            self._sources = self._commanding()
+        note = f"several egos: {', '.join(self._sources)}; what came last counts" if len(self._sources) > 1 else ""
+        return heard.ask(state), note
+
+    def _commanding(self) -> list[str]:
+        """Return the nodes that publish commands."""
+        found = [info for topic in INPUTS for info in self.get_publishers_info_by_topic(topic)]
+        return sorted({f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in found})
+
+    # --- steps ------------------------------------------------------------------------------------------------
+
+    def _tick(self) -> None:
+        if self._loop is None or self._paused or (self._heard is None and self.config.wait_for_ego):
+            return
+        if not self._verdict:
+            self._advance(self._loop)
+
+    def _advance(self, loop: ClosedLoop) -> None:
+        asked, note = self._command(self._states[-1])
+        self._states.append(loop.step(self._states[-1], asked, note))
+        if fault := self._states[-1].fault:
+            self._say(Level.WARN, fault, "ego")
+        self._tell()
+        if loop.over(self._states[-1]):
+            self._conclude(loop)
+
+    def _conclude(self, loop: ClosedLoop) -> None:
+        """Publish the verdict, and go on with the next scenario."""
+        drive = loop.record(self._states)
+        verdict, trial = judge(loop, drive), self._trials[self._at]
+        self._verdict = verdict.sentence()
+        self._outcomes.append(Outcome(trial.name, verdict, drive))
+        level = Level.OK if verdict.passed else Level.ERROR
+        values = {key: json.dumps(value) for key, value in verdict.document().items()}
+        if drive.faults:
+            values["first_faults"] = json.dumps(drive.faults[:5])
+        status = Status(f"{self.get_name()}: scenario {trial.name}", level, self._verdict, values)
+        self._publish("verdicts", encode_diagnostics([status], self._stamp(self._states[-1])))
+        self.get_logger().info(f"scenario {trial.name}: {self._verdict}")
+        if self.config.results:
+            folder, name = Path(self.config.results), f"{self.get_name()} over ROS 2"
+            folder.mkdir(parents=True, exist_ok=True)
+            write_text(folder / "drives.json", as_json(self._outcomes, name, self.config.drive))
+            write_text(folder / "junit.xml", as_junit(self._outcomes, name))
+        if self.config.follow_on and not self.config.lock_step and self._at + 1 < len(self._trials):
+            self._load(self._at + 1)
+
+    async def _serve_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Go one step, with a command that came after the one before; without one within the patience, without one."""
+        loop = self._loop
+        if loop is None or self._verdict or not self.config.lock_step:
+            response.message = self._why_no_step()
+            return response
+        state = self._states[-1]
+        if self._heard is None or self._heard.step < state.step:
+            self._waiting = Future(executor=self.executor)
+            waiting = self._waiting
+            timer = self.create_timer(
+                self.config.patience,
+                lambda: None if waiting.done() else waiting.set_result(None),
+                clock=Clock(clock_type=ClockType.STEADY_TIME),
+            )
+            await waiting
+            self.destroy_timer(timer)
+        if self._loop is loop and self._states[-1] is state:
+            self._advance(loop)
+        response.success = True
+        response.message = json.dumps({"time": self._states[-1].time, "over": bool(self._verdict), "verdict": self._verdict})
+        return response
+
+    def _why_no_step(self) -> str:
+        if not self.config.lock_step:
+            return "the parameter lock_step is false: the clock makes the steps"
+        if self._loop is None:
+            return "there is no scenario yet"
+        return f"scenario {self._trials[self._at].name} is over: {self._verdict}; call ~/next or ~/reset"
+
+    # --- services ---------------------------------------------------------------------------------------------
+
+    def _answer(self, action: Callable[[], str], response: Trigger.Response) -> Trigger.Response:
+        try:
+            response.message = action()
+            response.success = True
+        except ScenarioGenError as error:
+            response.message = str(error)
+        return response
+
+    def _next(self) -> str:
+        if self._at + 1 >= len(self._trials):
+            raise InputError(f"there is no scenario after number {self._at}; there are {len(self._trials)}")
+        self._load(self._at + 1)
+        return f"scenario {self._trials[self._at].name}"
+
+    def _reset(self) -> str:
+        if self._loop is None:
+            raise InputError("there is no scenario yet")
+        self._load(self._at)
+        return f"scenario {self._trials[self._at].name}, from its start"
+
+    def _pause(self) -> str:
+        self._paused = True
+        return "paused"
+
+    def _resume(self) -> str:
+        self._paused = False
+        return "driving"
+
+    # --- what is published ------------------------------------------------------------------------------------
+
+    def _stamp(self, state: State) -> int:
+        return FIRST_STAMP + round(state.time * 1e9)
+
+    def _publish(self, topic: str, data: bytes) -> None:
+        publish(self, self._out[topic], data)
+
+    def _tell(self) -> None:
+        """Publish where everyone is now."""
+        loop, state = self._loop, self._states[-1]
+        if loop is None:
+            return
+        stamp, frame = self._stamp(state), loop.scenario.frame_id
+        before = self._states[-2].vehicles if len(self._states) > 1 else state.vehicles
+        turned = (state.vehicles[:, 2] - before[:, 2]) / loop.config.step
+        self._publish("/clock", driving.encode_clock(stamp))
+        here = np.flatnonzero(state.here).tolist()
+        for i in here:
+            data = driving.encode_odometry(state.vehicles[i], float(turned[i]), self._children[i], frame, stamp)
+            publish(self, self._odometry[self._names[i]], data)
+        poses: Floats = state.vehicles[here, :3]
+        self._publish("/tf", encode_frames(poses, [self._children[i] for i in here], frame, stamp))
+        vehicles = loop.scenario.vehicles
+        markers = driving.encode_traffic_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp)
+        self._publish("traffic/markers", markers)
+        every = max(round(GRID_EVERY / loop.config.step), 1)
+        if state.step % every == 0 and loop.road is not None:
+            grid = local_map(loop, state)
+            self._publish("traffic/local_map", driving.encode_local_map(grid.blocked, grid.resolution, grid.origin, frame, stamp))
+
+    def _say(self, level: Level, message: str, subject: str) -> None:
+        self.diagnostics.status(level, message, subject, {}, log=False)
+
+    def _report(self) -> None:
+        """Say each second what is driven; a fault of the ego that is over clears."""
+        if self._loop is None:
+            self._say(Level.WARN, "there is no scenario yet", "driving")
+            return
+        state, trial = self._states[-1], self._trials[self._at]
+        doing = self._verdict or ("paused" if self._paused else "waiting for the ego" if self._heard is None else "driving")
+        self._say(Level.OK, f"scenario {trial.name}, {state.time:.1f} s: {doing}", "driving")
+        if not state.fault and not (self._heard and self._heard.fault):
+            self.diagnostics.resolve("ego")

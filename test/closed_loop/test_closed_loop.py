@@ -1,0 +1,196 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The core of the closed loop: the witness passes, the others keep their order whatever the ego does, nobody waits for ever."""
+
+from itertools import combinations
+
+from driving_worlds import Anything, as_scenario, draw_scenario, PERIOD, Witness
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lengths import LONG
+import numpy as np
+import pytest
+
+from scenario_gen.closed_loop.certified import certified
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
+from scenario_gen.closed_loop.simulation import ClosedLoop
+from scenario_gen.closed_loop.verdict import judge
+from scenario_gen.errors import InputError
+
+EXAMPLES = 10_000 if LONG else 60
+FAR = Pose(1e4, 1e4, 0.0, 0.0)
+
+
+def prepared(seed, **config):
+    """A drawn scenario, one of its vehicles as ego."""
+    scenario = draw_scenario(seed)
+    ego = seed % len(scenario.vehicles)
+    return scenario, ego, ClosedLoop(scenario, ego, config=ClosedLoopConfig(**config))
+
+
+@settings(max_examples=EXAMPLES, deadline=None)
+@given(st.integers(0, 10**9))
+def test_others_never_meet_and_come_to_their_ends_whatever_the_ego_does(seed):
+    scenario, ego, loop = prepared(seed)
+    anything, steps = Anything(seed), len(scenario.time) // 2 + seed % 50
+    drive = loop.drive(anything, lambda state: state.step >= steps)
+    assert judge(loop, drive).among_others == 0
+    assert (np.diff(drive.clock, axis=1) >= 0.0).all()
+    state = loop.start()
+    anything.reset(loop.task())
+    for _ in range(40):
+        state = loop.step(state, anything.act(loop.observe(state)))
+    others = [i for i in range(len(scenario.vehicles)) if i != ego]
+    for _ in range(3000):  # the ego has gone: no circle of others may be left waiting
+        state = loop.step(state, FAR)
+        if (state.clock[others] >= scenario.time[-1]).all():
+            return
+    raise AssertionError(f"clocks {state.clock} stand still at rates {state.rate}")
+
+
+@settings(max_examples=EXAMPLES, deadline=None)
+@given(st.integers(0, 10**9), st.sampled_from(["replay", "reactive"]))
+def test_with_the_witness_as_ego_everyone_drives_as_certified(seed, policy):
+    scenario, ego, loop = prepared(seed, policy=policy)
+    drive = loop.drive(Witness(scenario, ego), lambda state: state.step >= len(scenario.time) - 1)
+    assert np.abs(drive.motion.position - scenario.position).max() < 1e-6
+    verdict = judge(loop, drive)
+    assert verdict.collision is None and verdict.among_others == 0
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(2.0, 15.0), st.floats(0.0, 6.0), st.floats(0.5, 40.0), st.sampled_from([0.05, 0.1]))
+def test_a_follower_stops_for_the_ego_where_braking_at_the_limit_suffices(speed, braking, spare, step):
+    """The ego ahead brakes to a stand; the gap holds what the follower needs to stop less what the ego still drives."""
+    config = ClosedLoopConfig(step=step)
+    strongest = config.strongest_braking
+    need = 0.5 * speed**2 / strongest - (0.5 * speed**2 / braking if braking > 0.1 else 0.5 * speed**2 / 0.1)
+    gap = max(need, 0.0) + spare + speed * step
+    scenario = following(speed, gap)
+    loop = ClosedLoop(scenario, 1, config=config)
+    state = loop.start()
+    for _ in range(int(12 / step)):
+        state = loop.step(state, Command(-max(braking, 0.1), 0.0))
+        assert not loop.over(state) or loop.at_goal(state.time, state.vehicles[1])
+
+
+def following(speed, gap):
+    """One vehicle behind another on a straight line, at one speed; the second is 4.5 m long, like the first 4.0 m."""
+    time = np.arange(150) * PERIOD
+    motions = []
+    for start in (0.0, gap + 4.25):
+        xy = np.stack([start + speed * time, np.zeros_like(time)], axis=1)
+        motions.append((xy, np.zeros_like(time), np.full_like(time, speed)))
+    return as_scenario(motions, len(time))
+
+
+def crossing(first_speed=8.0, second_speed=8.0, second_start=-60.0):
+    """Vehicle 0 crosses from the west, then vehicle 1 from the south."""
+    time = np.arange(150) * PERIOD
+    zero = np.zeros_like(time)
+    west = (np.stack([-30.0 + first_speed * time, zero], axis=1), zero, np.full_like(time, first_speed))
+    south = (
+        np.stack([zero, second_start + second_speed * time], axis=1),
+        np.full_like(time, np.pi / 2),
+        np.full_like(time, second_speed),
+    )
+    return as_scenario([west, south], len(time))
+
+
+@pytest.mark.parametrize(("yields", "waits"), [("template", True), ("never", False)])
+def test_the_others_wait_for_the_ego_where_the_template_did(yields, waits):
+    """The ego went first in the template, but comes late: it stands 25 m before the crossing for 6 s."""
+    scenario = crossing()
+    loop = ClosedLoop(scenario, 0, config=ClosedLoopConfig(yield_to_ego=yields))
+    state, passed = loop.start(), None
+    for _ in range(100):
+        state = loop.step(state, Command(-4.0, 0.0))
+        if passed is None and state.vehicles[1, 1] > 0.0:
+            passed = state.time
+    assert (passed is None) == waits
+    assert state.vehicles[1, 1] < -2.0 or not waits
+
+
+def test_others_keep_their_order_behind_one_who_waits_for_the_ego():
+    """Vehicle 0 crosses before vehicle 1 and is held up by the ego ahead of it: vehicle 1 waits for it, then both go on."""
+    base, time = crossing(), np.arange(150) * PERIOD
+    lead = (np.stack([-20.0 + 8.0 * time, np.zeros_like(time)], axis=1), np.zeros_like(time), np.full_like(time, 8.0))
+    motions = [(base.position[i], base.heading[i], base.speed[i]) for i in range(2)]
+    scenario = as_scenario([*motions, lead], len(time))
+    loop = ClosedLoop(scenario, 2)
+    state = loop.start()
+    for _ in range(150):
+        state = loop.step(state, Command(-6.0, 0.0))
+    assert state.vehicles[2, 0] < -10.0 and state.vehicles[0, 0] < -10.0  # both stand before the crossing
+    assert state.vehicles[1, 1] < -3.0 and state.vehicles[1, 3] < 0.5  # so does the one whose turn comes later
+    for _ in range(250):
+        state = loop.step(state, FAR)
+    assert (state.clock[:2] >= scenario.time[-1]).all()
+
+
+def test_a_step_changes_nothing_but_gives_the_next_state():
+    _scenario, _, loop = prepared(7)
+    first = loop.start()
+    kept = first.vehicles.copy()
+    one, other = (loop.step(first, Command(1.0, 0.02)) for _ in range(2))
+    assert (one.vehicles == other.vehicles).all() and (one.clock == other.clock).all()
+    assert (first.vehicles == kept).all() and first.step == 0 and one.step == 1
+
+
+def test_the_body_keeps_to_its_limits_and_drives_arcs():
+    config = ClosedLoopConfig(ego_curvature_rate=20.0)
+    state, turn = EgoState(0.0, 0.0, 0.0, 5.0, 0.1), 0.1
+    for _ in range(200):
+        state = move(state, Command(0.0, turn), config).state
+    centre = np.hypot(state.x, state.y - 10.0)
+    assert centre == pytest.approx(10.0, abs=1e-9) and state.yaw == pytest.approx(5.0 * 20.0 * 0.1)
+    fast = move(state, Command(100.0, 9.0), config).state
+    assert fast.acceleration == pytest.approx(config.ego_acceleration) and fast.curvature == config.ego_curvature
+    state = EgoState(0.0, 0.0, 0.0, 0.45)
+    stopped = move(state, Command(-9.0, 0.0), config).state
+    assert stopped.speed == 0.0 and stopped.x == pytest.approx(0.45**2 / 18.0)
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (None, "no command"),
+        (Command(float("nan"), 0.0), "not finite"),
+        (Pose(0.0, float("inf"), 0.0, 0.0), "not finite"),
+        (Pose(500.0, 0.0, 0.0, 0.0), "jumped 500.0 m"),
+    ],
+)
+def test_what_is_wrong_with_a_command_is_said(asked, said):
+    moved = move(EgoState(0.0, 0.0, 0.0, 5.0), asked, ClosedLoopConfig())
+    assert said in moved.fault and np.isfinite(moved.state).all()
+
+
+def test_an_unknown_ego_is_refused_with_those_there_are():
+    scenario = crossing()
+    with pytest.raises(InputError, match="no vehicle 'x' to be the ego; it has v0, v1"):
+        certified(scenario, "x")
+    with pytest.raises(InputError, match="no vehicle number 5"):
+        certified(scenario, 5)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10**6))
+def test_the_order_never_holds_back_who_is_last_and_only_ever_opens(seed):
+    known = certified(draw_scenario(seed), 0)
+    cells = np.arange(known.order.shape[2]) * 0.1
+    for i, j in combinations(range(len(known.half)), 2):
+        for row in (known.order[i, j], known.order[j, i]):
+            assert (row >= cells - 1e-9).all() and (row[1:] >= row[:-1]).all()

@@ -1,0 +1,140 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node `traffic`: a planner over DDS in lock-step, whatever is wrong with its commands, and the verdict."""
+
+import json
+
+from bag_examples import hand_made_run
+import numpy as np
+import pytest
+
+from msg_conventions.diagnostics import decode_diagnostics, Level
+from msg_conventions.driving import decode_odometry, encode_odometry, encode_twist
+from msg_conventions.frames import decode_frames
+from msg_conventions.paths import encode_path
+from msg_conventions.roads import decode_map
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.simulation import ClosedLoop
+from scenario_gen.closed_loop.tracking import of_twist
+from scenario_gen.closed_loop.verdict import judge
+from scenario_gen.recordings.write import write_recording
+
+pytestmark = pytest.mark.dds
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    return write_recording(tmp_path_factory.mktemp("traffic") / "bag", hand_made_run())
+
+
+@pytest.fixture
+def traffic(start, client, bag):
+    """A running node in lock-step that this client steers."""
+
+    def run(**parameters):
+        process = start("traffic", bag=bag, lock_step=True, **parameters)
+        client.hear("verdicts", "vehicle_1/odom", "vehicle_bus_2/odom", "/tf", "/clock", "traffic/local_map", "/diagnostics")
+        for topic in ("ego/cmd_vel", "ego/odom", "ego/path"):
+            client.announce(topic)
+        for topic in ("ego/cmd_vel", "ego/odom", "ego/path", "verdicts"):
+            count = client.node.count_publishers if topic == "verdicts" else client.node.count_subscribers
+            client.until(lambda count=count, topic=topic: count(topic) >= 1, topic)
+        return process
+
+    return run
+
+
+def step(client):
+    from std_srvs.srv import Trigger
+
+    answer = client.call(Trigger, "/traffic/step", Trigger.Request())
+    assert answer.success, answer.message
+    return json.loads(answer.message)
+
+
+class Slow:
+    """The planner: 3 m/s, straight on."""
+
+    def reset(self, task):
+        self.step = task.step
+
+    def act(self, seen):
+        return of_twist(seen.ego, 3.0, 0.0, self.step)
+
+
+def test_a_planner_in_lock_step_gets_the_verdict_that_it_gets_in_process(traffic, client, tmp_path):
+    from std_srvs.srv import Trigger
+
+    traffic(results=tmp_path / "results")
+    for _ in range(2):  # and once more after a reset
+        said = {"over": False}
+        while not said["over"]:
+            client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
+            said = step(client)
+        assert not client.call(Trigger, "/traffic/step", Trigger.Request()).success
+        assert client.call(Trigger, "/traffic/reset", Trigger.Request()).success
+    client.wait("verdicts", 2)
+    first, second = (decode_diagnostics(data)[1][0] for data in client.heard["verdicts"])
+    assert first == second
+
+    run = hand_made_run()
+    loop = ClosedLoop(run.generated.scenarios[0], 0, run.road, ClosedLoopConfig())
+    expected = judge(loop, loop.drive(Slow())).document()
+    values = {key: json.loads(value) for key, value in first.values.items() if key != "first_faults"}
+    assert values == json.loads(json.dumps(expected))
+    assert (tmp_path / "results" / "drives.json").is_file() and (tmp_path / "results" / "junit.xml").is_file()
+
+    stamp, frame, state = decode_odometry(client.heard["vehicle_1/odom"][10])
+    assert frame == run.road.frame_id and stamp == 2_000_000_000 and np.isfinite(state).all()
+    assert {child for _, _, child, _ in decode_frames(client.heard["/tf"][0])} == {"vehicle_1", "vehicle_bus_2"}
+    grid = decode_map(client.heard["traffic/local_map"][0])[1]
+    assert not grid.drivable.all() and grid.drivable.any()
+
+
+def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, client):
+    process = traffic(patience=0.2)
+    far = np.array([1e5, 0.0, 0.0, 0.0])
+    frame = hand_made_run().road.frame_id
+    wrong = {
+        "not finite": ("ego/cmd_vel", encode_twist(float("nan"), 0.0)),
+        "jumped": ("ego/odom", encode_odometry(far, 0.0, "base_link", frame, 0)),
+        "is not that of the scenario": ("ego/odom", encode_odometry(far, 0.0, "base_link", "odom", 0)),
+        "damaged": ("ego/cmd_vel", encode_twist(1.0, 0.0)[:20]),
+        "must ascend": ("ego/path", encode_path(np.zeros((2, 3)), np.zeros(2, dtype=np.int64), frame, 0)),
+    }
+    for topic, data in wrong.values():
+        client.say(topic, data)
+        step(client)
+    for _ in range(8):
+        step(client)  # silent
+    found = set()
+
+    def all_said():
+        for data in client.heard["/diagnostics"]:
+            for status in decode_diagnostics(data)[1]:
+                if status.level is Level.WARN:
+                    found.update(text for text in (*wrong, "s old") if text in status.message)
+        return len(found) >= 3
+
+    client.until(all_said, "faults on /diagnostics")
+    assert process.poll() is None
+    said = {"over": False}
+    while not said["over"]:
+        said = step(client)
+    client.wait("verdicts")
+    values = decode_diagnostics(client.heard["verdicts"][-1])[1][0].values
+    assert int(values["faults"]) >= 5
+    faults = str(values["first_faults"])
+    assert "not finite" in faults and "jumped" in faults and "is not that of the scenario" in faults

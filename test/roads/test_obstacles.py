@@ -1,0 +1,82 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Obstacles: text, cells by shapely, the way there and back in a map's message, and what is refused by name."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from shapely import affinity
+from shapely.geometry import box
+
+from msg_conventions.roads import decode_map, encode_map
+from scenario_gen.errors import InputError
+from scenario_gen.roads import build_road, RoadConfig
+from scenario_gen.roads.obstacles import Obstacle, read_obstacles, with_obstacles
+
+
+def test_text():
+    assert read_obstacles(" 1 2 0.5 4 2 ; 3,4,0,1,1;") == (Obstacle(1, 2, 0.5, 4, 2), Obstacle(3, 4, 0, 1, 1))
+    assert read_obstacles("") == ()
+
+
+@pytest.mark.parametrize(
+    "text", ["1 2 3 4", "1 2 3 4 x", "1 2 3 4 inf", "1 2 3 0 1", "1 2 3 4 -1", "1 2 0 1 2; nonsense", "1 2 0 1e9 2"]
+)
+def test_bad_text_is_refused_by_name(text):
+    with pytest.raises(InputError, match="obstacles: '"):
+        RoadConfig(obstacles=text)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    x=st.floats(0, 20), y=st.floats(0, 10), yaw=st.floats(-7, 7), length=st.floats(0.3, 8), width=st.floats(0.3, 3)
+)  # fmt: skip
+def test_cells_that_overlap_are_closed(x, y, yaw, length, width):
+    road = build_road("straight", config=RoadConfig(resolution=0.5, arm_length=10.0, lane_width=5.0))
+    there = Obstacle(x + road.origin[0], y + road.origin[1] + 1.0, yaw, length, width)
+    made = with_obstacles(road, (there,)) if _area(road, there).max() > 0.0 else road
+    area = _area(road, there)
+    assert not made.drivable[area > 1e-6].any()
+    np.testing.assert_array_equal(made.drivable[area == 0.0], road.drivable[area == 0.0])
+    np.testing.assert_array_equal(made.cleared.drivable, road.drivable)
+
+
+def _area(road, obstacle):
+    """The overlap of each drivable cell with the rectangle [m²]."""
+    half = (obstacle.length / 2, obstacle.width / 2)
+    shape = affinity.rotate(box(-half[0], -half[1], *half), obstacle.yaw, origin=(0, 0), use_radians=True)
+    shape = affinity.translate(shape, obstacle.x, obstacle.y)
+    area = np.zeros(road.drivable.shape)
+    for i, j in np.argwhere(road.drivable):
+        low = road.origin + np.array([j, i]) * road.resolution
+        area[i, j] = shape.intersection(box(*low, *(low + road.resolution))).area
+    return area
+
+
+def test_a_map_carries_them():
+    plain = build_road("straight")
+    road = build_road("straight", config=RoadConfig(obstacles="20 3 0.1 4 2"))
+    assert 8.0 < (plain.drivable & ~road.drivable).sum() * 0.04 < 12.0
+    _, again = decode_map(encode_map(road, 0))
+    np.testing.assert_array_equal(again.drivable, road.drivable)
+    np.testing.assert_array_equal(again.cleared.drivable, plain.drivable)
+    assert decode_map(encode_map(plain, 0))[1].obstructed is None
+
+
+def test_one_that_stands_nowhere_is_refused():
+    with pytest.raises(InputError, match=r"obstacle `900 0 0 4 2` stands nowhere .* 'straight'"):
+        build_road("straight", config=RoadConfig(obstacles="900 0 0 4 2"))
+    with pytest.raises(InputError, match="leave nothing drivable"):
+        build_road("straight", config=RoadConfig(obstacles="0 0 0 900 900"))
