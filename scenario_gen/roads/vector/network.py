@@ -115,7 +115,7 @@ def cross_sections(left: Floats, right: Floats, where: str) -> tuple[Floats, Flo
 
 
 def with_junctions(network: LaneNetwork) -> LaneNetwork:
-    """Name the junctions of a map that names none: lanes whose centre lines cross, and those that touch them, are one.
+    """Name the junctions of a map that names none: lanes whose middles cross, and those that part from the same lane, are one.
 
     They are numbered 1, 2, … in the order of their first lanes.
     """
@@ -137,6 +137,12 @@ def with_junctions(network: LaneNetwork) -> LaneNetwork:
             if _cross(lanes[a].centre, lanes[b].centre):
                 crossing |= {a, b}
                 root[find(b)] = find(a)
+    for before in network.lanes:  # who parts from a lane that crosses others turns at the same junction
+        inner = [k for k in before.successors if k in crossing]
+        for k in before.successors if inner else ():
+            if k not in crossing:
+                crossing.add(k)
+                root[find(k)] = find(inner[0])
     first: dict[int, str] = {}
     named = []
     for k, lane in enumerate(lanes):
