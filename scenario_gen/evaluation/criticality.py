@@ -49,6 +49,10 @@ class Criticality:
         same = [mine[pair] == first for pair, first in template.order if pair in mine]
         return float(np.mean(same)) if same else float("nan")
 
+    def vanished_of(self, template: "Criticality") -> int:
+        """Return how many of the template's conflicts do not exist here; the order says nothing of those."""
+        return len(dict(template.order).keys() - dict(self.order).keys())
+
 
 def criticality(motion: Motion, horizon: float) -> Criticality:
     """Measure one motion; a time to collision above `horizon` [s] counts as the horizon."""

@@ -16,7 +16,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
+import math
 
 import numpy as np
 
@@ -29,6 +31,7 @@ from scenario_gen.evaluation.distributions import compare, QUANTITIES, values_of
 from scenario_gen.evaluation.metrics import LIMIT_CAUSES, METRICS
 from scenario_gen.evaluation.motion import at_count, at_period, Motion, of_vehicles, stacked
 from scenario_gen.parameters import parameter, Parameters
+from scenario_gen.template.manoeuvre import keeps
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import CheckCounts, Evaluation, Interval, Row, TEMPLATE
 from scenario_gen.types.generation import GenerationResult, ORACLE
@@ -37,6 +40,8 @@ from scenario_gen.types.scenario import Cause, Scenario, ScenarioSet
 MEASURED = 1000
 """Scenarios of a set that are measured; of a larger one this many, in RUNS evenly spaced runs of consecutive ones."""
 RUNS = 20
+TURNS = math.radians(10.0)
+"""Of a pair whose headings' differences spread by less, E for heading would measure noise; it has none."""
 Scenarios = Sequence[Scenario] | ScenarioSet
 
 
@@ -193,7 +198,12 @@ def chosen(motion: Motion, ids: Sequence[str]) -> Motion:
 
 def _template_row(reference: _Reference, resampled: bool, steps: int) -> Row:
     critical = reference.critical
-    values = {"min_distance": critical.min_distance, "min_ttc": critical.min_ttc, "pet": critical.pet}
+    values = {
+        "min_distance": critical.min_distance,
+        "min_ttc": critical.min_ttc,
+        "pet": critical.pet,
+        "conflicts": float(len(critical.order)),
+    }
     notes = (f"longer than max_steps: the feature matrices have {steps} instants",) if resampled else ()
     return Row(TEMPLATE, 1, {key: Interval(value) for key, value in values.items()}, notes)
 
@@ -207,9 +217,10 @@ def _measure(name: str, scenarios: Sequence[Scenario], size: int, reference: _Re
     bootstrap = Bootstrap.draw(_pairs(scenarios), config.resamples, config.level, reference.seed)
     steps = reference.motion.speed.shape[1]
     ids = [vehicle.id for vehicle in reference.motion.vehicles]
-    position, speed = stacked([chosen(at_count(scenario, steps), ids) for scenario in scenarios])
+    position, speed, heading = stacked([chosen(at_count(scenario, steps), ids) for scenario in scenarios])
     clocked = [chosen(at_period(scenario, config.period), ids) for scenario in scenarios]
-    values |= _similarity(reference, position, speed, bootstrap)
+    values |= _similarity(reference, position, speed, heading, bootstrap)
+    values["turn_kept"] = bootstrap.mean(_turn_kept(reference.motion.heading, heading))
     values |= _distributions(reference, clocked, bootstrap)
     values |= _criticality(reference, clocked, bootstrap)
     table = diversity.displacements(position)
@@ -232,17 +243,31 @@ def _pairs(scenarios: Sequence[Scenario]) -> Ints:
     return np.array([pairs.setdefault((seed, index // 2), len(pairs)) for seed, index in numbers], dtype=np.int64)
 
 
-def _similarity(reference: _Reference, position: Floats, speed: Floats, bootstrap: Bootstrap) -> dict[str, Interval]:
-    """E and the correlation: Euclidean distance for position, Manhattan for speed, as in the paper."""
+def _similarity(
+    reference: _Reference, position: Floats, speed: Floats, heading: Floats, bootstrap: Bootstrap
+) -> dict[str, Interval]:
+    """E and the correlation: Euclidean distance for position, Manhattan for speed, as in the paper; wrapped for heading.
+
+    Where nobody turns there is nothing of headings.
+    """
     motion = reference.motion
-    places = similarity.pair_similarities(motion.position, position, "euclidean")
-    paces = similarity.pair_similarities(motion.speed[..., None], speed[..., None], "manhattan")
-    return {
-        "e_position": bootstrap.interval(lambda weights: similarity.mean_error(places, weights)),
-        "e_speed": bootstrap.interval(lambda weights: similarity.mean_error(paces, weights)),
-        "correlation_position": bootstrap.interval(lambda weights: similarity.mean_correlation(places, weights)),
-        "correlation_speed": bootstrap.interval(lambda weights: similarity.mean_correlation(paces, weights)),
+    pairs = {
+        "position": similarity.pair_similarities(motion.position, position, "euclidean"),
+        "speed": similarity.pair_similarities(motion.speed[..., None], speed[..., None], "manhattan"),
+        "heading": similarity.pair_similarities(motion.heading[..., None], heading[..., None], "angle", TURNS),
     }
+    if not any(pair.template[2] for pair in pairs["heading"]):
+        del pairs["heading"]
+    found = {f"e_{what}": bootstrap.interval(partial(similarity.mean_error, of)) for what, of in pairs.items()}
+    return found | {
+        f"correlation_{what}": bootstrap.interval(partial(similarity.mean_correlation, of)) for what, of in pairs.items()
+    }
+
+
+def _turn_kept(template: Floats, samples: Floats) -> Floats:
+    """Share (S,) of vehicles that turn from start to end as the template's (N, T) do, of headings (S, N, T) [rad], unwrapped."""
+    before, after = template[:, -1] - template[:, 0], samples[:, :, -1] - samples[:, :, 0]
+    return np.array([np.mean([keeps(a, b) for a, b in zip(before, row, strict=True)]) for row in after])
 
 
 def _distributions(reference: _Reference, motions: Sequence[Motion], bootstrap: Bootstrap) -> dict[str, Interval]:
@@ -265,11 +290,14 @@ def _distributions(reference: _Reference, motions: Sequence[Motion], bootstrap: 
 
 def _criticality(reference: _Reference, motions: Sequence[Motion], bootstrap: Bootstrap) -> dict[str, Interval]:
     found = [criticality(motion, reference.config.ttc_horizon) for motion in motions]
+    vanished = np.array([float(one.vanished_of(reference.critical)) for one in found])
     return {
         "min_distance": bootstrap.mean(np.array([one.min_distance for one in found])),
         "min_ttc": bootstrap.mean(np.array([one.min_ttc for one in found])),
         "pet": bootstrap.mean(np.array([one.pet for one in found])),
         "order_kept": bootstrap.mean(np.array([one.keeps_order_of(reference.critical) for one in found])),
+        "conflicts": bootstrap.mean(len(reference.critical.order) - vanished),
+        "vanished_conflicts": bootstrap.mean(vanished),
     }
 
 
@@ -292,7 +320,12 @@ def _notes(samples: int, size: int, values: Mapping[str, Interval], config: Eval
         notes.append(f"few samples: every figure, E included, comes from {samples}, not {config.enough}")
     if np.isnan(values["min_distance"].value):
         return (*notes, "one vehicle is left: there is no pair to be measured")
-    for key, what in (("e_position", "position"), ("e_speed", "speed")):
-        if not np.isfinite(values[key].value):
-            notes.append(f"E for {what} is undefined: the template's matrix is constant for every pair of vehicles")
+    notes += [
+        f"E for {what} is undefined: the template's matrix is constant for every pair of vehicles"
+        for what in ("position", "speed")
+        if not np.isfinite(values[f"e_{what}"].value)
+    ]
+    if values["vanished_conflicts"].value > 0.0:
+        vanished, kept = (values[key].value for key in ("vanished_conflicts", "conflicts"))
+        notes.append(f"{vanished:.3g} of the template's {vanished + kept:.0f} conflict(s) vanish, mean over samples")
     return tuple(notes)

@@ -89,6 +89,7 @@ def of_vehicles(motion: Motion, rows: Sequence[int]) -> Motion:
     return Motion(tuple(motion.vehicles[n] for n in at), motion.dt, motion.position[at], motion.heading[at], motion.speed[at])
 
 
-def stacked(motions: Sequence[Motion]) -> tuple[Floats, Floats]:
-    """Stack S motions of equal T: positions (S, N, T, 2) [m] and speeds (S, N, T) [m/s]."""
-    return np.stack([motion.position for motion in motions]), np.stack([motion.speed for motion in motions])
+def stacked(motions: Sequence[Motion]) -> tuple[Floats, Floats, Floats]:
+    """Stack S motions of equal T: positions (S, N, T, 2) [m], speeds [m/s] and headings [rad], both (S, N, T)."""
+    position, speed, heading = ([getattr(motion, name) for motion in motions] for name in ("position", "speed", "heading"))
+    return np.stack(position), np.stack(speed), np.stack(heading)

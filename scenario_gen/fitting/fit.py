@@ -31,6 +31,7 @@ from scenario_gen.fitting.lanes import place_along_lanes
 from scenario_gen.fitting.placement import Placement
 from scenario_gen.fitting.search import place_by_search
 from scenario_gen.fitting.vector import place_on_lanes
+from scenario_gen.roads.arms import arms_of
 from scenario_gen.template.tracks import clean_tracks, Track
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit
@@ -112,7 +113,7 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         reasons.append(f"in its own frame, {error}")
     if own is not None and share >= _AT_HOME:
         return own
-    if has_lanes(road):
+    if has_lanes(road) or len(arms_of(road)) > 1:
         order, reasons = ("lanes", "junction"), []
     elif own is not None and share >= _NEAR_HOME:
         return own

@@ -35,6 +35,8 @@ from scenario_gen.types.segmentation import Segmentation
 FRAME_PERIOD = 0.2
 """Seconds between the frames that are stored; the page interpolates between them."""
 MAX_FRAMES, MAX_CELLS, MATRIX_SIZE, MAX_PAIRS, MAX_ROUTE_POINTS = 240, 900, 72, 10, 200
+MOTION_PERIOD, MAX_MOTION_FRAMES, MAX_MOTION_SAMPLES = 0.1, 400, 12
+"""Speed and accelerations over time are stored more finely than the animation, of fewer samples."""
 
 
 def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
@@ -55,6 +57,7 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
         "template": _template(case.encounter, case.segmentation, frames),
         "fit": _fit(case.fit, case.routes) if case.fit else [],
         "arms": {name: _trajectories(group, frames, ids, egos.get(name)) for name, group in arms.items() if group},
+        "motion": _motion(case.encounter, case.generated.scenarios[:MAX_MOTION_SAMPLES]),
         "features": _features(case.encounter, arms, case.evaluation.vehicles),
     }
 
@@ -123,6 +126,27 @@ def _whole(scenario: Scenario, frames: int, ids: Sequence[str], ego: Scenario | 
     own = {vehicle.id: state for vehicle, state in zip(scenario.vehicles, states(scenario, frames), strict=True)}
     track = next(iter(own.values())) if ego is None else states(ego, frames)[0]
     return np.stack([own.get(known, track) for known in ids])
+
+
+def _motion(encounter: Encounter, scenarios: Sequence[Scenario]) -> list[dict[str, Any]]:
+    """Return for each vehicle speed, acceleration and lateral acceleration of the template and of the scenarios that have it."""
+    found = []
+    for n, vehicle in enumerate(encounter.vehicles):
+        rows = [(s, k) for s in scenarios for k, own in enumerate(s.vehicles) if own.id == vehicle.id]
+        samples = [_over_time(scenario, k) for scenario, k in rows]
+        index = [scenario.index for scenario, _ in rows]
+        found.append({"template": _over_time(encounter, n), "samples": samples, "index": index})
+    return found
+
+
+def _over_time(source: Encounter | Scenario, n: int) -> dict[str, Any]:
+    """Speed [m/s], acceleration and lateral acceleration (speed times yaw rate) [m/s²] of one vehicle while it is there."""
+    first, last = source.time[source.present[n]].tolist()
+    frames = min(MAX_MOTION_FRAMES, max(3, round((last - first) / MOTION_PERIOD) + 1))
+    time = np.linspace(first, last, frames)
+    speed, heading = (np.interp(time, source.time, values[n]) for values in (source.speed, source.heading))
+    rates = np.gradient(np.stack([speed, heading]), time, axis=1)
+    return {"from": _short(first), "to": _short(last), "values": pack(np.column_stack([speed, rates[0], speed * rates[1]]))}
 
 
 def _template(encounter: Encounter, segmentation: Segmentation, frames: int) -> dict[str, Any]:

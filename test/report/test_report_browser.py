@@ -70,7 +70,7 @@ def test_it_loads_without_errors_or_requests(tab, report):
     tab.page.wait_for_timeout(300)
     assert tab.troubles == []
     assert tab.asked() == [report.as_uri()]
-    assert tab.page.locator('[data-case="0"] .js-plotly-plot').count() == 9  # template, two arms, six matrices
+    assert tab.page.locator('[data-case="0"] .js-plotly-plot').count() == 10  # template, two arms, motion, six matrices
     for role in ("stage", "template-map", "routes", "samples-with", "samples-without"):
         pixels = Image.open(io.BytesIO(b64decode(tab.picture(role).partition(",")[2])))
         assert len(pixels.getcolors(1_000_000)) > 10, role

@@ -83,6 +83,31 @@ function drawSpeeds(place, data, set, template, top) {
   });
 }
 
+/** One vehicle's speed, acceleration and lateral acceleration: the template bold, samples (all, or the one chosen) thin. */
+function drawMotion(place, motion, colour, chosen) {
+  const traces = [];
+  const add = (packed, line) => {
+    const { shape: [frames, channels], low, step, data } = packed.values;
+    const whole = new Uint16Array(bytesOf(data).buffer);
+    const x = Array.from({ length: frames }, (_, f) => +(packed.from + ((packed.to - packed.from) * f) / (frames - 1)).toFixed(2));
+    for (let c = 0; c < channels; c += 1) {
+      const y = Array.from({ length: frames }, (_, f) => +(low[c] + step[c] * whole[f * channels + c]).toFixed(3));
+      traces.push({ x, y, yaxis: `y${c ? c + 1 : ""}`, mode: "lines", line, hoverinfo: "skip" });
+    }
+  };
+  motion.samples.forEach((sample, s) => {
+    if (chosen < 0 || chosen === s) add(sample, { color: colour, width: chosen < 0 ? 1 : 2 });
+  });
+  add(motion.template, { color: "#0f172a", width: 2.5 });
+  const axis = (title, domain) => ({ ...GRID, title: { text: title, standoff: 6, font: { size: 11 } }, domain });
+  plot(place, traces, {
+    xaxis: { ...GRID, anchor: "y3", title: { text: "time [s]", standoff: 6 } },
+    yaxis: { ...axis("speed [m/s]", [0.7, 1]), rangemode: "tozero" },
+    yaxis2: axis("acceleration [m/s²]", [0.35, 0.65]),
+    yaxis3: axis("lateral [m/s²]", [0, 0.3]),
+  });
+}
+
 /** Figure 5: the mean feature matrices. */
 function drawFeature(place, text, duration, vehicles) {
   const bytes = bytesOf(text);

@@ -180,6 +180,17 @@ function open(section, data) {
     drawSpeeds(find(`speeds-${arm}`), data, sets[arm], template, 1.08 * top);
   });
   drawTemplate(find("template-speed"), data, template);
+  const who = find("motion-vehicle");
+  const which = find("motion-sample");
+  const motion = () => drawMotion(find("motion"), data.motion[who.selectedIndex], vehicleColour(who.selectedIndex), which.selectedIndex - 1);
+  const listed = () => {
+    which.replaceChildren(option("", "all drawn samples"), ...data.motion[who.selectedIndex].index.map((index) => option(index, `sample ${index}`)));
+    motion();
+  };
+  who.append(...data.vehicles.map((vehicle, n) => option(n, vehicle.id)));
+  who.addEventListener("change", listed);
+  which.addEventListener("change", motion);
+  listed();
   section.querySelectorAll('[data-role="legend"]').forEach((list) => list.append(...data.vehicles.map((vehicle, n) => chipLine(vehicle, n))));
   const pairs = find("pair");
   data.features.forEach((feature, i) => pairs.append(option(i, feature.pair.map((n) => data.vehicles[n].id).join(" and "))));

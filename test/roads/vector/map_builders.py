@@ -76,7 +76,7 @@ def commonroad(offset=(0.0, 0.0), extra=""):
         + '<laneletType>urban</laneletType><trafficSignRef ref="7"/></lanelet>'
         for name, (left, right, after) in found.items()
     )
-    sign = f"<trafficSign id='7'><trafficSignElement><trafficSignID>274</trafficSignID>"
+    sign = "<trafficSign id='7'><trafficSignElement><trafficSignID>274</trafficSignID>"
     sign += f"<additionalValue>{LIMIT / 3.6!r}</additionalValue></trafficSignElement></trafficSign>"
     crossing = "<intersection id='9'>" + "".join(
         f"<incoming id='{900 + k}'><incomingLanelet ref='{number[f'{arm}_in']}'/>"
@@ -156,8 +156,8 @@ def opendrive(reference=""):
     header = (
         f'<header revMajor="1" revMinor="6">{f"<geoReference>{escape(reference)}</geoReference>" if reference else ""}</header>'
     )
-    return f'<?xml version="1.0"?><OpenDRIVE>{header}{"".join(roads)}<junction name="" id="5">'
-        f'{"".join(connections)}</junction></OpenDRIVE>'
+    junction = f'<junction name="" id="5">{"".join(connections)}</junction>'
+    return f'<?xml version="1.0"?><OpenDRIVE>{header}{"".join(roads)}{junction}</OpenDRIVE>'
 
 
 FORMATS = {".xml": commonroad, ".osm": lanelet2, ".xodr": opendrive}
