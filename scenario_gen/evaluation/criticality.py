@@ -58,7 +58,7 @@ def criticality(motion: Motion, horizon: float) -> Criticality:
     """Measure one motion; a time to collision above `horizon` [s] counts as the horizon."""
     pairs = [(a, b, motion.together(a, b)) for a, b in combinations(range(len(motion.vehicles)), 2)]
     pairs = [(a, b, both) for a, b, both in pairs if both.stop > both.start]
-    conflicts = find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading)
+    conflicts = find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading, motion.present)
     encroachments = [c.entry_second - c.exit_first for c in conflicts if not c.following]
     return Criticality(
         min_distance=min((float(footprint_distance(motion, a, b)[both].min()) for a, b, both in pairs), default=float("nan")),

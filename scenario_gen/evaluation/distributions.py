@@ -66,8 +66,6 @@ def values_of(motion: Motion) -> dict[str, Floats]:
     found: dict[str, list[Floats]] = {quantity.id: [np.zeros(0)] for quantity in QUANTITIES}
     for n in range(len(motion.vehicles)):
         own = motion.own(n)
-        if own.stop == own.start:
-            continue
         speed, heading = motion.speed[n, own], motion.heading[n, own]
         acceleration = np.gradient(speed, motion.dt)
         sums = np.concatenate([np.zeros(1), np.cumsum(acceleration)])

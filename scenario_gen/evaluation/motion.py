@@ -39,8 +39,7 @@ class Motion:
         position: (N, T, 2) metres.
         heading: (N, T) rad, unwrapped.
         speed: (N, T) m/s.
-        present: (N, 2) first and last instant at which each vehicle is there, the last not after the first where it is there at
-            one instant at most; default: everybody throughout.
+        present: (N, 2) first and last instant at which each vehicle is there, at least two; default: everybody throughout.
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -65,9 +64,8 @@ class Motion:
         return mask(self.present, self.speed.shape[1])
 
     def own(self, n: int) -> slice:
-        """The instants at which vehicle n is there; none if that is less than two."""
-        first, last = self.present[n].tolist()
-        return slice(first, last + 1 if last > first else first)
+        """The instants at which vehicle n is there."""
+        return together(self.present, n, n)
 
     def together(self, a: int, b: int) -> slice:
         """The instants at which vehicles a and b are both there."""
@@ -126,8 +124,9 @@ def _motion(source: Encounter | Scenario, time: Floats, dt: float) -> Motion:
     present = ALWAYS
     if not source.all_present:
         there = source.time[source.present]
-        first = np.searchsorted(time, there[:, 0] - 1e-9)
-        present = frozen_ints(np.column_stack([first, np.searchsorted(time, there[:, 1] + 1e-9, side="right") - 1]))
+        first = np.minimum(np.searchsorted(time, there[:, 0] - 1e-9), len(time) - 2)
+        last = np.searchsorted(time, there[:, 1] + 1e-9, side="right") - 1
+        present = frozen_ints(np.column_stack([first, np.maximum(last, first + 1)]))
     return Motion(source.vehicles, dt, frozen(position), heading, speed, present)
 
 
