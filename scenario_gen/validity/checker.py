@@ -24,6 +24,7 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats, runs
 from scenario_gen.errors import InputError
 from scenario_gen.roads.clearance import clearance_in_cells
+from scenario_gen.roads.vector.ground import drives_against
 from scenario_gen.template.interaction import Conflict, find_conflicts, pair_conflict, Wait
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.presence import together
@@ -130,6 +131,7 @@ class Checker:
             *self._dynamics(scenario),
             *self._overlaps(scenario, control, half),
             *self._exits(scenario, control, half),
+            *self._wrong_ways(scenario),
             *self._waits(scenario),
         ]
         wrong, present, absent = self._passing_orders(scenario)
@@ -225,6 +227,17 @@ class Checker:
                 yield Violation(
                     Cause.OFF_ROAD, time, (i,), f"vehicle {i}: footprint {what} at {time:.3f} s near ({x:.2f}, {y:.2f})"
                 )
+
+    def _wrong_ways(self, scenario: Scenario) -> Iterator[Violation]:
+        """Vehicles that drive against all lanes where they are, at the samples."""
+        if self.road is None or self.road.lanes is None:
+            return
+        against = drives_against(self.road, scenario.position, scenario.heading)
+        for i in np.flatnonzero(against.any(axis=1)).tolist():
+            k = int(np.argmax(against[i]))
+            x, y = scenario.position[i, k].tolist()
+            message = f"vehicle {i}: drives against its lane near ({x:.2f}, {y:.2f}), {int(against[i].sum())} samples in all"
+            yield Violation(Cause.WRONG_WAY, float(scenario.time[k]), (i,), message)
 
     def _passing_orders(self, scenario: Scenario) -> tuple[list[Violation], int, int]:
         """Violations, and how many of the template's conflicts are present and absent in the scenario."""
