@@ -92,7 +92,8 @@ class Checker:
         vehicles = tuple(encounter.vehicles[n] for n in kept)
         conflicts = find_conflicts(vehicles, encounter.time, encounter.position[kept], encounter.heading[kept])
         own = [replace(wait, vehicle=kept.index(wait.vehicle)) for wait in waits if wait.vehicle != ego]
-        return cls(road, BoundaryStates(asked.start[kept], asked.end[kept]), conflicts, own, limits)
+        known = (limits or Limits()).for_template(encounter)
+        return cls(road, BoundaryStates(asked.start[kept], asked.end[kept]), conflicts, own, known)
 
     @property
     def not_applicable(self) -> tuple[str, ...]:
@@ -176,17 +177,17 @@ class Checker:
     def _overlaps(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
         n, limits = len(half), self.limits
         out = np.empty((n * (n - 1) // 2, 3))
-        apart.first_contacts(scenario.time, control, scenario.heading, half, limits.min_clearance, limits.time_resolution, out)
+        apart.first_contacts(scenario.time, control, scenario.heading, half, limits.clearance, limits.time_resolution, out)
         if not out[:, 0].any():
             return
         for pair, (status, time, gap) in zip(combinations(range(n), 2), out.tolist(), strict=True):
             if status != apart.PROVEN:
                 if status == apart.UNPROVEN:
-                    what = f"cannot be proven more than {limits.min_clearance:g} m apart (gap {gap:.6f} m)"
+                    what = f"cannot be proven more than {limits.clearance:g} m apart (gap {gap:.6f} m)"
                 elif gap <= 0.0:
                     what = f"overlap by {-gap:.3f} m"
                 else:
-                    what = f"come within {gap:.3f} m; {limits.min_clearance:g} m must be exceeded"
+                    what = f"come within {gap:.3f} m; {limits.clearance:g} m must be exceeded"
                 yield Violation(Cause.OVERLAP, time, pair, f"vehicles {pair[0]} and {pair[1]}: footprints {what} at {time:.3f} s")
 
     def _exits(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
