@@ -17,18 +17,18 @@
 Columns: vehicle, t_s from the file's time zero, x_m and y_m of the footprint's centre, speed_mps, heading_rad from +x
 counter-clockwise, length_m, width_m. CommonRoad (2018b, 2020a) says all of it; a speed it does not say is derived. OpenSCENARIO
 poses the rear axle, and its vertices have no speeds: the centre follows from the bounding box; the speeds are those of our own
-files' property, in others' files of a cubic spline through the timed vertices that begins with the speed of the initial action.
+files' property; in others' files they are derived from positions and times, but for the first, which the initial action says.
 """
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
-from scenario_gen.errors import guarded, InputError, of_system
+from scenario_gen.errors import InputError, of_system
 from scenario_gen.exchange.openscenario import SPEEDS
 from scenario_gen.exchange.xml import number, Place, read_xml
 
@@ -220,16 +220,11 @@ def _track(place: Place, vehicle: str, size: tuple[float, float], rows: Floats, 
     return Track(vehicle, *size, rows)
 
 
-def _speeds(rows: Floats, speed: float | None) -> Floats:
-    """Return (K,) speeds [m/s] of a cubic spline through the positions; `speed` is that at the first one, if it is known."""
-    time, heading = rows[:, 0], rows[0, 4]
-    if speed is None:
-        start: object = "not-a-knot"
-    else:
-        start = ((1, speed * np.array([exact.cos(heading), exact.sin(heading)])), "not-a-knot")
-    if speed is None and len(rows) < 4:
-        start = "natural"
-    with guarded("a spline through the trajectory"):
-        velocity = CubicSpline(time, rows[:, 1:3], bc_type=start)(time, 1)
+def _speeds(rows: Floats, first: float | None) -> Floats:
+    """Return (K,) speeds [m/s] along the headings by central differences; `first` is that of the first row, if it is known."""
+    order: Literal[1, 2] = 2 if len(rows) > 2 else 1
+    velocity = np.gradient(rows[:, 1:3], rows[:, 0], axis=0, edge_order=order)
     along = velocity[:, 0] * exact.cos(rows[:, 4]) + velocity[:, 1] * exact.sin(rows[:, 4])
+    if first is not None:
+        along[0] = first
     return frozen(np.maximum(along, 0.0))

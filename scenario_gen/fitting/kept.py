@@ -75,8 +75,8 @@ def find_losses(encounter: Encounter, tracks: tuple[Track, ...], placement: Plac
 
 def _lost_conflicts(encounter: Encounter, poses: Floats) -> list[Loss]:
     vehicles, time = encounter.vehicles, encounter.time
-    before = _by_pair(find_conflicts(vehicles, time, encounter.position, encounter.heading))
-    after = _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2]))
+    before = _by_pair(find_conflicts(vehicles, time, encounter.position, encounter.heading, encounter.present))
+    after = _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2], encounter.present))
     lost = []
     for pair in sorted(before.keys() | after.keys()):
         a, b = (vehicles[k].id for k in pair)

@@ -22,6 +22,7 @@ from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.nav2 import read_map
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.roads.shaped import bends, draw_bent, draw_junction, fitting_width
+from scenario_gen.roads.vector.read import is_vector_map, READERS, vector_road
 from scenario_gen.template.frenet import main_line, to_frenet
 from scenario_gen.template.separation import own_paths
 from scenario_gen.template.tracks import clean_tracks, Track
@@ -33,8 +34,10 @@ def build_road(name_or_path: str, encounter: Encounter | None = None, config: Ro
     """Return the road `name_or_path`, with the obstacles of `config` drawn into it.
 
     Args:
-        name_or_path: `straight`, `curve`, `t_intersection`, `four_way`, `corridor`, or the path of a nav2 map_server YAML.
-        encounter: the template, to which built-in roads are sized (None: plain sizes); `corridor` cannot do without.
+        name_or_path: `straight`, `curve`, `t_intersection`, `four_way`, `corridor`, or the path of a nav2 map_server YAML,
+            or of a vector map (.osm, .xodr, .xml), of which `#box=x0,y0,x1,y1`, `#lanelet=ID` or `#junction=ID` chooses a part.
+        encounter: the template, to which built-in roads are sized (None: plain sizes), and for which the best place on a vector
+            map is searched; `corridor` cannot do without.
         config: how it is drawn.
 
     Raises:
@@ -55,10 +58,13 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
         if encounter is None:
             raise InputError("road corridor is drawn around a template; give a log too")
         return draw_corridor(own_paths(encounter).tracks, config)
+    if is_vector_map(name_or_path):
+        return vector_road(name_or_path, None if encounter is None else clean_tracks(encounter), config)
     path = Path(name_or_path)
     if path.suffix.lower() not in (".yaml", ".yml"):
         names = ", ".join((*BUILT_IN, "corridor"))
-        raise InputError(f"road {name_or_path!r} is neither one of {names} nor the path of a map_server YAML file")
+        kinds = f"a map_server YAML file or a vector map ({', '.join(READERS)})"
+        raise InputError(f"road {name_or_path!r} is neither one of {names} nor the path of {kinds}")
     return read_map(path, config)
 
 
