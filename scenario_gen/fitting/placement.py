@@ -220,6 +220,8 @@ def equations(relation: Relation, one: Curve, two: Curve, scale: float) -> tuple
     if relation.kind is Kind.SHARED_END:
         if float(exact.hypot(*(one.points[-1, :2] - two.points[-1, :2]))) > 0.5:
             return None
+        if float(exact.hypot(*(one.points[0, :2] - two.points[0, :2]))) <= 0.5:  # they come from different lanes
+            return None
         return (Equation(((a, 1.0), (b, -1.0)), (one.length - la) - (two.length - lb), 1.0),)
     found = crossings(one, two, _ANGLE)
     if len(found) == 0:
