@@ -137,7 +137,7 @@ def draw_merge(tracks: tuple[Track, ...] | None, frenet: FrenetTracks | None, co
     """Draw a straight main road and a ramp that joins it from the side of its outermost lane, where the template changes to it.
 
     Raises:
-        RefusedError: nobody in the template changes from the outermost lane of its direction to the next one, or others keep to it.
+        RefusedError: nobody in the template changes from the outermost lane of its direction to the next, or others keep to it.
     """
     lanes, along, before, after, sharpness = max(config.lanes, 1), 1.0, 2.0 * _SHORTEST, 2.0 * _SHORTEST, 0.02
     if tracks is not None and frenet is not None:
