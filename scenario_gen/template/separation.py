@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
 from scenario_gen.template.tracks import clean_tracks, presence_of, Track
 from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
+from scenario_gen.types.presence import together
 
 _ROUNDS = 400
 _ALONG = 0.3  # how readily a vehicle is set forward or back on its path
@@ -219,3 +221,16 @@ def own_paths(encounter: Encounter) -> Separation:
         if track.deviation > 1.0
     ]
     return replace(separation, notes=(*notes, *separation.notes))
+
+
+@once_per_encounter
+def least_gap(encounter: Encounter) -> float:
+    """Return the least gap [m] of any two vehicles while both are there, negative if they overlap; inf if never two are."""
+    poses = np.concatenate([encounter.position, encounter.heading[..., None]], axis=-1)
+    least = np.inf
+    for a, b in combinations(range(len(poses)), 2):
+        common = together(encounter.present, a, b)
+        if common.stop > common.start:
+            gap, _ = footprint_gap(encounter.vehicles[a], poses[a, common], encounter.vehicles[b], poses[b, common])
+            least = min(least, float(gap.min()))
+    return least
