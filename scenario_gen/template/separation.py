@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
 from scenario_gen.template.tracks import clean_tracks, presence_of, Track
 from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
+from scenario_gen.types.presence import together
 
 _ROUNDS = 400
 _ALONG = 0.3  # how readily a vehicle is set forward or back on its path
@@ -153,10 +155,14 @@ def _near_pairs(tracks: Sequence[Track], poses: Sequence[Floats], room: float) -
     for i in range(len(tracks)):
         for j in range(i):
             both = presence_of(tracks[i]) & presence_of(tracks[j])
-            reach = sum(float(exact.hypot(t.vehicle.length, t.vehicle.width)) / 2.0 for t in (tracks[i], tracks[j]))
+            reach = (_diagonal(tracks[i].vehicle) + _diagonal(tracks[j].vehicle)) / 2.0
             if both.any() and exact.hypot(*(poses[i] - poses[j])[both, :2].T).min() < room + reach:
                 found.append((i, j))
     return found
+
+
+def _diagonal(vehicle: Vehicle) -> float:
+    return float(exact.hypot(vehicle.length, vehicle.width))
 
 
 def _worst(tracks: Sequence[Track], poses: Sequence[Floats], i: int, j: int) -> tuple[float, int, int, int, Floats]:
@@ -215,3 +221,16 @@ def own_paths(encounter: Encounter) -> Separation:
         if track.deviation > 1.0
     ]
     return replace(separation, notes=(*notes, *separation.notes))
+
+
+@once_per_encounter
+def least_gap(encounter: Encounter) -> float:
+    """Return the least gap [m] of any two vehicles while both are there, negative if they overlap; inf if never two are."""
+    poses = np.concatenate([encounter.position, encounter.heading[..., None]], axis=-1)
+    least = np.inf
+    for a, b in combinations(range(len(poses)), 2):
+        common = together(encounter.present, a, b)
+        if common.stop > common.start:
+            gap, _ = footprint_gap(encounter.vehicles[a], poses[a, common], encounter.vehicles[b], poses[b, common])
+            least = min(least, float(gap.min()))
+    return least
