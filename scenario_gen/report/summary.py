@@ -24,6 +24,7 @@ from rich.text import Text
 from scenario_gen.errors import printable
 from scenario_gen.types.evaluation import formatted
 from scenario_gen.types.generation import GenerationResult, WITH, WITHOUT
+from scenario_gen.types.route import legs_in_words
 from scenario_gen.types.scenario import Cause
 
 
@@ -59,7 +60,12 @@ def _case(case: GenerationResult) -> list[Text]:
         f"   order {order if order == '–' else order + ' %'}{measured}",
     )
     remark = case.segmentation.remark(case.encounter.duration)
-    return [title, figures, *([Text(f"  {remark}", style="yellow")] if remark else [])]
+    vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
+    remarks = [*([remark] if remark else []), *(said for vehicle, route in vehicles for said in route.remarks(vehicle.id))]
+    legs = legs_in_words(case.routes)
+    if legs:
+        figures.append(f"   routes: {legs}")
+    return [title, figures, *(Text(f"  {printable(said)}", style="yellow") for said in remarks)]
 
 
 def _errors(case: GenerationResult, metric: str) -> Text:

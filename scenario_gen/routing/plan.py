@@ -119,6 +119,26 @@ def deviations(route: Route, fitted: FittedVehicle) -> Floats:
     return np.asarray(exact.hypot(*(route.points[route.anchor, :2] - fitted.anchors[:, :2]).T))
 
 
+def farthest(points: Floats, path: Floats) -> float:
+    """Largest distance [m] between two polylines (M, 2 or more), from a point of either to the other; NaN: there is no path."""
+    if not len(path):
+        return float("nan")
+    one, other = points[:, :2], path[:, :2]
+    return max(float(_from_line(one, other).max()), float(_from_line(other, one).max()))
+
+
+def _from_line(points: Floats, line: Floats) -> Floats:
+    """Distance (M,) of points (M, 2) to a polyline (P, 2)."""
+    if len(line) == 1:
+        return np.asarray(exact.hypot(*(points - line[0]).T))
+    edge = np.diff(line, axis=0)
+    square = np.maximum(np.square(edge).sum(axis=1), 1e-12)
+    rel = points[:, None] - line[None, :-1]
+    along = np.clip((rel * edge).sum(axis=-1) / square, 0.0, 1.0)
+    off = rel - along[..., None] * edge
+    return np.asarray(np.sqrt(np.square(off).sum(axis=-1)).min(axis=1))
+
+
 def make_planner(config: PlanningConfig) -> Planner:
     """The geometric planner that `config` names."""
     if config.planner == "rrt_star_connect":
@@ -152,7 +172,8 @@ def _route(task: _Task) -> Route:
         curve = smooth(task.road, task.vehicle, anchors[0], anchors[-1], targets, held, task.config, rounds)
         if curve.curvature <= task.config.max_curvature and not len(curve.off_road):
             route = _sampled(task, curve.poses, curve.length)
-            return replace(route, joined=len(legs) - searched, searched=searched, left_out=left_out)
+            far = farthest(route.points, task.fitted.path)
+            return replace(route, joined=len(legs) - searched, searched=searched, left_out=left_out, farthest=far)
     assert curve is not None
     raise RefusedError(_reason(task, curve))
 
