@@ -20,7 +20,7 @@ to stdout.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 import json
 import os
 from pathlib import Path
@@ -108,7 +108,8 @@ def run(job: Job) -> Iterator[Made]:
     from scenario_gen.errors import ScenarioGenError
     from scenario_gen.logs import LogConfig, read_log
 
-    config = LogConfig(vehicles=",".join(job.vehicles), start=job.start, end=job.end)
+    whole: Any = {"whole": True} if "whole" in {one.name for one in fields(LogConfig)} else {}  # so older versions cut
+    config = LogConfig(vehicles=",".join(job.vehicles), start=job.start, end=job.end, **whole)
     try:
         found = read_log([Path(path) for path in job.paths], config).encounters
     except ScenarioGenError as error:

@@ -15,10 +15,11 @@
 """Scenario → Autoware's perception and localization outputs (docs/exchange.md has the source of each topic and frame).
 
 PredictedObjects on `/perception/object_recognition/objects`, TrackedObjects on `/perception/object_recognition/tracking/objects`:
-frame: the road's; each object is posed at its shape's centre, z = half its height; twist and acceleration in its own frame; its id
-is the first 16 bytes of the SHA-256 of the vehicle's id. The one predicted path is what the vehicle will do, each `STEP_NS` up to
-`HORIZON_NS` ahead or the end. Odometry of the ego on `/localization/kinematic_state`: frame: the road's, child frame
-`base_link`, the middle of the rear axle on the ground. Covariances are 0: what is said is true. QoS: reliable, volatile, depth 1.
+frame: the road's; each object is posed at its shape's centre, z = half its height; twist and acceleration in its own frame;
+its id is the first 16 bytes of the SHA-256 of the vehicle's id. The one predicted path is what the vehicle will do, each
+`STEP_NS` up to `HORIZON_NS` ahead or the end. Odometry of the ego on `/localization/kinematic_state`: frame: the road's, child
+frame `base_link`, the middle of the rear axle on the ground. Covariances are 0: what is said is true. QoS: reliable, volatile,
+depth 1.
 """
 
 import hashlib

@@ -332,6 +332,20 @@ def export_scenarios(
     say("\n".join((*made.notes, f"{made.scenarios} scenarios: {folder}")))
 
 
+@app.command("import")
+def import_scenario(
+    file: Annotated[Path, typer.Argument(help="a CommonRoad XML file or an OpenSCENARIO XML file with timed polylines")],
+    out: Annotated[Path | None, typer.Option(help="the new table; the file's name with .csv if not given")] = None,
+) -> None:
+    """Make a log of the trajectories in a CommonRoad or OpenSCENARIO file, for `generate` to read."""
+    from scenario_gen.exchange.importing import import_file
+
+    target = out or file.with_suffix(".csv")
+    made = import_file(file, target)
+    rows = sum(len(track.rows) for track in made.tracks)
+    say("\n".join((*made.notes, f"{len(made.tracks)} vehicles, {rows} rows: {target}")))
+
+
 @app.command("reindex")
 def save_bag(
     bag: Annotated[Path, typer.Argument(help="folder of a bag that was not closed or is damaged, or one of its MCAP files")],

@@ -40,6 +40,7 @@ class Difference:
         encounter, road: the case.
         metric: what is compared.
         first, second: the two estimates, None where a set has none.
+        changepoints: K of both, which stands beside E.
     """
 
     encounter: str
@@ -47,6 +48,7 @@ class Difference:
     metric: Metric
     first: Interval | None
     second: Interval | None
+    changepoints: tuple[int, int] = (0, 0)
 
     @property
     def clear(self) -> bool:
@@ -83,7 +85,7 @@ def compare(first: Sequence[Evaluation], second: Sequence[Evaluation], row: str 
         for metric in one.metrics:
             pair = mine.values.get(metric.id), theirs.values.get(metric.id)
             if any(pair):
-                found.append(Difference(one.encounter, one.road, metric, *pair))
+                found.append(Difference(one.encounter, one.road, metric, *pair, (one.changepoints, other.changepoints)))
     if not found:
         raise InputError("the two sets have no encounter on the same road in common")
     return tuple(found)
@@ -100,6 +102,8 @@ def comparison_table(differences: Sequence[Difference], names: tuple[str, str] =
             lines += [
                 "",
                 f"## {as_markdown(case[0])} on {as_markdown(case[1])}",
+                "",
+                "K = {} and {} changepoints.".format(*entry.changepoints),
                 "",
                 f"| metric | {names[0]} | {names[1]} | clearly better |",
                 "|---|---|---|---|",

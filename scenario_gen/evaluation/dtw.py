@@ -15,7 +15,8 @@
 """Dynamic time warping and the paper's feature: the normalised matrix of pairwise distances (paper V-B, Fig. 5).
 
 Series are laid out (D, T): one row per channel, so that the inner loops run over contiguous time. D = 2 for position
-(Euclidean distance) and 1 for speed, where Euclidean and Manhattan are both the absolute difference.
+(Euclidean distance), 1 for speed, where Euclidean and Manhattan are both the absolute difference, and 1 for heading, whose
+difference is wrapped. A kernel is told by one number, `turn`: 0 Euclidean, infinite Manhattan, else a circle's circumference.
 """
 
 from dataclasses import dataclass
@@ -24,52 +25,61 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints
+from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.errors import InputError
-from scenario_gen.kernels import B, F2, F3, I, kernel, OUT1, OUT2, OUTI2
+from scenario_gen.kernels import F, F2, F3, I, kernel, OUT1, OUT2, OUTI2
 
-Distance = Literal["euclidean", "manhattan"]
+Distance = Literal["euclidean", "manhattan", "angle"]
+_TURN: dict[Distance, float] = {"euclidean": 0.0, "manhattan": np.inf, "angle": 2.0 * np.pi}
 
 
 @kernel(inline=True)
-def _sums(a: Floats, i: int, b: Floats, manhattan: bool, out: Floats) -> None:
+def _step(difference: float, turn: float) -> float:
+    """What one channel adds to a distance; angles are less than a turn apart."""
+    if turn == 0.0:
+        return difference * difference
+    size = abs(difference)
+    return min(size, turn - size)
+
+
+@kernel(inline=True)
+def _sums(a: Floats, i: int, b: Floats, turn: float, out: Floats) -> None:
     """Write the distance of sample i of a (D, n) to every sample of b (D, m) into out (m,); squared if Euclidean."""
     for channel in range(a.shape[0]):
         x = a[channel, i]
         row = b[channel]
         for j in range(out.size):
-            difference = x - row[j]
-            step = abs(difference) if manhattan else difference * difference
+            step = _step(x - row[j], turn)
             out[j] = step if channel == 0 else out[j] + step
 
 
 @kernel(inline=True)
-def _distances(a: Floats, i: int, b: Floats, manhattan: bool, out: Floats) -> None:
+def _distances(a: Floats, i: int, b: Floats, turn: float, out: Floats) -> None:
     """Write the distance of sample i of a (D, n) to every sample of b (D, m) into out (m,)."""
-    _sums(a, i, b, manhattan, out)
-    if not manhattan:
+    _sums(a, i, b, turn, out)
+    if turn == 0.0:
         for j in range(out.size):
             out[j] = np.sqrt(out[j])
 
 
-@kernel(F2, F2, B, OUT1)
-def _extent(a: Floats, b: Floats, manhattan: bool, out: Floats) -> None:
+@kernel(F2, F2, F, OUT1)
+def _extent(a: Floats, b: Floats, turn: float, out: Floats) -> None:
     """Write the smallest and the largest pairwise distance into out (2,), storing no matrix."""
     m = b.shape[1]
     row = np.empty(m)
     low = np.full(m, np.inf)
     high = np.zeros(m)
     for i in range(a.shape[1]):
-        _sums(a, i, b, manhattan, row)
+        _sums(a, i, b, turn, row)
         for j in range(m):  # kept per column: a running scalar minimum would not vectorise
             low[j] = row[j] if row[j] < low[j] else low[j]
             high[j] = row[j] if row[j] > high[j] else high[j]
-    out[0] = low.min() if manhattan else np.sqrt(low.min())
-    out[1] = high.max() if manhattan else np.sqrt(high.max())
+    out[0] = np.sqrt(low.min()) if turn == 0.0 else low.min()
+    out[1] = np.sqrt(high.max()) if turn == 0.0 else high.max()
 
 
-@kernel(F3, F3, F2, B, I, OUT2)
-def _feature_rows(a: Floats, b: Floats, extents: Floats, manhattan: bool, first: int, out: Floats) -> None:
+@kernel(F3, F3, F2, F, I, OUT2)
+def _feature_rows(a: Floats, b: Floats, extents: Floats, turn: float, first: int, out: Floats) -> None:
     """Write rows first, first + 1, … of every sample's normalised matrix into out (S, rows·m)."""
     m = b.shape[2]
     for s in range(a.shape[0]):
@@ -77,14 +87,14 @@ def _feature_rows(a: Floats, b: Floats, extents: Floats, manhattan: bool, first:
         scale = 1.0 / (high - low) if high > low else 0.0
         for i in range(out.shape[1] // m):
             row = out[s, i * m : (i + 1) * m]
-            _distances(a[s], first + i, b[s], manhattan, row)
+            _distances(a[s], first + i, b[s], turn, row)
             for j in range(m):
                 value = (row[j] - low) * scale
                 row[j] = 1.0 if value > 1.0 else value
 
 
-@kernel(F2, F2, B, I)
-def _wavefront(a: Floats, b: Floats, manhattan: bool, band: int) -> float:
+@kernel(F2, F2, F, I)
+def _wavefront(a: Floats, b: Floats, turn: float, band: int) -> float:
     """Exact DTW by anti-diagonals: no cell of one depends on another, so the loop vectorises; three diagonals are kept.
 
     Cell (i, j) of diagonal k = i + j stands at index i + 1; b is reversed, so j = k - i runs forward in memory with i.
@@ -107,28 +117,27 @@ def _wavefront(a: Floats, b: Floats, manhattan: bool, band: int) -> float:
             left = a[channel, first : last + 1]
             right = reverse[channel, m - 1 - k + first : m - k + last]
             for q in range(count):
-                difference = left[q] - right[q]
-                step = abs(difference) if manhattan else difference * difference
+                step = _step(left[q] - right[q], turn)
                 cost[q] = step if channel == 0 else cost[q] + step
         vertical, horizontal, diagonal = old[first : last + 1], old[first + 1 : last + 2], older[first : last + 1]
         target = new[first + 1 : last + 2]
         for q in range(count):
             best = vertical[q] if vertical[q] < horizontal[q] else horizontal[q]
             best = diagonal[q] if diagonal[q] < best else best
-            target[q] = best + (cost[q] if manhattan else np.sqrt(cost[q]))
+            target[q] = best + (np.sqrt(cost[q]) if turn == 0.0 else cost[q])
         new[first] = new[last + 2] = np.inf  # the neighbours that the next two diagonals may read
         older, old, new = old, new, older
     return float(old[n])
 
 
-@kernel(F2, F2, B, I, OUT2)
-def _accumulate(a: Floats, b: Floats, manhattan: bool, band: int, total: Floats) -> None:
+@kernel(F2, F2, F, I, OUT2)
+def _accumulate(a: Floats, b: Floats, turn: float, band: int, total: Floats) -> None:
     """Write the cost of the best path to every cell into total (n, m), row by row; outside the band it is infinite."""
     n, m = total.shape
     below, above = max(0, n - m) + band, max(0, m - n) + band
     cost = np.empty(m)
     for i in range(n):
-        _distances(a, i, b, manhattan, cost)
+        _distances(a, i, b, turn, cost)
         for j in range(m):
             if j - i > above or i - j > below:
                 total[i, j] = np.inf
@@ -196,16 +205,16 @@ def dtw_distance(a: npt.ArrayLike, b: npt.ArrayLike, distance: Distance = "eucli
     Raises:
         InputError: an empty series, a different number of channels, a value that is not finite, or a negative band.
     """
-    left, right = _channels(a), _channels(b)
-    return float(_wavefront(left, right, distance == "manhattan", _band(left, right, band)))
+    left, right = _channels(a, distance), _channels(b, distance)
+    return float(_wavefront(left, right, _TURN[distance], _band(left, right, band)))
 
 
 def dtw(a: npt.ArrayLike, b: npt.ArrayLike, distance: Distance = "euclidean", band: int | None = None) -> Alignment:
     """Exact DTW with its path and accumulated matrix; arguments and errors as in `dtw_distance`."""
-    left, right = _channels(a), _channels(b)
+    left, right = _channels(a, distance), _channels(b, distance)
     n, m = left.shape[1], right.shape[1]
     total = np.empty((n, m))
-    _accumulate(left, right, distance == "manhattan", _band(left, right, band), total)
+    _accumulate(left, right, _TURN[distance], _band(left, right, band), total)
     path = np.empty((n + m - 1, 2), dtype=np.int64)
     count = _trace(total, path)
     return Alignment(float(total[-1, -1]), frozen_ints(path[:count][::-1]), frozen(total))
@@ -216,17 +225,17 @@ def feature_matrix(a: npt.ArrayLike, b: npt.ArrayLike, distance: Distance = "euc
 
     The smallest distance becomes 0 and the largest 1; if all are equal, the matrix is 0.
     """
-    left, right = _channels(a)[None], _channels(b)[None]
+    left, right = _channels(a, distance)[None], _channels(b, distance)[None]
     out = np.empty((1, left.shape[2] * right.shape[2]))
-    _feature_rows(left, right, feature_extents(left, right, distance), distance == "manhattan", 0, out)
+    _feature_rows(left, right, feature_extents(left, right, distance), _TURN[distance], 0, out)
     return out.reshape(left.shape[2], right.shape[2])
 
 
 def feature_extents(a: Floats, b: Floats, distance: Distance = "euclidean") -> Floats:
     """Return (S, 2): the smallest and largest pairwise distance of each of S samples a (S, D, n) and b (S, D, m)."""
-    extents = np.empty((a.shape[0], 2))
+    a, b, extents = _within(a, distance), _within(b, distance), np.empty((a.shape[0], 2))
     for s in range(a.shape[0]):
-        _extent(a[s], b[s], distance == "manhattan", extents[s])
+        _extent(a[s], b[s], _TURN[distance], extents[s])
     return extents
 
 
@@ -236,7 +245,7 @@ def feature_rows(a: Floats, b: Floats, extents: Floats, rows: range, distance: D
     A set of long encounters does not fit in memory at once, so what sums over matrices goes through them row by row.
     """
     out = np.empty((a.shape[0], len(rows) * b.shape[2]))
-    _feature_rows(a, b, extents, distance == "manhattan", rows.start, out)
+    _feature_rows(_within(a, distance), _within(b, distance), extents, _TURN[distance], rows.start, out)
     return out
 
 
@@ -259,14 +268,19 @@ def blocks(n: int, width: int, budget: int = 400_000) -> list[range]:
     return [range(first, min(n, first + step)) for first in range(0, n, step)]
 
 
-def _channels(series: npt.ArrayLike) -> Floats:
-    """Lay a series (n,) or (n, D) out as (D, n)."""
+def _channels(series: npt.ArrayLike, distance: Distance) -> Floats:
+    """Lay a series (n,) or (n, D) out as (D, n); angles [rad] within one turn."""
     array = np.asarray(series, dtype=np.float64)
     if array.ndim not in (1, 2) or array.size == 0:
         raise InputError(f"a series of shape {array.shape} cannot be compared; give (samples,) or (samples, channels)")
     if not np.isfinite(array).all():
         raise InputError("a series holds a value that is not finite")
-    return np.ascontiguousarray(array.reshape(array.shape[0], -1).T)
+    return np.ascontiguousarray(_within(array.reshape(array.shape[0], -1).T, distance))
+
+
+def _within(series: Floats, distance: Distance) -> Floats:
+    """Return the series; angles [rad] wrapped, for kernels take them less than a turn apart."""
+    return wrap_angle(series) if distance == "angle" else series
 
 
 def _band(a: Floats, b: Floats, band: int | None) -> int:

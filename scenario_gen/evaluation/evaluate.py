@@ -14,21 +14,25 @@
 
 """The evaluation of sets of scenarios against the encounter that they were generated from (paper V-B, method §7)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from functools import partial
+from itertools import chain, combinations
+import math
 
 import numpy as np
 
-from scenario_gen.arrays import Floats, Ints
+from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import diversity, similarity
 from scenario_gen.evaluation.bootstrap import Bootstrap, wilson
 from scenario_gen.evaluation.criticality import Criticality, criticality
 from scenario_gen.evaluation.distributions import compare, QUANTITIES, values_of
+from scenario_gen.evaluation.dtw import Distance
 from scenario_gen.evaluation.metrics import LIMIT_CAUSES, METRICS
-from scenario_gen.evaluation.motion import at_count, at_period, Motion, of_vehicles, stacked
+from scenario_gen.evaluation.motion import at_common, at_count, at_period, COMMON, Motion, of_vehicles, stacked
 from scenario_gen.parameters import parameter, Parameters
+from scenario_gen.template.manoeuvre import keeps
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import CheckCounts, Evaluation, Interval, Row, TEMPLATE
 from scenario_gen.types.generation import GenerationResult, ORACLE
@@ -37,6 +41,8 @@ from scenario_gen.types.scenario import Cause, Scenario, ScenarioSet
 MEASURED = 1000
 """Scenarios of a set that are measured; of a larger one this many, in RUNS evenly spaced runs of consecutive ones."""
 RUNS = 20
+TURNS = math.radians(10.0)
+"""Of a pair whose headings' differences spread by less, E for heading would measure noise; it has none."""
 Scenarios = Sequence[Scenario] | ScenarioSet
 
 
@@ -60,6 +66,7 @@ class _Reference:
     `motion` is the encounter on T even instants, `fitted` the fitted template on the same, if there is one.
     """
 
+    encounter: Encounter
     motion: Motion
     values: Mapping[str, Floats]
     critical: Criticality
@@ -134,7 +141,7 @@ def evaluate_scenarios(
     fitted = chosen(at_count(rows[oracle][0], steps), ids) if rows.get(oracle) else None
     critical = criticality(clocked, config.ttc_horizon)
     motion = chosen(at_count(encounter, steps), ids)
-    reference = _Reference(motion, values_of(clocked), critical, fitted, config, seed)
+    reference = _Reference(encounter, motion, values_of(clocked), critical, fitted, config, seed)
     found = [_measure(name, scenarios, sizes[name], reference, counts.get(name)) for name, scenarios in rows.items()]
     return Evaluation(
         encounter=encounter.name,
@@ -193,7 +200,12 @@ def chosen(motion: Motion, ids: Sequence[str]) -> Motion:
 
 def _template_row(reference: _Reference, resampled: bool, steps: int) -> Row:
     critical = reference.critical
-    values = {"min_distance": critical.min_distance, "min_ttc": critical.min_ttc, "pet": critical.pet}
+    values = {
+        "min_distance": critical.min_distance,
+        "min_ttc": critical.min_ttc,
+        "pet": critical.pet,
+        "conflicts": float(len(critical.order)),
+    }
     notes = (f"longer than max_steps: the feature matrices have {steps} instants",) if resampled else ()
     return Row(TEMPLATE, 1, {key: Interval(value) for key, value in values.items()}, notes)
 
@@ -207,17 +219,24 @@ def _measure(name: str, scenarios: Sequence[Scenario], size: int, reference: _Re
     bootstrap = Bootstrap.draw(_pairs(scenarios), config.resamples, config.level, reference.seed)
     steps = reference.motion.speed.shape[1]
     ids = [vehicle.id for vehicle in reference.motion.vehicles]
-    position, speed = stacked([chosen(at_count(scenario, steps), ids) for scenario in scenarios])
+    motions = [chosen(at_count(scenario, steps), ids) for scenario in scenarios]
+    position = np.stack([motion.position for motion in motions])
     clocked = [chosen(at_period(scenario, config.period), ids) for scenario in scenarios]
-    values |= _similarity(reference, position, speed, bootstrap)
+    pairs = list(_together(reference, scenarios, motions))
+    values |= _similarity(pairs, bootstrap)
+    heading = np.stack([motion.heading for motion in motions])
+    values["turn_kept"] = bootstrap.mean(_turn_kept(reference.motion.heading, heading))
     values |= _distributions(reference, clocked, bootstrap)
     values |= _criticality(reference, clocked, bootstrap)
-    table = diversity.displacements(position)
+    there: Bools = np.logical_and.reduce([reference.motion.there, *(motion.there for motion in motions)])
+    table = diversity.displacements(position, there)
     values["diversity"] = bootstrap.interval(lambda weights: diversity.diversity(table, weights))
     if fitted is not None:
-        error = diversity.displacement_to(position, fitted.position)
+        error = diversity.displacement_to(position, fitted.position, there)
         values["min_ade"] = bootstrap.interval(lambda weights: diversity.weighted_min(error, weights))
-    return Row(name, len(scenarios), values, _notes(len(scenarios), size, values, config))
+    return Row(
+        name, len(scenarios), values, _notes(len(scenarios), size, values, config, len(ids) * (len(ids) - 1) // 2 - len(pairs))
+    )
 
 
 def _pairs(scenarios: Sequence[Scenario]) -> Ints:
@@ -232,17 +251,66 @@ def _pairs(scenarios: Sequence[Scenario]) -> Ints:
     return np.array([pairs.setdefault((seed, index // 2), len(pairs)) for seed, index in numbers], dtype=np.int64)
 
 
-def _similarity(reference: _Reference, position: Floats, speed: Floats, bootstrap: Bootstrap) -> dict[str, Interval]:
-    """E and the correlation: Euclidean distance for position, Manhattan for speed, as in the paper."""
-    motion = reference.motion
-    places = similarity.pair_similarities(motion.position, position, "euclidean")
-    paces = similarity.pair_similarities(motion.speed[..., None], speed[..., None], "manhattan")
-    return {
-        "e_position": bootstrap.interval(lambda weights: similarity.mean_error(places, weights)),
-        "e_speed": bootstrap.interval(lambda weights: similarity.mean_error(paces, weights)),
-        "correlation_position": bootstrap.interval(lambda weights: similarity.mean_correlation(places, weights)),
-        "correlation_speed": bootstrap.interval(lambda weights: similarity.mean_correlation(paces, weights)),
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """Two vehicles while both are there, in the template and in S samples, at the same number of instants T.
+
+    `template` holds positions (2, T, 2) [m], speeds (2, T) [m/s] and headings (2, T) [rad], `samples` the same of S.
+    """
+
+    template: tuple[Floats, ...]
+    samples: tuple[Floats, ...]
+
+    def similarity(self, k: int, distance: Distance, least: float = 0.0) -> similarity.PairSimilarity:
+        """Compare one of the three, as `pair_similarity` does."""
+        one, many = self.template[k], self.samples[k]
+        if one.ndim == 2:
+            one, many = one[..., None], many[..., None]
+        target, series = np.moveaxis(one, -1, -2), np.moveaxis(many, -1, -2)
+        return similarity.pair_similarity((target[0], target[1]), (series[:, 0], series[:, 1]), distance, least)
+
+
+def _together(reference: _Reference, scenarios: Sequence[Scenario], motions: Sequence[Motion]) -> Iterator[_Pair]:
+    """Yield the pairs of vehicles that are there together, for COMMON s, in the template and in all samples (`motions`)."""
+    template, steps = reference.motion, reference.motion.speed.shape[1]
+    throughout = all(motion.always for motion in (template, *motions))
+    whole = stacked(motions)
+    for a, b in combinations(range(len(template.vehicles)), 2):
+        if throughout:
+            rows = [a, b]
+            own = template.position[rows], template.speed[rows], template.heading[rows]
+            yield _Pair(own, tuple(values[:, rows] for values in whole))
+            continue
+        names = template.vehicles[a].id, template.vehicles[b].id
+        sources: list[Encounter | Scenario] = [reference.encounter, *scenarios]
+        common = [at_common(source, names, steps) for source in sources]
+        found = [motion for motion in common if motion is not None]
+        if len(found) == len(common):
+            yield _Pair((found[0].position, found[0].speed, found[0].heading), stacked(found[1:]))
+
+
+def _similarity(pairs: Sequence[_Pair], bootstrap: Bootstrap) -> dict[str, Interval]:
+    """E and the correlation: Euclidean distance for position, Manhattan for speed, as in the paper; wrapped for heading.
+
+    Where nobody turns there is nothing of headings.
+    """
+    compared = {
+        "position": [pair.similarity(0, "euclidean") for pair in pairs],
+        "speed": [pair.similarity(1, "manhattan") for pair in pairs],
+        "heading": [pair.similarity(2, "angle", TURNS) for pair in pairs],
     }
+    if not any(pair.template[2] for pair in compared["heading"]):
+        del compared["heading"]
+    found = {f"e_{what}": bootstrap.interval(partial(similarity.mean_error, of)) for what, of in compared.items()}
+    return found | {
+        f"correlation_{what}": bootstrap.interval(partial(similarity.mean_correlation, of)) for what, of in compared.items()
+    }
+
+
+def _turn_kept(template: Floats, samples: Floats) -> Floats:
+    """Share (S,) of vehicles that turn from start to end as the template's (N, T) do, of headings (S, N, T) [rad], unwrapped."""
+    before, after = template[:, -1] - template[:, 0], samples[:, :, -1] - samples[:, :, 0]
+    return np.array([np.mean([keeps(a, b) for a, b in zip(before, row, strict=True)]) for row in after])
 
 
 def _distributions(reference: _Reference, motions: Sequence[Motion], bootstrap: Bootstrap) -> dict[str, Interval]:
@@ -265,11 +333,14 @@ def _distributions(reference: _Reference, motions: Sequence[Motion], bootstrap: 
 
 def _criticality(reference: _Reference, motions: Sequence[Motion], bootstrap: Bootstrap) -> dict[str, Interval]:
     found = [criticality(motion, reference.config.ttc_horizon) for motion in motions]
+    vanished = np.array([float(one.vanished_of(reference.critical)) for one in found])
     return {
         "min_distance": bootstrap.mean(np.array([one.min_distance for one in found])),
         "min_ttc": bootstrap.mean(np.array([one.min_ttc for one in found])),
         "pet": bootstrap.mean(np.array([one.pet for one in found])),
         "order_kept": bootstrap.mean(np.array([one.keeps_order_of(reference.critical) for one in found])),
+        "conflicts": bootstrap.mean(len(reference.critical.order) - vanished),
+        "vanished_conflicts": bootstrap.mean(vanished),
     }
 
 
@@ -284,15 +355,22 @@ def _rates(counts: CheckCounts, level: float) -> dict[str, Interval]:
     }
 
 
-def _notes(samples: int, size: int, values: Mapping[str, Interval], config: EvaluationConfig) -> tuple[str, ...]:
+def _notes(samples: int, size: int, values: Mapping[str, Interval], config: EvaluationConfig, apart: int) -> tuple[str, ...]:
     notes = []
+    if apart:
+        notes.append(f"E leaves out {apart} pair(s) of vehicles that are not there together for {COMMON:g} s")
     if samples < size:
         notes.append(f"measured on {samples:,} of {size:,} scenarios, in {RUNS} evenly spaced runs; candidates are all counted")
     if 1 < samples < config.enough:
         notes.append(f"few samples: every figure, E included, comes from {samples}, not {config.enough}")
     if np.isnan(values["min_distance"].value):
         return (*notes, "one vehicle is left: there is no pair to be measured")
-    for key, what in (("e_position", "position"), ("e_speed", "speed")):
-        if not np.isfinite(values[key].value):
-            notes.append(f"E for {what} is undefined: the template's matrix is constant for every pair of vehicles")
+    notes += [
+        f"E for {what} is undefined: the template's matrix is constant for every pair of vehicles"
+        for what in ("position", "speed")
+        if not np.isfinite(values[f"e_{what}"].value)
+    ]
+    if values["vanished_conflicts"].value > 0.0:
+        vanished, kept = (values[key].value for key in ("vanished_conflicts", "conflicts"))
+        notes.append(f"{vanished:.3g} of the template's {vanished + kept:.0f} conflict(s) vanish, mean over samples")
     return tuple(notes)

@@ -34,8 +34,25 @@ METRICS: tuple[Metric, ...] = (
         "e_position", "E position", "", "lower", _SIMILARITY, "‖mean feature matrix − template's‖ / ‖template's‖, of positions"
     ),
     Metric("e_speed", "E speed", "", "lower", _SIMILARITY, "‖mean feature matrix − template's‖ / ‖template's‖, of speeds"),
+    Metric(
+        "e_heading",
+        "E heading",
+        "",
+        "lower",
+        _SIMILARITY,
+        "‖mean feature matrix − template's‖ / ‖template's‖, of headings; none where they hardly differ in the template",
+    ),
     Metric("correlation_position", "correlation position", "", "higher", _SIMILARITY, "of the mean matrix with the template's"),
     Metric("correlation_speed", "correlation speed", "", "higher", _SIMILARITY, "of the mean matrix with the template's"),
+    Metric("correlation_heading", "correlation heading", "", "higher", _SIMILARITY, "of the mean matrix with the template's"),
+    Metric(
+        "turn_kept",
+        "turn kept",
+        "%",
+        "higher",
+        _SIMILARITY,
+        "vehicles that do the template's manoeuvre and turn as far, within 25°, from start to end",
+    ),
     *(
         Metric(
             f"js_{q.id}", f"JS {q.label}", "bit", "lower", _REALISM, f"Jensen–Shannon divergence, bins of {q.bin_width} {q.unit}"
@@ -56,6 +73,15 @@ METRICS: tuple[Metric, ...] = (
         "higher",
         _CRITICAL,
         "conflicts of the template in which the same vehicle goes first",
+    ),
+    Metric("conflicts", "conflicts", "", "", _CRITICAL, "conflicts of the template, and how many of them a sample has, mean"),
+    Metric(
+        "vanished_conflicts",
+        "conflicts vanished",
+        "",
+        "lower",
+        _CRITICAL,
+        "conflicts of the template that a sample does not have, mean; the passing order is of the others",
     ),
     Metric("acceptance", "accepted", "%", "higher", _VALID, "share of candidates that the checker accepted"),
     Metric("collision_rate", "overlap", "%", "lower", _VALID, "share of candidates refused because footprints overlap"),

@@ -66,13 +66,16 @@ class PairSimilarity:
         return np.where((variance > 1e-12 * count) & (generated > 1e-12 * count), result, np.nan)
 
 
-def pair_similarity(template: tuple[Floats, Floats], generated: tuple[Floats, Floats], distance: Distance) -> PairSimilarity:
+def pair_similarity(
+    template: tuple[Floats, Floats], generated: tuple[Floats, Floats], distance: Distance, least: float = 0.0
+) -> PairSimilarity:
     """Compare the feature matrices of one pair of vehicles.
 
     Args:
         template: series of the two vehicles, (D, T) each.
         generated: series of the two vehicles in S samples, (S, D, T) each.
         distance: of the feature; the paper takes Euclidean for position, Manhattan for speed.
+        least: a template whose distances spread by less counts as constant: scaled to [0, 1] it would show its noise.
     """
     a, b = (np.ascontiguousarray(series) for series in generated)
     left, right = (np.ascontiguousarray(series)[None] for series in template)
@@ -80,6 +83,8 @@ def pair_similarity(template: tuple[Floats, Floats], generated: tuple[Floats, Fl
     samples, _, steps = a.shape
     gram, cross, total = np.zeros((samples, samples)), np.zeros(samples), np.zeros(samples)
     first = second = 0.0
+    if own[0, 1] - own[0, 0] < least:
+        return PairSimilarity(gram, cross, total, (steps * steps, first, second))
     for rows in blocks(steps, samples * steps):
         target = feature_rows(left, right, own, rows, distance)[0]
         difference = feature_rows(a, b, extents, rows, distance)
@@ -92,11 +97,11 @@ def pair_similarity(template: tuple[Floats, Floats], generated: tuple[Floats, Fl
     return PairSimilarity(gram, cross, total, (steps * steps, first, second))
 
 
-def pair_similarities(template: Floats, generated: Floats, distance: Distance) -> list[PairSimilarity]:
-    """Compare all pairs of vehicles: template (N, T, D) against generated (S, N, T, D)."""
+def pair_similarities(template: Floats, generated: Floats, distance: Distance, least: float = 0.0) -> list[PairSimilarity]:
+    """Compare all pairs of vehicles: template (N, T, D) against generated (S, N, T, D), as `pair_similarity` does."""
     target, series = np.moveaxis(template, -1, -2), np.moveaxis(generated, -1, -2)
     return [
-        pair_similarity((target[a], target[b]), (series[:, a], series[:, b]), distance)
+        pair_similarity((target[a], target[b]), (series[:, a], series[:, b]), distance, least)
         for a, b in combinations(range(template.shape[0]), 2)
     ]
 

@@ -25,13 +25,14 @@ from datetime import datetime, UTC
 
 from scenario_gen.exchange.cases import Case, Exported
 from scenario_gen.exchange.config import ExportConfig
-from scenario_gen.exchange.xml import add, Element, serialized
+from scenario_gen.exchange.xml import add, Element, number, serialized
 from scenario_gen.types.body import height, is_truck, rear_axle, shifted, WHEELBASE
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.names import token
 from scenario_gen.types.scenario import Scenario
 
 EGO = "Ego"
+SPEEDS = "speed_mps"  # name of the property that holds a vehicle's speed at each vertex, for `scenario-gen import`
 WHEEL = 0.65  # metres of diameter
 LIMITS = {"maxSpeed": 70.0, "maxAcceleration": 10.0, "maxDeceleration": 10.0}  # beyond what any published scenario does
 STEERING = 0.7  # rad
@@ -53,10 +54,10 @@ def write_openscenario(case: Case, one: Exported, road_file: str, export: Export
     add(root, "CatalogLocations")
     add(add(root, "RoadNetwork"), "LogicFile", filepath=road_file)
     entities = add(root, "Entities")
-    for vehicle in one.others.vehicles:
-        _entity(entities, entity_name(vehicle), vehicle)
+    for n, vehicle in enumerate(one.others.vehicles):
+        _entity(entities, entity_name(vehicle), vehicle, _speeds(one.others, n))
     if one.ego is not None:
-        _entity(entities, EGO, one.ego.vehicles[0])
+        _entity(entities, EGO, one.ego.vehicles[0], "")
     storyboard = add(root, "Storyboard")
     actions = add(add(storyboard, "Init"), "Actions")
     for n in range(len(one.others.vehicles)):
@@ -77,7 +78,13 @@ def entity_name(vehicle: Vehicle) -> str:
     return f"vehicle_{token(vehicle.id)}"
 
 
-def _entity(entities: Element, name: str, vehicle: Vehicle) -> None:
+def _speeds(scenario: Scenario, n: int) -> str:
+    """Return the speeds at a vehicle's vertices, which the format has no place for, as the text of a property."""
+    first, last = scenario.present[n].tolist()
+    return " ".join(map(number, scenario.speed[n, first : last + 1].tolist()))
+
+
+def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None:
     kind = "truck" if is_truck(vehicle) else "car"
     element = add(add(entities, "ScenarioObject", name=name), "Vehicle", name=kind, vehicleCategory=kind)
     add(element, "ParameterDeclarations")
@@ -89,7 +96,9 @@ def _entity(entities: Element, name: str, vehicle: Vehicle) -> None:
     track = 0.85 * vehicle.width
     for tag, x, steering in (("FrontAxle", WHEELBASE * vehicle.length, STEERING), ("RearAxle", 0.0, 0.0)):
         add(axles, tag, maxSteering=steering, wheelDiameter=WHEEL, trackWidth=track, positionX=x, positionZ=WHEEL / 2.0)
-    add(element, "Properties")
+    properties = add(element, "Properties")
+    if speeds:
+        add(properties, "Property", name=SPEEDS, value=speeds)
 
 
 def _pose(parent: Element, scenario: Scenario, n: int, k: int) -> None:

@@ -30,6 +30,8 @@ from scenario_gen.fitting.junction import has_lanes, place_at_junction
 from scenario_gen.fitting.lanes import place_along_lanes
 from scenario_gen.fitting.placement import Placement
 from scenario_gen.fitting.search import place_by_search
+from scenario_gen.fitting.vector import place_on_lanes
+from scenario_gen.roads.arms import arms_of
 from scenario_gen.template.tracks import clean_tracks, Track
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit
@@ -98,6 +100,8 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         "junction": place_at_junction,
         "search": place_by_search,
     }
+    if road.lanes is not None and config.placement != "search":
+        return place_on_lanes(tracks, road, config)
     if config.placement != "auto":
         return ways[config.placement](tracks, road, config)
     own, share = None, 0.0
@@ -109,7 +113,7 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         reasons.append(f"in its own frame, {error}")
     if own is not None and share >= _AT_HOME:
         return own
-    if has_lanes(road):
+    if has_lanes(road) or len(arms_of(road)) > 1:
         order, reasons = ("lanes", "junction"), []
     elif own is not None and share >= _NEAR_HOME:
         return own

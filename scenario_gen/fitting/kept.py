@@ -30,6 +30,7 @@ from scenario_gen.types.fit import Loss
 
 _LONG = 1.0  # s side by side that count
 _NEAREST, _FARTHEST = 1.0, 6.0  # metres sideways between centres of two vehicles that are beside each other
+_LANES_DIFFER = 1.5  # metres by which they may be farther apart on a road, whose lanes are all of one width
 _SAME_WAY = np.radians(30.0)
 _ENOUGH = 0.5  # share of that time in which they are beside each other on the road, on the same side
 
@@ -54,6 +55,18 @@ def _otherwise(turn: float) -> str:
     return f"{verb.removesuffix('es') if verb == 'goes' else verb.removesuffix('s')} {rest}"
 
 
+def count_lost(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> int:
+    """How many of the template's conflicts a placement has not, or in another order, each counted twice, and new ones."""
+    time = np.arange(len(tracks[0].progress), dtype=np.float64)
+    vehicles = tuple(track.vehicle for track in tracks)
+    before, after = (
+        _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2]))
+        for poses in (np.stack([track.poses for track in some]) for some in (tracks, placed))
+    )
+    gone = sum(pair not in after or after[pair].first != conflict.first for pair, conflict in before.items())
+    return 2 * gone + sum(pair not in before for pair in after)
+
+
 def find_losses(encounter: Encounter, tracks: tuple[Track, ...], placement: Placement) -> tuple[Loss, ...]:
     """What of the template's interaction the placed motion has not, or has otherwise.
 
@@ -74,8 +87,8 @@ def find_losses(encounter: Encounter, tracks: tuple[Track, ...], placement: Plac
 
 def _lost_conflicts(encounter: Encounter, poses: Floats) -> list[Loss]:
     vehicles, time = encounter.vehicles, encounter.time
-    before = _by_pair(find_conflicts(vehicles, time, encounter.position, encounter.heading))
-    after = _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2]))
+    before = _by_pair(find_conflicts(vehicles, time, encounter.position, encounter.heading, encounter.present))
+    after = _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2], encounter.present))
     lost = []
     for pair in sorted(before.keys() | after.keys()):
         a, b = (vehicles[k].id for k in pair)
@@ -103,13 +116,14 @@ def _lost_neighbours(encounter: Encounter, own: Floats, poses: Floats) -> list[L
     lost = []
     for i, j in combinations(range(len(own)), 2):
         reach = (encounter.vehicles[i].length + encounter.vehicles[j].length) / 2.0
-        before = _side(own[i], own[j], reach)
+        both = encounter.there[i] & encounter.there[j]
+        before = np.where(both, _side(own[i], own[j], reach), 0)
         for side, word in ((1, "left"), (-1, "right")):
             there: Bools = before == side
             seconds = float(there.sum()) * encounter.dt
             if seconds < _LONG:
                 continue
-            kept = float((_side(poses[i], poses[j], reach)[there] == side).mean())
+            kept = float((_side(poses[i], poses[j], reach, _LANES_DIFFER)[there] == side).mean())
             if kept < _ENOUGH:
                 a, b = encounter.vehicles[i].id, encounter.vehicles[j].id
                 lost.append(
@@ -123,11 +137,11 @@ def _lost_neighbours(encounter: Encounter, own: Floats, poses: Floats) -> list[L
     return lost
 
 
-def _side(one: Floats, other: Floats, reach: float) -> Ints:
+def _side(one: Floats, other: Floats, reach: float, wider: float = 0.0) -> Ints:
     """(T,) 1 where `other` (T, 3) is to the left of `one`, side by side and the same way, -1 to the right, 0 elsewhere."""
     d = other[:, :2] - one[:, :2]
     cos, sin = exact.cos(one[:, 2]), exact.sin(one[:, 2])
     ahead, left = d[:, 0] * cos + d[:, 1] * sin, d[:, 1] * cos - d[:, 0] * sin
     same = np.abs(wrap_angle(other[:, 2] - one[:, 2])) < _SAME_WAY
-    beside = same & (np.abs(ahead) < reach) & (np.abs(left) > _NEAREST) & (np.abs(left) < _FARTHEST)
+    beside = same & (np.abs(ahead) < reach) & (np.abs(left) > _NEAREST) & (np.abs(left) < _FARTHEST + wider)
     return np.where(beside, np.sign(left), 0.0).astype(np.int64)

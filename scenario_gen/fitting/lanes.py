@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Placing a template along a road's lanes: following, oncoming, passing, changing lanes, on a line laid out straight.
+"""Placing a template along a road's lanes: following, oncoming, passing, changing lanes, on a line that bends as its own.
 
 Eq 9 in path coordinates is one-dimensional: stations on the template's reference line, times s, are stations on the lane.
 All vehicles share one map, so the gaps between them survive.
@@ -27,9 +27,13 @@ from scenario_gen.arrays import Floats, frozen, wrap_angle
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
-from scenario_gen.fitting.placement import check_scale, Placement, separated
+from scenario_gen.fitting.kept import refuse_lost_turns
+from scenario_gen.fitting.placement import check_scale, Placement, separated, share_with_room
+from scenario_gen.roads.arms import arms_of, reverse
 from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.template.frenet import FrenetTracks, to_frenet
+from scenario_gen.roads.ways import line_between, relative
+from scenario_gen.template.frenet import FrenetTracks, main_line, MainLine, to_frenet
+from scenario_gen.template.manoeuvre import manoeuvre_of, turn_of
 from scenario_gen.template.tracks import Track
 from scenario_gen.types.road import Road
 
@@ -41,53 +45,74 @@ _SHIFT_CURVATURE = 0.08  # 1/m, sharpest change of lanes
 
 @dataclass(frozen=True, eq=False)
 class _Axis:
-    """A straight road through the map: where it begins, its yaw and length, and its lanes.
+    """A road through the map: its dividing line, its lanes, and where on the line the template's main line begins.
 
-    `ahead` and `against` are the offsets [m, left positive] of the lanes along and against the yaw, each from its driver's
-    left to the right.
+    `ahead` and `against` are the offsets [m, left positive] of the lanes along and against the line, each from its driver's
+    left to the right. `begin` is None where the template may stand anywhere along it.
     """
 
-    begin: Floats
-    yaw: float
-    length: float
+    line: Curve
     ahead: Floats
     against: Floats
+    begin: float | None = None
 
 
 def place_along_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> Placement:
-    """Place a template that needs no junction on the longest straight road that has its lanes.
+    """Place a template that needs no junction on a road that has its lanes and bends as its own, or else on a straight one.
 
     Raises:
-        RefusedError: it turns or crosses, or the road has too few lanes or is too short.
+        RefusedError: it turns or crosses, or the road has too few lanes, is too short, or bends otherwise.
     """
-    axes = _axes(road, tracks)
     compact = to_frenet(tracks)
-    for frenet in (compact.spread(), compact):
-        needed = {sign: int(frenet.lane[frenet.direction == sign].max(initial=-1)) + 1 for sign in (1, -1)}
-        fitting = [axis for axis in axes if len(axis.ahead) >= needed[1] and len(axis.against) >= needed[-1]]
-        if fitting:
-            break
-    if not fitting:
-        found = "; ".join(f"{len(a.ahead)} and {len(a.against)}" for a in axes) or "none"
-        raise RefusedError(
-            f"road {road.name} has no straight way through with the lanes that the template needs "
-            f"({needed[1]} one way, {needed[-1]} the other; found: {found})"
-        )
-    axis = max(fitting, key=lambda a: round(a.length, 1))
-    half = np.array([[track.vehicle.length / 2.0] for track in tracks])
-    low, high = float((frenet.station - half).min()), float((frenet.station + half).max())
-    centre, scale = (low + high) / 2.0, 1.0
-    if high - low > axis.length - 2.0 * _END_ROOM:
-        cars = float(2.0 * half.max())
-        scale = (axis.length - 2.0 * _END_ROOM - cars) / (high - low - cars)
-        check_scale(scale, f"the template is {high - low:.0f} m long, road {road.name} {axis.length:.0f} m: it", config)
-    placed = tuple(_placed_track(track, i, frenet, axis, centre, scale) for i, track in enumerate(tracks))
-    manoeuvres = tuple("wait" if track.still else "straight" for track in tracks)
+    reasons: list[str] = []
+    for axes in (_bent_axes(road, main_line(compact, tracks)), _straight_axes(road, tracks)):
+        for frenet in (compact.spread(), compact):
+            needed = {sign: int(frenet.lane[frenet.direction == sign].max(initial=-1)) + 1 for sign in (1, -1)}
+            fitting = [axis for axis in axes if len(axis.ahead) >= needed[1] and len(axis.against) >= needed[-1]]
+            if fitting:
+                break
+        if not fitting:
+            found = "; ".join(f"{len(a.ahead)} and {len(a.against)}" for a in axes)
+            if found:
+                reasons.append(
+                    f"road {road.name} has no way through with the lanes that the template needs "
+                    f"({needed[1]} one way, {needed[-1]} the other; found: {found})"
+                )
+            continue
+        for axis in sorted(fitting, key=lambda a: -round(a.line.length, 1)):
+            try:
+                return _on_axis(tracks, frenet, axis, road, config)
+            except RefusedError as error:
+                reasons.append(str(error))
+    raise RefusedError(
+        reasons[0] if reasons else f"road {road.name} has no straight way through, and none that bends as the template's"
+    )
+
+
+def _on_axis(tracks: tuple[Track, ...], frenet: FrenetTracks, axis: _Axis, road: Road, config: FittingConfig) -> Placement:
+    main = main_line(frenet, tracks)
+    scale = 1.0
+    if axis.begin is not None:
+        along = axis.begin + np.interp(frenet.station, main.station, main.at)
+    else:
+        low, high = main.station[[0, -1]].tolist()
+        if high - low > axis.line.length - 2.0 * _END_ROOM:
+            cars = max(track.vehicle.length for track in tracks)
+            scale = (axis.line.length - 2.0 * _END_ROOM - cars) / (high - low - cars)
+            check_scale(scale, f"the template is {high - low:.0f} m long, road {road.name} {axis.line.length:.0f} m: it", config)
+        along = axis.line.length / 2.0 + scale * (frenet.station - (low + high) / 2.0)
+    placed = tuple(_placed_track(track, i, frenet, axis, along[i]) for i, track in enumerate(tracks))
+    refuse_lost_turns(tracks, placed, road.name)
+    if axis.begin is not None:
+        for track in placed:
+            if share_with_room(road, track) < 1.0:
+                raise RefusedError(f"vehicle {track.vehicle.id} has no room everywhere on the bent way through road {road.name}")
+    manoeuvres = tuple("wait" if track.still else manoeuvre_of(turn_of(track)) for track in placed)
     notes = tuple(_note(track, i, frenet) for i, track in enumerate(tracks))
     if scale != 1.0:
         notes = (f"scaled by {scale:.3f} to fit the road's length", *notes)
     placement = Placement(placed, frozen(np.full(len(tracks), scale)), manoeuvres, frozen(np.zeros(len(tracks))), notes)
-    return separated(placement, config, sideways=0.0)
+    return separated(placement, config, sideways=0.0, own=tracks)
 
 
 def _note(track: Track, i: int, frenet: FrenetTracks) -> str:
@@ -97,58 +122,69 @@ def _note(track: Track, i: int, frenet: FrenetTracks) -> str:
     return f"vehicle {track.vehicle.id} drives {way} the main direction {lane} (counted from its left)"
 
 
-def _axes(road: Road, tracks: tuple[Track, ...]) -> list[_Axis]:
+def _straight_axes(road: Road, tracks: tuple[Track, ...]) -> list[_Axis]:
     """Straight ways from an entry to an exit, those that are parallel gathered into one road."""
     length, width = max(t.vehicle.length for t in tracks), max(t.vehicle.width for t in tracks)
     through: list[tuple[Floats, float]] = []
     for entry in road.entries:
         for leave in road.exits:
-            d = leave[:2] - entry[:2]
-            cos, sin = exact.cos(entry[2]), exact.sin(entry[2])
-            ahead, aside = d[0] * cos + d[1] * sin, d[1] * cos - d[0] * sin
+            ahead, aside = relative(entry, leave[:2])
             straight = abs(wrap_angle(np.asarray(leave[2] - entry[2]))) < _PARALLEL
             if straight and ahead > 2.0 * length and abs(aside) < _COLLINEAR:
                 line = Curve(np.array([entry, [*leave[:2], entry[2]]])).cut(length / 2.0 + 0.5, ahead - length / 2.0 - 0.5)
                 if footprint_fits(road, line.points, length, width).all():
-                    through.append((entry, float(ahead)))
+                    through.append((entry, ahead))
     axes: list[_Axis] = []
     for entry, size in through:
         if any(_belongs(entry, axis) for axis in axes):
             continue
         yaw = float(entry[2])
         normal = np.array([-exact.sin(yaw), exact.cos(yaw)])
-        ahead, against = [], []
+        ahead_lanes, against = [], []
         for other, _ in through:
             turned = abs(float(wrap_angle(np.asarray(other[2] - yaw))))
             offset = float(exact.matmul(other[:2] - entry[:2], normal))
             if turned < _PARALLEL:
-                ahead.append(offset)
+                ahead_lanes.append(offset)
             elif turned > np.pi - _PARALLEL:
                 against.append(offset)
-        axes.append(_Axis(entry[:2], yaw, size, frozen(sorted(ahead, reverse=True)), frozen(sorted(against))))
+        end = entry + size * np.array([exact.cos(yaw), exact.sin(yaw), 0.0])
+        axes.append(_Axis(Curve(np.stack((entry, end))), frozen(sorted(ahead_lanes, reverse=True)), frozen(sorted(against))))
     return axes
 
 
 def _belongs(entry: Floats, axis: _Axis) -> bool:
-    turned = abs(float(wrap_angle(np.asarray(entry[2] - axis.yaw))))
+    turned = abs(float(wrap_angle(np.asarray(entry[2] - axis.line.points[0, 2]))))
     return bool(turned < _PARALLEL or turned > np.pi - _PARALLEL)
 
 
-def _placed_track(track: Track, i: int, frenet: FrenetTracks, axis: _Axis, centre: float, scale: float) -> Track:
-    """One vehicle in its lane."""
+def _bent_axes(road: Road, main: MainLine) -> list[_Axis]:
+    """Ways between two arms of the road that bend as the template's main line does (for a straight one: by up to 25°)."""
+    axes = []
+    arms = arms_of(road)
+    for a in arms:
+        for b in arms:
+            entry, leave = reverse(a.pose), b.pose
+            if a is b or (main.straight and abs(wrap_angle(np.asarray(leave[2] - entry[2]))) < _PARALLEL):
+                continue
+            found = line_between(main.shape, entry, leave)
+            if found is not None:
+                ahead = [-k for k in a.inward if np.abs(b.outward - -k).min(initial=np.inf) < _COLLINEAR]
+                against = [k for k in b.inward if np.abs(-a.outward - k).min(initial=np.inf) < _COLLINEAR]
+                axes.append(_Axis(found[0], frozen(sorted(ahead, reverse=True)), frozen(sorted(against)), found[1]))
+    return axes
+
+
+def _placed_track(track: Track, i: int, frenet: FrenetTracks, axis: _Axis, along: Floats) -> Track:
+    """One vehicle in its lane, given where along the axis it is at each sample."""
     sign = int(frenet.direction[i])
-    along = axis.length / 2.0 + scale * (frenet.station[i] - centre)  # metres from the axis' beginning
     lanes = axis.ahead if sign > 0 else axis.against
     start, end = float(lanes[frenet.lane[i, 0]]), float(lanes[frenet.lane[i, 1]])
-    along = along if sign > 0 else axis.length - along  # metres driven since the beginning of its own lane
-    begin = axis.begin if sign > 0 else axis.begin + axis.length * np.array([exact.cos(axis.yaw), exact.sin(axis.yaw)])
-    yaw = axis.yaw if sign > 0 else axis.yaw + np.pi
-    s = np.arange(0.0, max(along[-1] - along[0], 1.0) + 1.0, 0.5)
-    aside = start + (end - start) * _blend(along - along[0], frenet.change[i], s, abs(end - start))
-    x = along[0] + s
-    xy = begin + np.outer(x, [exact.cos(yaw), exact.sin(yaw)]) + np.outer(aside, [-exact.sin(axis.yaw), exact.cos(axis.yaw)])
-    curve = Curve.through(xy)
-    progress = np.zeros_like(along) if track.still else np.interp(along - along[0], s, curve.station)
+    driven = sign * (along - along[0])
+    s = np.arange(0.0, max(driven[-1], 1.0) + 1.0, 0.5)
+    aside = start + (end - start) * _blend(driven, frenet.change[i], s, abs(end - start))
+    curve = Curve.through(axis.line.beside(along[0] + sign * s, aside)[:, :2])
+    progress = np.zeros_like(along) if track.still else np.interp(driven, s, curve.station)
     return replace(track, curve=curve, progress=frozen(progress))
 
 

@@ -27,10 +27,13 @@ from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room
 from scenario_gen.template.path_crossing import path_crossing
-from scenario_gen.template.separation import separate
+from scenario_gen.template.separation import separate, smallest_gaps
 from scenario_gen.template.tracks import Track
 from scenario_gen.types.fit import Loss
 from scenario_gen.types.road import Road
+
+_LEAST_CLEARANCE = 0.1  # metres between fitted footprints, where the template's own are as near
+_RELUCTANTLY = 0.1  # how readily a vehicle leaves the middle of its lane, where setting it forward or back does not do
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +69,27 @@ def check_scale(scale: float, what: str, config: FittingConfig) -> None:
         )
 
 
-def separated(placement: Placement, config: FittingConfig, *, sideways: float) -> Placement:
-    """Shift vehicles that come too close on this road, as little as possible."""
-    separation = separate(placement.tracks, config.clearance, config.max_move, sideways=sideways)
+def separated(placement: Placement, config: FittingConfig, *, sideways: float, own: Sequence[Track] = ()) -> Placement:
+    """Shift vehicles that come too close on this road, as little as possible.
+
+    Args:
+        placement: where they are.
+        config: how far apart they should be, and how far they may be moved.
+        sideways: how readily a path is shifted across itself, 0 to 1.
+        own: the template's tracks; where they are nearer to each other than `clearance`, so may these be.
+
+    Raises:
+        RefusedError: no shift up to `max_move` does it.
+    """
+    clearance = config.clearance
+    if own:
+        clearance = min(clearance, max(float(smallest_gaps(own).min()), _LEAST_CLEARANCE))
+    try:
+        separation = separate(placement.tracks, clearance, config.max_move, sideways=sideways)
+    except RefusedError:
+        if sideways > 0.0:
+            raise
+        separation = separate(placement.tracks, clearance, config.max_move, sideways=_RELUCTANTLY)
     return replace(
         placement,
         tracks=separation.tracks,

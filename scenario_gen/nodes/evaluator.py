@@ -144,7 +144,8 @@ class Evaluator(StageNode):
         chosen = f"measured on {len(decoded)} of {summary.published} scenarios, chosen by seed {self.config.seed}"
         for row in evaluation.rows:
             figures = {key: repr(entry.value) for key, entry in row.values.items() if math.isfinite(entry.value)}
-            values = {"request": summary.request, "samples": str(row.samples), **figures}
+            k = str(evaluation.changepoints)  # beside E always: more changepoints always lower it
+            values = {"request": summary.request, "samples": str(row.samples), "changepoints": k, **figures}
             notes = (*row.notes, chosen) if row.name == WITH and len(decoded) < summary.published else row.notes
             statuses.append(Status(f"{self.get_fully_qualified_name()}: {row.name}", Level.OK, "; ".join(notes), values))
         self.outputs.send("report", encode_diagnostics(statuses, encounter.start_ns))

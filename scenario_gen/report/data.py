@@ -23,7 +23,7 @@ import numpy as np
 
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.evaluation.dtw import mean_feature
-from scenario_gen.evaluation.motion import at_count
+from scenario_gen.evaluation.motion import at_common, at_count
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit
 from scenario_gen.types.generation import GenerationResult, UNIFORM, WITHOUT
@@ -35,6 +35,8 @@ from scenario_gen.types.segmentation import Segmentation
 FRAME_PERIOD = 0.2
 """Seconds between the frames that are stored; the page interpolates between them."""
 MAX_FRAMES, MAX_CELLS, MATRIX_SIZE, MAX_PAIRS, MAX_ROUTE_POINTS = 240, 900, 72, 10, 200
+MOTION_PERIOD, MAX_MOTION_FRAMES, MAX_MOTION_SAMPLES = 0.1, 400, 12
+"""Speed and accelerations over time are stored more finely than the animation, of fewer samples."""
 
 
 def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
@@ -55,6 +57,7 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
         "template": _template(case.encounter, case.segmentation, frames),
         "fit": _fit(case.fit, case.routes) if case.fit else [],
         "arms": {name: _trajectories(group, frames, ids, egos.get(name)) for name, group in arms.items() if group},
+        "motion": _motion(case.encounter, case.generated.scenarios[:MAX_MOTION_SAMPLES]),
         "features": _features(case.encounter, arms, case.evaluation.vehicles),
     }
 
@@ -110,9 +113,17 @@ def states(source: Encounter | Scenario, frames: int) -> Floats:
 def _trajectories(scenarios: Sequence[Scenario], frames: int, ids: Sequence[str], ego: Scenario | None) -> dict[str, Any]:
     return {
         "states": pack(np.stack([_whole(scenario, frames, ids, ego) for scenario in scenarios])),
+        "there": [_there(scenario, ids) for scenario in scenarios],
         "durations": [_short(scenario.time[-1]) for scenario in scenarios],
         "index": [scenario.index for scenario in scenarios],
     }
+
+
+def _there(source: Encounter | Scenario, ids: Sequence[str]) -> list[list[float]]:
+    """Return from which to which share of the duration each vehicle is there; one that is left out, throughout."""
+    own = [vehicle.id for vehicle in source.vehicles]
+    shares = source.time[source.present] / source.time[-1]
+    return [[_short(v, 5) for v in shares[own.index(known)]] if known in own else [0.0, 1.0] for known in ids]
 
 
 def _whole(scenario: Scenario, frames: int, ids: Sequence[str], ego: Scenario | None) -> Floats:
@@ -123,6 +134,27 @@ def _whole(scenario: Scenario, frames: int, ids: Sequence[str], ego: Scenario | 
     own = {vehicle.id: state for vehicle, state in zip(scenario.vehicles, states(scenario, frames), strict=True)}
     track = next(iter(own.values())) if ego is None else states(ego, frames)[0]
     return np.stack([own.get(known, track) for known in ids])
+
+
+def _motion(encounter: Encounter, scenarios: Sequence[Scenario]) -> list[dict[str, Any]]:
+    """Return for each vehicle speed, acceleration and lateral acceleration of the template and of the scenarios that have it."""
+    found = []
+    for n, vehicle in enumerate(encounter.vehicles):
+        rows = [(s, k) for s in scenarios for k, own in enumerate(s.vehicles) if own.id == vehicle.id]
+        samples = [_over_time(scenario, k) for scenario, k in rows]
+        index = [scenario.index for scenario, _ in rows]
+        found.append({"template": _over_time(encounter, n), "samples": samples, "index": index})
+    return found
+
+
+def _over_time(source: Encounter | Scenario, n: int) -> dict[str, Any]:
+    """Speed [m/s], acceleration and lateral acceleration (speed times yaw rate) [m/s²] of one vehicle while it is there."""
+    first, last = source.time[source.present[n]].tolist()
+    frames = min(MAX_MOTION_FRAMES, max(3, round((last - first) / MOTION_PERIOD) + 1))
+    time = np.linspace(first, last, frames)
+    speed, heading = (np.interp(time, source.time, values[n]) for values in (source.speed, source.heading))
+    rates = np.gradient(np.stack([speed, heading]), time, axis=1)
+    return {"from": _short(first), "to": _short(last), "values": pack(np.column_stack([speed, rates[0], speed * rates[1]]))}
 
 
 def _template(encounter: Encounter, segmentation: Segmentation, frames: int) -> dict[str, Any]:
@@ -158,15 +190,18 @@ def _fit(fit: Fit, routes: Sequence[Route]) -> list[dict[str, Any]]:
 def _features(encounter: Encounter, arms: Mapping[str, Sequence[Scenario]], shared: Sequence[str]) -> list[dict[str, Any]]:
     """Return the paper's figure 5 for each pair of the `shared` vehicles: matrices of MATRIX_SIZE² bytes, 255 = 1."""
     groups: dict[str, Sequence[Encounter | Scenario]] = {"template": [encounter], **arms}
-    motions = {name: [at_count(source, MATRIX_SIZE) for source in group] for name, group in groups.items() if group}
     pairs = []
     rows = [n for n, vehicle in enumerate(encounter.vehicles) if vehicle.id in shared]
     for pair in list(combinations(rows, 2))[:MAX_PAIRS]:
+        names = encounter.vehicles[pair[0]].id, encounter.vehicles[pair[1]].id
         entry: dict[str, Any] = {"pair": list(pair), "position": {}, "speed": {}}
-        for name, group in motions.items():
-            at = [[[v.id for v in m.vehicles].index(encounter.vehicles[n].id) for n in pair] for m in group]
-            place = [np.ascontiguousarray(np.stack([m.position[i[k]].T for m, i in zip(group, at, strict=True)])) for k in (0, 1)]
-            pace = [np.stack([m.speed[i[k]][None] for m, i in zip(group, at, strict=True)]) for k in (0, 1)]
+        for name, group in groups.items():
+            common = [at_common(source, names, MATRIX_SIZE) for source in group]
+            motions = [motion for motion in common if motion is not None]
+            if not motions:
+                continue
+            place = [np.ascontiguousarray(np.stack([m.position[k].T for m in motions])) for k in (0, 1)]
+            pace = [np.stack([m.speed[k][None] for m in motions]) for k in (0, 1)]
             entry["position"][name] = _bytes(mean_feature(place[0], place[1], "euclidean"))
             entry["speed"][name] = _bytes(mean_feature(pace[0], pace[1], "manhattan"))
         pairs.append(entry)

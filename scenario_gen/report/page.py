@@ -29,6 +29,7 @@ from scenario_gen.types.scenario import ScenarioSet
 
 SIGNIFICANT = 0.03
 """Below this, E without changepoints leaves nothing to gain and the case is not counted."""
+ERRORS = ("e_position", "e_speed", "e_heading")
 MAX_SAMPLES = 50
 """Scenarios of each arm that a page draws; the figures count all."""
 
@@ -100,7 +101,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "errors": {
             (arm, key): _found(evaluation, case.row if arm == WITH else arm, key)
             for arm in (WITH, WITHOUT, UNIFORM, ORACLE)
-            for key in ("e_position", "e_speed")
+            for key in ERRORS
         },
         "segments": [
             {"from": bounds[k], "to": bounds[k + 1], "label": int(case.segmentation.labels[start]), "text": text}
@@ -138,7 +139,7 @@ def _causes(made: ScenarioSet) -> list[tuple[str, int]]:
 
 def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the page's first sentence in figures: how many were accepted, and where changepoints brought E down."""
-    better: dict[str, list[bool]] = {"e_position": [], "e_speed": []}
+    better: dict[str, list[bool]] = {key: [] for key in ERRORS}
     for view in views:
         for key, found in better.items():
             one, other = view["errors"][WITH, key], view["errors"][WITHOUT, key]
@@ -149,6 +150,5 @@ def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "published": sum(view["case"].published for view in views),
         "requested": sum(made.requested for made in sets),
         "candidates": sum(made.candidates for made in sets),
-        "position": (sum(better["e_position"]), len(better["e_position"])),
-        "speed": (sum(better["e_speed"]), len(better["e_speed"])),
+        **{key.removeprefix("e_"): (sum(found), len(found)) for key, found in better.items()},
     }

@@ -15,14 +15,14 @@
 """The end of a run on one screen of the terminal."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import math
 
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from scenario_gen.errors import printable
-from scenario_gen.types.evaluation import formatted
+from scenario_gen.types.evaluation import formatted, Interval
 from scenario_gen.types.generation import GenerationResult, WITH, WITHOUT
 from scenario_gen.types.route import legs_in_words
 from scenario_gen.types.scenario import Cause
@@ -53,19 +53,36 @@ def _case(case: GenerationResult) -> list[Text]:
     figures = Text.assemble(
         "  ",
         (f"{len(made.scenarios)}/{made.requested} valid", "green" if complete else "red"),
-        f" of {made.candidates}   K {len(case.segmentation.changepoints)}   E position ",
+        f" of {made.candidates}  K {len(case.segmentation.changepoints)}  E position ",
         _errors(case, "e_position"),
-        "   speed ",
+        "  speed ",
         _errors(case, "e_speed"),
-        f"   order {order if order == '–' else order + ' %'}{measured}",
+        *(("  heading ", _errors(case, "e_heading")) if found and "e_heading" in found.values else ()),
+        f"  order {order if order == '–' else order + ' %'}{measured}",
     )
+    kept = [] if found is None else _not_kept(found.values)
     remark = case.segmentation.remark(case.encounter.duration)
     vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
-    remarks = [*([remark] if remark else []), *(said for vehicle, route in vehicles for said in route.remarks(vehicle.id))]
+    routes = [said for vehicle, route in vehicles for said in route.remarks(vehicle.id)]
     legs = legs_in_words(case.routes)
     if legs:
-        figures.append(f"   routes: {legs}")
-    return [title, figures, *(Text(f"  {printable(said)}", style="yellow") for said in remarks)]
+        figures.append(f"  routes: {legs}")
+    return [
+        title,
+        figures,
+        *(Text(f"  {printable(line)}", style="yellow") for line in (*kept, *routes, *([remark] if remark else []))),
+    ]
+
+
+def _not_kept(values: Mapping[str, Interval]) -> list[str]:
+    """Say what of the template the samples have not: turns, conflicts."""
+    turns, vanished, conflicts = (
+        values.get(key, Interval(math.nan)).value for key in ("turn_kept", "vanished_conflicts", "conflicts")
+    )
+    said = [f"{100.0 * (1.0 - turns):.3g} % of the vehicles turn otherwise than in the template"] if turns < 1.0 else []
+    if vanished > 0.0:
+        said.append(f"{vanished:.3g} of the template's {vanished + conflicts:.0f} conflict(s) vanish, mean over samples")
+    return said
 
 
 def _errors(case: GenerationResult, metric: str) -> Text:

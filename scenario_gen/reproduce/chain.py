@@ -28,14 +28,13 @@ from scenario_gen.arrays import Bools, Floats, wrap_angle
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.evaluation import without_changepoints
 from scenario_gen.fitting import fit_template, FittingConfig
+from scenario_gen.reproduce.speed_profile import knots_on, SpeedBounds, SpeedProfile, SpeedProfileQP
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.routing import plan_routes, PlanningConfig
 from scenario_gen.routing.search.rrt_star_connect import PAPER
-from scenario_gen.sampling.candidates import knots_on
 from scenario_gen.sampling.config import SamplingConfig
 from scenario_gen.sampling.gp import Features, Observations, Posterior, Regression
 from scenario_gen.sampling.speed_profile.knots import speed_knots
-from scenario_gen.sampling.speed_profile.qp import SpeedBounds, SpeedProfile, SpeedProfileQP
 from scenario_gen.template.interaction import find_waits, Wait
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit

@@ -32,6 +32,7 @@ _VERGE = 2.0  # metres of kerb drawn beside a road
 _PAPER_LANE = 100.0  # cells
 _ARMS = {
     "straight": ("west", "east"),
+    "curve": ("west", "east"),
     "t_intersection": ("west", "east", "south"),
     "four_way": ("west", "east", "south", "north"),
 }

@@ -125,6 +125,11 @@ def line_between(shape: Curve, entry: Floats, leave: Floats) -> tuple[Curve, flo
     return _joined(entry, max(before, 0.0), bent, max(after, 0.0)), max(before, 0.0)
 
 
+def extended(shape: Curve, extra: float, run: float) -> Curve:
+    """The shape from the origin along x, turned by `extra` [rad] more, evenly, and `run` metres straight on at both ends."""
+    return _joined(np.zeros(3), run, _bent(shape, extra), run)
+
+
 def _bent(shape: Curve, extra: float) -> Floats:
     """(M, 3) the shape from the origin along x, turned by `extra` [rad] more, evenly."""
     count = max(int(np.ceil(shape.length / _STEP)), 1)

@@ -25,6 +25,7 @@ from scenario_gen.arrays import Bools, Floats
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import RefusedError
 from scenario_gen.roads.clearance import clearance_field, footprint_fits, nearest_pose_with_room
+from scenario_gen.roads.vector.ground import own_ground
 from scenario_gen.routing.config import PlanningConfig
 from scenario_gen.routing.connections import candidates, direct
 from scenario_gen.routing.search.planner import (  # fmt: skip
@@ -112,7 +113,18 @@ def plan_routes(road: Road, fit: Fit, config: PlanningConfig = PlanningConfig(),
         _Task(road, vehicle, fitted, config, planner, seed + 7919 * n)
         for n, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True))
     )
-    return tuple(_route(task) for task in tasks)
+    return tuple(_on_own_lanes(task) for task in tasks)
+
+
+def _on_own_lanes(task: _Task) -> Route:
+    """The route on the vehicle's own lanes, where lanes are known; on the whole road where none is on them (an obstacle)."""
+    ground = own_ground(task.road, task.fitted.path, task.vehicle)
+    if ground is not task.road:
+        try:
+            return _route(replace(task, road=ground))
+        except RefusedError:
+            pass
+    return _route(task)
 
 
 def deviations(route: Route, fitted: FittedVehicle) -> Floats:

@@ -29,12 +29,12 @@ class SamplingConfig(Parameters):
     lateral_sigma: float = parameter(
         0.3, "σ_f: standard deviation across the route, between anchors", unit="m", low=0.0, high=10.0
     )
-    lateral_length: float = parameter(15.0, "l: distance along the route over which it varies", unit="m", low=1.0, high=1000.0)
+    lateral_length: float = parameter(40.0, "l: distance along the route over which it varies", unit="m", low=1.0, high=1000.0)
     observation_sigma: float = parameter(
-        0.3, "σ_ω: standard deviation across the route at an interior anchor", unit="m", low=1e-3, high=10.0
+        1.0, "σ_ω: standard deviation across the route at an interior anchor", unit="m", low=1e-3, high=10.0
     )
     longitudinal_sigma: float = parameter(
-        0.5, "σ_s: standard deviation of an interior anchor along the route", unit="m", low=0.0, high=10.0
+        0.8, "σ_s: standard deviation along the route, at the same template time", unit="m", low=0.0, high=10.0
     )
     longitudinal_time: float = parameter(
         4.0, "time over which displacements along the route vary", unit="s", low=0.1, high=1000.0
@@ -48,7 +48,17 @@ class SamplingConfig(Parameters):
     max_acceleration: float = parameter(4.5, "strongest speeding up", unit="m/s²", low=0.1)
     max_deceleration: float = parameter(8.0, "strongest braking", unit="m/s²", low=0.1)
     max_lateral_acceleration: float = parameter(5.0, "largest speed² times curvature", unit="m/s²", low=0.1)
+    max_jerk: float = parameter(
+        0.0, "largest jerk along the route; 0: 1.2 times the template's, 1.5 m/s³ at least", unit="m/s³", low=0.0, high=100.0
+    )
+    bend_acceleration: float = parameter(
+        0.0,
+        "lateral acceleration above which the pace is lowered ahead of bends; 0: 1.2 times the template's, 2 m/s² at least",
+        unit="m/s²",
+        low=0.0,
+        high=10.0,
+    )
     max_stretch: float = parameter(
-        0.2, "share by which the clock may be stretched where no speed profile exists", low=0.0, high=1.0
+        0.2, "share by which the clock may be longer than the template's, where bends or lengths ask for it", low=0.0, high=1.0
     )
     attempts: int = parameter(20, "candidates drawn per scenario asked for, at most", low=1, high=10_000)

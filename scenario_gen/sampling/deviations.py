@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How far samples lie to the side of the route and along it: the square roots of both covariances."""
+"""How far samples lie to the side of the route: the square root of the covariance."""
 
 import numpy as np
 
@@ -24,40 +24,8 @@ from scenario_gen.sampling.path import BasePath
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.road import Road
 
-MAX_GAP_SHARE = 0.3  # an anchor moves by at most this share of the way to its neighbours
-
-
-def longitudinal_covariance_root(times: Floats, anchor: Floats, config: SamplingConfig) -> Floats:
-    """Square root (D, r) of the covariance of the displacements [m] of the route's D distinct inner anchors.
-
-    Independent displacements of anchors a second apart would jerk the speed; those of neighbours in time go together.
-
-    Args:
-        times: (K + 2,) seconds on the template's clock.
-        anchor: (K + 2,) arc lengths [m]; the anchors of a dwell are one and the same.
-        config: σ_s and the time over which displacements vary.
-    """
-    distinct, which = np.unique(anchor, return_inverse=True)
-    if config.longitudinal_sigma == 0.0 or len(distinct) < 3:
-        return np.zeros((max(len(distinct) - 2, 0), 0))
-    middle = np.bincount(which, times) / np.bincount(which)
-    ends = times[[0, -1]]
-    features = Features(ends[0], ends[1], config.longitudinal_sigma, config.longitudinal_time)
-    factor = Regression(features, Observations(ends, np.zeros(2), np.zeros(2))).predict(middle[1:-1]).factor
-    return exact.compact(factor)
-
-
-def displaced_anchors(anchor: Floats, factor: Floats, z: Floats) -> Floats:
-    """Arc lengths (S, K + 2) of the anchors (K + 2,), displaced by factor·z for z (S, r); a dwell's move together."""
-    distinct, which = np.unique(anchor, return_inverse=True)
-    moved = np.broadcast_to(distinct, (len(z), len(distinct))).copy()
-    if factor.size:
-        gap = np.diff(distinct)
-        most = MAX_GAP_SHARE * np.minimum(gap[:-1], gap[1:])
-        moved[:, 1:-1] += np.clip(exact.matmul(z, factor.T), -most, most)
-    return np.asarray(moved[:, which])
-
-
+LENGTH_SHARE = 0.25  # of the route, at most: what varies more slowly between given ends hardly varies
+SHORTEST_LENGTH = 15.0  # m; drivers do not wander within less, so on a short route there is little to draw
 SHORTEST_ROUTE = 3.0  # m; a shorter one is driven as planned
 ROOM_SIGMAS = 2.0  # a deviation of so many standard deviations still leaves the footprint on the road
 MAX_ROOM_SIGMAS = 5.0  # more room than so many standard deviations is not looked for
@@ -83,13 +51,14 @@ def lateral_covariance_root(path: BasePath, room: Floats, config: SamplingConfig
     nodes, sigma = len(path.node), config.lateral_sigma
     if sigma == 0.0 or path.length < SHORTEST_ROUTE:
         return np.zeros((nodes, 0))
+    length = min(config.lateral_length, max(LENGTH_SHARE * path.length, SHORTEST_LENGTH))
     inside = np.unique(path.anchor)
     inside = inside[(inside > 1.0) & (inside < path.length - 1.0)]
     ends = np.array([0.0, path.length])
     x = np.concatenate([ends, ends, inside])
     noise = np.concatenate([np.zeros(4), np.full(len(inside), config.observation_sigma)])
     seen = Observations(x, np.zeros(len(x)), noise, (0, 0, 1, 1, *(0 for _ in inside)))
-    factor = Regression(Features(0.0, path.length, sigma, config.lateral_length), seen).predict(path.arc).factor
+    factor = Regression(Features(0.0, path.length, sigma, length), seen).predict(path.arc).factor
     return np.minimum(room / (ROOM_SIGMAS * sigma), 1.0)[:, None] * exact.compact(factor, 1e-6 * sigma)
 
 

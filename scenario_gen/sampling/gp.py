@@ -165,9 +165,9 @@ class Regression:
         self._weights = start + exact.matmul(basis, exact.solve_triangular(r, exact.matmul(q.T, target)))
         self._root = exact.solve_triangular(r, basis.T, transposed=True).T  # basis·r⁻¹
 
-    def predict(self, x: Floats) -> Posterior:
-        """The posterior of f at x (m,)."""
-        rows = self.features(x)
+    def predict(self, x: Floats, derivative: int = 0) -> Posterior:
+        """The posterior of f, or of its derivative of that order, at x (m,)."""
+        rows = self.features(x, derivative)
         return Posterior(exact.matmul(rows, self._weights), exact.matmul(rows, self._root))
 
 

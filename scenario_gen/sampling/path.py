@@ -26,7 +26,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen, Ints
-from scenario_gen.kernels import F, F2, F3, I1, kernel, OUT2, OUT3
+from scenario_gen.kernels import F, F1, F2, F3, I1, kernel, OUT2, OUT3
 from scenario_gen.types.route import Route
 
 NODE_SPACING = 1.0  # m; a cubic through nodes this far apart is within 0.1 mm of an arc of radius 5 m
@@ -151,16 +151,6 @@ def _displace(node: Floats, h: float, deviation: Floats, curve: Floats, arc: Flo
             arc[s, j + 1] = arc[s, j] + _part(c, j, h, 1.0)
 
 
-@kernel(F3, F2, F, F2, OUT2)
-def arc_lengths(curve: Floats, arc: Floats, h: float, u: Floats, out: Floats) -> None:
-    """Fill `out` (S, A) with each sample's own arc length [m] at route arc lengths `u` (S, A)."""
-    g = arc.shape[1]
-    for s in range(u.shape[0]):
-        for k in range(u.shape[1]):
-            j = min(max(int(u[s, k] / h), 0), g - 2)
-            out[s, k] = arc[s, j] + _part(curve[s], j, h, min(max(u[s, k] / h - j, 0.0), 1.0))
-
-
 @kernel(inline=True)
 def _fraction(curve: Floats, j: int, h: float, at: float, length: float) -> float:
     """Fraction of cell j at which `at` metres of its `length` are behind (Newton: |dp/du| hardly varies in a cell)."""
@@ -186,39 +176,67 @@ def _pose(c: Floats, j: int, h: float, x: float, out: Floats) -> None:
     out[2] = exact.arctan2(dy, dx)
 
 
-@kernel(F3, F2, F, F2, F2, F2, I1, OUT3)
-def states(curve: Floats, arc: Floats, h: float, knot: Floats, speed: Floats, time: Floats, count: Ints, out: Floats) -> None:
-    """States of one vehicle of every sample at given times.
+@kernel(F3, F2, F, F1, I1, F3, F2, F2, F2, F2, I1, OUT3)
+def states(
+    curve: Floats,
+    arc: Floats,
+    h: float,
+    breaks: Floats,
+    first: Ints,
+    pieces: Floats,
+    speed: Floats,
+    tau: Floats,
+    pace: Floats,
+    slope: Floats,
+    count: Ints,
+    out: Floats,
+) -> None:
+    """States of one vehicle of every sample.
 
     Args:
         curve: (S, G, 4) path, see `BasePath.displaced`; G = 1 for a vehicle that stands throughout.
         arc: (S, G) arc lengths [m].
         h: node spacing [m].
-        knot: (S, M) times [s] at which acceleration changes.
-        speed: (S, M) speed [m/s] there, linear in between.
-        time: (S, T) seconds, ascending.
+        breaks: (m + 1,) template times [s] between the pieces of the speed.
+        first: (m,) the first of the four coefficients of each piece.
+        pieces: (m, 4, 4) the pieces of a spline, see `SpeedSpline.pieces`.
+        speed: (S, n) coefficients [m/s].
+        tau: (S, T) template times [s], ascending.
+        pace: (S, T) rate of the sample's clock there.
+        slope: (S, T) 1/s, its derivative.
         count: (S,) how many of them are asked for.
         out: (S, T, 5) x, y [m], yaw [rad, not unwrapped], speed [m/s], acceleration [m/s²].
     """
-    g, m = curve.shape[1], knot.shape[1]
+    g, m = curve.shape[1], pieces.shape[0]
+    p = np.empty(4)
     for s in range(curve.shape[0]):
-        i, j, start, before = 0, 0, 0.0, -1.0
+        i, j, start, before, fresh = 0, 0, 0.0, -1.0, True
         c = curve[s]
         for k in range(count[s]):
-            t = time[s, k]
-            while i < m - 2 and t >= knot[s, i + 1]:
-                start += 0.5 * (speed[s, i] + speed[s, i + 1]) * (knot[s, i + 1] - knot[s, i])
+            t = min(max(tau[s, k], breaks[0]), breaks[m])
+            while True:
+                if fresh:
+                    for power in range(4):
+                        p[power] = 0.0
+                        for q in range(4):
+                            p[power] += pieces[i, power, q] * speed[s, first[i] + q]
+                    fresh = False
+                if i == m - 1 or t < breaks[i + 1]:
+                    break
+                x = breaks[i + 1] - breaks[i]
+                start += x * (p[0] + x * (p[1] / 2.0 + x * (p[2] / 3.0 + x * p[3] / 4.0)))
                 i += 1
-            step = knot[s, i + 1] - knot[s, i]
-            a = (speed[s, i + 1] - speed[s, i]) / step
-            since = min(t - knot[s, i], step)
-            out[s, k, 3] = max(speed[s, i] + a * since, 0.0)
-            out[s, k, 4] = a
+                fresh = True
+            x = t - breaks[i]
+            u, du = p[0] + x * (p[1] + x * (p[2] + x * p[3])), p[1] + x * (2.0 * p[2] + x * 3.0 * p[3])
+            r = pace[s, k]
+            out[s, k, 3] = max(u / r, 0.0)
+            out[s, k, 4] = (du - u / r * slope[s, k]) / (r * r)
             if g == 1:
                 out[s, k, 0], out[s, k, 1] = c[0, 0], c[0, 1]
                 out[s, k, 2] = exact.arctan2(c[0, 3], c[0, 2])
                 continue
-            at = start + (speed[s, i] + 0.5 * a * since) * since
+            at = start + x * (p[0] + x * (p[1] / 2.0 + x * (p[2] / 3.0 + x * p[3] / 4.0)))
             if at == before:  # stands
                 out[s, k, :3] = out[s, k - 1, :3]
                 continue

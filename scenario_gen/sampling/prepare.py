@@ -11,47 +11,51 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+"""From an encounter and its routes to a model that draws candidates: the nominal clock, and every vehicle's mean speed on it."""
 
-"""From an encounter and its routes to a model that draws candidates: knots, limits in curves, and feasible times."""
-
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
-from scenario_gen.sampling.candidates import CandidateModel, knots_on, piece_lengths, VehicleModel
+from scenario_gen.sampling.candidates import CandidateModel, VehicleModel
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.deviations import (
-    lateral_covariance_root,
-    lateral_room,
-    longitudinal_covariance_root,
-    MAX_ROOM_SIGMAS,
-    ROOM_SIGMAS,
-)
+from scenario_gen.sampling.deviations import lateral_covariance_root, lateral_room, MAX_ROOM_SIGMAS, ROOM_SIGMAS
+from scenario_gen.sampling.pace import clock_of, slowed_clock, template_grid
 from scenario_gen.sampling.path import BasePath
 from scenario_gen.sampling.speed_profile.knots import speed_knots, SpeedKnots, STAND
-from scenario_gen.sampling.speed_profile.qp import SpeedBounds, SpeedProfile, SpeedProfileQP
-from scenario_gen.sampling.speed_profile.stops import creep_bounds, lengthened, shortest_shares, standing_part
-from scenario_gen.sampling.time_warp import TimeWarp
-from scenario_gen.template.interaction import Wait
+from scenario_gen.sampling.speed_profile.mean import Bounds, mean_speed, Motion, rounded_lines, SMOOTHING, Target
+from scenario_gen.sampling.speed_profile.model import speed_model
+from scenario_gen.sampling.speed_profile.spline import SpeedSpline
+from scenario_gen.sampling.speed_profile.stops import least_shares, lengthened, SHORTEST_WAIT, standing_part
+from scenario_gen.sampling.time_warp import Clock, TimeWarp
+from scenario_gen.template.interaction import Wait, WAIT_SPEED
+from scenario_gen.template.tracks import clean_tracks
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates
 from scenario_gen.types.segmentation import Segmentation
 
-SLIDE_SIGMAS = 2.0  # an anchor that slides by so many σ_s is no farther from the template than a sample is anyway
-SAMPLE_SLIDE_SIGMAS = 4.0  # by which an anchor of a sample may slide, rather than have its time warp damped
 _STRETCHES = 9
-_KNOT_SHARES = (None, 0.5, 0.35, 0.65, 0.2, 0.8, 0.1, 0.9)  # of a primitive; None: where the template bends
+_MOST_SCALE = 4.0  # a template speed is scaled at most so much; beyond it, lengths alone decide
+_CREEPS = 0.9 * WAIT_SPEED  # m/s, fastest in a creeping wait
+_RAMP = 1.5  # m/s², by which an asked end speed is reached from the template's
 _CURVE_REACH = 2.0  # m, around a position, in which the route's curvature is looked at
-_CURVE_MARGINS = (0.85, 1.0)  # share of the lateral limit that the route itself may use; the rest is the samples'
-_CURVE_STEP = 0.5  # s, at which speeds are bounded
-_CURVE_NEAR = 0.7  # a speed above this share of its bound may exceed it in a sample
-_BOUND_ROUNDS = 6
+_CURVE_MARGIN = 0.85  # share of the lateral limit that the mean may use; the rest is the samples'
+_BOUND_ROUNDS = 4
+_JERK_SHARE, _LEAST_JERK = 1.2, 1.0  # of the template's largest jerk; m/s³
+_BEND_SHARE, _LEAST_BEND = 1.2, 2.0  # of the template's largest lateral acceleration; m/s²
+_SMOOTH = 0.5  # s, over which that is taken
+_TIME_SHARE = 1.0 / 3.0  # of the duration, at most: what varies more slowly between given ends hardly varies
+_FREE_SLIDE = 1.5  # m, by which changepoints may be passed from their place before the clock is stretched
+_SAID_PACE, _SAID_SLIDE, _SAID_JERK = 0.02, 0.3, 0.2  # slowing, m and m/s³ from which on they are said
+
+
+_Mean = tuple[Floats, Motion, Bounds]  # coefficients of a mean speed, and what it keeps to
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +63,7 @@ class Prepared:
     """A model of candidates, or why there is none.
 
     Attributes:
-        model: draws candidates; None if no speed profile exists even for the undisturbed routes.
+        model: draws candidates; None if no speed exists even for the undisturbed routes.
         adaptations: what was changed to get there, in sentences.
         refusal: why there is no model, "" if there is one.
     """
@@ -67,6 +71,96 @@ class Prepared:
     model: CandidateModel | None
     adaptations: tuple[str, ...]
     refusal: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Drive:
+    """One vehicle on its route, before its speed is known.
+
+    Attributes:
+        vehicle: identity and footprint.
+        path: the route.
+        knots: what the primitives tell of the template's speed, scaled to the route.
+        spline: the basis of its speed.
+        times: (K + 2,) its arrival, the changepoints while it is there, and when it leaves [s].
+        anchor: (K + 2,) arc lengths [m] of their anchors.
+        time: (T,) the template's samples while it is there [s].
+        speed: (T,) its speeds [m/s] there, scaled to the route.
+        ends: asked speeds [m/s] at start and end.
+        jerk: m/s³ that it keeps to; bend: m/s² sideways above which the pace is lowered.
+    """
+
+    vehicle: Vehicle
+    path: BasePath
+    knots: SpeedKnots
+    spline: SpeedSpline
+    times: Floats
+    anchor: Floats
+    time: Floats
+    speed: Floats
+    ends: tuple[float, float]
+    jerk: float
+    bend: float
+
+    def target(self, clock: Clock) -> Target:
+        """What its mean speed should be near to, on this clock."""
+        grid = clock.grid[(clock.grid >= self.times[0] - 1e-9) & (clock.grid <= self.times[-1] + 1e-9)]
+        line = np.interp(grid, self.knots.knot, self.knots.lines)
+        rates = clock.at(self.times[[0, -1]])[1]
+        ends = (self.ends[0] * float(rates[0]), self.ends[1] * float(rates[1]))
+        for end, since in ((0, grid - grid[0]), (-1, grid[-1] - grid)):
+            off = ends[end] - float(line[end])
+            line = line + off * np.square(np.maximum(1.0 - since / max(2.0 * abs(off) / _RAMP, 1.0), 0.0))
+        inner = 1 + np.flatnonzero(np.diff(self.anchor[:-1]) != 0.0)
+        return Target(grid, np.maximum(line, 0.0), self.times[inner], self.anchor[inner], ends, self.path.length)
+
+    def mean(self, clock: Clock, config: SamplingConfig) -> _Mean | str:
+        """The mean's coefficients on this clock, with what they keep to; or why there are none."""
+        spline, rate = self.spline, clock.at(self.spline.stations)[1:]
+        motion, target = Motion.of(spline, *rate), self.target(clock)
+        at, pace = spline.middle, clock.at(spline.middle)[1]
+        top = config.max_speed * pace
+        for a, b in self.knots.stretches(self.knots.creeping):
+            margin = float(spline.breaks[1] - spline.breaks[0])
+            top = np.where((at > a - margin) & (at < b + margin), np.minimum(top, _CREEPS * pace), top)
+        most, limit = top, ""
+        for _ in range(_BOUND_ROUNDS):
+            bounds = Bounds(most, config.max_acceleration, config.max_deceleration, self.jerk)
+            mean = mean_speed(spline, target, motion, bounds)
+            if mean is None:
+                longest = f"{clock.time[-1]:.1f} s"
+                return f"cannot drive {self.path.length:.1f} m{limit} in {longest} within the limits"
+            allowed = self._bend_speed(exact.matmul(spline.driven(at), mean), _CURVE_MARGIN * config.max_lateral_acceleration)
+            if (mean <= allowed * pace * 1.01 + 1e-6)[1:-1].all():
+                return mean, motion, bounds
+            most, limit = np.minimum(most, allowed * pace), " through its curves"
+        return f"cannot drive its curves within {config.max_lateral_acceleration:g} m/s² sideways in {clock.time[-1]:.1f} s"
+
+    def slid(self, mean: Floats) -> float:
+        """How far [m] from their place the mean passes changepoints, at most."""
+        if len(self.path.node) == 1:
+            return 0.0
+        return float(np.abs(exact.matmul(self.spline.driven(self.times), mean) - self.anchor).max())
+
+    def need(self, mean: Floats, grid: Floats) -> Floats:
+        """By how much the clock must be slowed at template times (G,) [s], so that bends are driven at ease."""
+        if len(self.path.node) == 1:
+            return np.ones(len(grid))
+        there = (grid >= self.times[0]) & (grid <= self.times[-1])
+        s, v = (exact.matmul(rows, mean) for rows in (self.spline.driven(grid[there]), self.spline.design(grid[there])))
+        need = np.ones(len(grid))
+        need[there] = v / self._bend_speed(s, self.bend)
+        return need
+
+    def _bend_speed(self, s: Floats, limit: float) -> Floats:
+        """Speed [m/s] that the route's bends allow at arc lengths (q,) [m]."""
+        from scipy.ndimage import maximum_filter1d, uniform_filter1d  # slow to import
+
+        if len(self.path.node) == 1:
+            return np.full(len(s), np.inf)
+        reach = 2 * int(np.ceil(_CURVE_REACH / self.path.spacing)) + 1
+        bend = maximum_filter1d(uniform_filter1d(np.abs(self.path.curvature), 3, mode="nearest"), reach, mode="nearest")
+        return np.asarray(np.sqrt(limit / np.maximum(np.interp(s, self.path.arc, bend), 1e-6)))
 
 
 def prepare(
@@ -79,7 +173,7 @@ def prepare(
     config: SamplingConfig,
     ego: int | None = None,
 ) -> Prepared:
-    """Build the model: first in the template's time, then with anchors slid by little, then in a stretched time.
+    """Build the model: on the template's clock, slowed ahead of bends, and stretched only where no speed exists otherwise.
 
     Vehicle `ego` is left out of it, with its waits.
 
@@ -89,157 +183,151 @@ def prepare(
     times = encounter.time[np.concatenate([[0], segmentation.changepoints, [encounter.speed.shape[1] - 1]]).astype(np.int64)]
     if len(routes) != len(encounter.vehicles) or any(len(route.anchor) != len(times) for route in routes):
         raise InputError(f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each")
-    waits = [standing_part(encounter, wait) for wait in waits]
-    driven = [n for n in range(len(encounter.vehicles)) if n != ego]
-    vehicles, waits = [encounter.vehicles[n] for n in driven], [wait for wait in waits if wait.vehicle != ego]
-    paths = [BasePath.of(routes[n]) for n in driven]
-    knots_of = [partial(_knots, n, encounter, times, routes[n], asked, waits) for n in driven]
-    slide = SLIDE_SIGMAS * config.longitudinal_sigma
-    stretches = np.linspace(1.0, 1.0 + config.max_stretch, _STRETCHES if config.max_stretch > 0.0 else 1)
-    reasons: list[str] = []
-    for most, factors in ((slide, stretches), (np.inf, stretches)):
-        for stretch in factors.tolist():
-            stretched = stretch * times
-            tried = [_nominal(path, at, times, stretched, most, config) for path, at in zip(paths, knots_of, strict=True)]
-            reasons = [f"vehicle {v.id} {why}" for v, why in zip(vehicles, tried, strict=True) if isinstance(why, str)]
-            if not reasons:
-                found = [nominal for nominal in tried if isinstance(nominal, _Nominal)]
-                warp = TimeWarp(stretched, config, shortest_shares(times, waits))
-                return _model(vehicles, road, times, warp, paths, found, config)
-    return Prepared(None, (), "; ".join(reasons))
+    waits = [standing_part(encounter, wait) for wait in waits if wait.vehicle != ego]
+    drives = [_drive(n, encounter, times, routes[n], asked, waits, config) for n in range(len(encounter.vehicles)) if n != ego]
+    clock, sentences = _slowed(drives, template_grid(encounter), config)
+    left = (1.0 + config.max_stretch) * float(times[-1]) / float(clock.time[-1])
+    best: tuple[float, float, list[_Mean]] | None = None
+    reasons = ""
+    for stretch in np.linspace(1.0, max(left, 1.0), _STRETCHES if left > 1.0 else 1).tolist():
+        means = [drive.mean(clock_of(clock.grid, stretch * clock.rate), config) for drive in drives]
+        found = [mean for mean in means if not isinstance(mean, str)]
+        if len(found) < len(means):
+            reasons = "; ".join(f"vehicle {d.vehicle.id} {m}" for d, m in zip(drives, means, strict=True) if isinstance(m, str))
+            continue
+        slid = max(drive.slid(mean[0]) for drive, mean in zip(drives, found, strict=True))
+        if best is None or slid < best[0] - _FREE_SLIDE:
+            best = slid, stretch, found
+        if slid <= _FREE_SLIDE:
+            break
+    if best is None:
+        return Prepared(None, (), reasons)
+    _, stretch, found = best
+    if stretch > 1.0:
+        share = 100.0 * (stretch - 1.0)
+        sentences.append(f"clock stretched by {share:.1f} % so that every vehicle can keep to its limits and its changepoints")
+    warp = TimeWarp(clock_of(clock.grid, stretch * clock.rate), config, least_shares(clock.grid, waits))
+    vehicles = [_model(d, road, *mean, config, sentences) for d, mean in zip(drives, found, strict=True)]
+    return Prepared(CandidateModel(tuple(vehicles), warp), tuple(sentences))
 
 
-def _knots(
-    n: int, encounter: Encounter, times: Floats, route: Route, asked: BoundaryStates, waits: Sequence[Wait], share: float | None
-) -> SpeedKnots:
-    """The knots of vehicle n; a route without length stands throughout, whatever speed is asked."""
-    dwells = route.anchor[:-1] == route.anchor[1:]
-    own, creeps = lengthened(n, waits, creeping=False), lengthened(n, waits, creeping=True)
+def _slowed(drives: Sequence[_Drive], grid: Floats, config: SamplingConfig) -> tuple[Clock, list[str]]:
+    """The nominal clock on template times (G,) [s], and what is said of it."""
+    plain = clock_of(grid, np.ones(len(grid)))
+    needs = []
+    for drive in drives:
+        mean = drive.mean(plain, _without_bends(config))
+        needs.append(np.ones(len(grid)) if isinstance(mean, str) else drive.need(mean[0], grid))
+    clock = slowed_clock(grid, needs, 1.0 + config.max_stretch)
+    if clock.rate.max() < 1.0 + _SAID_PACE:
+        return plain, []
+    worst, k = divmod(int(np.argmax(needs)), len(grid))
+    return clock, [
+        f"the pace is lowered by up to {100.0 * (1.0 - 1.0 / clock.rate.max()):.0f} % ahead of bends, most for vehicle "
+        f"{drives[worst].vehicle.id} at {grid[k]:.1f} s; in all the clock is {clock.time[-1] - grid[-1]:.1f} s longer"
+    ]
+
+
+def _without_bends(config: SamplingConfig) -> SamplingConfig:
+    """The parameters of a drive that takes bends at any speed: it tells where the vehicle is when."""
+    return replace(config, max_lateral_acceleration=1e6)
+
+
+def _drive(
+    n: int,
+    encounter: Encounter,
+    times: Floats,
+    route: Route,
+    asked: BoundaryStates,
+    waits: Sequence[Wait],
+    config: SamplingConfig,
+) -> _Drive:
+    """Vehicle n on its route; one without length stands throughout, whatever speed is asked."""
+    first, last = encounter.present[n].tolist()
+    here = slice(first, last + 1)
+    time, speed = encounter.time[here], encounter.speed[n, here]
+    own = np.concatenate([[0], 1 + np.flatnonzero((times[1:-1] > time[0]) & (times[1:-1] < time[-1])), [len(times) - 1]])
+    anchor, times = route.anchor[own], np.concatenate([time[:1], times[own[1:-1]], time[-1:]])
+    dwells = anchor[:-1] == anchor[1:]
+    path = BasePath.of(route)
+    stands, creeps = lengthened(n, waits, creeping=False), lengthened(n, waits, creeping=True)
     ends = (float(asked.start[n, 3]), float(asked.end[n, 3]))
     if dwells.all():
         ends = (0.0, 0.0)
-    knots = speed_knots(times, dwells, own, encounter.time, encounter.speed[n], ends, 0.5, creeps)
+    driven = float(0.5 * encounter.dt * (speed[1:] + speed[:-1]).sum())
+    scale = min(path.length / driven, _MOST_SCALE) if driven > 1e-3 else 1.0
+    knots = speed_knots(times, dwells, stands, time, speed, ends, 0.0, creeps)
     standing = [v if v > STAND or not still else 0.0 for v, still in zip(ends, knots.still[[0, -1]], strict=True)]
-    return speed_knots(times, dwells, own, encounter.time, encounter.speed[n], (standing[0], standing[1]), share, creeps)
+    spline = SpeedSpline.over(float(times[0]), float(times[-1]), _at_rest(knots, times))
+    recorded = [0.0 if still else scale * float(speed[k]) for k, still in zip((0, -1), knots.still[[0, -1]], strict=True)]
+    lines = rounded_lines(spline, knots, time, scale * speed, (recorded[0], recorded[1]))
+    jerk, sideways = _largest_jerk(scale * speed, encounter.dt), _largest_sideways(encounter, n)
+    return _Drive(
+        encounter.vehicles[n],
+        path,
+        replace(knots, lines=lines),
+        spline,
+        times,
+        path.anchor[own],
+        time,
+        scale * speed,
+        (standing[0], standing[1]),
+        config.max_jerk or max(_JERK_SHARE * jerk, _LEAST_JERK),
+        min(
+            config.bend_acceleration or max(_BEND_SHARE * sideways, _LEAST_BEND), _CURVE_MARGIN * config.max_lateral_acceleration
+        ),
+    )
 
 
-@dataclass(frozen=True, eq=False)
-class _Nominal:
-    """A vehicle that can be driven: its speed profile QP, its anchors after sliding, and by how much the farthest slid [m]."""
-
-    qp: SpeedProfileQP
-    anchor: Floats
-    slid: float
-
-
-def _nominal(
-    path: BasePath,
-    knots_at: Callable[[float | None], SpeedKnots],
-    times: Floats,
-    stretched: Floats,
-    most: float,
-    config: SamplingConfig,
-) -> _Nominal | str:
-    """How the undisturbed route can be driven in the times `stretched` (K + 2,) [s], or why it cannot.
-
-    With the knots where the template bends if possible, else elsewhere; well within the lateral limit, else just.
-    """
-    reason = ""
-    for share in _KNOT_SHARES:
-        for margin in _CURVE_MARGINS:
-            found = _feasible(path, knots_at(share), times, stretched, most, config, margin)
-            if isinstance(found, _Nominal):
-                return found
-            reason = reason or found
-    return reason
+def _at_rest(knots: SpeedKnots, times: Floats) -> list[tuple[float, float]]:
+    """The parts of stands in which the speed is zero: lines are rounded, so a vehicle leaves a little before theirs do."""
+    rest = []
+    for a, b in knots.stretches(knots.still):
+        room = max(min(SMOOTHING, 0.5 * (b - a - SHORTEST_WAIT)), 0.0)
+        rest.append((a + room if a > times[0] else a, b - room if b < times[-1] else b))
+    return rest
 
 
-def _feasible(
-    path: BasePath, knots: SpeedKnots, times: Floats, stretched: Floats, most: float, config: SamplingConfig, margin: float
-) -> _Nominal | str:
-    """Anchors and speed bounds with which the undisturbed route can be driven in `stretched` times, or why it cannot."""
-    curve, arc = path.displaced(np.zeros((1, len(path.node))))
-    knot = knots_on(stretched[None], times, knots)
-    lengths = piece_lengths(knots, curve, arc, path.spacing, path.anchor[None])
-    creep, bounds = creep_bounds(knots), SpeedBounds.none()
-    for _ in range(_BOUND_ROUNDS):
-        qp = SpeedProfileQP(knots, config, creep.and_(bounds))
-        speed, ok = qp.solve(knot, lengths)
-        anchor, slid = path.anchor, 0.0
-        if not ok[0]:
-            speed, ok, moved = qp.slide(knot, lengths)
-            if not ok[0]:
-                limit = "" if len(bounds.interval) == 0 else " through its curves"
-                return f"cannot drive {path.length:.1f} m{limit} in {stretched[-1]:.1f} s within the limits"
-            anchor, slid = _slide(path.anchor, knots, moved[0])
-            if slid > most:
-                return f"would have to pass a changepoint {slid:.1f} m from its place"
-        needed, kept = _curve_bounds(path, SpeedProfile(knot[0], speed[0]), knots, margin * config.max_lateral_acceleration)
-        if kept and (len(bounds.interval) or not len(needed.interval)):
-            return _Nominal(qp, anchor, slid)
-        bounds = needed
-    return f"cannot drive its curves within {config.max_lateral_acceleration:g} m/s² sideways in {stretched[-1]:.1f} s"
+def _largest_jerk(speed: Floats, dt: float) -> float:
+    """Largest second difference of speeds (T,) [m/s] over time, m/s³."""
+    return float(np.abs(np.diff(speed, 2)).max(initial=0.0)) / (dt * dt)
 
 
-def _slide(anchor: Floats, knots: SpeedKnots, moved: Floats) -> tuple[Floats, float]:
-    """Anchors moved so that constraint g ends `moved[g]` farther along, and the largest movement [m]."""
-    slid = anchor.copy()
-    before = 0.0
-    for (first, last), after in zip(knots.bounds, moved, strict=True):
-        inside = slice(first + 1, last + 1)
-        slid[inside] += np.where(anchor[inside] > anchor[first], after, before)
-        before = after
-    return slid, float(np.abs(slid - anchor).max())
+def _largest_sideways(encounter: Encounter, n: int) -> float:
+    """Largest lateral acceleration [m/s²] of the template's vehicle n, over half a second."""
+    from scipy.ndimage import uniform_filter1d  # slow to import
 
-
-def _curve_bounds(path: BasePath, profile: SpeedProfile, knots: SpeedKnots, limit: float) -> tuple[SpeedBounds, bool]:
-    """Speed bounds wherever the route's curvature might ask for them, and whether the profile itself keeps to the limit."""
-    from scipy.ndimage import maximum_filter1d  # slow to import
-
-    if len(path.node) == 1:
-        return SpeedBounds.none(), True
-    bend = np.abs(path.curvature)
-    wide = maximum_filter1d(bend, 2 * int(np.ceil(_CURVE_REACH / path.spacing)) + 1, mode="nearest")
-    s, v, _ = profile.state(np.linspace(profile.time[0], profile.time[-1], 20 * len(knots.knot)))
-    kept = bool((np.square(v) * np.interp(s, path.arc, bend)).max() <= limit * 1.02)
-    moving = np.flatnonzero(~knots.still)
-    steps = np.diff(profile.time)
-    parts = np.maximum(np.ceil(steps[moving] / _CURVE_STEP), 4).astype(np.int64)
-    interval = np.repeat(moving, parts)
-    at = np.concatenate([np.arange(1, n + 1) / n for n in parts.tolist()])
-    s, v, _ = profile.state(profile.time[interval] + at * steps[interval])
-    most = np.sqrt(limit / np.maximum(np.interp(s, path.arc, wide), 1e-6))
-    needed = ~((at == 1.0) & (knots.unknown[interval + 1] < 0)) & (v > _CURVE_NEAR * most)
-    return SpeedBounds(interval[needed], at[needed], most[needed]), kept
+    first, last = encounter.present[n].tolist()
+    yaw = clean_tracks(encounter)[n].poses[first : last + 1, 2]
+    width = 2 * round(0.5 * _SMOOTH / encounter.dt) + 1
+    return float(
+        np.abs(
+            uniform_filter1d(np.gradient(yaw, encounter.dt) * encounter.speed[n, first : last + 1], width, mode="nearest")
+        ).max()
+    )
 
 
 def _model(
-    driven: Sequence[Vehicle],
+    drive: _Drive,
     road: Road,
-    times: Floats,
-    warp: TimeWarp,
-    paths: list[BasePath],
-    found: list[_Nominal],
+    mean: Floats,
+    motion: Motion,
+    bounds: Bounds,
     config: SamplingConfig,
-) -> Prepared:
-    """The model with a time warp that may start from stretched times."""
-    sentences, stretch = [], float(warp.times[-1] / times[-1])
-    slide = max(SAMPLE_SLIDE_SIGMAS * config.longitudinal_sigma, *(nominal.slid for nominal in found))
-    if stretch > 1.0 + 1e-9:
-        sentences.append(f"clock stretched by {100.0 * (stretch - 1.0):.1f} % so that every vehicle can keep to its limits")
-    vehicles = []
-    for vehicle, path, nominal in zip(driven, paths, found, strict=True):
-        if nominal.slid > 1e-6:
-            sentences.append(f"vehicle {vehicle.id} passes changepoints up to {nominal.slid:.2f} m from their place")
-        room = lateral_room(path, vehicle, road, MAX_ROOM_SIGMAS * config.lateral_sigma)
-        narrow = room < ROOM_SIGMAS * config.lateral_sigma
-        if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
-            sentences.append(
-                f"vehicle {vehicle.id} varies less across {100.0 * narrow.mean():.0f} % of its route, where the road is narrow"
-            )
-        lateral = lateral_covariance_root(path, room, config)
-        longitudinal = longitudinal_covariance_root(times, nominal.anchor, config)
-        knots = replace(nominal.qp.knots, knot=nominal.qp.knots.knot * stretch)
-        qp = SpeedProfileQP(knots, config, nominal.qp.bounds)
-        vehicles.append(VehicleModel(vehicle, path, nominal.anchor, lateral, longitudinal, room, qp))
-    return Prepared(CandidateModel(tuple(vehicles), warp, slide), tuple(sentences))
+    sentences: list[str],
+) -> VehicleModel:
+    """The vehicle's model; what was changed for it is added to the sentences."""
+    name, path, spline = f"vehicle {drive.vehicle.id}", drive.path, drive.spline
+    slid = drive.slid(mean)
+    if slid > _SAID_SLIDE:
+        sentences.append(f"{name} passes changepoints up to {slid:.2f} m from their place")
+    jerk = float(np.abs(exact.matmul(motion.jerk, mean)).max())
+    if jerk > bounds.jerk + _SAID_JERK:
+        sentences.append(f"{name} needs a jerk of {jerk:.1f} m/s³; {bounds.jerk:.1f} m/s³ would be smooth")
+    room = lateral_room(path, drive.vehicle, road, MAX_ROOM_SIGMAS * config.lateral_sigma)
+    narrow = room < ROOM_SIGMAS * config.lateral_sigma
+    if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
+        sentences.append(f"{name} varies less across {100.0 * narrow.mean():.0f} % of its route, where the road is narrow")
+    length = min(config.longitudinal_time, _TIME_SHARE * float(drive.times[-1] - drive.times[0]))
+    speed = speed_model(spline, mean, motion, bounds, drive.time, drive.speed, config.longitudinal_sigma, length)
+    return VehicleModel(drive.vehicle, path, lateral_covariance_root(path, room, config), room, speed)

@@ -211,7 +211,6 @@ class _Loop:
     index: Any = field(default_factory=lambda: array("q"))  # of all that are valid
     refused: Counter[Cause] = field(default_factory=Counter)
     candidates: int = 0
-    damped: int = 0
     adaptations: list[str] = field(default_factory=list)
 
     def run(self, budget: int) -> None:
@@ -248,11 +247,10 @@ class _Loop:
             batch, index = next(blocks)
             drawn = batch.scenarios(self.sampler.seed, index, self.sampler.frame_id)
             verdicts = iter(self.check([s for s in drawn if s is not None]))
-            for number, scenario, damping in zip(index, drawn, batch.damping, strict=True):
+            for number, scenario in zip(index, drawn, strict=True):
                 if seen == most or len(self.index) == self.count or self.cancelled():
                     break
                 seen += 1
-                self.damped += damping < 1.0
                 verdict = None if scenario is None else next(verdicts)
                 if scenario is not None and verdict is not None and verdict.valid:
                     good += 1
@@ -275,10 +273,6 @@ class _Loop:
             self.adaptations.append(
                 f"few candidates were valid: standard deviations multiplied by {s.lateral:g} across the route, "
                 f"{s.longitudinal:g} along it, {s.time:g} in time"
-            )
-        if self.damped:
-            self.adaptations.append(
-                f"{self.damped} of {self.candidates} candidates have a clock nearer to the template's, to be drivable"
             )
         if self.cancelled():
             self.adaptations.append("cancelled")

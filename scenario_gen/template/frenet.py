@@ -23,15 +23,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints, wrap_angle
+from scenario_gen.arrays import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
-from scenario_gen.template.tracks import smoothing_spline, Track
+from scenario_gen.template.manoeuvre import turn_of
+from scenario_gen.template.tracks import presence_of, smoothing_spline, Track
 
 _ALONG = np.radians(50.0)  # a vehicle along the road is never turned from it by more
 _SAME_LANE = 1.75  # metres of offset within which two vehicles may share a lane
 _LANE_CHANGE = 2.1  # metres of offset between start and end that make a lane change
 _LINE_WAVELENGTH = 20.0  # metres: the reference line is smoothed over this wavelength
+_ROAD_WAVELENGTH = 60.0  # metres: and as the line of a road over this one
+_STRAIGHT = np.radians(10.0)  # a template in which nobody turns by more is one of a straight road
 _STATION_WAVELENGTH = 150.0  # metres: what projection adds is smoothed over this wavelength
 _MAX_SHIFT = 30.0  # metres between oncoming vehicles on the widest road
 _BUMPER = 1.0  # metres kept between two footprints that share a lane
@@ -68,6 +71,43 @@ class FrenetTracks:
         ahead, against = self.between
         lane = self.lane + np.where(self.direction[:, None] > 0, ahead, against)
         return replace(self, lane=frozen_ints(lane), lanes=int(lane.max()) + 1, between=(0, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class MainLine:
+    """The line of the road that a template drives along, as a road of its own would have it: straight, or with its bends.
+
+    Attributes:
+        shape: the line over the stations that the template uses, footprints included.
+        station: (S,) stations of the template's reference line, ascending, and
+        at: (S,) the arc lengths [m] on `shape` at them.
+    """
+
+    shape: Curve
+    station: Floats
+    at: Floats
+
+    @property
+    def straight(self) -> bool:
+        """True if it does not bend."""
+        return len(self.shape.points) == 2
+
+
+def main_line(frenet: FrenetTracks, tracks: tuple[Track, ...]) -> MainLine:
+    """The line along which a road for the template is drawn, and on which the template is placed again.
+
+    It is straight where no vehicle turns by more than 10°; else the reference line without its wiggles.
+    """
+    half = np.array([[track.vehicle.length / 2.0] for track in tracks])
+    low, high = float((frenet.station - half).min()), float((frenet.station + half).max())
+    if max(abs(turn_of(track)) for track in tracks) <= _STRAIGHT:
+        shape = Curve(np.array([[0.0, 0.0, 0.0], [high - low, 0.0, 0.0]]))
+        return MainLine(shape, frozen([low, high]), frozen([0.0, high - low]))
+    line = frenet.line.cut(low, high, 1.0)
+    grid, smooth = smoothing_spline(line.station, line.points[:, :2], _ROAD_WAVELENGTH)
+    shape = Curve.through(smooth)
+    scale = (high - low) / line.length
+    return MainLine(shape, frozen(low + scale * grid), frozen(shape.station))
 
 
 def to_frenet(tracks: tuple[Track, ...]) -> FrenetTracks:
@@ -184,20 +224,22 @@ def _lanes(tracks: tuple[Track, ...], direction: Ints, station: Floats, offset: 
     for i in np.flatnonzero(changes):
         done = np.clip((right[i] - ends[i, 0]) / (ends[i, 1] - ends[i, 0]), 0.0, 1.0)
         change[i] = np.maximum.accumulate(done)
+    there = np.stack((change < 0.5, (change >= 0.5) | ~changes[:, None]), axis=1)  # when each is in its first, in its last lane
+    there &= np.stack([presence_of(track) for track in tracks])[:, None]
     lane = np.zeros((len(tracks), 2), dtype=np.int64)
     for sign in (1, -1):
         members = np.flatnonzero(direction == sign)
         slots = sorted((float(ends[i, k]), int(i), k) for i in members for k in (0, 1) if k == 0 or changes[i])
         current = 0
         values: list[float] = []
-        held: list[int] = []
+        held: list[tuple[int, int]] = []
         for value, j, k in slots:
             apart = bool(values) and value - float(np.mean(values)) > _SAME_LANE
-            if apart or any(_beside(tracks, station, j, other) for other in held if other != j):
+            if apart or any(_beside(tracks, station, j, other, there[j, k] & there[other, m]) for other, m in held if other != j):
                 current += max(1, round((value - float(np.mean(values))) / (2.0 * _SAME_LANE)))
                 values, held = [], []
             values.append(value)
-            held.append(j)
+            held.append((j, k))
             lane[j, k] = current
             if not changes[j]:
                 lane[j, 1] = current
@@ -214,8 +256,10 @@ def _between(direction: Ints, offset: Floats) -> tuple[int, int]:
     return (free + 1) // 2, free // 2
 
 
-def _beside(tracks: tuple[Track, ...], station: Floats, i: int, j: int) -> bool:
-    """True if the two are ever side by side, so that they cannot share a lane."""
+def _beside(tracks: tuple[Track, ...], station: Floats, i: int, j: int, when: Bools) -> bool:
+    """True if the two are ever side by side at these samples (T,), so that they cannot share a lane."""
+    if not when.any():
+        return False
     reach = (tracks[i].vehicle.length + tracks[j].vehicle.length) / 2.0 + _BUMPER
-    ahead = station[i] - station[j]
+    ahead = (station[i] - station[j])[when]
     return bool((np.abs(ahead) < reach).any() or np.sign(ahead[0]) != np.sign(ahead[-1]))

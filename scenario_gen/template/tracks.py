@@ -27,7 +27,7 @@ import math
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats, frozen, frozen_ints, Ints, wrap_angle
+from scenario_gen.arrays import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.curve import Curve
 from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
@@ -100,6 +100,12 @@ class Track:
     def turns(self) -> bool:
         """True if it turns as at a junction: by more than 45° within 30 m (a bend of the road is gentler)."""
         return abs(self.turning(30.0)) > _TURN
+
+
+def presence_of(track: Track) -> Bools:
+    """(T,) whether a vehicle is there at each sample."""
+    at = np.arange(len(track.progress))
+    return np.asarray((at >= track.present[0]) & (at <= track.present[1]))
 
 
 @once_per_encounter

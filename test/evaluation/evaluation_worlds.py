@@ -127,7 +127,7 @@ def ego_case(count=4):
     case = report_case(count, without=False)
 
     def only(scenario, n):
-        fields = ("position", "heading", "speed", "acceleration")
+        fields = ("position", "heading", "speed", "acceleration", "present")
         return replace(scenario, vehicles=(scenario.vehicles[n],), **{name: getattr(scenario, name)[[n]] for name in fields})
 
     left = tuple(only(scenario, 1) for scenario in case.generated.scenarios)

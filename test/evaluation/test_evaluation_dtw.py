@@ -86,6 +86,16 @@ def test_feature_matrix_by_hand_and_against_scipy():
         np.testing.assert_allclose(feature_matrix(a, b, ours), (cost - cost.min()) / np.ptp(cost), atol=1e-14)
 
 
+@settings(max_examples=60, deadline=None)
+@given(series(1), series(1))
+def test_headings_differ_by_the_wrapped_angle(a, b):
+    away = np.abs(np.angle(np.exp(1j * (a - b.T))))
+    spread = np.ptp(away)
+    if spread > 1e-6:
+        np.testing.assert_allclose(feature_matrix(a, b, "angle"), (away - away.min()) / spread, atol=1e-11 / spread)
+    assert dtw_distance(a[:1], b[:1], "angle") == pytest.approx(away[0, 0], abs=1e-11)
+
+
 def test_batched_rows_are_the_matrices():
     rng = np.random.default_rng(3)
     a, b = rng.normal(size=(5, 2, 20)), rng.normal(size=(5, 2, 30))

@@ -27,6 +27,7 @@ from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig, replay
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import CheckCounts, Evaluation
 from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.presence import ALWAYS
 from scenario_gen.types.scenario import BoundaryStates, Cause, ScenarioSet, Verdict, Violation
 
 T = 121
@@ -83,6 +84,71 @@ def test_json_round_trip_and_markdown():
         Evaluation.from_json('{"rows": 3}')
 
 
+def turning(scenario, degrees):
+    """The scenario, its first car turned more and more to the left."""
+    more = np.radians(degrees) * np.linspace(0.0, 1.0, len(scenario.time))
+    return replace(scenario, heading=scenario.heading + np.stack([more, 0.0 * more]))
+
+
+def test_headings_and_turns():
+    encounter = crossing()
+    bend = np.radians(60.0) * np.linspace(0.0, 1.0, T)
+    bent = replace(encounter, heading=encounter.heading + np.stack([bend, 0.0 * bend]))
+    rows = {str(d): [turning(s, d) for s in samples(encounter, 3)] for d in (0, 40, 58, 60)}
+    found = evaluate_scenarios(bent, rows, changepoints=K, config=QUICK)
+    kept = [found.value(name, "turn_kept") for name in rows]
+    assert kept == [0.5, 1.0, 1.0, 1.0]  # of two cars one goes straight on instead
+    errors = [found.value(name, "e_heading") for name in rows]
+    assert errors[0] == pytest.approx(1.0) and errors[3] < 1e-6  # parallel headings are a matrix of zeros
+    straight = evaluate_scenarios(encounter, rows, changepoints=K, config=QUICK)
+    assert "e_heading" not in straight.row("0").values  # nobody turns in the template
+    assert straight.value("60", "turn_kept") == 0.5
+
+
+def test_vanished_conflicts_are_counted_for_themselves():
+    encounter = crossing()
+    away = replace(replayed(encounter, 1), position=replayed(encounter).position + np.array([[[0.0, 0.0]], [[500.0, 0.0]]]))
+    found = evaluate_scenarios(encounter, {"x": [replayed(encounter), away]}, changepoints=K, config=QUICK)
+    assert found.value("template", "conflicts") == 1.0
+    assert (found.value("x", "conflicts"), found.value("x", "vanished_conflicts")) == (0.5, 0.5)
+    assert found.value("x", "order_kept") == 1.0  # of those that are there
+    assert any("0.5 of the template's 1 conflict(s) vanish" in note for note in found.row("x").notes)
+
+
+def late(source, n, first):
+    """The encounter or scenario, vehicle n of which arrives at sample `first`."""
+    present = source.present.copy()
+    present[n, 0] = first
+    return replace(source, present=present)
+
+
+def test_who_arrives_late_is_measured_while_there():
+    whole = crossing()
+    encounter, made = late(whole, 1, 40), [late(sample, 1, 40) for sample in samples(whole, 3)]
+    found = evaluate_scenarios(encounter, {"x": made, "oracle": [late(replayed(whole), 1, 40)]}, changepoints=K, config=QUICK)
+    # for the pair the same as where both are there from then on
+    cut = replace(
+        whole, position=whole.position[:, 40:], heading=whole.heading[:, 40:], speed=whole.speed[:, 40:], present=ALWAYS
+    )
+    rows = [replayed_from(sample, 40) for sample in samples(whole, 3)]
+    after = evaluate_scenarios(cut, {"x": rows}, changepoints=K, config=QUICK)
+    for key in ("e_position", "e_speed"):
+        assert found.value("x", key) == pytest.approx(after.value("x", key), rel=0.03), key
+    for key in ("min_distance", "min_ttc"):
+        assert found.value("x", key) == pytest.approx(after.value("x", key), rel=1e-9), key
+    assert found.value("oracle", "e_position") < 1e-6 and found.value("oracle", "js_gap") < 1e-9
+    alone = late(encounter, 1, 115)
+    last = evaluate_scenarios(alone, {"x": [late(replayed(whole), 1, 115)]}, changepoints=K, config=QUICK)
+    assert any("E leaves out 1 pair(s)" in note for note in last.row("x").notes)
+    assert math.isnan(last.value("x", "e_position")) and math.isfinite(last.value("x", "js_speed"))
+
+
+def replayed_from(scenario, first):
+    """The scenario from an instant on."""
+    parts = {name: getattr(scenario, name)[:, first:] for name in ("position", "heading", "speed", "acceleration")}
+    return replace(scenario, time=scenario.time[first:] - scenario.time[first], present=ALWAYS, **parts)
+
+
 def test_missing_and_empty_rows():
     encounter = crossing()
     found = evaluate_scenarios(encounter, {"with changepoints": []}, changepoints=K, config=QUICK)
@@ -101,6 +167,7 @@ def test_another_number_of_vehicles_is_refused():
         heading=scenario.heading[[0, 1, 1]],
         speed=scenario.speed[[0, 1, 1]],
         acceleration=scenario.acceleration[[0, 1, 1]],
+        present=scenario.present[[0, 1, 1]],
     )
     with pytest.raises(InputError, match="3 vehicles"):
         evaluate_scenarios(encounter, {"x": [trio]}, changepoints=K, config=QUICK)
@@ -163,7 +230,7 @@ def test_the_oracle_keeps_a_dwell_and_a_short_chord():
 
 def alone(scenario, n):
     """The scenario of vehicle n alone."""
-    fields = ("position", "heading", "speed", "acceleration")
+    fields = ("position", "heading", "speed", "acceleration", "present")
     return replace(scenario, vehicles=(scenario.vehicles[n],), **{name: getattr(scenario, name)[[n]] for name in fields})
 
 

@@ -195,14 +195,19 @@ def test_turns_take_the_arm_on_their_side():
             fit_template(encounter, every(encounter), build_road("straight", encounter))
 
 
-def test_a_platoon_on_a_bend_keeps_its_gaps_on_a_straight_road():
+@pytest.mark.parametrize("road_name", ["curve", "t_intersection", "four_way"])
+def test_a_platoon_on_a_bend_keeps_its_bend_and_its_gaps_and_is_refused_on_a_straight_road(road_name):
     bend = turn(0.0, 0.0, 0.0, 20.0, 1.4, 120.0, 400.0)
     ahead = Curve(bend.at(np.arange(18.0, 400.0, 0.5)))
     encounter = encounter_of(driven(ahead, np.full(150, 12.0)), driven(bend, np.full(150, 12.0)))
-    fit = fit_template(encounter, every(encounter), build_road("straight", encounter))
+    fit = fit_template(encounter, every(encounter), build_road(road_name, encounter))
     lead, follow = (f.anchors for f in fit.fitted)
-    assert np.abs(lead[:, 1] - follow[:, 1]).max() < 1e-6
-    assert np.abs(np.abs(lead[:, 0] - follow[:, 0]) - 18.0).max() < 0.1
+    assert np.abs(np.hypot(*(lead - follow)[:, :2].T) - 18.0).max() < 0.25
+    for f in fit.fitted:
+        assert f.turned[1] == pytest.approx(f.turned[0], abs=np.radians(5.0))
+    assert not [loss for loss in fit.lost if loss.kind != "arm"]
+    with pytest.raises(RefusedError, match=r"vehicle 0 turns left by 80°.*would on road straight go straight on"):
+        fit_template(encounter, every(encounter), build_road("straight", encounter))
 
 
 def test_scale_out_of_range_is_refused_with_the_figure():

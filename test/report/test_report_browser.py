@@ -15,6 +15,7 @@
 """The report in headless Chromium: no errors, no requests, it plays, scrubs and switches; nothing is wider than a phone."""
 
 from base64 import b64decode
+from dataclasses import replace
 import io
 
 from browser_tab import DESKTOP, PHONE, Tab
@@ -70,7 +71,7 @@ def test_it_loads_without_errors_or_requests(tab, report):
     tab.page.wait_for_timeout(300)
     assert tab.troubles == []
     assert tab.asked() == [report.as_uri()]
-    assert tab.page.locator('[data-case="0"] .js-plotly-plot').count() == 9  # template, two arms, six matrices
+    assert tab.page.locator('[data-case="0"] .js-plotly-plot').count() == 10  # template, two arms, motion, six matrices
     for role in ("stage", "template-map", "routes", "samples-with", "samples-without"):
         pixels = Image.open(io.BytesIO(b64decode(tab.picture(role).partition(",")[2])))
         assert len(pixels.getcolors(1_000_000)) > 10, role
@@ -176,4 +177,24 @@ def test_an_ego_is_drawn_as_its_template_track(browser, tmp_path):
     tab.part("play").click()
     tab.wait(lambda: tab.picture("stage") != before)
     assert tab.troubles == []
+    tab.page.close()
+
+
+def test_who_arrives_late_is_not_shown_before(browser, tmp_path):
+    case = report_case(3, without=False)
+
+    def late(motion):
+        present = motion.present.copy()
+        present[1, 0] = 60
+        return replace(motion, present=present)
+
+    made = replace(case.generated, scenarios=tuple(map(late, case.generated.scenarios)))
+    write_report(
+        tmp_path / "late.html", ReportInput([replace(case, encounter=late(case.encounter), generated=made, oracle=None)])
+    )
+    tab = Report(browser, tmp_path / "late.html", DESKTOP)
+    tab.page.wait_for_timeout(300)
+    assert "not there" in tab.part("readout").inner_text()
+    tab.part("scrub").fill("800")
+    assert "not there" not in tab.part("readout").inner_text() and tab.troubles == []
     tab.page.close()

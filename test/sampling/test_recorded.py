@@ -55,8 +55,8 @@ def test_recorded_encounter(data, case, ablation):
     assert found.acceptance > 0.7
     assert found.candidates == 30 + found.refused.total()
     for s in found.scenarios:
-        assert s.acceleration.max() <= config.max_acceleration + 1e-4
-        assert s.acceleration.min() >= -config.max_deceleration - 1e-4
+        assert s.acceleration.max() <= 5.0 + 1e-6  # the checker's limit
+        assert s.acceleration.min() >= -9.0 - 1e-6
         assert abs(s.time[-1] / encounter.duration - 1.0) <= (1.0 + config.max_stretch) * 1.1 - 1.0 + 1e-9
         for wait in waits:
             assert (s.speed[wait.vehicle] == 0.0).sum() * 0.1 > 0.7 * (wait.end - wait.start)

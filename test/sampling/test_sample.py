@@ -22,11 +22,11 @@ import pytest
 
 from scenario_gen.arrays import wrap_angle
 from scenario_gen.errors import InputError
+from scenario_gen.reproduce.speed_profile import SpeedProfile
 from scenario_gen.sampling import regenerate, sample_scenarios, SamplingConfig
 from scenario_gen.sampling.candidates import Scale
 from scenario_gen.sampling.prepare import prepare
 from scenario_gen.sampling.sample import LEVEL_SIZE
-from scenario_gen.sampling.speed_profile.qp import SpeedProfile
 from scenario_gen.template.interaction import find_waits, Wait
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.road import Road
@@ -90,12 +90,12 @@ def all_valid(scenarios):
 
 def drawn(count=50, check=all_valid, config=None, seed=5):
     *head, waits = scene()
-    return sample_scenarios(*head, check, config or SamplingConfig(), count=count, seed=seed, waits=waits)
+    return sample_scenarios(*head, check, config or SamplingConfig(bend_acceleration=5.0), count=count, seed=seed, waits=waits)
 
 
 def batch(samples=200, scale=None, **changes):
     *head, waits = scene(120.0)
-    model = prepare(*head, waits, SamplingConfig(**changes)).model
+    model = prepare(*head, waits, SamplingConfig(bend_acceleration=5.0, **changes)).model
     return model, model.draw(np.random.default_rng(1).standard_normal((samples, model.size)), scale or Scale())
 
 
@@ -115,7 +115,7 @@ def test_grid_and_duration(fifty):
         assert np.array_equal(s.time, np.round(np.arange(len(s.time)) * 0.1, 9))
         assert 18.0 - 1e-9 <= s.time[-1] <= 22.0 + 1e-9
     assert len({len(s.time) for s in fifty.scenarios}) > 5
-    fixed = drawn(config=SamplingConfig(fixed_duration=True))
+    fixed = drawn(config=SamplingConfig(fixed_duration=True, bend_acceleration=5.0))
     assert {s.time[-1] for s in fixed.scenarios} == {20.0}
 
 
@@ -145,13 +145,13 @@ def test_speed_is_the_rate_of_position_and_acceleration_that_of_speed(fifty):
         along = 0.5 * (s.heading[:, 1:] + s.heading[:, :-1])
         ahead = step[..., 0] * np.cos(along) + step[..., 1] * np.sin(along)
         aside = -step[..., 0] * np.sin(along) + step[..., 1] * np.cos(along)
-        bend = np.abs(np.diff(s.acceleration, axis=1)) * 0.1 / 8.0  # a knot between two samples
-        assert (np.abs(ahead / 0.1 - 0.5 * (s.speed[:, 1:] + s.speed[:, :-1])) < bend + 0.02).all()
+        assert np.abs(ahead / 0.1 - 0.5 * (s.speed[:, 1:] + s.speed[:, :-1])).max() < 0.02
         assert np.abs(aside / 0.1).max() < 0.05
         rate = np.diff(s.speed, axis=1) / 0.1
         low = np.minimum(s.acceleration[:, 1:], s.acceleration[:, :-1])
         high = np.maximum(s.acceleration[:, 1:], s.acceleration[:, :-1])
-        assert ((rate > low - 1e-6) & (rate < high + 1e-6)).all()
+        assert ((rate > low - 0.05) & (rate < high + 0.05)).all()
+        assert np.abs(np.diff(s.acceleration, axis=1)).max() / 0.1 < 12.0  # the template's has corners of 20
 
 
 def test_headings_are_smooth(fifty):
@@ -168,7 +168,7 @@ def test_same_seed_same_bytes_and_any_one_again(fifty):
         assert a.position.tobytes() == b.position.tobytes() == c.position.tobytes()
         assert a.speed.tobytes() == b.speed.tobytes() == c.speed.tobytes()
     last = more.scenarios[-1]
-    one = regenerate(*head, seed=5, index=last.index, waits=waits)
+    one = regenerate(*head, SamplingConfig(bend_acceleration=5.0), seed=5, index=last.index, waits=waits)
     for name in ("time", "position", "heading", "speed", "acceleration"):
         assert getattr(one, name).tobytes() == getattr(last, name).tobytes()
     assert drawn(count=1, seed=6).scenarios[0].position.tobytes() != fifty.scenarios[0].position.tobytes()
@@ -178,13 +178,13 @@ def test_state_at_any_time_agrees_with_the_published_samples():
     _, some = batch(8)
     published = some.scenarios(0, range(8), "map")
     for k, s in enumerate(published):
-        for n in range(3):
-            state = some.motion(k, n).state(s.time)
-            assert np.array_equal(state[:, :2], s.position[n])
-            assert np.array_equal(state[:, 3], s.speed[n])
-            between = some.motion(k, n).state(np.linspace(0.0, s.time[-1], 5001))
-            travelled = np.hypot(*np.diff(between[:, :2], axis=0).T).sum()
-            assert travelled == pytest.approx(SpeedProfile(some.knot[n][k], some.speed[n][k]).travelled[-1], abs=1e-3)
+        state = some.states(s.time)[:, k]
+        assert np.array_equal(state[..., :2], s.position)
+        assert np.array_equal(state[..., 3], s.speed)
+        between = some.states(np.linspace(0.0, s.time[-1], 5001))[:, k]
+        for n in range(2):
+            travelled = np.hypot(*np.diff(between[n, :, :2], axis=0).T).sum()
+            assert travelled == pytest.approx(some.arc[n][k, -1], abs=2e-3)
 
 
 def spread_across(b):
@@ -203,8 +203,8 @@ def roughness(b):
         ("lateral_sigma", (0.1, 0.2, 0.4, 0.8), spread_across, 1),
         ("observation_sigma", (0.05, 0.2, 0.6), spread_across, 1),
         ("lateral_length", (8.0, 15.0, 30.0, 60.0), roughness, -1),
-        ("time_sigma", (0.1, 0.3, 0.6, 1.0), lambda b: float(b.warped[:, 2].std()), 1),
-        ("time_sigma", (0.1, 0.3, 0.6, 1.0), lambda b: float(b.warped[:, -1].std()), 1),
+        ("time_sigma", (0.1, 0.3, 0.6, 1.0), lambda b: float(warped(b)[:, 2].std()), 1),
+        ("time_sigma", (0.1, 0.3, 0.6, 1.0), lambda b: float(warped(b)[:, -1].std()), 1),
         ("longitudinal_sigma", (0.0, 0.5, 1.0, 2.0), lambda b: float(stops(b).std()), 1),
     ],
 )
@@ -213,25 +213,30 @@ def test_each_parameter_has_its_monotone_effect(name, values, measure, sign):
     assert (np.diff(found) > 0.0).all(), found
 
 
+def warped(b):
+    """Times (S, K + 2) [s] of start, changepoints and end."""
+    return b.clock.time[:, np.searchsorted(b.clock.grid, CLOCK - 1e-9)]
+
+
 def stops(b):
     """Where vehicle 1 stands [m]."""
-    middle = 0.5 * (b.warped[:, 2] + b.warped[:, 3])
-    return np.array([b.motion(k, 1).state(middle[[k]])[0, 1] for k in range(len(b.warped))])
+    middle = 0.5 * (warped(b)[:, 2] + warped(b)[:, 3])
+    return np.array([b.states(middle[[k]])[1, k, 0, 1] for k in range(len(middle))])
 
 
 def test_deviations_have_the_stated_standard_deviation():
     model, some = batch(4000, lateral_sigma=0.4, observation_sigma=10.0)
     middle = len(model.vehicles[0].path.node) // 2
-    assert some.curve[0][:, middle, 1].std() == pytest.approx(0.4, rel=0.05)
-    assert some.warped[:, 2].std() == pytest.approx(np.sqrt(1.0 - np.exp(-((9.0 / 30.0) ** 2))), rel=0.1)
+    assert some.curve[0][:, middle, 1].std() == pytest.approx(0.36, rel=0.05)  # tied down at both ends
 
 
-def test_clocks_are_monotone_and_shared():
+def test_clocks_are_monotone_and_shared_and_end_on_the_grid():
     _, some = batch(500, time_sigma=3.0)
-    rate = np.diff(some.warped, axis=1) / np.diff(CLOCK)
+    rate = some.clock.rate
     assert rate.min() > 0.7
     assert rate.max() < 1.4
-    assert np.abs(some.warped[:, -1] / 0.1 - np.round(some.warped[:, -1] / 0.1)).max() < 1e-9
+    assert np.abs(some.clock.time[:, -1] / 0.1 - np.round(some.clock.time[:, -1] / 0.1)).max() < 1e-9
+    assert np.abs(rate[:, [0, -1]] - 1.0).max() < 1e-6  # speeds are given at both ends
 
 
 def test_lateral_deviation_leaves_room_on_a_narrow_road():
@@ -258,7 +263,10 @@ def test_refusals_are_counted_by_cause_and_levels_are_tried():
     assert max(s.index for s in found.scenarios) >= LEVEL_SIZE
     *head, waits = scene()
     last = found.scenarios[-1]
-    assert regenerate(*head, seed=5, index=last.index, waits=waits).position.tobytes() == last.position.tobytes()
+    assert (
+        regenerate(*head, SamplingConfig(bend_acceleration=5.0), seed=5, index=last.index, waits=waits).position.tobytes()
+        == last.position.tobytes()
+    )
 
 
 def test_short_set_is_returned_with_its_account():
@@ -293,9 +301,10 @@ def test_nothing_is_given_out_after_a_cancellation():
 
 def test_a_wait_stands_where_the_vehicle_does_not_where_it_creeps():
     *head, _ = scene()
-    qp = prepare(*head, (Wait(1, 6.8, 13.2),), SamplingConfig()).model.vehicles[1].qp
-    still = np.flatnonzero(qp.knots.still)
-    assert qp.knots.knot[[still[0], still[-1] + 1]] == pytest.approx([7.0, 13.0])
+    speed = prepare(*head, (Wait(1, 6.8, 13.2),), SamplingConfig()).model.vehicles[1].speed
+    at_rest = speed.spline.breaks[speed.spline.design(speed.spline.breaks) @ speed.mean == 0.0]
+    assert 7.0 <= at_rest[0] < 7.5
+    assert 12.5 < at_rest[-1] <= 13.0
 
 
 def test_a_creeping_wait_stays_slow_and_does_not_stand():
@@ -319,7 +328,7 @@ def test_a_creeping_wait_stays_slow_and_does_not_stand():
 
 def test_stretched_clock_is_said():
     encounter, segmentation, road, routes, asked, waits = scene()
-    slow = SamplingConfig(max_speed=6.6)
+    slow = SamplingConfig(max_speed=6.0)
     done = prepare(encounter, segmentation, road, routes, asked, waits, slow)
     assert done.model is not None
     assert any("stretched" in sentence for sentence in done.adaptations)

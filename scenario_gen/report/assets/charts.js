@@ -27,7 +27,8 @@ function clock(set, sample) {
 }
 
 function speeds(set, sample, vehicle) {
-  return Array.from({ length: set.frames }, (_, f) => +set.values[set.offset(sample, vehicle, f) + 3].toFixed(2));
+  const at = (f) => +set.values[set.offset(sample, vehicle, f) + 3].toFixed(2);
+  return Array.from({ length: set.frames }, (_, f) => (set.there(sample, vehicle, f / (set.frames - 1)) ? at(f) : null));
 }
 
 /** Figure 3: speed over time on the colours of its primitives, and the probability of a changepoint below. */
@@ -80,6 +81,31 @@ function drawSpeeds(place, data, set, template, top) {
   plot(place, traces, {
     xaxis: { ...GRID, title: { text: "time [s]", standoff: 6 } },
     yaxis: { ...GRID, title: { text: "speed [m/s]", standoff: 6 }, range: [0, top] },
+  });
+}
+
+/** One vehicle's speed, acceleration and lateral acceleration: the template bold, samples (all, or the one chosen) thin. */
+function drawMotion(place, motion, colour, chosen) {
+  const traces = [];
+  const add = (packed, line) => {
+    const { shape: [frames, channels], low, step, data } = packed.values;
+    const whole = new Uint16Array(bytesOf(data).buffer);
+    const x = Array.from({ length: frames }, (_, f) => +(packed.from + ((packed.to - packed.from) * f) / (frames - 1)).toFixed(2));
+    for (let c = 0; c < channels; c += 1) {
+      const y = Array.from({ length: frames }, (_, f) => +(low[c] + step[c] * whole[f * channels + c]).toFixed(3));
+      traces.push({ x, y, yaxis: `y${c ? c + 1 : ""}`, mode: "lines", line, hoverinfo: "skip" });
+    }
+  };
+  motion.samples.forEach((sample, s) => {
+    if (chosen < 0 || chosen === s) add(sample, { color: colour, width: chosen < 0 ? 1 : 2 });
+  });
+  add(motion.template, { color: "#0f172a", width: 2.5 });
+  const axis = (title, domain) => ({ ...GRID, title: { text: title, standoff: 6, font: { size: 11 } }, domain });
+  plot(place, traces, {
+    xaxis: { ...GRID, anchor: "y3", title: { text: "time [s]", standoff: 6 } },
+    yaxis: { ...axis("speed [m/s]", [0.7, 1]), rangemode: "tozero" },
+    yaxis2: axis("acceleration [m/s²]", [0.35, 0.65]),
+    yaxis3: axis("lateral [m/s²]", [0, 0.3]),
   });
 }
 

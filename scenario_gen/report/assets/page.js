@@ -113,7 +113,8 @@ class Player {
     const { data, set, sample, view } = this;
     const share = this.time / this.duration;
     const states = data.vehicles.map((_, n) => set.state(sample, n, share));
-    view.box = this.frame(states);
+    const here = data.vehicles.map((_, n) => set.there(sample, n, share));
+    view.box = this.frame(states.filter((_, n) => here[n]));
     const context = view.begin();
     view.road(data.road, this.picture);
     const ghosts = this.find("ghosts").checked;
@@ -129,11 +130,15 @@ class Player {
       set.path(context, view, sample, n, Math.max(0, share - 3 / this.duration), share);
       if (ghosts) {
         for (let s = 0; s < set.samples; s += 1) {
-          if (s !== sample && !isEgo(data, n)) view.footprint(set.state(s, n, this.time / set.durations[s]), vehicle, vehicleColour(n), 0.08, false);
+          if (s !== sample && !isEgo(data, n) && set.there(s, n, this.time / set.durations[s])) view.footprint(set.state(s, n, this.time / set.durations[s]), vehicle, vehicleColour(n), 0.08, false);
         }
       }
     });
     data.vehicles.forEach((vehicle, n) => {
+      if (!here[n]) {
+        this.readouts[n].textContent = "not there";
+        return;
+      }
       if (isEgo(data, n)) {
         view.outline(states[n], vehicle, vehicleColour(n));
         view.label(states[n].x, states[n].y, "ego", vehicleColour(n));
@@ -180,6 +185,17 @@ function open(section, data) {
     drawSpeeds(find(`speeds-${arm}`), data, sets[arm], template, 1.08 * top);
   });
   drawTemplate(find("template-speed"), data, template);
+  const who = find("motion-vehicle");
+  const which = find("motion-sample");
+  const motion = () => drawMotion(find("motion"), data.motion[who.selectedIndex], vehicleColour(who.selectedIndex), which.selectedIndex - 1);
+  const listed = () => {
+    which.replaceChildren(option("", "all drawn samples"), ...data.motion[who.selectedIndex].index.map((index) => option(index, `sample ${index}`)));
+    motion();
+  };
+  who.append(...data.vehicles.map((vehicle, n) => option(n, vehicle.id)));
+  who.addEventListener("change", listed);
+  which.addEventListener("change", motion);
+  listed();
   section.querySelectorAll('[data-role="legend"]').forEach((list) => list.append(...data.vehicles.map((vehicle, n) => chipLine(vehicle, n))));
   const pairs = find("pair");
   data.features.forEach((feature, i) => pairs.append(option(i, feature.pair.map((n) => data.vehicles[n].id).join(" and "))));

@@ -25,7 +25,7 @@ from itertools import pairwise
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, frozen, Ints
+from scenario_gen.arrays import Bools, Floats, frozen, Ints, runs
 
 STAND = 0.05  # m/s; an asked speed below this is met by standing
 SHORTEST = 0.2  # s, between two knots in the template
@@ -44,7 +44,7 @@ class SpeedKnots:
         creeping: (M - 1,) True where it waits, but rolls on slowly.
         group: (M - 1,) length constraint each moving interval belongs to, -1 where it stands.
         bounds: (G, 2) anchors at which each length constraint begins and ends.
-        moments: (M - 1, 2) ∫ (1 - ξ) v̂ dξ and ∫ ξ v̂ dξ over each interval, ξ from 0 to 1 [m/s].
+        lines: (M,) m/s, v̂ at the knots: the straight lines that fit the template's speed best.
         interior: numbers of the knots inside primitives.
         unknown: (M,) number of each knot's unknown speed, -1 where it is given.
         given: (M,) m/s, the speed where it is given.
@@ -56,10 +56,20 @@ class SpeedKnots:
     creeping: Bools
     group: Ints
     bounds: Ints
-    moments: Floats
+    lines: Floats
     interior: Ints
     unknown: Ints
     given: Floats
+
+    @property
+    def moments(self) -> Floats:
+        """(M - 1, 2) ∫ (1 - ξ) v̂ dξ and ∫ ξ v̂ dξ over each interval, ξ from 0 to 1 [m/s]."""
+        a, b = self.lines[:-1], self.lines[1:]
+        return np.column_stack([a / 3.0 + b / 6.0, a / 6.0 + b / 3.0])
+
+    def stretches(self, marked: Bools) -> list[tuple[float, float]]:
+        """Begin and end [s] of the longest runs of marked intervals (M - 1,)."""
+        return [(float(self.knot[a]), float(self.knot[b])) for a, b in runs(marked)]
 
     @property
     def size(self) -> int:
@@ -88,13 +98,14 @@ def speed_knots(
         time: (T,) the template's samples [s].
         speed: (T,) its speeds [m/s].
         ends: asked speeds [m/s] at start and end.
-        knot_share: where in each primitive its knot lies, as a share of its duration; None for where the template bends.
+        knot_share: where in each primitive a knot lies, as a share of its duration; 0 for none, None for where the template
+            bends.
         creeps: begin and end [s] of the waits in which it rolls on slowly; they become knots.
     """
     cuts, still = _cuts(clock, dwells, waits, ends, creeps)
     knots, stands, interior = [cuts[0]], [], []
     for a, b, stand in zip(cuts[:-1], cuts[1:], still, strict=True):
-        if not stand:
+        if not stand and knot_share != 0.0:
             at = best_knot(time, speed, a, b) if knot_share is None else a + knot_share * (b - a)
             distance = min(KNOT_DISTANCE, 0.5 * (b - a))
             interior.append(len(knots))
@@ -113,9 +124,8 @@ def speed_knots(
     given[1:][standing] = 0.0
     unknown = np.where(np.isnan(given), np.cumsum(np.isnan(given)) - 1, -1)
     fitted = _joined_lines(time, speed, knot, standing)
-    moments = np.column_stack([fitted[:-1] / 3.0 + fitted[1:] / 6.0, fitted[:-1] / 6.0 + fitted[1:] / 3.0])
     inner = np.array(interior, dtype=np.int64)
-    return SpeedKnots(knot, piece, standing, slow, group, bounds, frozen(moments), inner, unknown, np.nan_to_num(given))
+    return SpeedKnots(knot, piece, standing, slow, group, bounds, frozen(fitted), inner, unknown, np.nan_to_num(given))
 
 
 def _stands(t: float, clock: Floats, dwells: Bools, waits: list[tuple[float, float]]) -> bool:

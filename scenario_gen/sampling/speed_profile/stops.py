@@ -20,14 +20,11 @@ from dataclasses import replace
 import numpy as np
 
 from scenario_gen.arrays import Floats
-from scenario_gen.sampling.speed_profile.knots import SpeedKnots
-from scenario_gen.sampling.speed_profile.qp import SpeedBounds
 from scenario_gen.sampling.time_warp import SHORTEST_SHARE
-from scenario_gen.template.interaction import STAND_SPEED, Wait, WAIT_SPEED
+from scenario_gen.template.interaction import STAND_SPEED, Wait
 from scenario_gen.types.encounter import Encounter
 
-_CREEPS = 0.9 * WAIT_SPEED  # m/s, fastest in a creeping wait
-_SHORTEST_WAIT = 1.25  # s; shorter waits are lengthened to it, so that they are still waits on the published grid
+SHORTEST_WAIT = 1.25  # s; shorter waits are lengthened to it, so that they are still waits on the published grid
 _LEAST_WAIT = 1.15  # s, to which a fast clock may shorten one
 
 
@@ -45,12 +42,12 @@ def standing_part(encounter: Encounter, wait: Wait) -> Wait:
     return replace(wait, start=start, end=end)
 
 
-def shortest_shares(times: Floats, waits: Sequence[Wait]) -> Floats:
-    """(K + 1,) the shortest each primitive may become, as a share of its duration, so that every wait remains one."""
-    shares = np.full(len(times) - 1, SHORTEST_SHARE)
+def least_shares(grid: Floats, waits: Sequence[Wait]) -> Floats:
+    """(G,) the slowest that a clock may run at template times (G,) [s], as a share of the nominal, so that waits remain waits."""
+    shares = np.full(len(grid), SHORTEST_SHARE)
     for wait in waits:
-        inside = (times[1:] > wait.start) & (times[:-1] < wait.end)
-        least = _LEAST_WAIT / max(wait.end - wait.start, _SHORTEST_WAIT)
+        inside = (grid > wait.start - 1.0) & (grid < wait.end + 1.0)
+        least = _LEAST_WAIT / max(wait.end - wait.start, SHORTEST_WAIT)
         shares[inside] = np.maximum(shares[inside], least)
     return shares
 
@@ -58,13 +55,5 @@ def shortest_shares(times: Floats, waits: Sequence[Wait]) -> Floats:
 def lengthened(n: int, waits: Sequence[Wait], *, creeping: bool) -> list[tuple[float, float]]:
     """Begin and end [s] of vehicle n's waits of one kind, short ones lengthened."""
     own = [wait for wait in waits if wait.vehicle == n and wait.creeps == creeping]
-    pads = [max(0.0, 0.5 * (_SHORTEST_WAIT - (wait.end - wait.start))) for wait in own]
+    pads = [max(0.0, 0.5 * (SHORTEST_WAIT - (wait.end - wait.start))) for wait in own]
     return [(wait.start - pad, wait.end + pad) for wait, pad in zip(own, pads, strict=True)]
-
-
-def creep_bounds(knots: SpeedKnots) -> SpeedBounds:
-    """Speed bounds at both ends of every interval within a creeping wait, where the speed there is not given."""
-    inside = np.flatnonzero(knots.creeping)
-    interval, at = np.concatenate([inside, inside]), np.repeat([0.0, 1.0], len(inside))
-    known = knots.unknown[interval + at.astype(np.int64)] < 0
-    return SpeedBounds(interval[~known], at[~known], np.full(int((~known).sum()), _CREEPS))

@@ -49,6 +49,13 @@ _LENGTH_TOLERANCE = 1e-6  # m
 _EQUALITY = 5  # DAQP's mark
 
 
+def knots_on(warped: Floats, times: Floats, knots: SpeedKnots) -> Floats:
+    """Knots (S, M) [s] of a vehicle at the warped times (S, K + 2) of `times` (K + 2,), linear within each primitive."""
+    piece = np.append(knots.piece, knots.piece[-1])
+    share = (knots.knot - times[piece]) / (times[piece + 1] - times[piece])
+    return np.asarray(warped[:, piece] + share * (warped[:, piece + 1] - warped[:, piece]))
+
+
 @dataclass(frozen=True, eq=False)
 class SpeedProfile:
     """Speed over time, linear between knots.

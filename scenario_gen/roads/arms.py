@@ -1,0 +1,76 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The arms of a road: where lanes in and lanes out lie side by side, and the line between them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, frozen, wrap_angle
+from scenario_gen.roads.ways import relative
+from scenario_gen.types.road import Road
+
+_PARALLEL = np.radians(3.0)
+_LEVEL = 0.5  # metres along the arm by which the ends of its lanes may differ
+_WIDEST = 40.0  # metres sideways
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """An arm of a road.
+
+    Attributes:
+        pose: (3,) the end of its dividing line, heading out of the road.
+        inward: (E,) offsets [m, left of `pose` positive] of the lanes in.
+        outward: (X,) offsets of the lanes out.
+    """
+
+    pose: Floats
+    inward: Floats
+    outward: Floats
+
+
+def reverse(pose: Floats) -> Floats:
+    """The same place (3,), heading the other way."""
+    return np.asarray(pose + np.array([0.0, 0.0, np.pi]))
+
+
+def arms_of(road: Road) -> tuple[Arm, ...]:
+    """The arms of a road that have lanes both ways, in the order of the exits."""
+    arms: list[Arm] = []
+    taken: set[int] = set()
+    for x, leave in enumerate(road.exits):
+        if x in taken:
+            continue
+        outs = [k for k, other in enumerate(road.exits) if k not in taken and _beside(leave, other)]
+        taken.update(outs)
+        ins = [k for k, other in enumerate(road.entries) if _beside(leave, reverse(other))]
+        if not ins:
+            continue
+        out_offset = np.array([relative(leave, road.exits[k, :2])[1] for k in outs])
+        in_offset = np.array([relative(leave, road.entries[k, :2])[1] for k in ins])
+        gap = np.abs(in_offset[:, None] - out_offset[None])
+        i, o = np.unravel_index(int(np.argmin(gap)), gap.shape)
+        middle = float(in_offset[i] + out_offset[o]) / 2.0
+        pose = leave + middle * np.array([-exact.sin(leave[2]), exact.cos(leave[2]), 0.0])
+        arms.append(Arm(frozen(pose), frozen(np.sort(in_offset - middle)), frozen(np.sort(out_offset - middle))))
+    return tuple(arms)
+
+
+def _beside(pose: Floats, other: Floats) -> bool:
+    ahead, left = relative(pose, other[:2])
+    turned = abs(float(wrap_angle(np.asarray(other[2] - pose[2]))))
+    return turned < _PARALLEL and abs(ahead) < _LEVEL and abs(left) < _WIDEST

@@ -1,0 +1,66 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The nominal clock: the template's, slowed ahead of bends that the template's speed would not suit.
+
+A route may bend more than the recorded path did. A vehicle that slowed down alone would have to make up for it elsewhere, for
+lengths and changepoint times are given: it would speed up, brake and speed up again. So the clock of all vehicles runs slower
+there, they meet as before, and it is known before the bend.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.sampling.time_warp import Clock
+from scenario_gen.types.encounter import Encounter
+
+GRID = 0.1  # s
+REACH = 1.5  # s, ahead of a bend and behind it, over which the clock is slowed
+
+
+def template_grid(encounter: Encounter) -> Floats:
+    """(G,) evenly spaced template times [s], the samples' own among them."""
+    parts = max(round(encounter.dt / GRID), 1)
+    return np.linspace(0.0, encounter.duration, parts * (len(encounter.time) - 1) + 1)
+
+
+def slowed_clock(grid: Floats, needs: Sequence[Floats], most: float) -> Clock:
+    """The clock that runs everywhere as slow as any vehicle needs, smooth (C2), at most `most` times as long as the template.
+
+    Args:
+        grid: (G,) template times [s].
+        needs: (G,) per vehicle, by how much the clock must be slowed there; 1 where it need not.
+        most: duration over the template's, at most; needs beyond it are met in part.
+    """
+    from scipy.ndimage import maximum_filter1d, uniform_filter1d  # slow to import
+
+    need = np.maximum(np.max(needs, axis=0), 1.0)
+    step = float(grid[1] - grid[0])
+    width = 2 * max(round(REACH / step / 3.0), 1) + 1
+    rate = maximum_filter1d(need, 3 * (width - 1) + 1, mode="nearest")
+    for _ in range(3):
+        rate = uniform_filter1d(rate, width, mode="nearest")
+    extra = rate - 1.0
+    longer = 0.5 * step * float((extra[1:] + extra[:-1]).sum())
+    room = (most - 1.0) * float(grid[-1] - grid[0])
+    rate = 1.0 + extra * (min(room / longer, 1.0) if longer > 0.0 else 1.0)
+    return clock_of(grid, rate)
+
+
+def clock_of(grid: Floats, rate: Floats) -> Clock:
+    """The clock with these rates (G,) on its grid, cubic between."""
+    step = float(grid[1] - grid[0])
+    time = np.concatenate([[0.0], np.cumsum(0.5 * step * (rate[1:] + rate[:-1]))])
+    return Clock(grid, time, rate)

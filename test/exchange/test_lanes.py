@@ -1,0 +1,110 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Lanes: those of a built-in road cover its drivable cells and no more; derived ones hold every footprint."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapely import box, contains_xy, Polygon, union_all
+from small_scenarios import crossing, moving
+
+from scenario_gen.exchange.derived_lanes import derived_lanes
+from scenario_gen.exchange.lanes import lanes_of
+from scenario_gen.exchange.road_lanes import lane_map_of, true_lanes
+from scenario_gen.roads import RoadConfig
+from scenario_gen.roads.build import build_road
+
+CONFIGS = [RoadConfig(), RoadConfig(lanes=2, traffic_side="left"), RoadConfig(lanes=3, corner_radius=11.0, lane_width=3.1)]
+
+
+def area_of(lanes):
+    return union_all([Polygon(np.concatenate([lane.left, lane.right[::-1]])) for lane in lanes])
+
+
+@pytest.mark.parametrize("config", CONFIGS, ids=["plain", "left-hand", "wide"])
+@pytest.mark.parametrize("name", ["straight", "t_intersection", "four_way"])
+def test_true_lanes_are_the_drivable_cells(name, config):
+    road = build_road(name, None, config)
+    lane_map = true_lanes(road, name, None, config, run_out=1.0)  # the last cells reach beyond the ends of arms
+    assert lane_map is not None and not lane_map.derived and lane_map.side == config.traffic_side
+    area = area_of(lanes_of(lane_map))
+    assert area.geom_type == "Polygon" and not area.interiors  # one piece, without a gap between lanes
+    rows, columns = np.nonzero(road.drivable)
+    low = road.origin + road.resolution * np.column_stack((columns, rows))
+    edge = area.buffer(-0.3)
+    at_edge = ~contains_xy(area.buffer(-0.8), *(low + road.resolution / 2.0).T)
+    cells = union_all([box(x, y, x + road.resolution, y + road.resolution) for x, y in low[at_edge]])
+    assert cells.difference(area.buffer(1e-5)).area < 1e-9  # every cell lies in lanes; a cell is 0.2 m in float32
+    size = np.array(road.drivable.shape[::-1]) * road.resolution
+    on_grid = area & box(*road.origin, *(road.origin + size))
+    assert on_grid.difference(union_all([cells.buffer(2.0 * road.resolution), edge])).area < 1e-9  # and none far beyond them
+
+
+@pytest.mark.parametrize("name", ["t_intersection", "four_way"])
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_lanes_lead_from_entries_to_exits_in_their_direction(name, side):
+    config = RoadConfig(lanes=2, traffic_side=side)
+    road = build_road(name, None, config)
+    lanes = lanes_of(true_lanes(road, name, None, config, run_out=0.0))
+    starts = [lane for lane in lanes if not lane.predecessors]
+    ends = [lane for lane in lanes if not lane.successors]
+    for poses, which, at in ((road.entries, starts, 0), (road.exits, ends, -1)):
+        assert len(which) == len(poses)
+        for x, y, yaw in poses:
+            lane = min(which, key=lambda one: np.hypot(*(one.middle[at] - (x, y))))
+            assert np.hypot(*(lane.middle[at] - (x, y))) < road.resolution
+            step = lane.middle[at + 1 if at == 0 else at] - lane.middle[at if at == 0 else at - 1]
+            assert step @ (np.cos(yaw), np.sin(yaw)) > 0.99 * np.hypot(*step)
+    by_id = {lane.id: lane for lane in lanes}
+    arms = len(road.entries) // 2
+    assert sum(bool(lane.turn) for lane in lanes) == 2 * arms * (arms - 1)
+    for lane in lanes:
+        for other in lane.successors:  # the very same points
+            assert np.array_equal(lane.left[-1], by_id[other].left[0]) and np.array_equal(lane.right[-1], by_id[other].right[0])
+            assert lane.id in by_id[other].predecessors
+        if lane.left_of is not None:
+            other, same = by_id[lane.left_of[0]], lane.left_of[1]
+            assert np.array_equal(lane.left, other.right if same else other.left[::-1])
+        (ax, ay), (bx, by) = lane.right[0] - lane.left[0], lane.middle[1] - lane.middle[0]
+        assert ax * by - ay * bx > 0.0  # left is left
+
+
+def test_a_road_that_is_not_what_its_name_says_has_derived_lanes():
+    config = RoadConfig()
+    road = build_road("t_intersection", None, config)
+    drivable = road.drivable.copy()
+    drivable[tuple(np.argwhere(drivable)[0])] = False
+    assert true_lanes(replace(road, drivable=drivable), "t_intersection", None, config, 0.0) is None
+    assert true_lanes(road, "four_way", None, config, 0.0) is None
+    made = lane_map_of(replace(road, drivable=drivable), "t_intersection", None, {}, [crossing()], 10.0)
+    assert made.derived and "derived" in made.origin
+    assert not lane_map_of(road, "", None, {}, [crossing()], 10.0).derived  # a nameless map of ours is known by its cells
+
+
+def test_derived_lanes_hold_every_footprint_and_followers_share_one():
+    rows = [[0.0, 0.0, 0.3, 8.0, 0.0, 0.05], [-15.0, -4.64, 0.3, 8.0, 0.0, 0.0], [60.0, 40.0, -2.0, 5.0, -1.2, 0.1]]
+    scenarios = [moving(rows), moving([[x, y + 0.4, *rest] for x, y, *rest in rows])]
+    lanes = lanes_of(derived_lanes(scenarios, None, 3.5, 20.0))
+    area = area_of(lanes)
+    for scenario in scenarios:
+        for n, vehicle in enumerate(scenario.vehicles):
+            for (x, y), yaw in zip(scenario.position[n], scenario.heading[n], strict=True):
+                turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+                half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * (vehicle.length / 2.0, vehicle.width / 2.0)
+                assert area.covers(Polygon(half @ turn.T + (x, y)))
+    assert all(lane.successors == () for lane in lanes)
+    platoon = moving([[0.0, 0.0, 0.0, 8.0, 0.0, 0.0], [-12.0, 0.0, 0.0, 8.0, 0.0, 0.0]])
+    assert len(lanes_of(derived_lanes([platoon], None, 3.5, 60.0))) == 1
