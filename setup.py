@@ -42,7 +42,7 @@ EXTRAS["segmentation"] = [
     wanted for wanted in CORE if wanted.startswith(("numpy", "scipy", "numba"))
 ]  # all that it needs of the core
 EXTRAS["cli"] += [*EXTRAS["bags"], *EXTRAS["parquet"], *EXTRAS["report"]]
-EXTRAS["all"] = [*EXTRAS["cli"], *EXTRAS["planners"]]
+EXTRAS["all"] = [*EXTRAS["cli"], *EXTRAS["planners"], *EXTRAS["gym"]]
 EXTRAS["ros"] = [*EXTRAS["all"], *chain.from_iterable(needed("requirements-ros.in").values())]
 
 setup(

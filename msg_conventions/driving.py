@@ -64,7 +64,7 @@ def encode_clock(stamp_ns: int) -> bytes:
 
 
 def encode_odometry(state: Floats, yaw_rate: float, child: str, frame_id: str, stamp_ns: int) -> bytes:
-    """Return x [m], y [m], yaw [rad], speed [m/s] and the yaw rate [rad/s] as an Odometry's CDR bytes."""
+    """Return a state (4,) of x [m], y [m], yaw [rad], speed [m/s] and the yaw rate [rad/s] as an Odometry's CDR bytes."""
     writer = CdrWriter().header(stamp_ns, frame_id).string(child)
     writer.pack("d", *pose_rows(state[None, :3])[0], *[0.0] * _COVARIANCE)
     return writer.pack("d", float(state[3]), 0.0, 0.0, 0.0, 0.0, yaw_rate, *[0.0] * _COVARIANCE).finish()

@@ -202,12 +202,16 @@ def registered() -> list[tuple[Any, Any]]:
 
 
 def import_all() -> None:
-    """Import every module that may have kernels."""
+    """Import every module that may have kernels; one whose extra is not installed cannot be called."""
     import scenario_gen
 
     for module in pkgutil.walk_packages(scenario_gen.__path__, "scenario_gen."):
         if ".nodes" not in module.name and not module.name.endswith("__main__"):
-            importlib.import_module(module.name)
+            try:
+                importlib.import_module(module.name)
+            except ModuleNotFoundError as error:
+                if (error.name or "scenario_gen").startswith("scenario_gen"):
+                    raise
 
 
 def cache_folder() -> Path | None:

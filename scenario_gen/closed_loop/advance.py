@@ -90,13 +90,14 @@ def place(time: Floats, motion: Floats, clock: Floats, rate: Floats, out: Floats
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = pose[0], pose[1], pose[2], pose[3] * rate[i]
 
 
-@kernel(F, F, F1, F3, F2, B1, F3, F, F3, I, F1, F1, F2, B1, OUT2, OUT2, OUTB1)
+@kernel(F, F, F1, F3, F2, F2, B1, F3, F, F3, I, F1, F1, F2, OUT2, OUT2, OUTB1)
 def advance(
     h: float,
     now: float,
     time: Floats,
     motion: Floats,
     half: Floats,
+    spans: Floats,
     leaves: Bools,
     cells: Floats,
     cell: float,
@@ -105,7 +106,6 @@ def advance(
     body: Floats,
     driving: Floats,
     before: Floats,
-    here: Bools,
     after: Floats,
     vehicles: Floats,
     there: Bools,
@@ -114,11 +114,12 @@ def advance(
 
     Args:
         h: step [s].
-        now: time at its end [s].
+        now: certified time at its end [s].
         time: (T,) of the scenario [s].
         motion: (N, T, 6) as in `Certified`.
         half: (N, 2) half lengths and widths [m].
-        leaves: (N,) as in `Certified`.
+        spans: (N, 2) as in `Certified`.
+        leaves: (N,) likewise.
         cells: (N, K, 8) as in `Certified`.
         cell: length of a cell [s].
         order: (N, N, K) as in `Certified`.
@@ -127,7 +128,6 @@ def advance(
         driving: (7,) headway [s], standstill gap [m], acceleration, comfortable and strongest braking [m/s²], whether the others
             yield to the ego as the template did, and whether they react at all.
         before: (N, 2) clocks [s] and their rates.
-        here: (N,) who is on the scene.
         after: (N, 3) clocks and rates at the end of the step, and 1 where one of the others brakes harder than the strongest.
         vehicles: (N, 4) x, y [m], yaw [rad], speed [m/s] at the end of the step.
         there: (N,) who is on the scene then.
@@ -140,7 +140,7 @@ def advance(
     if driving[6] > 0.0:
         yields = driving[5] > 0.0
         react(
-            h, time, motion, half, cells, cell, order, ego, body, witness, yields, driving, here,
+            h, time, motion, half, spans, leaves, cells, cell, order, ego, body, witness, yields, driving,
             clock, rate, new_clock, new_rate, forced,
         )  # fmt: skip
     else:
@@ -153,7 +153,7 @@ def advance(
         lost = rate[i] * pose[3] - vehicles[i, 3]
         after[i, 0], after[i, 1] = new_clock[i], new_rate[i]
         after[i, 2] = 1.0 if i != ego and lost > driving[4] * h + HARDER and new_rate[i] < 1.0 else 0.0
-        there[i] = i == ego or not (leaves[i] and new_clock[i] >= last)
+        there[i] = i == ego or (new_clock[i] >= spans[i, 0] and not (leaves[i] and new_clock[i] >= spans[i, 1]))
 
 
 AT = 0.2  # metres before the goal that count as there

@@ -50,7 +50,8 @@ class Certified:
             its yaw, half length, half width [m], radius [m]), and the way driven [m] at its start.
         order: (N, N, K) `order[i, j, k]`: clock [s] that vehicle i may not pass while the clock of j is in cell k, unless that
             of j is there, too; inf if nothing is in its way.
-        leaves: (N,) whether a vehicle leaves the scene when its certified motion ends.
+        spans: (N, 2) clocks [s] at which each vehicle comes onto the scene and at which its certified motion ends.
+        leaves: (N,) whether it leaves the scene then; who stands at the scenario's end stays.
     """
 
     scenario: Scenario
@@ -59,6 +60,7 @@ class Certified:
     half: Floats
     cells: Floats
     order: Floats
+    spans: Floats
     leaves: Bools
 
     @property
@@ -89,10 +91,11 @@ def certified(scenario: Scenario, ego: int | str) -> Certified:
     half = frozen([(0.5 * vehicle.length, 0.5 * vehicle.width) for vehicle in scenario.vehicles])
     n, count = len(ids), int(np.ceil(time[-1] / CELL - 1e-9))
     cells, order = np.empty((n, count, 8)), np.empty((n, n, count))
-    fill_cells(time, motion, half, CELL, cells)
+    spans = frozen(time[scenario.present])
+    fill_cells(time, motion, half, spans, CELL, cells)
     fill_order(cells, CELL, order)
-    leaves = np.asarray(speed[:, -1] >= STANDS)
-    return Certified(scenario, ego, motion, half, frozen(cells), frozen(order), leaves)
+    leaves = np.asarray((speed[:, -1] >= STANDS) | (spans[:, 1] < time[-1]))
+    return Certified(scenario, ego, motion, half, frozen(cells), frozen(order), spans, leaves)
 
 
 @kernel(inline=True)
@@ -127,7 +130,7 @@ def pose_at(time: Floats, motion: Floats, clock: float, out: Floats) -> None:
 
 @kernel(inline=True)
 def boxes_meet(a: Floats, b: Floats) -> bool:
-    """Whether two boxes overlap: each x, y, cos, sin, half length, half width, radius. Source: separating axes."""
+    """Whether two boxes (7,) overlap: each x, y [m], cos, sin, half length, half width, radius [m]. Source: separating axes."""
     dx, dy, reach = b[0] - a[0], b[1] - a[1], a[6] + b[6]
     if dx * dx + dy * dy >= reach * reach:
         return False
@@ -142,14 +145,17 @@ def boxes_meet(a: Floats, b: Floats) -> bool:
 
 @kernel(inline=True)
 def fill_box(x: float, y: float, yaw: float, length: float, width: float, out: Floats) -> None:
-    """Write a box of half sizes `length` and `width` at a pose into `out` (7 or more)."""
+    """Write a box of half sizes `length` and `width` [m] at a pose [m, rad] into `out` (7,), as `boxes_meet` takes it."""
     out[0], out[1], out[2], out[3] = x, y, exact.cos(yaw), exact.sin(yaw)
     out[4], out[5], out[6] = length, width, np.sqrt(length * length + width * width)
 
 
-@kernel(F1, F3, F2, F, OUT3)
-def fill_cells(time: Floats, motion: Floats, half: Floats, cell: float, out: Floats) -> None:
-    """Fill `out` (N, K, 8) as in `Certified`, from the motion (N, T, 6), half sizes (N, 2) [m] and the cells' length [s].
+FAR = 1e15  # metres; where the boxes are of a vehicle that is not on the scene
+
+
+@kernel(F1, F3, F2, F2, F, OUT3)
+def fill_cells(time: Floats, motion: Floats, half: Floats, spans: Floats, cell: float, out: Floats) -> None:
+    """Fill `out` (N, K, 8) as in `Certified`, from the motion (N, T, 6), half sizes (N, 2) [m], spans and the cells' length [s].
 
     The box stands at the middle pose, is longer and wider by what the ends ask for, by what the turn adds, and by ROOM.
     """
@@ -157,7 +163,11 @@ def fill_cells(time: Floats, motion: Floats, half: Floats, cell: float, out: Flo
     for i in range(out.shape[0]):
         way = 0.0
         for k in range(out.shape[1]):
-            start, end = k * cell, min((k + 1) * cell, time[-1])
+            start, end = max(k * cell, spans[i, 0]), min((k + 1) * cell, spans[i, 1])
+            if start > end:
+                fill_box(FAR, FAR, 0.0, 0.0, 0.0, out[i, k])
+                out[i, k, 7] = way
+                continue
             pose_at(time, motion[i], start, a)
             pose_at(time, motion[i], end, b)
             pose_at(time, motion[i], 0.5 * (start + end), m)

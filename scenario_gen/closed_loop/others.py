@@ -38,6 +38,7 @@ SLOW = 0.2  # m/s, certified speed below which a clock runs or stands, for there
 STAND = 0.02  # m/s, certified speed of a stand, which passes whatever there is
 NEARER = 0.1  # metres by which a gap must be smaller than the certified one to be minded
 LATE = 0.05  # seconds by which the ego's clock is uncertain
+ENTRY = 3.0  # metres ahead of and behind its place that the ego must leave free for one who comes onto the scene
 PARTS = 4  # of a step, in each of which the order is proven
 
 
@@ -100,11 +101,13 @@ def _limit(order: Floats, cell: float, clock: float) -> float:
 
 
 @kernel(inline=True)
-def react(  # noqa: PLR0912 - one loop after the other
+def react(  # noqa: PLR0912, PLR0915 - one loop after the other
     h: float,
     time: Floats,
     motion: Floats,
     half: Floats,
+    spans: Floats,
+    leaves: Bools,
     cells: Floats,
     cell: float,
     order: Floats,
@@ -113,7 +116,6 @@ def react(  # noqa: PLR0912 - one loop after the other
     witness: Floats,
     yields: bool,
     driving: Floats,
-    here: Bools,
     clock: Floats,
     rate: Floats,
     new_clock: Floats,
@@ -127,6 +129,8 @@ def react(  # noqa: PLR0912 - one loop after the other
         time: (T,) of the scenario [s].
         motion: (N, T, 6) as in `Certified`.
         half: (N, 2) half lengths and widths [m].
+        spans: (N, 2) as in `Certified`.
+        leaves: (N,) as in `Certified`.
         cells: (N, K, 8) as in `Certified`.
         cell: length of a cell [s].
         order: (N, N, K) as in `Certified`.
@@ -135,7 +139,6 @@ def react(  # noqa: PLR0912 - one loop after the other
         witness: (3,) clock of the ego on its witness' path [s], its rate, and 1 if it is on that path.
         yields: whether the others wait for the ego where the template did.
         driving: (5,) headway [s], standstill gap [m], acceleration, comfortable and strongest braking [m/s²].
-        here: (N,) whether a vehicle is (still) on the scene.
         clock: (N,) seconds.
         rate: (N,) rates of the clocks.
         new_clock: (N,) likewise, one step later.
@@ -150,11 +153,22 @@ def react(  # noqa: PLR0912 - one loop after the other
     fill_box(body[0], body[1], body[2], half[ego, 0], half[ego, 1], box)
     coming = np.empty((n, steps + 1))
     level = np.zeros(n)
+    goes, here = np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)  # whose clock runs; who is on the scene
     for i in range(n):
+        goes[i] = not (leaves[i] and clock[i] >= spans[i, 1])
+        here[i] = goes[i] and clock[i] >= spans[i, 0]
         new_clock[i], new_rate[i], forced[i] = clock[i], rate[i], 0.0
         pose_at(time, motion[i], clock[i], pose[i])
     for i in range(n):  # with regard to the ego alone
-        if i == ego or not here[i]:
+        if i == ego or not goes[i]:
+            continue
+        if not here[i]:  # it comes when it is due, unless the ego is in its place
+            new_rate[i] = 1.0
+            if clock[i] + 0.5 * (rate[i] + 1.0) * h >= spans[i, 0]:
+                pose_at(time, motion[i], spans[i, 0], same)
+                fill_box(same[0], same[1], same[2], half[i, 0] + ENTRY, half[i, 1], other)
+                if boxes_meet(other, box):
+                    new_rate[i] = 0.0
             continue
         v, a, u = pose[i, 3], pose[i, 4], rate[i] * pose[i, 3]
         least = _minded(time, motion, half, cells, cell, i, ego, clock[i], u, pose[i], box, body[2], body[3], h, driving)
@@ -168,7 +182,7 @@ def react(  # noqa: PLR0912 - one loop after the other
                 coming[i, 0] = clock[i]
                 r = rate[i]
             else:
-                after = min(max(rate[i] + (new_rate[i] - rate[i]) * m, 0.0), 1.0) if here[i] else 1.0
+                after = min(max(rate[i] + (new_rate[i] - rate[i]) * m, 0.0), 1.0) if goes[i] else 1.0
                 coming[i, m] = coming[i, m - 1] + 0.5 * (r + after) * h
                 r = after
     if n > 2:
@@ -192,11 +206,13 @@ def react(  # noqa: PLR0912 - one loop after the other
                 same[0] = min(CREEP / v, 1.0) if v > CREEP else 1.0
                 new_rate[i] = min(new_rate[i], max(slower, same[0]))
     for i in range(n):
-        if i != ego and here[i]:
+        if i != ego and goes[i]:
             new_clock[i] = clock[i] + 0.5 * (rate[i] + new_rate[i]) * h
-    _keep_order(h, cell, order, ego, here, clock, rate, new_clock, new_rate, forced)
+            if not here[i] and new_rate[i] == 0.0:
+                new_clock[i] = clock[i]
+    _keep_order(h, cell, order, ego, goes, clock, rate, new_clock, new_rate, forced)
     for i in range(n):
-        if i != ego and here[i]:
+        if i != ego and goes[i]:
             new_clock[i] = min(new_clock[i], time[-1])
 
 
@@ -389,7 +405,7 @@ def _keep_order(
     cell: float,
     order: Floats,
     ego: int,
-    here: Bools,
+    goes: Bools,
     clock: Floats,
     rate: Floats,
     new_clock: Floats,
@@ -407,7 +423,7 @@ def _keep_order(
         changed = False
         for i in range(n):
             for j in range(n):
-                if i in (j, ego) or j == ego or not here[i] or not here[j] or forced[i] > 1.0:
+                if i in (j, ego) or j == ego or not goes[i] or not goes[j] or forced[i] > 1.0:
                     continue
                 if _ordered(h, cell, order, i, j, clock, rate, new_clock, new_rate, forced):
                     continue
@@ -419,7 +435,7 @@ def _keep_order(
                         continue
                 room = np.inf
                 for k in range(n):
-                    if k not in (i, ego) and here[k]:
+                    if k not in (i, ego) and goes[k]:
                         room = min(room, _limit(order[i, k], cell, clock[k]) - clock[i])
                 new_clock[i] = clock[i] + max(min(new_clock[i] - clock[i], room), 0.0)
                 new_rate[i] = 0.0

@@ -14,13 +14,12 @@
 
 """Planners of our own, to start from and to compare with: one that keeps its distance, and one that looks at nobody."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
 
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats
 from scenario_gen.closed_loop.ego import Command, EgoState
 from scenario_gen.closed_loop.simulation import Observation, Task
 from scenario_gen.curve import Curve
@@ -80,7 +79,6 @@ class IdmFollower(RouteFollower):
     lateral: float = 2.5  # m/s², in bends
     foresight: float = 4.0  # s, for which others are expected to go straight on
     room: float = 0.5  # m beside the ego that it keeps free
-    _instants: Floats = field(default_factory=lambda: np.arange(0.0, 4.01, 0.5), repr=False)
 
     def act(self, observation: Observation) -> Command:
         """Steer, and brake for the nearest."""
@@ -110,7 +108,7 @@ class IdmFollower(RouteFollower):
         nearest, speed = math.inf, 0.0
         own = 0.5 * self.task.vehicle.length
         direction = np.stack([exact.cos(seen.others[:, 2]), exact.sin(seen.others[:, 2])], axis=1)
-        when = self._instants[self._instants <= self.foresight]
+        when = np.arange(0.0, self.foresight + 0.01, 0.5)
         places = seen.others[:, None, :2] + (seen.others[:, None, 3:4] * when[:, None]) * direction[:, None]
         at, aside = self.route.project(places.reshape(-1, 2))
         turn = self.route.at(at)[:, 2].reshape(len(seen.ids), -1) - seen.others[:, 2:3]

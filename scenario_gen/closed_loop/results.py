@@ -108,7 +108,7 @@ def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:
     drive, verdict = outcome.drive, outcome.verdict
     motion = drive.motion
     frames = max(2, min(MAX_FRAMES, int(np.ceil(verdict.duration / FRAME_PERIOD)) + 1))
-    gone = [float(motion.time[here][-1]) if here.any() else 0.0 for here in drive.here]
+    spans = [motion.time[here][[0, -1]].tolist() if here.any() else [0.0, -1.0] for here in drive.here]
     witness = trial.scenario
     return {
         "name": outcome.name,
@@ -120,7 +120,7 @@ def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:
         "witness": [
             [round(x, 2), round(y, 2)] for x, y in witness.position[drive.ego, :: max(1, len(witness.time) // 100)].tolist()
         ],
-        "gone": [round(time, 3) for time in gone],
+        "spans": [[round(time, 3) for time in span] for span in spans],
         "hit": round(verdict.collision.time, 3) if verdict.collision else None,
     }
 

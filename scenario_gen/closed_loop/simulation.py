@@ -31,6 +31,7 @@ from scenario_gen.closed_loop.certified import CELL, Certified, certified
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, TEMPLATE
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
 from scenario_gen.errors import InputError
+from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import Scenario
@@ -42,7 +43,7 @@ class State:
 
     Attributes:
         step: how many steps there were before.
-        time: seconds from the scenario's start.
+        time: seconds from the drive's start.
         ego: the ego.
         vehicles: (N, 4) x, y [m], yaw [rad], speed [m/s] of all.
         here: (N,) whether each is on the scene.
@@ -91,7 +92,7 @@ class Observation:
     """What a planner sees at one instant: the ego, and the M others that are on the scene.
 
     Attributes:
-        time: seconds from the scenario's start.
+        time: seconds from the drive's start.
         ego: the ego.
         ids: of the others.
         others: (M, 4) x, y [m], yaw [rad], speed [m/s]; (x, y) is the footprint's centre.
@@ -176,9 +177,10 @@ class ClosedLoop:
         self._sizes = 2.0 * self.certified.half
         self._ids = tuple(vehicle.id for vehicle in scenario.vehicles)
         self._others = np.arange(len(self._ids)) != self.certified.ego
-        duration = self.certified.duration
+        self.begin, end = self.certified.spans[self.certified.ego].tolist()
+        self.duration = end - self.begin
         self._waits = bool(self.certified.cells[self.certified.ego, -1, 7] < WAITS)
-        self.last_step = int(np.ceil((duration * config.overtime + 5.0) / config.step))
+        self.last_step = int(np.ceil((self.duration * config.overtime + 5.0) / config.step))
 
     @property
     def scenario(self) -> Scenario:
@@ -207,11 +209,14 @@ class ClosedLoop:
         )
 
     def start(self) -> State:
-        """Return the first instant: everyone, the ego too, is where the certified scenario begins."""
-        first = self.certified.motion[:, 0, :4].copy()
-        n = len(first)
-        ego = EgoState(*first[self.ego].tolist())
-        return State(0, 0.0, ego, first, np.ones(n, dtype=np.bool_), np.zeros(n), np.ones(n))
+        """Return the first instant: where everyone is when the ego's witness comes onto the scene."""
+        known = self.certified
+        first = int(known.scenario.present[self.ego, 0])
+        vehicles = known.motion[:, first, :4].copy()
+        n = len(vehicles)
+        here = (known.spans[:, 0] <= self.begin) & ~(known.leaves & (known.spans[:, 1] <= self.begin))
+        ego = EgoState(*vehicles[self.ego].tolist())
+        return State(0, 0.0, ego, vehicles, here, np.full(n, self.begin), np.ones(n))
 
     def step(self, state: State, asked: Command | Pose | None, note: str = "") -> State:
         """Return the next instant; `state` stays what it was. `note` says what else was wrong with what was asked."""
@@ -220,15 +225,17 @@ class ClosedLoop:
         ego, n = moved.state, len(self._ids)
         number = state.step + 1
         time = number * config.step
+        now = self.begin + time
         before, after = np.empty((n, 2)), np.empty((n, 3))
         before[:, 0], before[:, 1] = state.clock, state.rate
         vehicles, here = np.empty((n, 4)), np.empty(n, dtype=np.bool_)
         advance(
             config.step,
-            time,
+            now,
             known.scenario.time,
             known.motion,
             known.half,
+            known.spans,
             known.leaves,
             known.cells,
             CELL,
@@ -237,7 +244,6 @@ class ClosedLoop:
             np.array(ego),
             self._driving,
             before,
-            state.here,
             after,
             vehicles,
             here,
@@ -272,11 +278,21 @@ class ClosedLoop:
             return True
         if self.at_goal(state.time, state.vehicles[self.ego]):
             return True
+        return self.hit(state)
+
+    def hit(self, state: State) -> bool:
+        """Whether the ego overlaps another at this instant."""
         return bool(overlaps(state.vehicles, self.certified.half, state.here, self.ego))
 
+    def off_road(self, state: State) -> bool:
+        """Whether the ego's footprint covers a cell that is not drivable at this instant; False if no road is known."""
+        length, width = self._sizes[self.ego].tolist()
+        pose = state.vehicles[self.ego, None, :3]
+        return self.road is not None and not bool(footprint_fits(self.road, pose, length, width)[0])
+
     def at_goal(self, time: float, pose: Floats) -> bool:
-        """Whether an ego at a pose (3+,) is at its goal; one whose witness stays where it starts must be there at the end."""
-        if self._waits and time < self.certified.duration - 1e-9:
+        """Whether an ego at a pose (3,) of x, y [m], yaw [rad] is at its goal; if the witness waits there, only at the end."""
+        if self._waits and time < self.duration - 1e-9:
             return False
         return bool(at_goal(self.certified.motion[self.ego, -1], self.config.goal_width, self._waits, pose))
 

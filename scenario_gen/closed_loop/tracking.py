@@ -41,7 +41,7 @@ class Track:
 
     @classmethod
     def of(cls, time: Floats, poses: Floats) -> "Track":
-        """Take poses whose yaw need not be continuous."""
+        """Take times (T,) [s] and poses (T, 3) whose yaw need not be continuous."""
         return cls(time, np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])]))
 
     def at(self, time: float) -> tuple[float, float, float]:

@@ -57,7 +57,7 @@ class Collision:
 
 @dataclass(frozen=True)
 class DriveVerdict:
-    """What one drive came to. Times in seconds from the scenario's start; NaN where there is no such thing.
+    """What one drive came to. Times in seconds from the drive's start; NaN where there is no such thing.
 
     Attributes:
         index: of the scenario; seed: of its request; ego: id of the vehicle in whose place the ego drove.
@@ -161,7 +161,7 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         collision=None if who < 0 else _collision(drive, first, who),
         off_road=math.nan if loop.road is None else _off_road(drive, loop.road),
         goal=goal,
-        delay=goal - known.duration,
+        delay=goal - loop.duration,
         min_ttc=float(min((config.horizon, *ttc))),
         min_gap=float(min(gap, default=math.nan)),
         min_pet=_pet(drive),

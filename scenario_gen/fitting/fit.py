@@ -30,6 +30,7 @@ from scenario_gen.fitting.junction import has_lanes, place_at_junction
 from scenario_gen.fitting.lanes import place_along_lanes
 from scenario_gen.fitting.placement import Placement
 from scenario_gen.fitting.search import place_by_search
+from scenario_gen.fitting.vector import place_on_lanes
 from scenario_gen.roads.arms import arms_of
 from scenario_gen.template.tracks import clean_tracks, Track
 from scenario_gen.types.encounter import Encounter
@@ -99,6 +100,8 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         "junction": place_at_junction,
         "search": place_by_search,
     }
+    if road.lanes is not None and config.placement != "search":
+        return place_on_lanes(tracks, road, config)
     if config.placement != "auto":
         return ways[config.placement](tracks, road, config)
     own, share = None, 0.0
@@ -121,4 +124,6 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
             return ways[name](tracks, road, config)
         except RefusedError as error:
             reasons.append(str(error))
+    if order != ("search",):  # what stands against it on one road, or at a junction where the road has one
+        reasons = reasons[-1:] if len(arms_of(road)) > 2 else reasons[:1]
     raise RefusedError(f"the template does not fit road {road.name}: " + "; ".join(reasons))

@@ -91,7 +91,7 @@ def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | Non
 def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Limits | None) -> list[Verdict]:
     """Check every scenario; an ego may have been left out of one, and its map be another than the newest."""
     encounter = namespace.encounter
-    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
+    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
     waits = find_waits(encounter) if namespace.segmentation.changepoints.size else ()
     names = tuple(vehicle.id for vehicle in encounter.vehicles)
     checkers: dict[tuple[str, ...], Checker] = {}

@@ -175,7 +175,7 @@ def _reference(namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is
     if encounter is None:
         return Reference(road, asked, None, (), None)
     segmentation = namespace.segmentation_of(encounter)
-    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
+    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
     waits = None  # without changepoints there is no dwell to hold: waits are not asked for
     if segmentation is not None:
         waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()

@@ -21,7 +21,8 @@ from scenario_gen.roads.builtin import BUILT_IN, draw, draw_corridor, draw_paper
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.nav2 import read_map
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
-from scenario_gen.roads.shaped import bends, draw_bent, draw_junction, fitting_width
+from scenario_gen.roads.shaped import bends, draw_along, draw_bent, draw_junction, draw_merge, fitting_width, PLAIN_LINE
+from scenario_gen.roads.vector.read import is_vector_map, READERS, vector_road
 from scenario_gen.template.frenet import main_line, to_frenet
 from scenario_gen.template.separation import own_paths
 from scenario_gen.template.tracks import clean_tracks, Track
@@ -33,8 +34,10 @@ def build_road(name_or_path: str, encounter: Encounter | None = None, config: Ro
     """Return the road `name_or_path`, with the obstacles of `config` drawn into it.
 
     Args:
-        name_or_path: `straight`, `curve`, `t_intersection`, `four_way`, `corridor`, or the path of a nav2 map_server YAML.
-        encounter: the template, to which built-in roads are sized (None: plain sizes); `corridor` cannot do without.
+        name_or_path: `straight`, `curve`, `t_intersection`, `four_way`, `corridor`, or the path of a nav2 map_server YAML,
+            or of a vector map (.osm, .xodr, .xml), of which `#box=x0,y0,x1,y1`, `#lanelet=ID` or `#junction=ID` chooses a part.
+        encounter: the template, to which built-in roads are sized (None: plain sizes), and for which the best place on a vector
+            map is searched; `corridor` cannot do without.
         config: how it is drawn.
 
     Raises:
@@ -55,24 +58,33 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
         if encounter is None:
             raise InputError("road corridor is drawn around a template; give a log too")
         return draw_corridor(own_paths(encounter).tracks, config)
+    if is_vector_map(name_or_path):
+        return vector_road(name_or_path, None if encounter is None else clean_tracks(encounter), config)
     path = Path(name_or_path)
     if path.suffix.lower() not in (".yaml", ".yml"):
         names = ", ".join((*BUILT_IN, "corridor"))
-        raise InputError(f"road {name_or_path!r} is neither one of {names} nor the path of a map_server YAML file")
+        kinds = f"a map_server YAML file or a vector map ({', '.join(READERS)})"
+        raise InputError(f"road {name_or_path!r} is neither one of {names} nor the path of {kinds}")
     return read_map(path, config)
 
 
 def _built_in(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -> Road:
     """A built-in road in plain sizes, or shaped to a template."""
     if tracks is None:
-        return draw(name, layout_for(name, None, config), config)
+        if name == "curve":
+            return draw_along(name, PLAIN_LINE, max(config.lanes, 1), config)
+        return draw_merge(None, None, config) if name == "merge" else draw(name, layout_for(name, None, config), config)
     config = fitting_width(tracks, config)
     try:
         frenet = to_frenet(tracks)
     except RefusedError:  # turns or crossings: a junction's template
         if name in ("t_intersection", "four_way") and not any(track.makes_u_turn for track in tracks):
             return draw_junction(name, tracks, junction_centre(tracks), config)
+        if name == "merge":
+            raise
         return draw(name, layout_for(name, tracks, config), config)
+    if name == "merge":
+        return draw_merge(tracks, frenet, config)
     if bends(name, main_line(frenet, tracks)):
         return draw_bent(name, tracks, frenet.spread(), config)
     return draw(name, layout_for(name, tracks, config), config)

@@ -53,12 +53,23 @@ def describe_segments(encounter: Tracks, changepoints: Ints) -> tuple[str, ...]:
     """One sentence per segment between changepoints (K,), naming every vehicle by its id."""
     edges = [0, *(int(c) for c in changepoints), encounter.speed.shape[1]]
     return tuple(
-        ", ".join(
-            f"vehicle {vehicle.id} {describe_motion(encounter.speed[i, a:b], encounter.heading[i, a:b], encounter.dt)}"
-            for i, vehicle in enumerate(encounter.vehicles)
-        )
+        ", ".join(f"vehicle {vehicle.id} {_in_segment(encounter, i, a, b)}" for i, vehicle in enumerate(encounter.vehicles))
         for a, b in pairwise(edges)
     )
+
+
+def _in_segment(encounter: Tracks, i: int, a: int, b: int) -> str:
+    """Describe what vehicle i does from sample a to before b, as far as it is there."""
+    first, last = encounter.present[i].tolist()
+    if last < a:
+        return "has left"
+    if first >= b - 1:
+        return "is not there yet"
+    own = slice(max(a, first), min(b, last + 1))
+    motion = describe_motion(encounter.speed[i, own], encounter.heading[i, own], encounter.dt)
+    comes = f"arrives after {(first - a) * encounter.dt:.1f} s and " if first > a else ""
+    goes = f", leaves after {(last - a) * encounter.dt:.1f} s" if last < b - 1 else ""
+    return f"{comes}{motion}{goes}"
 
 
 def describe_accelerations(mean: Floats) -> str:

@@ -134,15 +134,18 @@ def driving_features(
         speed_noise: m/s², differences in longitudinal acceleration that are noise.
         turn_noise: m/s², the same for the lateral one.
     """
-    columns = []
-    for position, speed in zip(encounter.position, encounter.speed, strict=True):
+    features = np.full((encounter.speed.shape[1], len(encounter.vehicles), 3), np.nan)  # NaN: not measured, where it is not there
+    for i, (first, last) in enumerate(encounter.present.tolist()):
+        own = slice(first, last + 1)
+        position, speed = encounter.position[i, own], encounter.speed[i, own]
         moves = moving(speed, encounter.dt)
-        columns.append(longitudinal_acceleration(speed, encounter.dt, speed_window))
-        columns.append(lateral_acceleration(position, encounter.dt, turn_window) * moves)
-        columns.append(moves)
-    return np.column_stack(columns), np.tile([speed_noise, turn_noise, STAND_BLUR], len(encounter.vehicles))
+        features[own, i, 0] = longitudinal_acceleration(speed, encounter.dt, speed_window)
+        features[own, i, 1] = lateral_acceleration(position, encounter.dt, turn_window) * moves
+        features[own, i, 2] = moves
+    return features.reshape(len(features), -1), np.tile([speed_noise, turn_noise, STAND_BLUR], len(encounter.vehicles))
 
 
 def paper_features(encounter: Tracks) -> Floats:
-    """(T, 3N) positions and speeds as the paper stacks them."""
-    return np.column_stack([np.column_stack([p, v]) for p, v in zip(encounter.position, encounter.speed, strict=True)])
+    """(T, 3N) positions and speeds as the paper stacks them; NaN where a vehicle is not there."""
+    stacked = np.concatenate((encounter.position, encounter.speed[..., None]), axis=-1)
+    return np.column_stack(list(np.where(encounter.there[..., None], stacked, np.nan)))

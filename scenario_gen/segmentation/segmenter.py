@@ -31,7 +31,7 @@ from scenario_gen.segmentation.trends import course, Trends
 from scenario_gen.types.encounter import Tracks, Vehicle
 from scenario_gen.types.segmentation import Segmentation
 
-DRIVING_SAMPLER = SamplerConfig(weight=0.5, chains=3, sweeps=90)
+DRIVING_SAMPLER = SamplerConfig(weight=0.5, chains=3, sweeps=60)
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def segment_track(
 
 def on_trends(encounter: Tracks, posterior: Posterior, points: Ints, config: SegmentationConfig) -> Ints:
     """Put changepoints (K,) where trends change, see `trends`, and keep the most useful ones up to `max_rate`."""
-    trends = Trends.of(encounter.position, encounter.speed, encounter.dt)
+    trends = Trends.of(encounter.position, encounter.speed, encounter.dt, encounter.present)
     chance = config.significance_level
     least, certain = trends.threshold(chance), trends.threshold(chance * chance)
     reach = round(config.settle / encounter.dt)

@@ -31,6 +31,7 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F2, I, I1, kernel, OUT1
 from scenario_gen.segmentation.hdp_hmm.problem import moving_mean
+from scenario_gen.types.presence import ALWAYS, canonical_presence
 
 SPEED_NOISE = 0.1
 COURSE_NOISE = 0.3
@@ -97,26 +98,30 @@ class Trends:
     _cache: dict[tuple[int, ...], tuple[float, int]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, position: Floats, speed: Floats, dt: float) -> "Trends":
+    def of(cls, position: Floats, speed: Floats, dt: float, present: Ints = ALWAYS) -> "Trends":
         """Take the trends of N vehicles; noise is at least 0.1 m/s in speed and 0.3 m/s across the course.
 
         Args:
             position: (N, T, 2) m.
             speed: (N, T) m/s.
             dt: s.
+            present: (N, 2) first and last sample of each vehicle; outside of them nothing has weight.
         """
         signals, weights = [], []
-        for xy, v in zip(position, speed, strict=True):
+        samples = speed.shape[1]
+        for i, (first, last) in enumerate(canonical_presence(present, len(speed), samples, "trends").tolist()):
+            xy, v = position[i, first : last + 1], speed[i, first : last + 1]
+            beyond = (first, samples - 1 - last)
             bend = np.diff(v, 2)
             noise = max(SPEED_NOISE, 1.4826 * float(np.median(np.abs(bend))) / np.sqrt(6.0) if len(bend) else 0.0)
-            signals.append(v)
-            weights.append(np.full(len(v), 1.0 / noise))
+            signals.append(np.pad(v, beyond, mode="edge"))
+            weights.append(np.pad(np.full(len(v), 1.0 / noise), beyond))
             angle, pace = course(xy, v, dt)
-            signals.append(angle)
+            signals.append(np.pad(angle, beyond, mode="edge"))
             sure = np.where(pace > LEAST_SPEED, pace / COURSE_NOISE, 0.0)
             edge = round(COURSE_WINDOW / dt) // 2
             sure[:edge] = sure[len(sure) - edge :] = 0.0  # half a window has three times the noise
-            weights.append(sure)
+            weights.append(np.pad(sure, beyond))
         stack = np.array(signals)
         return cls(np.ascontiguousarray(stack - stack.mean(axis=1, keepdims=True)), np.array(weights))
 

@@ -27,9 +27,10 @@ from itertools import combinations
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats, runs
+from scenario_gen.arrays import Floats, Ints, runs
 from scenario_gen.kernels import F1, F2, kernel, OUT1
 from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
+from scenario_gen.types.presence import ALWAYS
 from scenario_gen.types.segmentation import Segmentation
 
 WAIT_SPEED = 0.5  # m/s
@@ -87,12 +88,12 @@ def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
     from scipy.ndimage import uniform_filter1d  # slow to import
 
     width = 2 * round(0.5 * WAIT_SMOOTHING / encounter.dt) + 1
-    smooth = uniform_filter1d(encounter.speed, width, axis=1, mode="nearest")
+    smooth = uniform_filter1d(encounter.speed, width, axis=1, mode="nearest")  # outside of its presence a speed is held
     time = encounter.time
     return tuple(
         Wait(vehicle, float(time[a]), float(time[b - 1]), _creeps(encounter.speed[vehicle, a:b], time[a:b]))
-        for vehicle, speed in enumerate(smooth)
-        for a, b in runs(speed < WAIT_SPEED)
+        for vehicle, (speed, there) in enumerate(zip(smooth, encounter.there, strict=True))
+        for a, b in runs((speed < WAIT_SPEED) & there)
         if time[b - 1] - time[a] >= WAIT_DURATION - 1e-9
     )
 
@@ -108,7 +109,9 @@ def _creeps(speed: Floats, time: Floats) -> bool:
     return len(stands) == 0 or bool(stands[-1] - stands[0] < WAIT_DURATION - 1e-9)
 
 
-def find_conflicts(vehicles: tuple[Vehicle, ...], time: Floats, position: Floats, heading: Floats) -> tuple[Conflict, ...]:
+def find_conflicts(
+    vehicles: tuple[Vehicle, ...], time: Floats, position: Floats, heading: Floats, present: Ints = ALWAYS
+) -> tuple[Conflict, ...]:
     """Return one conflict per pair of vehicles whose swept footprints intersect, ordered by pair.
 
     Between samples both position and heading are linear. Two vehicles that enter at the same instant (both are inside
@@ -119,24 +122,33 @@ def find_conflicts(vehicles: tuple[Vehicle, ...], time: Floats, position: Floats
         time: (T,) seconds.
         position: (N, T, 2) metres.
         heading: (N, T) rad.
+        present: (N, 2) first and last sample of each vehicle; default: everybody throughout.
     """
     time, position, heading = (np.ascontiguousarray(array, dtype=np.float64) for array in (time, position, heading))
     found = []
     for a, b in combinations(range(len(vehicles)), 2):
-        answer = pair_conflict(vehicles, time, position, heading, a, b)
+        answer = pair_conflict(vehicles, time, position, heading, a, b, present)
         if answer is not None:
             found.append(answer)
     return tuple(found)
 
 
 def pair_conflict(
-    vehicles: tuple[Vehicle, ...], time: Floats, position: Floats, heading: Floats, a: int, b: int
+    vehicles: tuple[Vehicle, ...],
+    time: Floats,
+    position: Floats,
+    heading: Floats,
+    a: int,
+    b: int,
+    present: Ints = ALWAYS,
 ) -> Conflict | None:
     """Return the conflict of `a` < `b`, or None if their swept footprints are apart; arrays as in `find_conflicts`, in metres."""
     out = np.empty(7)
     size_a = np.array((vehicles[a].length, vehicles[a].width))
     size_b = np.array((vehicles[b].length, vehicles[b].width))
-    _conflict(time, position[a], heading[a], size_a, position[b], heading[b], size_b, out)
+    own = [slice(first, last + 1) for first, last in present[[a, b]].tolist()] if len(present) else [slice(None)] * 2
+    of_a, of_b = ((time[at], position[n, at], heading[n, at]) for n, at in zip((a, b), own, strict=True))
+    _conflict(*of_a, size_a, *of_b, size_b, out)
     exists, a_first, following, *times = out.tolist()
     if not exists:
         return None
@@ -293,12 +305,13 @@ def _shared_path(a: Floats, b: Floats, circles_b: Floats, half_a: Size, half_b: 
     return shared, lead
 
 
-@kernel(F1, F2, F1, F1, F2, F1, F1, OUT1)
+@kernel(F1, F2, F1, F1, F1, F2, F1, F1, OUT1)
 def _conflict(
-    time: Floats,
+    time_a: Floats,
     position_a: Floats,
     heading_a: Floats,
     size_a: Floats,
+    time_b: Floats,
     position_b: Floats,
     heading_b: Floats,
     size_b: Floats,
@@ -307,7 +320,7 @@ def _conflict(
     """Fill `out`: exists, a first, following, entry and exit of a, entry and exit of b (7,)."""
     out[0] = 0.0
     half_a, half_b = (0.5 * size_a[0], 0.5 * size_a[1]), (0.5 * size_b[0], 0.5 * size_b[1])
-    a, b = _sweep(time, position_a, heading_a), _sweep(time, position_b, heading_b)
+    a, b = _sweep(time_a, position_a, heading_a), _sweep(time_b, position_b, heading_b)
     circles_a, circles_b = _block_circles(a), _block_circles(b)
     entry_a, exit_a = _occupancy(a, half_a, b, circles_b, half_b)
     entry_b, exit_b = _occupancy(b, half_b, a, circles_a, half_a)

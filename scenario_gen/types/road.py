@@ -21,6 +21,7 @@ import numpy as np
 
 from scenario_gen.arrays import Bools, canonical_poses, Floats, frozen, Ints
 from scenario_gen.errors import InputError
+from scenario_gen.types.lanes import LaneNetwork
 
 FINEST, COARSEST = 0.001, 10.0  # metres of a cell: nothing is seen of a vehicle in larger ones
 FARTHEST = 1e8  # metres from the frame's origin: more than any geodetic grid has
@@ -38,6 +39,7 @@ class Road:
         entries: (E, 3) x, y, yaw: centre of each lane by which traffic comes in, heading into the road.
         exits: (X, 3) x, y, yaw: centre of each lane by which traffic leaves, heading out of the road.
         frame_id: the frame of all poses.
+        lanes: the lanes of a vector map that the grid was drawn from, in the same frame; None: nothing is known of lanes.
         obstructed: (H, W) bool; cells that would be drivable, but for something that stands there. None: nothing does.
     """
 
@@ -48,6 +50,7 @@ class Road:
     entries: Floats
     exits: Floats
     frame_id: str = "map"
+    lanes: LaneNetwork | None = None
     obstructed: Bools | None = None
 
     def __post_init__(self) -> None:

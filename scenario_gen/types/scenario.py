@@ -96,6 +96,7 @@ class Cause(StrEnum):
     SPEED_PROFILE = "speed_profile"  # no speed profile meets lengths, end speeds and limits
     OVERLAP = "overlap"  # two footprints touch at some instant
     OFF_ROAD = "off_road"  # a footprint leaves drivable space
+    WRONG_WAY = "wrong_way"  # a vehicle drives against its lane
     BOUNDARY_STATE = "boundary_state"  # start or end differs from what was asked
     SPEED = "speed"  # negative or above the limit
     LONGITUDINAL_ACCELERATION = "longitudinal_acceleration"

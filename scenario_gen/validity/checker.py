@@ -24,8 +24,10 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats, runs
 from scenario_gen.errors import InputError
 from scenario_gen.roads.clearance import clearance_in_cells
+from scenario_gen.roads.vector.ground import drives_against
 from scenario_gen.template.interaction import Conflict, find_conflicts, pair_conflict, Wait
 from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.presence import together
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, Verdict, Violation
 from scenario_gen.validity import collision as apart
@@ -90,9 +92,11 @@ class Checker:
         """
         kept = [n for n in range(len(encounter.vehicles)) if n != ego]
         vehicles = tuple(encounter.vehicles[n] for n in kept)
-        conflicts = find_conflicts(vehicles, encounter.time, encounter.position[kept], encounter.heading[kept])
+        arrays = (encounter.position[kept], encounter.heading[kept], encounter.present[kept])
+        conflicts = find_conflicts(vehicles, encounter.time, *arrays)
         own = [replace(wait, vehicle=kept.index(wait.vehicle)) for wait in waits if wait.vehicle != ego]
-        return cls(road, BoundaryStates(asked.start[kept], asked.end[kept]), conflicts, own, limits)
+        known = (limits or Limits()).for_template(encounter)
+        return cls(road, BoundaryStates(asked.start[kept], asked.end[kept]), conflicts, own, known)
 
     @property
     def not_applicable(self) -> tuple[str, ...]:
@@ -128,6 +132,7 @@ class Checker:
             *self._dynamics(scenario),
             *self._overlaps(scenario, control, half),
             *self._exits(scenario, control, half),
+            *self._wrong_ways(scenario),
             *self._waits(scenario),
         ]
         wrong, present, absent = self._passing_orders(scenario)
@@ -156,18 +161,20 @@ class Checker:
             return
         limits = self.limits
         for name, k, asked in (("start", 0, self.asked.start), ("end", -1, self.asked.end)):  # too few numbers for arrays
+            # a vehicle's row is held outside of its presence: its first or last value is that at its own first or last instant
             ends = zip(scenario.position[:, k].tolist(), scenario.speed[:, k].tolist(), asked.tolist(), strict=True)
             for i, ((x, y), speed, (x_asked, y_asked, _, speed_asked)) in enumerate(ends):
                 distance, difference = exact.hypot(x - x_asked, y - y_asked), abs(speed - speed_asked)
                 if distance > limits.position_tolerance + 1e-9 or difference > limits.speed_tolerance + 1e-9:
                     message = f"vehicle {i}: {name} is {distance:.3f} m and {difference:.3f} m/s from what was asked"
-                    yield Violation(Cause.BOUNDARY_STATE, float(scenario.time[k]), (i,), message)
+                    yield Violation(Cause.BOUNDARY_STATE, float(scenario.time[scenario.present[i, k]]), (i,), message)
 
     def _dynamics(self, scenario: Scenario) -> Iterator[Violation]:
         out = np.empty((len(scenario.vehicles), len(dynamics.Check), 4))
-        dynamics.worst_excess(
-            scenario.time, scenario.position, scenario.heading, scenario.speed, scenario.acceleration, self._limits, out
-        )
+        names = ("position", "heading", "speed", "acceleration")
+        for rows, at in spans(scenario):
+            position, heading, speed, acceleration = (np.ascontiguousarray(getattr(scenario, name)[rows, at]) for name in names)
+            dynamics.worst_excess(scenario.time[at], position, heading, speed, acceleration, self._limits, out[rows])
         for i, row in zip(*(index.tolist() for index in np.nonzero(out[..., 0] > 0.0)), strict=True):
             _, value, limit, time = out[i, row].tolist()
             cause, sentence = dynamics.MESSAGES[dynamics.Check(row)]
@@ -175,35 +182,45 @@ class Checker:
 
     def _overlaps(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
         n, limits = len(half), self.limits
-        out = np.empty((n * (n - 1) // 2, 3))
-        apart.first_contacts(scenario.time, control, scenario.heading, half, limits.min_clearance, limits.time_resolution, out)
+        out = np.zeros((n * (n - 1) // 2, 3))
+        bounds = (limits.clearance, limits.time_resolution)
+        if scenario.all_present:
+            apart.first_contacts(scenario.time, control, scenario.heading, half, *bounds, out)
+        else:  # who is not there meets nobody
+            for k, (a, b) in enumerate(combinations(range(n), 2)):
+                at, two = together(scenario.present, a, b), [a, b]
+                if at.stop - at.start >= 2:
+                    curves = np.ascontiguousarray(control[two, at.start : at.stop - 1])
+                    heading = np.ascontiguousarray(scenario.heading[two, at])
+                    apart.first_contacts(scenario.time[at], curves, heading, half[two], *bounds, out[k : k + 1])
         if not out[:, 0].any():
             return
         for pair, (status, time, gap) in zip(combinations(range(n), 2), out.tolist(), strict=True):
             if status != apart.PROVEN:
                 if status == apart.UNPROVEN:
-                    what = f"cannot be proven more than {limits.min_clearance:g} m apart (gap {gap:.6f} m)"
+                    what = f"cannot be proven more than {limits.clearance:g} m apart (gap {gap:.6f} m)"
                 elif gap <= 0.0:
                     what = f"overlap by {-gap:.3f} m"
                 else:
-                    what = f"come within {gap:.3f} m; {limits.min_clearance:g} m must be exceeded"
+                    what = f"come within {gap:.3f} m; {limits.clearance:g} m must be exceeded"
                 yield Violation(Cause.OVERLAP, time, pair, f"vehicles {pair[0]} and {pair[1]}: footprints {what} at {time:.3f} s")
 
     def _exits(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
         if self.road is None:
             return
         out = np.empty((len(half), 2))
-        inside.first_exits(
-            scenario.time,
-            control,
-            scenario.heading,
-            half,
-            self._clearance,
-            self._blocked,
-            self._grid,
-            self.limits.time_resolution,
-            out,
-        )
+        for rows, at in spans(scenario):
+            inside.first_exits(
+                scenario.time[at],
+                np.ascontiguousarray(control[rows, at.start : at.stop - 1]),
+                np.ascontiguousarray(scenario.heading[rows, at]),
+                half[rows],
+                self._clearance,
+                self._blocked,
+                self._grid,
+                self.limits.time_resolution,
+                out[rows],
+            )
         for i, (status, time) in enumerate(out.tolist()):
             if status != inside.PROVEN:
                 what = "leaves drivable space" if status == inside.FOUND else "cannot be proven inside drivable space"
@@ -212,12 +229,24 @@ class Checker:
                     Cause.OFF_ROAD, time, (i,), f"vehicle {i}: footprint {what} at {time:.3f} s near ({x:.2f}, {y:.2f})"
                 )
 
+    def _wrong_ways(self, scenario: Scenario) -> Iterator[Violation]:
+        """Vehicles that drive against all lanes where they are, at the samples."""
+        if self.road is None or self.road.lanes is None:
+            return
+        against = drives_against(self.road, scenario.position, scenario.heading)
+        for i in np.flatnonzero(against.any(axis=1)).tolist():
+            k = int(np.argmax(against[i]))
+            x, y = scenario.position[i, k].tolist()
+            message = f"vehicle {i}: drives against its lane near ({x:.2f}, {y:.2f}), {int(against[i].sum())} samples in all"
+            yield Violation(Cause.WRONG_WAY, float(scenario.time[k]), (i,), message)
+
     def _passing_orders(self, scenario: Scenario) -> tuple[list[Violation], int, int]:
         """Violations, and how many of the template's conflicts are present and absent in the scenario."""
         wrong, present = [], 0
         for asked in self.conflicts or ():
             a, b = sorted((asked.first, asked.second))
-            found = pair_conflict(scenario.vehicles, scenario.time, scenario.position, scenario.heading, a, b)
+            arrays = (scenario.time, scenario.position, scenario.heading)
+            found = pair_conflict(scenario.vehicles, *arrays, a, b, scenario.present)
             present += found is not None
             if found is not None and found.first != asked.first:
                 message = (
@@ -231,8 +260,8 @@ class Checker:
         waits = self.waits or ()
         for i in sorted({wait.vehicle for wait in waits}):
             asked = [wait for wait in waits if wait.vehicle == i]
-            if self._never_moves(i):
-                if self._slow(scenario, i, self.limits.stand_speed) != [(0, scenario.time.size - 1)]:
+            if self._never_moves(i, asked[0].start, scenario):
+                if self._slow(scenario, i, self.limits.stand_speed) != [tuple(scenario.present[i].tolist())]:
                     k = int(np.argmax(scenario.speed[i]))
                     message = f"vehicle {i}: waits throughout in the template, but reaches {scenario.speed[i, k]:.3f} m/s"
                     yield Violation(Cause.STOP_NOT_KEPT, float(scenario.time[k]), (i,), message)
@@ -255,14 +284,22 @@ class Checker:
         slow = scenario.speed[i] < limit
         moved = exact.hypot(*np.diff(scenario.position[i], axis=0).T)
         still = slow[:-1] & slow[1:] & (moved < limit * np.diff(scenario.time))
+        still &= scenario.there[i, :-1] & scenario.there[i, 1:]
         return runs(still)  # of T - 1 steps: a step's end is a sample
 
-    def _never_moves(self, i: int) -> bool:
-        """Whether vehicle i, which waits from the very start, was asked to end where it starts."""
-        if self.asked is None or not any(wait.vehicle == i and wait.start == 0.0 for wait in self.waits or ()):
+    def _never_moves(self, i: int, begins: float, scenario: Scenario) -> bool:
+        """Whether vehicle i, whose first wait `begins` when it arrives, was asked to end where it starts."""
+        if self.asked is None or begins > float(scenario.time[scenario.present[i, 0]]):
             return False
         off = self.asked.end[i, :2] - self.asked.start[i, :2]
         return bool(exact.hypot(off[0], off[1]) <= self.limits.position_tolerance)
+
+
+def spans(scenario: Scenario) -> list[tuple[slice, slice]]:
+    """Return rows of vehicles and the instants at which they are there: all at once where everybody is there throughout."""
+    if scenario.all_present:
+        return [(slice(None), slice(0, len(scenario.time)))]
+    return [(slice(i, i + 1), slice(first, last + 1)) for i, (first, last) in enumerate(scenario.present.tolist())]
 
 
 def _not_finite(scenario: Scenario) -> Violation | None:

@@ -14,6 +14,7 @@
 
 """The core of the closed loop: the witness passes, the others keep their order whatever the ego does, nobody waits for ever."""
 
+from dataclasses import replace
 from itertools import combinations
 
 from driving_worlds import Anything, as_scenario, draw_scenario, PERIOD, Witness
@@ -194,3 +195,38 @@ def test_the_order_never_holds_back_who_is_last_and_only_ever_opens(seed):
     for i, j in combinations(range(len(known.half)), 2):
         for row in (known.order[i, j], known.order[j, i]):
             assert (row >= cells - 1e-9).all() and (row[1:] >= row[:-1]).all()
+
+
+def test_who_comes_late_and_leaves_early_is_there_for_that_time_only():
+    """Vehicle 1 comes at 3 s and leaves at 9 s; held up by the ego on its place, it comes later."""
+    base = crossing()
+    present = np.array([[0, 149], [30, 90]])
+    scenario = replace(base, present=present)
+    loop = ClosedLoop(scenario, 0)
+    drive = loop.drive(Witness(scenario, 0), lambda state: state.step >= 149)
+    assert (drive.here == scenario.there).sum() >= drive.here.size - 1  # at the very end of its presence it has gone
+    assert np.abs((drive.motion.position - scenario.position)[drive.here]).max() < 1e-9
+    x, y = scenario.position[1, 30].tolist()
+    state = loop.start()
+    for _ in range(60):
+        state = loop.step(state, Pose(x, y, 0.0, 0.0))
+    assert not state.here[1] and state.clock[1] < 3.0
+    for _ in range(15):
+        state = loop.step(state, FAR)
+    assert state.here[1]
+    late = ClosedLoop(replace(base, present=np.array([[0, 149], [30, 149]])), 1)
+    assert late.start().vehicles[1].tolist() == pytest.approx([*base.position[1, 30].tolist(), np.pi / 2, 8.0])
+    drive = late.drive(Late(base, 1, 3.0))
+    verdict = judge(late, drive)
+    assert verdict.passed and verdict.delay == pytest.approx(0.0, abs=1e-9)
+
+
+class Late(Witness):
+    """A witness that comes onto the scene later."""
+
+    def __init__(self, scenario, ego, begin):
+        super().__init__(scenario, ego)
+        self.begin = begin
+
+    def act(self, seen):
+        return super().act(replace(seen, time=seen.time + self.begin))

@@ -151,3 +151,20 @@ def test_one_vehicle_alone_can_be_segmented():
 def test_a_track_that_cannot_be_used_is_refused(position, speed, dt):
     with pytest.raises(InputError):
         segment_track(position, speed, dt)
+
+
+def test_a_vehicle_that_comes_and_goes_makes_no_changepoint(encounter_of):
+    t = np.arange(200) * 0.1
+    speed = np.array([np.interp(t, [0, 10, 20], [10, 10, 2]), np.full(200, 8.0), np.full(200, 12.0)])
+    found = segment(replace(encounter_of(speed, noise=0.05), present=np.array([[0, 199], [45, 199], [0, 150]])), seed=1)
+    assert np.abs(found.changepoints - [100]).max() <= 5
+    assert "vehicle 1 arrives after 4.5 s and drives at" in found.descriptions[0]
+    assert found.descriptions[1].endswith("leaves after 5.0 s")
+
+
+@pytest.mark.parametrize("preset", ["driving", "paper"])
+def test_what_is_held_outside_of_a_presence_does_not_count(encounter_of, preset):
+    whole = encounter_of(np.array([np.full(80, 8.0), np.linspace(8.0, 4.0, 80), np.full(80, 5.0)]), noise=0.05)
+    found = segment(replace(whole, present=np.array([[0, 79], [0, 40], [41, 79]])), SegmentationConfig(preset=preset), seed=2)
+    assert "has left" in found.descriptions[-1] or len(found.descriptions) == 1
+    assert np.isfinite(found.changepoint_probability).all()

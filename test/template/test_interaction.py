@@ -15,6 +15,7 @@
 """Waits, conflicts and passing orders: known cases, and agreement with shapely on random ones."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 from hypothesis import given, settings
@@ -187,3 +188,20 @@ def test_recorded_left_turner_yields_to_the_oncoming_car(data):
     assert found.exit_first < found.entry_second
     position, heading = read_ngsim(folder / "encounter_c_opposite_stop_go_Peach-4_2_134_334.csv")
     assert find_conflicts(CARS, np.arange(position.shape[1]) * 0.1, position, heading) == ()
+
+
+def test_who_is_there_only_for_a_time_enters_then():
+    """Vehicle b stands in a's way from its arrival on; before it arrives it is in nobody's way."""
+    tracks = straight(-30, 0, 0, 5), straight(-10, 0, 0, 0)
+    position, heading = (np.array(a) for a in zip(*tracks, strict=True))
+    (found,) = find_conflicts(CARS, TIME, position, heading, np.array([[0, 100], [70, 100]]))
+    assert (found.first, found.entry_second) == (0, 7.0)
+    (found,) = find_conflicts(CARS, TIME, position, heading)
+    assert (found.first, found.entry_first) == (1, 0.0)
+
+
+def test_a_vehicle_waits_only_while_it_is_there():
+    speed = np.array([np.full(100, 5.0), np.full(100, 0.2)])
+    made = replace(encounter(speed), present=np.array([[0, 99], [30, 80]]))
+    (wait,) = find_waits(made)
+    assert (wait.vehicle, wait.start, wait.end) == (1, 3.0, 8.0)

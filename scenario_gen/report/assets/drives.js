@@ -42,14 +42,15 @@ function draw() {
   const readout = byId("readout");
   readout.replaceChildren();
   drive.vehicles.forEach((vehicle, n) => {
-    const there = n === drive.ego || time <= drive.gone[n] + 1e-6;
+    const [came, gone] = drive.spans[n];
+    const there = n === drive.ego || (time >= came - 1e-6 && time <= gone + 1e-6);
     const state = motion.state(0, n, share);
     const colour = n === drive.ego ? "#0f172a" : vehicleColour(n);
     if (there) {
       context.globalAlpha = 0.35;
       context.lineWidth = 2;
       context.strokeStyle = colour;
-      motion.path(context, view, 0, n, 0, share);
+      motion.path(context, view, 0, n, Math.min(came / Math.max(duration, 1e-9), share), share);
       view.footprint(state, vehicle, colour, n === drive.ego ? 1 : 0.85, true);
       if (n === drive.ego) view.outline(state, { length: vehicle.length + 0.6, width: vehicle.width + 0.6 }, colour);
       view.label(state.x, state.y, n === drive.ego ? `ego (${vehicle.id})` : vehicle.id, colour);
@@ -58,7 +59,7 @@ function draw() {
     const chip = document.createElement("i");
     chip.style.background = colour;
     const speed = document.createElement("b");
-    speed.textContent = there ? `${state.speed.toFixed(1)} m/s` : "gone";
+    speed.textContent = there ? `${state.speed.toFixed(1)} m/s` : "not there";
     item.append(chip, `${vehicle.id} `, speed);
     readout.append(item);
   });

@@ -1,0 +1,158 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A Gymnasium environment over the closed loop: `pip install 'scenario_gen[gym,bags]'`.
+
+    env = DriveEnv(read_trials(Path("out/mine/bag"), ego="2"))
+    seen, info = env.reset(seed=7, options={"index": 0})
+    seen, reward, terminated, truncated, info = env.step(env.action_space.sample())
+
+Many at once: `gymnasium.vector.SyncVectorEnv([lambda: DriveEnv(trials)] * 8)`, or AsyncVectorEnv.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import gymnasium
+from gymnasium.spaces import Box
+import numpy as np
+import numpy.typing as npt
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.ego import Command
+from scenario_gen.closed_loop.simulation import ClosedLoop, State
+from scenario_gen.closed_loop.trials import read_trials, Trial
+from scenario_gen.closed_loop.verdict import judge
+from scenario_gen.curve import Curve
+from scenario_gen.errors import InputError
+
+OTHERS = 8  # nearest others that are seen
+AHEAD = np.array((5.0, 10.0, 15.0, 20.0, 30.0, 40.0))  # metres along the route at which it is seen
+OWN, EACH = 5, 7  # numbers about the ego, and about each other
+REACH = 100.0  # metres beyond which nobody is seen
+
+Seen = npt.NDArray[np.float32]
+
+
+class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
+    """One scenario at a time, drawn from the seed or named by its index.
+
+    Observation (float32, all in the ego's frame, x ahead):
+
+    - the ego: speed [m/s], curvature [1/m], offset from the route [m, left positive], angle to it [rad], metres to the goal;
+    - the route at 5, 10, 15, 20, 30 and 40 m ahead: x, y [m] each;
+    - the 8 nearest others within 100 m: 1, x, y [m], cos and sin of the relative yaw, speed [m/s], length [m]; zeros where there
+      are fewer.
+
+    Action (float32, 2): -1 to 1 of acceleration (the body's braking to its acceleration), -1 to 1 of its sharpest curvature.
+
+    Reward: metres driven along the route; -100 for a collision or leaving the road, +10 at the goal. It terminates with each of
+    those, and is truncated when the time is up; `info["verdict"]` then holds the verdict.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+
+    def __init__(self, trials: Sequence[Trial] | Path, config: ClosedLoopConfig = ClosedLoopConfig(), ego: str = "") -> None:
+        """Take what is driven in: trials, or a bag, of which `ego` names the vehicle in whose place the ego drives.
+
+        Raises:
+            InputError: the bag cannot be read, or there is nothing to drive in.
+        """
+        self.trials = read_trials(trials, ego) if isinstance(trials, Path) else list(trials)
+        if not self.trials:
+            raise InputError("there is no scenario to drive in")
+        self.config = config
+        size = OWN + 2 * len(AHEAD) + OTHERS * EACH
+        self.observation_space = Box(-np.inf, np.inf, (size,), np.float32)
+        self.action_space = Box(-1.0, 1.0, (2,), np.float32)
+        self._loops: dict[int, ClosedLoop] = {}
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
+        """Begin a drive: the scenario `options["index"]`, else one drawn by the seed.
+
+        Raises:
+            InputError: there is no scenario of that index.
+        """
+        super().reset(seed=seed)
+        index = (options or {}).get("index")
+        if index is None:
+            index = int(self.np_random.integers(len(self.trials)))
+        if not 0 <= index < len(self.trials):
+            raise InputError(f"there is no scenario {index}; there are {len(self.trials)}, from 0")
+        trial = self.trials[index]
+        if index not in self._loops:
+            self._loops[index] = ClosedLoop(trial.scenario, trial.ego, trial.road, self.config)
+        self._loop = self._loops[index]
+        task = self._loop.task()
+        self._route = Curve.through(task.route[:, :2]) if len(task.route) > 2 else None
+        self._states: list[State] = [self._loop.start()]
+        self._station = 0.0
+        return self._observed(), {"index": index, "name": trial.name}
+
+    def step(self, action: Seen) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
+        """Drive one step."""
+        pedal, wheel = (min(max(float(value), -1.0), 1.0) for value in action)
+        config, loop = self.config, self._loop
+        acceleration = pedal * (config.ego_acceleration if pedal > 0.0 else config.ego_braking)
+        before = self._station
+        self._states.append(loop.step(self._states[-1], Command(acceleration, wheel * config.ego_curvature)))
+        state = self._states[-1]
+        seen, reward = self._observed(), self._station - before
+        info: dict[str, Any] = {"time": state.time}
+        at_goal = loop.at_goal(state.time, state.vehicles[loop.ego])
+        off_road = loop.off_road(state)
+        hit = loop.hit(state)
+        terminated = at_goal or off_road or hit
+        truncated = not terminated and state.step >= loop.last_step
+        if terminated:
+            reward += 10.0 if at_goal and not (off_road or hit) else -100.0
+        if terminated or truncated:
+            info["verdict"] = judge(loop, loop.record(self._states)).document()
+        return seen, reward, terminated, truncated, info
+
+    def _observed(self) -> Seen:
+        state = self._states[-1]
+        ego = state.ego
+        c, s = float(exact.cos(ego.yaw)), float(exact.sin(ego.yaw))
+
+        def local(xy: Floats) -> Floats:
+            """Positions (..., 2) in the ego's frame."""
+            dx, dy = xy[..., 0] - ego.x, xy[..., 1] - ego.y
+            return np.stack([dx * c + dy * s, dy * c - dx * s], axis=-1)
+
+        route, offset, angle, left = np.zeros((len(AHEAD), 2)), 0.0, 0.0, 0.0
+        if self._route is not None:
+            around = np.linspace(self._station - 2.0, self._station + 8.0, 41)
+            poses = self._route.at(around)
+            self._station = float(around[np.argmin(exact.hypot(poses[:, 0] - ego.x, poses[:, 1] - ego.y))])
+            x, y, yaw = self._route.at(self._station).tolist()
+            offset = (ego.y - y) * float(exact.cos(yaw)) - (ego.x - x) * float(exact.sin(yaw))
+            angle = (ego.yaw - yaw + np.pi) % (2.0 * np.pi) - np.pi
+            left = self._route.length - self._station
+            route = local(self._route.at(self._station + AHEAD)[:, :2])
+        found = self._loop.observe(state)
+        others = np.zeros((OTHERS, EACH))
+        if len(found.ids):
+            place = local(found.others[:, :2])
+            away = exact.hypot(place[:, 0], place[:, 1])
+            for row, k in enumerate(np.argsort(away, kind="stable")[:OTHERS].tolist()):
+                if away[k] <= REACH:
+                    turn = found.others[k, 2] - ego.yaw
+                    speed, length = found.others[k, 3], found.sizes[k, 0]
+                    others[row] = (1.0, *place[k], float(exact.cos(turn)), float(exact.sin(turn)), speed, length)
+        own = np.array((ego.speed, ego.curvature, offset, angle, left))
+        return np.concatenate([own, route.ravel(), others.ravel()]).astype(np.float32)

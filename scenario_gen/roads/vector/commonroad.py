@@ -1,0 +1,128 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""CommonRoad maps, XML of versions 2018b and 2020a; its obstacles and planning problems are passed over.
+
+Source: CommonRoad's documentation of the XML format, 2018b and 2020a.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.errors import InputError
+from scenario_gen.markup import Element, finite, read_xml
+from scenario_gen.roads.vector.network import Draft, network_of
+from scenario_gen.types.lanes import LaneNetwork
+
+_SKIPPED = frozenset(
+    ("obstacle", "staticObstacle", "dynamicObstacle", "environmentObstacle", "phantomObstacle", "planningProblem", "scenarioTags")
+)
+_NOT_FOR_CARS = frozenset(
+    ("sidewalk", "crosswalk", "bicycleLane", "busLane", "shoulder", "parking", "border", "railway", "restricted")
+)
+_MAX_SPEED = ("274", "274.1", "R2-1", "maxSpeed")  # names and national numbers of the sign
+
+
+def read_commonroad(path: Path) -> LaneNetwork:
+    """Return the lanes of a CommonRoad file.
+
+    Raises:
+        InputError: it is broken or holds no lane that cars may use; names file and line.
+    """
+    root = read_xml(path, f"map {path}", _SKIPPED)
+    if root.tag != "commonRoad":
+        raise InputError(f"{root.place}: the root of a CommonRoad file is <commonRoad>")
+    lanelets = {element.get("id"): element for element in root.all("lanelet")}
+    limits = _speed_signs(root)
+    junctions = _junctions(root, set(lanelets))
+    drafts, left_out = [], 0
+    for name, lanelet in lanelets.items():
+        if {kind.text.strip() for kind in lanelet.all("laneletType")} & _NOT_FOR_CARS:
+            left_out += 1
+            continue
+        successors = tuple(after.get("ref") for after in lanelet.all("successor"))
+        unknown = next((after for after in successors if after not in lanelets), None)
+        if unknown is not None:
+            raise InputError(f"{lanelet.place}: lanelet {name} leads to lanelet {unknown}, which is not there")
+        beside = tuple(
+            side.get("ref")
+            for tag in ("adjacentLeft", "adjacentRight")
+            for side in lanelet.all(tag)
+            if side.attributes.get("drivingDir") == "same"
+        )
+        drafts.append(
+            Draft(
+                id=name,
+                left=_points(lanelet.one("leftBound")),
+                right=_points(lanelet.one("rightBound")),
+                successors=successors,
+                beside=beside,
+                speed_limit=_speed_limit(lanelet, limits),
+                junction=junctions.get(name, ""),
+                place=lanelet.place,
+            )
+        )
+    notes = [
+        f"CommonRoad {root.attributes.get('commonRoadVersion', '?')}: coordinates as they stand, in metres",
+        *_georeference(root),
+    ]
+    if left_out:
+        notes.append(f"{left_out} lanelets are for others than cars and were left out")
+    return network_of(path.stem, drafts, notes)
+
+
+def _georeference(root: Element) -> list[str]:
+    reference = root.first("location", "geoTransformation", "geoReference")
+    return [f"geoReference {' '.join(reference.text.split())} is stated, not applied"] if reference is not None else []
+
+
+def _points(bound: Element) -> Floats:
+    points = [(point.one("x").value(), point.one("y").value()) for point in bound.all("point")]
+    return np.array(points, dtype=np.float64).reshape(-1, 2)
+
+
+def _speed_signs(root: Element) -> dict[str, float]:
+    """Speed limits [m/s] by the id of their sign."""
+    limits = {}
+    for sign in root.all("trafficSign"):
+        for element in sign.all("trafficSignElement"):
+            kind, value = element.first("trafficSignID"), element.first("additionalValue")
+            if kind is not None and value is not None and kind.text.strip() in _MAX_SPEED:
+                limits[sign.get("id")] = finite(value.text.strip(), value.place)
+    return limits
+
+
+def _speed_limit(lanelet: Element, signs: dict[str, float]) -> float:
+    own = lanelet.first("speedLimit")
+    if own is not None:
+        return own.value()
+    return min(
+        (signs[ref.get("ref")] for ref in lanelet.all("trafficSignRef") if ref.attributes.get("ref") in signs), default=math.nan
+    )
+
+
+def _junctions(root: Element, known: set[str]) -> dict[str, str]:
+    """The intersection of each lanelet that lies in one: those that follow its incoming lanelets."""
+    found: dict[str, str] = {}
+    for intersection in root.all("intersection"):
+        for incoming in intersection.all("incoming"):
+            for tag in ("successorsLeft", "successorsRight", "successorsStraight"):
+                for ref in incoming.all(tag):
+                    if ref.get("ref") not in known:
+                        raise InputError(f"{ref.place}: lanelet {ref.get('ref')} is not there")
+                    found[ref.get("ref")] = intersection.get("id")
+    return found

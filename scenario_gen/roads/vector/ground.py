@@ -1,0 +1,129 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Nobody drives against a lane: the directions in which each cell may be driven, and a vehicle's own part of the road."""
+
+from dataclasses import replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from scenario_gen import exact
+from scenario_gen.arrays import Bools, Floats, wrap_angle
+from scenario_gen.roads.clearance import clearance_field, footprint_fits
+from scenario_gen.roads.vector.raster import covered
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.lanes import Lane
+from scenario_gen.types.road import Road
+
+_BINS = 16  # of directions
+_ALLOWED = np.pi / 2.0 + np.pi / _BINS  # a pose turned from a lane by more drives against it; half a bin is not told apart
+_ALL = np.uint16(0xFFFF)
+_ALONG = np.radians(60.0)  # a path uses a lane from whose direction it is turned by less
+_AT_ONCE = 4096  # cells
+_KERB = 1.0  # metres beyond its own lanes that a vehicle's footprint may reach
+
+_known: "WeakKeyDictionary[Road, npt.NDArray[np.uint16]]" = WeakKeyDictionary()
+
+
+def directions(road: Road) -> npt.NDArray[np.uint16]:
+    """Return (H, W): bit k of a cell says whether one may drive there in direction k · 22.5°; all bits where no lane lies.
+
+    Several lanes may lie in a cell, as in a junction; each allows what differs from it by at most 90°.
+    """
+    found = _known.get(road)
+    if found is None:
+        found = np.zeros(road.drivable.shape, dtype=np.uint16)
+        lanes = road.lanes.lanes if road.lanes is not None else ()
+        for lane in lanes:
+            rows, columns = _cells(road, lane)
+            found[rows, columns] |= _bits(road, lane, rows, columns)
+        found[found == 0] = _ALL
+        found.setflags(write=False)
+        _known[road] = found
+    return found
+
+
+def _cells(road: Road, lane: Lane) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    first = np.round(road.origin / road.resolution).astype(np.int64)
+    corner, inside = covered(lane.outline, road.resolution, first, road.drivable.shape)
+    rows, columns = np.nonzero(inside)
+    return rows + corner[1], columns + corner[0]
+
+
+def _bits(road: Road, lane: Lane, rows: npt.NDArray[np.int64], columns: npt.NDArray[np.int64]) -> npt.NDArray[np.uint16]:
+    """The directions that a lane allows in its cells, by the section that is nearest to each."""
+    centre = lane.centre
+    step = np.diff(centre, axis=0)
+    yaw = exact.arctan2(step[:, 1], step[:, 0])
+    k = np.arange(_BINS)
+    near = np.abs(wrap_angle(2.0 * np.pi * k / _BINS - yaw[:, None])) <= _ALLOWED
+    allowed = (near * (1 << k)).sum(axis=1).astype(np.uint16)
+    middle = (centre[1:] + centre[:-1]) / 2.0
+    points = road.origin + (np.column_stack((columns, rows)) + 0.5) * road.resolution
+    nearest = np.empty(len(points), dtype=np.int64)
+    for part in range(0, len(points), _AT_ONCE):
+        some = points[part : part + _AT_ONCE]
+        away = np.square(some[:, None, 0] - middle[:, 0]) + np.square(some[:, None, 1] - middle[:, 1])
+        nearest[part : part + _AT_ONCE] = np.argmin(away, axis=1)
+    return np.asarray(allowed[nearest])
+
+
+def drives_against(road: Road, position: Floats, heading: Floats) -> Bools:
+    """Return whether poses, (..., 2) [m] and (...) [rad], are driven against all lanes that lie there."""
+    row, column, inside = road.cells(position)
+    turn = np.round(heading / (2.0 * np.pi / _BINS)).astype(np.int64) % _BINS
+    return np.asarray(inside & ((directions(road)[row, column] >> turn.astype(np.uint16)) & 1 == 0))
+
+
+def own_ground(road: Road, path: Floats, vehicle: Vehicle) -> Road:
+    """Return the part of a road on which a vehicle keeps to its side: its own lanes, those beside them, and a metre more.
+
+    Args:
+        road: with or without lanes.
+        path: (M, 3) x, y [m], yaw [rad] of its fitted path; its own lanes are those along which it lies.
+        vehicle: where its footprint has no room at the path's ends, it keeps the whole road.
+    """
+    if road.lanes is None or not len(path):
+        return road
+    lanes = road.lanes.lanes
+    own = {k for k, lane in enumerate(lanes) if _uses(lane, path)}
+    own |= {other for k in own for other in lanes[k].beside}
+    cells = np.zeros(road.drivable.shape, dtype=np.bool_)
+    for k in sorted(own):
+        cells[_cells(road, lanes[k])] = True
+    if not cells.any():
+        return road
+    away = clearance_field(replace(road, drivable=~cells, lanes=None)) if not cells.all() else np.zeros(cells.shape)
+    part = replace(road, drivable=road.drivable & (cells | (away <= _KERB)))
+    ends = path[[0, -1]]
+    return part if footprint_fits(part, ends, vehicle.length, vehicle.width).all() else road
+
+
+def _uses(lane: Lane, path: Floats) -> bool:
+    """Whether part of a path lies in a lane, about its way."""
+    low, high = lane.outline.min(axis=0), lane.outline.max(axis=0)
+    inside = ((path[:, :2] >= low) & (path[:, :2] <= high)).all(axis=1)
+    centre = lane.centre
+    step = np.diff(centre, axis=0)
+    yaw = exact.arctan2(step[:, 1], step[:, 0])
+    middle = (centre[1:] + centre[:-1]) / 2.0
+    half = exact.hypot(*(lane.left - lane.right).T)[:-1] / 2.0
+    for pose in path[inside][::2]:
+        away = exact.hypot(middle[:, 0] - pose[0], middle[:, 1] - pose[1])
+        k = int(np.argmin(away))
+        if away[k] <= half[k] and abs(float(wrap_angle(np.asarray(yaw[k] - pose[2])))) < _ALONG:
+            return True
+    return False

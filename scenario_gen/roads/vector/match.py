@@ -1,0 +1,346 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A template on the lanes of a map: which chain of lanes each vehicle drives, and where on it the template begins.
+
+A placement as one piece (`search`) says about where; then each vehicle gets the chain of lanes that its path lies nearest to, in
+their direction, with at most one change of lanes where the map allows one. Along the chains the template keeps its distances
+to crossings and between vehicles on one lane (least squares, weighted).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+import math
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, wrap_angle
+from scenario_gen.curve import crossings, Curve
+from scenario_gen.roads.vector.search import Spot
+from scenario_gen.template.path_crossing import path_crossing, PathCrossing
+from scenario_gen.template.tracks import Track
+from scenario_gen.types.lanes import LaneNetwork
+
+NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
+_HEADING = math.radians(60.0)  # and is turned from it by this at most
+_MOST_CHAINS = 48  # of one vehicle
+_STEP = 0.5  # metres between a chain's points
+_SMOOTHED = 3  # points to either side of which a point is the mean: polylines have corners
+_SAMPLES = 24  # of a path that are compared with a chain
+_CAPPED = 100.0  # m²
+_YAW = 20.0  # m² per unit of 1 - cos
+_OWN_TURN = 40.0  # m² per rad²
+_CHANGING = 4  # chains, the most alike, between which a change of lanes is looked for
+_PRIOR, _CROSSED, _BEYOND, _FOLLOWED = (
+    0.5,
+    1.0,
+    0.25,
+    2.0,
+)  # weights: where the place says; crossings driven, or beyond the ends; gaps
+_WORTH = 1.5  # m² that a change of lanes must gain
+_TURN = math.radians(40.0)  # a chain may turn by this much more or less than the vehicle in the template
+_CROSS = math.radians(15.0)  # least angle of a crossing
+_SAME = 2.0  # metres sideways within which two vehicles follow each other
+_ROOM = 1.0  # metres between a footprint and the end of the lanes
+_BLEND = 5.7735  # largest second derivative of x³(10 − 15x + 6x²)
+_SHIFT = 0.02  # 1/m, curvature of a change of lanes
+_FORTH = 25.0  # metres of lanes before and after what is driven
+_LOST = 6.0  # m² of a crossing beyond the recorded ends that is none on the lanes
+_SPEEDING = 0.1  # m² per (m/s)² beyond the speed limit
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What one vehicle drives.
+
+    Attributes:
+        lanes: the chain of lanes.
+        curve: their middle, around what is driven.
+        start: arc length [m] on the curve at which the template begins.
+        progress: (T,) metres from there at each of the template's samples.
+    """
+
+    lanes: tuple[int, ...]
+    curve: Curve
+    start: float
+    progress: Floats
+
+    @property
+    def end(self) -> float:
+        """Arc length [m] on the curve at which the template ends."""
+        return self.start + float(self.progress[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """A course for every vehicle; `cost` [m²] is how badly they resemble the template, `reason` why it cannot be had, or ""."""
+
+    courses: tuple[Course, ...]
+    cost: float
+    reason: str
+
+
+class Chains:
+    """The chains of lanes of one network, and their middles, made once."""
+
+    def __init__(self, network: LaneNetwork) -> None:
+        self.network = network
+        self.length = [float(exact.hypot(*np.diff(lane.centre, axis=0).T).sum()) for lane in network.lanes]
+        self.points = np.concatenate([lane.centre[:-1] for lane in network.lanes])
+        steps = [np.diff(lane.centre, axis=0) for lane in network.lanes]
+        self.yaws = np.concatenate([exact.arctan2(step[:, 1], step[:, 0]) for step in steps])
+        self.owner = np.repeat(np.arange(len(steps)), [len(step) for step in steps])
+        self._curves: dict[tuple[int, ...], Curve] = {}
+
+    def curve(self, chain: tuple[int, ...]) -> Curve:
+        """The middle of a chain."""
+        if chain not in self._curves:
+            self._curves[chain] = middle(np.concatenate([self.network.lanes[k].centre for k in chain]))
+        return self._curves[chain]
+
+    def near(self, pose: Floats) -> list[int]:
+        """Lanes that pass a pose (3,) nearby, about its way; the nearest first."""
+        away = exact.hypot(self.points[:, 0] - pose[0], self.points[:, 1] - pose[1])
+        fits = (away <= NEAR) & (np.abs(wrap_angle(self.yaws - pose[2])) <= _HEADING)
+        found: dict[int, float] = {}
+        for k in np.flatnonzero(fits).tolist():
+            owner = int(self.owner[k])
+            found[owner] = min(found.get(owner, math.inf), round(float(away[k]), 6))
+        return sorted(found, key=lambda lane: (found[lane], lane))
+
+    def from_lane(self, first: int, travelled: float) -> Iterator[tuple[int, ...]]:
+        """Chains that begin before a lane and go on for what is travelled from it, or until the lanes end."""
+        before: tuple[int, ...] = ()
+        reach, lane = 0.0, first
+        while reach < _FORTH and self.network.predecessors[lane]:
+            lane = self.network.predecessors[lane][0]
+            if lane in before or lane == first:
+                break
+            before, reach = (lane, *before), reach + self.length[lane]
+        open_chains: list[tuple[tuple[int, ...], float]] = [((first,), self.length[first])]
+        for _ in range(_MOST_CHAINS):
+            if not open_chains:
+                break
+            chain, length = open_chains.pop(0)
+            after = [k for k in self.network.lanes[chain[-1]].successors if k not in chain]
+            if not after or length > travelled + self.length[first] + _FORTH:
+                yield tuple(k for k in before if k not in chain) + chain
+            else:
+                open_chains += [((*chain, k), length + self.length[k]) for k in after]
+
+
+def middle(points: Floats) -> Curve:
+    """A curve through the means of neighbouring points of a polyline (M, 2) [m]; its ends stay where they are."""
+    rough = Curve.through(points)
+    even = rough.cut(0.0, rough.length, _STEP).points[:, :2]
+    index = np.arange(len(even))
+    room = np.minimum(index, index[::-1])[:, None]  # at the ends the window shrinks, on both sides alike
+    offset = np.arange(-_SMOOTHED, _SMOOTHED + 1)
+    return Curve.through(even[index[:, None] + np.clip(offset, -room, room)].mean(axis=1))
+
+
+def match(chains: Chains, tracks: Sequence[Track], spot: Spot, scale: float = 1.0) -> Match:
+    """Give every vehicle its course near a placement of the template as one piece.
+
+    Args:
+        chains: of the map or the part of it.
+        tracks: the template.
+        spot: where it lies.
+        scale: s of eq 9, of the distances driven.
+    """
+    courses = []
+    for track in tracks:
+        course = _course(chains, track, spot, scale)
+        if course is None:
+            return Match((), math.inf, f"no lane passes where vehicle {track.vehicle.id} would drive")
+        courses.append(course)
+    courses = _tied(courses, tracks, scale)
+    return judged(chains, courses, tracks, spot)
+
+
+def _placed(track: Track, spot: Spot) -> Floats:
+    """Poses (K, 3) along a template's path, on the map."""
+    poses = track.curve.at(np.linspace(0.0, track.travelled, 1 if track.still else _SAMPLES))
+    return np.column_stack((spot.moved(poses[:, :2]), poses[:, 2] + spot.yaw))
+
+
+def _course(chains: Chains, track: Track, spot: Spot, scale: float) -> Course | None:
+    """The chain of lanes that resembles a vehicle's path most."""
+    poses = _placed(track, spot)
+    driven = scale * track.travelled
+    tried: dict[tuple[int, ...], tuple[float, Curve, Floats]] = {}
+    for first in chains.near(poses[0]):
+        for chain in chains.from_lane(first, driven):
+            if chain not in tried:
+                curve = _around(chains.curve(chain), poses, driven)
+                misses = _misses(curve, poses)
+                tried[chain] = (float(misses.mean()) + _turn_cost(curve, poses), curve, misses)
+    ranked = sorted(tried, key=lambda chain: (round(tried[chain][0], 6), chain))
+    if not ranked:
+        return None
+    cost, curve, _ = tried[ranked[0]]
+    used = ranked[0]
+    for one in ranked[:_CHANGING] if not track.still else ():
+        for other in ranked[:_CHANGING]:
+            change = _change(tried[one][2], tried[other][2])
+            if change is not None and change[1] < cost - _WORTH and _beside(chains.network, one, other):
+                changed = changed_curve(tried[one][1], tried[other][1], poses[change[0], :2])
+                if changed is not None:
+                    cost, curve, used = change[1], changed, tuple(dict.fromkeys((*one, *other)))
+    station, _ = curve.project(poses[:, :2])
+    start = float(np.median(station - np.linspace(0.0, driven, len(station))))
+    return Course(used, curve, start, scale * track.progress)
+
+
+def _around(curve: Curve, poses: Floats, driven: float) -> Curve:
+    """The part of a chain around a path (K, 3), with what lies before and after it."""
+    station, _ = curve.project(poses[:1, :2])
+    low, high = max(float(station[0]) - _FORTH, 0.0), min(float(station[0]) + 1.1 * driven + 2.0 * _FORTH, curve.length)
+    return curve.cut(low, high) if high - low > _STEP else curve
+
+
+def _turn_cost(curve: Curve, poses: Floats) -> float:
+    """How differently [m²] a chain turns over a path."""
+    station, _ = curve.project(poses[[0, -1], :2])
+    yaw = curve.at(np.clip(station, 0.0, curve.length))[:, 2]
+    return float(_OWN_TURN * np.square((yaw[1] - yaw[0]) - (poses[-1, 2] - poses[0, 2])))
+
+
+def _misses(curve: Curve, poses: Floats) -> Floats:
+    """How badly (K,) [m²] poses agree with a curve."""
+    station, offset = curve.project(poses[:, :2])
+    off = poses[:, 2] - curve.at(station)[:, 2]
+    beyond = np.maximum(-station, 0.0) + np.maximum(station - curve.length, 0.0)
+    return np.asarray(np.minimum(np.square(offset) + np.square(beyond), _CAPPED) + _YAW * (1.0 - exact.cos(off)))
+
+
+def _change(before: Floats, after: Floats) -> tuple[int, float] | None:
+    """At which sample (not the first or last) to change from one chain to another, and the mean miss then [m²]."""
+    forth = np.cumsum(before)[:-1] + (after.sum() - np.cumsum(after))[:-1]
+    k = int(np.argmin(forth))
+    return (k, float(forth[k]) / len(before)) if 2 <= k < len(before) - 3 else None
+
+
+def _beside(network: LaneNetwork, one: tuple[int, ...], other: tuple[int, ...]) -> bool:
+    """Whether traffic may change from a chain to another."""
+    return any(k in network.lanes[lane].beside for lane in one for k in other)
+
+
+def changed_curve(one: Curve, other: Curve, at: Floats) -> Curve | None:
+    """A curve that changes smoothly (x³(10 − 15x + 6x²)) from one curve to another around a place (2,)."""
+    station = float(one.project(at[None])[0][0])
+    _, offset = other.project(one.at(np.array([station]))[:, :2])
+    width = abs(float(offset[0]))
+    reach = math.sqrt(max(width, 0.1) * _BLEND / _SHIFT)
+    s = np.arange(0.0, one.length + 1e-9, _STEP)
+    here = one.at(s)
+    there, _ = other.project(here[:, :2])
+    x = np.clip((s - station) / reach + 0.5, 0.0, 1.0)
+    share = exact.power(x, 3) * (10.0 - 15.0 * x + 6.0 * np.square(x))
+    target = other.at(there)[:, :2]
+    kept = (s < station) | ((there > 0.0) & (there < other.length))
+    mixed = (here[:, :2] + share[:, None] * (target - here[:, :2]))[kept]
+    return Curve.through(mixed) if len(mixed) > 3 else None
+
+
+def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[Course]:
+    """Shift the beginnings so that crossings and gaps on one lane are as far along as in the template (least squares)."""
+    rows: list[tuple[dict[int, float], float, float]] = [({i: 1.0}, course.start, _PRIOR) for i, course in enumerate(courses)]
+    for a, one in enumerate(tracks):
+        for b in range(a):
+            two = tracks[b]
+            crossing = path_crossing(one, two)
+            if crossing is not None:
+                found = crossings(courses[a].curve, courses[b].curve, _CROSS)
+                if len(found):
+                    want = np.array([courses[a].start + scale * crossing.first, courses[b].start + scale * crossing.second])
+                    at = found[int(np.argmin(np.abs(found - want).sum(axis=1)))]
+                    weight = _CROSSED if _driven(crossing, one, two) else _BEYOND
+                    rows.append(({a: 1.0}, float(at[0]) - scale * crossing.first, weight))
+                    rows.append(({b: 1.0}, float(at[1]) - scale * crossing.second, weight))
+            for first, second in ((a, b), (b, a)):
+                gap = _follows(tracks[first], tracks[second])
+                if gap is None:
+                    continue
+                station, offset = courses[second].curve.project(courses[first].curve.at(np.array([courses[first].start]))[:, :2])
+                if abs(float(offset[0])) < _SAME:  # of `first`, its start lies so far along the course of `second`
+                    shift = float(station[0]) - courses[first].start
+                    rows.append(({first: 1.0, second: -1.0}, scale * gap - shift, _FOLLOWED))
+    matrix, value = np.zeros((len(rows), len(courses))), np.zeros(len(rows))
+    for row, (terms, wanted, weight) in enumerate(rows):
+        for i, factor in terms.items():
+            matrix[row, i] = weight * factor
+        value[row] = weight * wanted
+    solution = exact.lstsq(matrix, value)
+    return [replace(course, start=float(s)) for course, s in zip(courses, solution, strict=True)]
+
+
+def _driven(crossing: PathCrossing, one: Track, two: Track) -> bool:
+    """Whether both vehicles drive as far as their crossing."""
+    return 0.0 <= crossing.first <= one.travelled and 0.0 <= crossing.second <= two.travelled
+
+
+def _follows(one: Track, two: Track) -> float | None:
+    """How far along the path of `two` the path of `one` begins, if it begins on it."""
+    start = one.curve.at(0.0)
+    station, offset = two.curve.project(start[None, :2])
+    turned = abs(float(wrap_angle(np.asarray(two.curve.at(float(station[0]))[2] - start[2]))))
+    on = abs(float(offset[0])) < _SAME and turned < math.radians(30.0) and 0.0 <= station[0] <= two.travelled
+    return float(station[0]) if on else None
+
+
+def turned_more(course: Course, track: Track) -> float:
+    """By how much [rad, signed] a course turns more than the vehicle does in the template."""
+    if track.still:
+        return 0.0
+    ends, own = course.curve.at(np.array([course.start, course.end])), track.curve.at(np.array([0.0, track.travelled]))
+    return float((ends[1, 2] - ends[0, 2]) - (own[1, 2] - own[0, 2]))
+
+
+def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], spot: Spot) -> Match:
+    """Say how well courses resemble the template, and what is lost."""
+    cost, reason = 0.0, ""
+    for course, track in zip(courses, tracks, strict=True):
+        half = track.vehicle.length / 2.0 + _ROOM
+        short = max(half - course.start, course.end + half - course.curve.length)
+        turn = turned_more(course, track)
+        if short > 0.0:
+            reason = reason or f"the lanes of vehicle {track.vehicle.id} end {short:.1f} m too soon"
+        if abs(turn) > _TURN:
+            reason = reason or f"the lanes turn vehicle {track.vehicle.id} by {math.degrees(turn):.0f}° more than in the template"
+        poses = _placed(track, spot)
+        fitted = course.curve.at(np.linspace(course.start, course.end, len(poses)))
+        miss = np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1])
+        cost += float(np.minimum(miss, _CAPPED).mean() + _YAW * (1.0 - exact.cos(fitted[:, 2] - poses[:, 2])).mean()) / len(
+            tracks
+        )
+    for a, one in enumerate(tracks):
+        for b, two in enumerate(tracks[:a]):
+            crossing = path_crossing(one, two)
+            if crossing is None or len(crossings(courses[a].curve, courses[b].curve, _CROSS)):
+                continue
+            cost += _LOST
+            if _driven(crossing, one, two):
+                reason = reason or f"vehicles {two.vehicle.id} and {one.vehicle.id} cross in the template, and not on these lanes"
+    return Match(tuple(courses), cost + speeding(chains.network, courses, tracks), reason)
+
+
+def speeding(network: LaneNetwork, courses: Sequence[Course], tracks: Sequence[Track]) -> float:
+    """What it counts [m²] that vehicles would drive faster than the highest limit of their lanes."""
+    over = []
+    for course, track in zip(courses, tracks, strict=True):
+        limit = max((network.lanes[k].speed_limit for k in course.lanes), default=math.nan)
+        over.append(max(float(track.speed.max()) - limit, 0.0) if limit > 0.0 else 0.0)
+    return _SPEEDING * float(np.mean(np.square(over)))

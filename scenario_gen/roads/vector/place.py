@@ -1,0 +1,125 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where on a map a template goes: all ways of laying it on lanes, the best first, and the part of the map around one."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from itertools import islice
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, frozen
+from scenario_gen.cancelling import stop_if_cancelled
+from scenario_gen.errors import RefusedError
+from scenario_gen.roads.vector.match import Chains, Match, match
+from scenario_gen.roads.vector.search import at_home, find_spots
+from scenario_gen.roads.vector.street import along_streets
+from scenario_gen.template.separation import separate
+from scenario_gen.template.tracks import Track
+from scenario_gen.types.lanes import LaneNetwork
+
+_HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
+_SPOTS = 15  # placements as one piece, and
+_STREETS = 8  # stretches of road that are looked at closely
+_SCALES = (1.0, 0.9, 1.1)
+_WORST = 40.0  # m²: what resembles the template less is no place for it
+_BESIDE = 12.0  # metres of the map around what is driven, and
+_FORTH = 20.0  # metres of the lanes before and after it
+_SHIFT = 3.0  # metres by which paths may be shifted to be clear of each other
+
+
+@lru_cache(maxsize=4)
+def chains_of(network: LaneNetwork) -> Chains:
+    """Return the chains of a network, the same for the same network."""
+    return Chains(network)
+
+
+def placements(
+    network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None, scales: Sequence[float] = _SCALES
+) -> Iterator[tuple[Match, float]]:
+    """Yield the ways of laying a template on lanes, with their scales: at home first, then those that resemble it most.
+
+    Args:
+        network: a map or a part of it.
+        tracks: of the template, all vehicles.
+        lanes: a vehicle is laid onto one of these; None: anywhere.
+        scales: s of eq 9, tried in this order where none before could be had.
+
+    Raises:
+        RefusedError: there is none; says what is lost most often.
+    """
+    chains = chains_of(network)
+    home = at_home(network, tracks)
+    reasons: Counter[str] = Counter()
+    if lanes is None and home.cost <= _HOME:
+        own = match(chains, tracks, home)
+        if not own.reason:
+            yield own, 1.0
+    spots = find_spots(network, tracks, lanes)[:_SPOTS]
+    streets = list(islice(along_streets(chains, tracks, lanes), _STREETS))
+    found = 0
+    for scale in scales:
+        matches = streets if scale == 1.0 else []
+        for spot in spots:
+            stop_if_cancelled()
+            one = match(chains, tracks, spot, scale)
+            if one.reason or one.cost > _WORST:
+                reasons[one.reason or "vehicles would be too far from where they are in the template"] += 1
+            else:
+                matches.append(one)
+        for one in sorted(matches, key=lambda one: round(one.cost, 3)):
+            found += 1
+            yield one, scale
+        if found:
+            return
+    why = "; ".join(f"{reason} ({count} of {len(spots) * len(scales)} placements)" for reason, count in reasons.most_common(2))
+    raise RefusedError(f"the template fits no place on map {network.name}: {why or 'it has no lanes of its directions'}")
+
+
+def laid(one: Match, tracks: Sequence[Track], scale: float) -> tuple[Track, ...]:
+    """The template's tracks on their courses."""
+    placed = []
+    for course, track in zip(one.courses, tracks, strict=True):
+        driven = float(course.progress[-1])
+        curve = course.curve.cut(course.start, course.start + max(driven, 1.0), 0.25)
+        progress = course.progress * (curve.length / driven if driven > 1.0 else 1.0)
+        placed.append(replace(track, curve=curve, progress=frozen(np.minimum(progress, curve.length))))
+    return tuple(placed)
+
+
+def best_part(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> tuple[Floats, str]:
+    """Return the box (2, 2) [m] around the best place of a template on a map, and a sentence that names it.
+
+    Raises:
+        RefusedError: there is no place for it.
+    """
+    reason = ""
+    for one, scale in placements(network, tracks, lanes):
+        try:
+            separate(laid(one, tracks, scale), 0.0, _SHIFT, sideways=0.0)
+        except RefusedError as error:
+            reason = reason or str(error)
+            continue
+        points = np.concatenate(
+            [course.curve.at(np.linspace(course.start - _FORTH, course.end + _FORTH, 200))[:, :2] for course in one.courses]
+        )
+        box = np.round(np.stack((points.min(axis=0) - _BESIDE, points.max(axis=0) + _BESIDE)))
+        names = dict.fromkeys(network.lanes[k].junction for course in one.courses for k in course.lanes)
+        where = ", ".join(f"junction {name}" for name in names if name) or f"lane {network.lanes[one.courses[0].lanes[0]].id}"
+        (x0, y0), (x1, y1) = box.tolist()
+        return box, f"the best place for the template is at {where}: #box={x0:g},{y0:g},{x1:g},{y1:g} (cost {one.cost:.1f} m²)"
+    raise RefusedError(f"the template fits no place on map {network.name}: {reason}")

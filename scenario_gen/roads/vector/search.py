@@ -1,0 +1,221 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The best place for a template in a whole map: where its paths lie along lanes, in their directions, as one piece.
+
+Every placement that lays one of a few instants of the template onto a lane is tried: the cost of a placement is the mean
+squared distance of the template's samples from the nearest lane of their direction. The best are refined (Hooke & Jeeves 1961).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+import math
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, Ints, wrap_angle
+from scenario_gen.cancelling import stop_if_cancelled
+from scenario_gen.template.path_crossing import path_crossing
+from scenario_gen.template.tracks import Track
+from scenario_gen.types.lanes import LaneNetwork
+
+_CELL = 1.0  # metres
+_MOST_CELLS = 30_000_000  # of a map: a larger one is looked at in larger cells
+_REACH = 4.0  # metres from a lane beyond which a sample counts as off the road
+_BINS = 16  # of directions
+_ALIKE = math.radians(35.0)  # a sample may be turned from its lane by this
+_EVERY = 2  # sections of a lane between placements
+_SPACING = 2.0  # metres between a path's samples
+_MOST_SAMPLES = 40  # of a path
+_REFINED = 60  # placements
+_ELSEWHERE = 15.0  # metres and
+_TURNED = math.radians(30.0)  # by which placements differ that are not the same
+_TOGETHER = 2_000_000  # samples looked up at once
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A placement of the template as one piece: turned by `yaw` about its own origin, then moved by x, y; its cost [m²]."""
+
+    cost: float
+    yaw: float
+    x: float
+    y: float
+
+    def moved(self, points: Floats) -> Floats:
+        """Points (P, 2) [m] of the template on the map."""
+        cos, sin = exact.cos(self.yaw), exact.sin(self.yaw)
+        return np.column_stack(
+            (points[:, 0] * cos - points[:, 1] * sin + self.x, points[:, 0] * sin + points[:, 1] * cos + self.y)
+        )
+
+
+@lru_cache(maxsize=4)
+def _field(network: LaneNetwork) -> "_Field":
+    return _Field(network)
+
+
+class _Field:
+    """How far each cell lies from the nearest lane of each direction, as far as `_REACH`."""
+
+    def __init__(self, network: LaneNetwork) -> None:
+        points, yaws = _sections(network)
+        low, high = points.min(axis=0) - _REACH, points.max(axis=0) + _REACH
+        self.cell = max(_CELL, math.sqrt(float(np.prod(high - low)) / _MOST_CELLS))
+        self.low = low
+        size = np.ceil((high - low) / self.cell).astype(np.int64) + 1
+        reach = math.ceil(_REACH / self.cell)
+        at = np.floor((points - low) / self.cell).astype(np.int64)
+        offsets = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)), axis=-1).reshape(-1, 2)
+        cells = np.clip(at[:, None] + offsets, 0, size - 1)
+        centres = low + (cells + 0.5) * self.cell
+        distance = exact.hypot(centres[..., 0] - points[:, None, 0], centres[..., 1] - points[:, None, 1])
+        flat = cells[..., 1] * size[0] + cells[..., 0]
+        known, own = np.unique(flat, return_inverse=True)
+        self.index = np.full(int(size[0] * size[1]), len(known), dtype=np.int32)
+        self.index[known] = np.arange(len(known))
+        self.size = size
+        self.table = np.full((len(known) + 1, _BINS), _REACH)
+        own = own.reshape(flat.shape)
+        for k in range(_BINS):
+            near = np.abs(wrap_angle(yaws - 2.0 * np.pi * k / _BINS)) <= _ALIKE
+            np.minimum.at(self.table[:, k], own[near].ravel(), distance[near].ravel())
+
+    def squared(self, points: Floats, yaws: Floats) -> Floats:
+        """Squared distance [m²] of poses (..., 2), (...) from the nearest lane of their direction."""
+        cell = np.floor((points - self.low) / self.cell).astype(np.int64)
+        inside = ((cell >= 0) & (cell < self.size)).all(axis=-1)
+        flat = np.where(inside, cell[..., 1] * self.size[0] + cell[..., 0], 0)
+        which = np.where(inside, self.index[flat], len(self.table) - 1)
+        turn: Ints = np.round(yaws / (2.0 * np.pi / _BINS)).astype(np.int64) % _BINS
+        return np.asarray(np.square(self.table[which, turn]))
+
+
+def _sections(network: LaneNetwork, every: int = 1, lanes: Sequence[int] | None = None) -> tuple[Floats, Floats]:
+    """Middles (P, 2) [m] and directions (P,) [rad] of the lanes' sections."""
+    points, yaws = [], []
+    for k in range(len(network.lanes)) if lanes is None else lanes:
+        centre = network.lanes[k].centre
+        step = np.diff(centre, axis=0)
+        points.append(((centre[1:] + centre[:-1]) / 2.0)[::every])
+        yaws.append(exact.arctan2(step[:, 1], step[:, 0])[::every])
+    return np.concatenate(points), np.concatenate(yaws)
+
+
+def find_spots(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> list[Spot]:
+    """Return the best placements, the best first, each at another place or turned otherwise.
+
+    Args:
+        network: a whole map.
+        tracks: of the template, all vehicles.
+        lanes: a vehicle is laid onto one of these; None: onto any lane.
+    """
+    field = _field(network)
+    poses, weight = _samples(tracks)
+    points, yaws = _sections(network, _EVERY, lanes)
+    spots: list[Spot] = []
+    for anchor in _anchors(tracks):
+        turn = yaws - anchor[2]
+        cos, sin = exact.cos(turn), exact.sin(turn)
+        x = points[:, 0] - (anchor[0] * cos - anchor[1] * sin)
+        y = points[:, 1] - (anchor[0] * sin + anchor[1] * cos)
+        cost = np.concatenate(
+            [
+                _costs(field, poses, weight, turn[k : k + step], x[k : k + step], y[k : k + step])
+                for step in (max(_TOGETHER // len(poses), 1),)
+                for k in range(0, len(turn), step)
+            ]
+        )
+        stop_if_cancelled()
+        best = np.argsort(cost, kind="stable")[: 4 * _REFINED]
+        spots += [Spot(*row) for row in np.column_stack((cost, turn, x, y))[best].tolist()]
+    centre = poses[:, :2].mean(axis=0)
+    chosen = _distinct(spots, centre, _REFINED)
+    return _distinct([_refined(field, poses, weight, spot) for spot in chosen], centre, _REFINED)
+
+
+def at_home(network: LaneNetwork, tracks: tuple[Track, ...]) -> Spot:
+    """The template where it was recorded; the cost says whether lanes of its directions are there."""
+    poses, weight = _samples(tracks)
+    return Spot(float((_field(network).squared(poses[:, :2], poses[:, 2]) * weight).sum()), 0.0, 0.0, 0.0)
+
+
+def _samples(tracks: tuple[Track, ...]) -> tuple[Floats, Floats]:
+    """Poses (P, 3) along all paths, and their weights (P,), whose sum is one for all vehicles alike."""
+    poses, weight = [], []
+    for track in tracks:
+        count = 1 if track.still else min(max(math.ceil(track.travelled / _SPACING), 1) + 1, _MOST_SAMPLES)
+        poses.append(track.curve.at(np.linspace(0.0, track.travelled, count)))
+        weight.append(np.full(count, 1.0 / (count * len(tracks))))
+    return np.concatenate(poses), np.concatenate(weight)
+
+
+def _anchors(tracks: tuple[Track, ...]) -> list[Floats]:
+    """Poses of the template that are laid onto lanes: where paths cross, and the begin, middle and end of the longest paths."""
+    found: list[Floats] = []
+    for a, one in enumerate(tracks):
+        for two in tracks[:a]:
+            crossing = path_crossing(one, two)
+            if crossing is not None and len(found) < 4:
+                found += [one.curve.at(crossing.first), two.curve.at(crossing.second)]
+    for track in sorted(tracks, key=lambda track: -track.travelled)[:2]:
+        found += [track.curve.at(share * track.travelled) for share in (0.05, 0.5, 0.95)]
+    return found
+
+
+def _costs(field: _Field, poses: Floats, weight: Floats, turn: Floats, x: Floats, y: Floats) -> Floats:
+    """Costs (M,) [m²] of placements."""
+    cos, sin = exact.cos(turn)[:, None], exact.sin(turn)[:, None]
+    points = np.stack(
+        (poses[:, 0] * cos - poses[:, 1] * sin + x[:, None], poses[:, 0] * sin + poses[:, 1] * cos + y[:, None]), axis=-1
+    )
+    return np.asarray((field.squared(points, poses[:, 2] + turn[:, None]) * weight).sum(axis=1))
+
+
+def _refined(field: _Field, poses: Floats, weight: Floats, spot: Spot) -> Spot:
+    """Pattern search over place and rotation about the template's middle."""
+    centre = poses[:, :2].mean(axis=0)
+    state = np.array([*spot.moved(centre[None])[0], spot.yaw])
+    local = poses - np.array([*centre, 0.0])
+    cost, step = spot.cost, np.array([2.0, 2.0, math.radians(4.0)])
+    signs = np.concatenate((np.eye(3), -np.eye(3)))
+    while step[0] > 0.2:
+        trials = state + signs * step
+        costs = _costs(field, local, weight, trials[:, 2], trials[:, 0], trials[:, 1])
+        best = int(np.argmin(costs))
+        if costs[best] < cost - 1e-9:
+            state, cost = trials[best], float(costs[best])
+        else:
+            step /= 2.0
+    cos, sin = exact.cos(float(state[2])), exact.sin(float(state[2]))
+    x = float(state[0] - (centre[0] * cos - centre[1] * sin))
+    return Spot(cost, float(state[2]), x, float(state[1] - (centre[0] * sin + centre[1] * cos)))
+
+
+def _distinct(spots: list[Spot], centre: Floats, most: int) -> list[Spot]:
+    """The best of those that are alike, at most `most`, the best first."""
+    kept: list[Spot] = []
+    places = np.empty((0, 3))
+    for spot in sorted(spots, key=lambda spot: (round(spot.cost, 6), spot.yaw, spot.x, spot.y)):
+        place = np.array([*spot.moved(centre[None])[0], spot.yaw])
+        off = np.abs(places - place)
+        turned = np.abs(wrap_angle(places[:, 2] - place[2]))
+        if not ((off[:, 0] < _ELSEWHERE) & (off[:, 1] < _ELSEWHERE) & (turned < _TURNED)).any():
+            kept.append(spot)
+            places = np.vstack((places, place))
+            if len(kept) == most:
+                break
+    return kept

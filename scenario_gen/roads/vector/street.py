@@ -1,0 +1,209 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A template along one road of a map: following, oncoming, passing, on lanes side by side, however the road winds.
+
+Stations on the template's reference line (`template.frenet`) become stations on a chain of lanes; lanes counted from the
+driver's left become lanes beside it.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, wrap_angle
+from scenario_gen.cancelling import stop_if_cancelled
+from scenario_gen.curve import Curve
+from scenario_gen.errors import RefusedError
+from scenario_gen.roads.vector.match import Chains, changed_curve, Course, Match, speeding, turned_more
+from scenario_gen.template.frenet import FrenetTracks, to_frenet
+from scenario_gen.template.tracks import Track
+
+_ROOM = 1.0  # metres between a footprint and the end of the road
+_FORTH = 25.0  # metres of road before and after what is driven, where it has them
+_TRIED = 40  # roads, the straightest first
+_TURN = math.radians(60.0)  # a road may turn by this much more or less than the vehicles in the template
+_APART = 2.2  # metres between the middles of oncoming lanes, at least
+_ASIDE = 18.0  # metres between a road's outermost lanes
+_STRAIGHT = 0.02  # rad/m: how much of the cost is the road's bending: (rad/m)² are counted against this
+_PARALLEL = math.radians(20.0)
+_EVERY = 10.0  # metres between the places at which lanes are compared
+_WANDER = 1.8  # metres by which the distance between parallel lanes may differ
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """A lane beside the axis: its chain, its middle, its mean offset [m, left positive]."""
+
+    chain: tuple[int, ...]
+    curve: Curve
+    offset: float
+
+
+def along_streets(chains: Chains, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> Iterator[Match]:
+    """Yield the template along the straightest stretches of road that have its lanes.
+
+    Args:
+        chains: of the map or the part of it.
+        tracks: the template.
+        lanes: the axis begins on one of these; None: on any lane.
+    """
+    try:
+        compact = to_frenet(tracks)
+    except RefusedError:
+        return
+    half = np.array([[track.vehicle.length / 2.0] for track in tracks])
+    low, high = float((compact.station - half).min()) - _ROOM, float((compact.station + half).max()) + _ROOM
+    axes = sorted(_axes(chains, high - low, lanes), key=lambda found: (round(found[0], 4), found[1]))
+    for frenet in (compact.spread(), compact):
+        for bend, chain, begin in axes[:_TRIED]:
+            stop_if_cancelled()
+            whole = chains.curve(chain)
+            axis = whole.cut(max(begin - _FORTH, 0.0), min(begin + high - low + _FORTH, whole.length))
+            lead = min(begin, _FORTH)
+            match = _laid(chains, axis, lead, high - low, chain, tracks, frenet, low, bend)
+            if match is not None:
+                yield match
+
+
+def _axes(chains: Chains, span: float, lanes: Sequence[int] | None) -> Iterator[tuple[float, tuple[int, ...], float]]:
+    """Chains of lanes that are long enough: their mean bend [rad/m], the lanes, where the straightest stretch begins."""
+    for first in range(len(chains.network.lanes)) if lanes is None else lanes:
+        chain = _straight_on(chains, first, span)
+        curve = chains.curve(chain)
+        if curve.length < span:
+            continue
+        begins = np.arange(0.0, curve.length - span + 1e-9, 5.0)
+        station = np.arange(0.0, curve.length + 1e-9, 1.0)
+        turned = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(curve.at(station)[:, 2])))))
+        bend = (np.interp(begins + span, station, turned) - np.interp(begins, station, turned)) / span
+        k = int(np.argmin(np.round(bend, 6)))
+        yield float(bend[k]), chain, float(begins[k])
+
+
+def _straight_on(chains: Chains, first: int, span: float) -> tuple[int, ...]:
+    """The chain from a lane that turns least at every fork, as long as needed."""
+    chain, length = [first], chains.length[first]
+    while length < span + 2.0 * _FORTH:
+        after = [k for k in chains.network.lanes[chain[-1]].successors if k not in chain]
+        if not after:
+            break
+        chain.append(min(after, key=lambda k: (round(_turn_of(chains, k), 3), k)))
+        length += chains.length[chain[-1]]
+    return tuple(chain)
+
+
+def _turn_of(chains: Chains, lane: int) -> float:
+    centre = chains.network.lanes[lane].centre
+    first, last = centre[1] - centre[0], centre[-1] - centre[-2]
+    return abs(float(exact.arctan2(first[0] * last[1] - first[1] * last[0], first[0] * last[0] + first[1] * last[1])))
+
+
+def _laid(
+    chains: Chains,
+    axis: Curve,
+    lead: float,
+    span: float,
+    chain: tuple[int, ...],
+    tracks: tuple[Track, ...],
+    frenet: FrenetTracks,
+    low: float,
+    bend: float,
+) -> Match | None:
+    """The template on a stretch of road that begins `lead` metres along the axis, None if lanes are missing."""
+    stretch = (lead, lead + span)
+    ahead = sorted(_sides(chains, axis, stretch, 1), key=lambda side: -side.offset)
+    against = sorted(_sides(chains, axis, stretch, -1), key=lambda side: side.offset)
+    if ahead and against and against[0].offset < ahead[0].offset:  # traffic keeps left: count from the middle of the road
+        ahead, against = ahead[::-1], against[::-1]
+    courses = []
+    for i, track in enumerate(tracks):
+        sign = int(frenet.direction[i])
+        sides = ahead if sign > 0 else against
+        first, last = (int(k) for k in frenet.lane[i])
+        if max(first, last) >= len(sides):
+            return None
+        along = lead + frenet.station[i] - low
+        curve, used = sides[first].curve, sides[first].chain
+        if first != last:
+            at = int(np.argmax(frenet.change[i] >= 0.5))
+            changed = changed_curve(curve, sides[last].curve, axis.at(float(along[at]))[:2])
+            if changed is None:
+                return None
+            curve, used = changed, tuple(dict.fromkeys((*used, *sides[last].chain)))
+        begin, _ = curve.project(axis.at(along[:1])[:, :2])
+        progress = np.zeros(len(along)) if track.still else (along - along[0]) * sign
+        courses.append(Course(used, curve, float(begin[0]), np.maximum.accumulate(progress)))
+        half = track.vehicle.length / 2.0 + _ROOM / 2.0
+        if courses[-1].start < half or courses[-1].end + half > curve.length or abs(turned_more(courses[-1], track)) > _TURN:
+            return None
+    offsets = [
+        [sides[int(k)].offset for k in frenet.lane[frenet.direction == sign].ravel()]
+        for sign, sides in ((1, ahead), (-1, against))
+    ]
+    if any(abs(a - b) < _APART for a in offsets[0] for b in offsets[1]):
+        return None  # one lane for both directions
+    return Match(tuple(courses), bend / _STRAIGHT + speeding(chains.network, courses, tracks), "")
+
+
+def _sides(chains: Chains, axis: Curve, stretch: tuple[float, float], sign: int) -> list[_Side]:
+    """The lanes that run beside an axis, in its direction (+1) or against it (-1), all along a stretch of it."""
+    at = np.linspace(*stretch, max(math.ceil((stretch[1] - stretch[0]) / _EVERY), 1) + 1)
+    poses = axis.at(at)
+    start = poses[0 if sign > 0 else -1]
+    yaw = start[2] + (0.0 if sign > 0 else np.pi)
+    away = exact.hypot(chains.points[:, 0] - start[0], chains.points[:, 1] - start[1])
+    near = np.flatnonzero((away < _ASIDE) & (np.abs(wrap_angle(chains.yaws - yaw)) < _PARALLEL))
+    found: list[_Side] = []
+    for first in sorted(set(chains.owner[near].tolist())):
+        chain = _beside(chains, first, poses if sign > 0 else poses[::-1], sign)
+        back = chains.network.predecessors[first]
+        chain = (back[0], *chain) if back and back[0] not in chain else chain
+        curve = chains.curve(chain)
+        station, _ = curve.project(poses[:, :2])
+        turned = np.abs(wrap_angle(curve.at(station)[:, 2] - poses[:, 2] + (0.0 if sign > 0 else np.pi)))
+        _, offset = axis.project(curve.at(np.clip(station, 0.0, curve.length))[:, :2])
+        inside = (station > -0.1).all() and (station < curve.length + 0.1).all()
+        if inside and (turned < _PARALLEL).all() and np.ptp(offset) < _WANDER:
+            mean = float(offset.mean())
+            if all(abs(mean - other.offset) > 1.0 for other in found):
+                low, high = float(station.min()) - _FORTH, float(station.max()) + _FORTH
+                found.append(_Side(chain, curve.cut(max(low, 0.0), min(high, curve.length)), mean))
+    return found
+
+
+def _beside(chains: Chains, first: int, poses: Floats, sign: int) -> tuple[int, ...]:
+    """The chain from a lane that keeps its distance from the axis's poses, the last of which it is to reach."""
+    chain, goal = [first], poses[-1, :2]
+    while True:
+        centre = chains.network.lanes[chain[-1]].centre
+        if float(exact.hypot(*(centre - goal).T).min()) < _ASIDE and len(chain) > 1 and _passed(centre, poses[-1], sign):
+            return tuple(chain)
+        after = [k for k in chains.network.lanes[chain[-1]].successors if k not in chain]
+        if not after:
+            return tuple(chain)
+        chain.append(min(after, key=lambda k: (round(_off(chains.network.lanes[k].centre[-1], poses), 3), k)))
+
+
+def _off(point: Floats, poses: Floats) -> float:
+    return float(exact.hypot(*(poses[:, :2] - point).T).min())
+
+
+def _passed(centre: Floats, pose: Floats, sign: int) -> bool:
+    """Whether a lane goes on beyond a pose by more than room for a vehicle."""
+    ahead = (centre[-1] - pose[:2]) * np.array([exact.cos(float(pose[2])), exact.sin(float(pose[2]))])
+    return bool(sign * float(ahead.sum()) > 10.0)

@@ -1,0 +1,113 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The lanes of a vector map: their borders, what follows what, where one may change, how fast."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+import math
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, frozen
+from scenario_gen.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Lane:
+    """One lane, in the direction in which it is driven.
+
+    Attributes:
+        id: its name in the map: a lanelet's number, or road.section.lane of OpenDRIVE.
+        left: (M, 2) metres, its left border from begin to end, M >= 2.
+        right: (M, 2) metres, its right border; left[k] and right[k] are one cross-section.
+        successors: indices of the lanes that its traffic drives into.
+        beside: indices of the lanes of the same direction to which its traffic may change.
+        speed_limit: m/s; NaN where the map does not say.
+        junction: the junction that it is part of, "" if none.
+    """
+
+    id: str
+    left: Floats
+    right: Floats
+    successors: tuple[int, ...] = ()
+    beside: tuple[int, ...] = ()
+    speed_limit: float = math.nan
+    junction: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "left", frozen(self.left))
+        object.__setattr__(self, "right", frozen(self.right))
+        if self.left.shape != self.right.shape or self.left.ndim != 2 or self.left.shape[1] != 2 or len(self.left) < 2:
+            raise InputError(
+                f"lane {self.id}: borders of shapes {self.left.shape} and {self.right.shape}; (M, 2), M >= 2, are needed"
+            )
+        if not (np.isfinite(self.left).all() and np.isfinite(self.right).all()):
+            raise InputError(f"lane {self.id}: a border is not finite")
+
+    @cached_property
+    def centre(self) -> Floats:
+        """(M, 2) metres, the middle of each cross-section."""
+        return frozen((self.left + self.right) / 2.0)
+
+    @cached_property
+    def outline(self) -> Floats:
+        """(2 M, 2) metres: the left border forth and the right border back."""
+        return frozen(np.concatenate((self.left, self.right[::-1])))
+
+
+@dataclass(frozen=True, eq=False)
+class LaneNetwork:
+    """The lanes of a map that cars may use, or of a part of it; in metres in the map's own frame.
+
+    Attributes:
+        name: of the map, for people.
+        lanes: the lanes; `Lane.successors` and `Lane.beside` count in here.
+        notes: how it was read: projection, what was left out, which part it is.
+    """
+
+    name: str
+    lanes: tuple[Lane, ...]
+    notes: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        count = len(self.lanes)
+        for lane in self.lanes:
+            if any(not 0 <= k < count for k in (*lane.successors, *lane.beside)):
+                raise InputError(f"lane {lane.id} of {self.name!r} leads to a lane that is not there")
+
+    @cached_property
+    def predecessors(self) -> tuple[tuple[int, ...], ...]:
+        """The lanes that lead into each lane."""
+        before: list[list[int]] = [[] for _ in self.lanes]
+        for k, lane in enumerate(self.lanes):
+            for after in lane.successors:
+                before[after].append(k)
+        return tuple(map(tuple, before))
+
+    @cached_property
+    def entries(self) -> tuple[int, ...]:
+        """The lanes by which traffic comes in: no lane leads into them."""
+        return tuple(k for k, before in enumerate(self.predecessors) if not before)
+
+    @cached_property
+    def exits(self) -> tuple[int, ...]:
+        """The lanes by which traffic leaves: they lead nowhere."""
+        return tuple(k for k, lane in enumerate(self.lanes) if not lane.successors)
+
+    @cached_property
+    def box(self) -> Floats:
+        """(2, 2) metres: lowest and highest x, y of all borders."""
+        points = np.concatenate([lane.outline for lane in self.lanes])
+        return frozen(np.stack((points.min(axis=0), points.max(axis=0))))

@@ -1,0 +1,229 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Vector maps: the same crossroads in three formats is the same network, drawn as the same grid; parts of it; what is refused."""
+
+import math
+
+from map_builders import ARM, FORMATS, HALF, lanelet2, lanes, LIMIT, opendrive, WIDTH, write
+import numpy as np
+import pytest
+
+from scenario_gen import geodesy
+from scenario_gen.errors import InputError, RefusedError
+from scenario_gen.markup import parse_xml
+from scenario_gen.roads import build_road, RoadConfig
+from scenario_gen.roads.vector.plan_view import reference_line
+from scenario_gen.roads.vector.read import read_network
+
+
+def middles(network):
+    """Return {begin and end of a lane, rounded: the lane}."""
+    return {tuple(np.round(lane.centre[[0, -1]], 3).ravel().tolist()): lane for lane in network.lanes}
+
+
+def wanted():
+    found = {}
+    for name, (left, right, after) in lanes().items():
+        centre = (np.array(left) + np.array(right))[[0, -1]] / 2.0
+        found[tuple((np.round(centre, 3) + 0.0).ravel().tolist())] = (name, after)
+    return found
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_the_crossroads_is_read_with_its_lanes_what_follows_and_its_limits(tmp_path, suffix):
+    network = read_network(write(tmp_path, suffix))
+    assert len(network.lanes) == 20 and len(network.entries) == len(network.exits) == 4
+    known, key_of = middles(network), {}
+    for key, (name, _) in wanted().items():
+        matches = [k for k in known if np.allclose(k, key, atol=2e-3)]
+        assert len(matches) == 1, name
+        key_of[name] = matches[0]
+    for name, after in wanted().values():
+        lane = known[key_of[name]]
+        assert {id(network.lanes[k]) for k in lane.successors} == {id(known[key_of[other]]) for other in after}, name
+        assert lane.speed_limit == pytest.approx(LIMIT / 3.6)
+        assert bool(lane.junction) == (not name.endswith(("_in", "_out"))), name
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_the_grid_is_free_in_the_lanes_and_nowhere_else(tmp_path, suffix):
+    from shapely import contains_xy
+    from shapely.geometry import Polygon
+    from shapely.ops import unary_union
+
+    road = build_road(str(write(tmp_path, suffix)))
+    polygons = [Polygon([*left, *right[::-1]]) for left, right, _ in lanes().values()]
+    area = unary_union([polygon.buffer(1e-6) for polygon in polygons])
+    rows, columns = np.indices(road.drivable.shape)
+    x, y = (road.origin[axis] + (index + 0.5) * road.resolution for axis, index in ((0, columns), (1, rows)))
+    sure, outside = area.buffer(-road.resolution), area.buffer(1.5 * road.resolution)
+    assert road.drivable[contains_xy(sure, x, y)].all()
+    assert not road.drivable[~contains_xy(outside, x, y)].any()
+    assert len(road.entries) == len(road.exits) == 4
+    for x, y, yaw in road.entries:
+        assert math.hypot(x, y) == pytest.approx(math.hypot(ARM, WIDTH / 2.0), abs=2e-3)
+        assert math.cos(yaw) * x + math.sin(yaw) * y < -HALF  # into the road
+
+
+def test_latitude_and_longitude_are_in_the_local_frame(tmp_path):
+    def place(x, y):
+        latitude, longitude = geodesy.geodetic(np.array([x, y]), (48.5, 9.25))
+        return f'lat="{float(latitude)!r}" lon="{float(longitude)!r}">'
+
+    network = read_network(write(tmp_path, ".osm", lanelet2(place)))
+    assert np.allclose(network.box, [[-ARM, -ARM], [ARM, ARM]], atol=0.02)
+    assert "48.5000000, 9.2500000" in network.notes[0]
+
+
+def test_a_geo_reference_is_stated(tmp_path):
+    network = read_network(write(tmp_path, ".xodr", opendrive("+proj=utm +zone=32")))
+    assert "+proj=utm +zone=32 is stated, not applied" in network.notes[0]
+
+
+def test_a_lanelet_for_both_directions_is_two_lanes_and_others_are_left_out(tmp_path):
+    both = lanelet2(tags="").replace('<tag k="one_way" v="yes"/>', '<tag k="one_way" v="no"/>', 1)
+    assert len(read_network(write(tmp_path, ".osm", both)).lanes) == 21
+    walk = lanelet2().replace('<tag k="subtype" v="road"/>', '<tag k="subtype" v="walkway"/>', 1)
+    network = read_network(write(tmp_path, ".osm", walk))
+    assert len(network.lanes) == 19 and "1 lanelets are for others than cars" in network.notes[1]
+    bus = lanelet2(tags='<tag k="participant:vehicle:bus" v="yes"/>')
+    with pytest.raises(InputError, match="none of its 20 lanelets is for cars"):
+        read_network(write(tmp_path, ".osm", bus))
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_part_is_cut_at_its_box(tmp_path, suffix):
+    path = write(tmp_path, suffix)
+    road = build_road(f"{path}#box=-30,-20,0,20")
+    assert road.drivable.shape == (200, 150) and road.origin.tolist() == pytest.approx([-30.0, -20.0])
+    assert len(road.entries) == 5 and {tuple(np.round(e, 1)) for e in road.entries} >= {(-30.0, -1.8, 0.0)}
+    network = read_network(path)
+    junction = next(lane.junction for lane in network.lanes if lane.junction)
+    assert build_road(f"{path}#junction={junction}").drivable.sum() == build_road(f"{path}#box=-48,-48,48,48").drivable.sum()
+    assert build_road(f"{path}#lanelet={network.lanes[0].id}").lanes.lanes
+
+
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [
+        ("lanelet=nowhere", "has no lanelet 'nowhere'"),
+        ("junction=77", "has no junction '77'"),
+        ("box=1,2,3", "box=x0,y0,x1,y1 in metres is needed"),
+        ("box=1,2,a,4", "is no number"),
+        ("box=1,2,nan,4", "is no number"),
+        ("box=500,500,600,600", "no lane in the box"),
+        ("box=5,5,5,6", "less than 1 m wide"),
+        ("lane=3", "choose one of #lanelet=…, #junction=…, #box=…"),
+    ],
+)
+def test_a_part_that_is_not_there_is_refused(tmp_path, part, said):
+    with pytest.raises(InputError, match=said):
+        build_road(f"{write(tmp_path, '.xml')}#{part}")
+
+
+def test_a_map_too_large_to_draw_is_refused(tmp_path):
+    with pytest.raises(RefusedError, match=r"road\.max_cells"):
+        build_road(str(write(tmp_path, ".xodr")), None, RoadConfig(max_cells=1000))
+
+
+BOMB = '<!DOCTYPE osm [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]><osm>&b;</osm>'
+BROKEN = [  # suffix, text, what is said, with its place
+    (".osm", BOMB, r"line 1, column \d+: the document type 'osm' is not read"),
+    (".xodr", BOMB.replace("osm", "OpenDRIVE"), "document type"),
+    (".xml", '<!DOCTYPE a SYSTEM "file:///etc/passwd"><a/>', "document type"),
+    (".osm", lanelet2()[:-40], r"line 1, column \d+: not XML"),
+    (".osm", "<osm>" + "<a>" * 100 + "</a>" * 100 + "</osm>", "nested more than 64 deep"),
+    (".osm", "", "is empty"),
+    (".osm", "<osm/>", "none of its 0 lanelets"),
+    (".osm", "<OpenDRIVE/>", "the root of a Lanelet2 map is <osm>"),
+    (".xodr", "<osm/>", "the root of an OpenDRIVE map is <OpenDRIVE>"),
+    (".xml", "<osm/>", "the root of a CommonRoad file is <commonRoad>"),
+    (".xml", "<commonRoad/>", "no lane that cars may use"),
+    (".xodr", "<OpenDRIVE><header/></OpenDRIVE>", "no <road>"),
+    (".osm", lanelet2(lambda x, y: ">"), r"line 1, <node>: node \d+ has neither tags local_x and local_y nor lat and lon"),
+    (".osm", lanelet2(lambda x, y: f'lat="{91 + x}" lon="{y}">'), "degrees up to 90 are needed"),
+    (".osm", lanelet2(lambda x, y: f'lat="{x / 10}" lon="{y / 10}">'), "km from their middle"),
+    (".osm", lanelet2(lambda x, y: 'lat="1" lon="2">'), "no length"),
+    (".osm", lanelet2().replace('<tag k="local_x"', '<tag k="local_z"', 1), "two frames cannot be mixed"),
+    (".osm", lanelet2().replace('<nd ref="1"/>', '<nd ref="77777"/>', 1), "goes through node 77777, which is not in the map"),
+    (".osm", lanelet2().replace('role="left"', 'role="middle"', 1), "has 0 members with role left"),
+    (".osm", lanelet2().replace('ref="1000"', 'ref="4000"'), "way 4000 is not in the map"),
+    (".osm", lanelet2().replace('v="60.0"', 'v="nan"', 1), "is no number"),
+    (".osm", lanelet2().replace('<node id="2"', '<node id="1"', 1), "node 1 is there twice"),
+    (".xodr", opendrive().replace('curvature="0.125"', 'curvature="1e9"', 1), "curvature"),
+    (".xodr", opendrive().replace("<line/>", "<helix/>", 1), "holds none of line, arc, spiral"),
+    (".xodr", opendrive().replace('a="3.5"', 'a="inf"', 1), "is no number"),
+    (".xodr", opendrive().replace('incomingRoad="0"', 'incomingRoad="99"', 1), "road '99' is not in the map"),
+    (".xodr", opendrive().replace('length="52.0"', 'length="-1"'), "length -1"),
+    (".xodr", opendrive().replace('<lane id="1"', '<lane id="2"', 1), "missing"),
+    (".xodr", opendrive().replace('<lane id="1"', '<lane id="one"', 1), "whole numbers above 0"),
+    (
+        ".xml",
+        FORMATS[".xml"]().replace('<successor ref="102"/>', '<successor ref="9999"/>', 1),
+        "leads to lanelet 9999, which is not there",
+    ),
+    (".xml", FORMATS[".xml"]().replace("<x>-60.0</x>", "<x>west</x>", 1), r"line 1, <x>: 'west' is no number"),
+    (".xml", FORMATS[".xml"]().replace("leftBound", "left", 2), "has no <leftBound>"),
+]
+
+
+@pytest.mark.parametrize(("suffix", "text", "said"), BROKEN)
+def test_a_broken_map_is_refused_with_its_name_and_place(tmp_path, suffix, text, said):
+    path = write(tmp_path, suffix, text)
+    with pytest.raises(InputError, match=said) as error:
+        build_road(str(path))
+    assert path.stem in str(error.value)
+
+
+def test_too_many_elements_are_refused(monkeypatch):
+    monkeypatch.setattr("scenario_gen.markup.MOST_ELEMENTS", 50)
+    with pytest.raises(InputError, match="more than 50 elements"):
+        parse_xml(b"<a>" + b"<b/>" * 60 + b"</a>", "map")
+
+
+def test_a_missing_map_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"nowhere\.osm"):
+        build_road(str(tmp_path / "nowhere.osm"))
+
+
+SHAPES = {
+    "<line/>": lambda s: (s, 0.0 * s),
+    '<arc curvature="0.02"/>': lambda s: (np.sin(0.02 * s) / 0.02, (1.0 - np.cos(0.02 * s)) / 0.02),
+    '<poly3 a="0" b="0" c="0.001" d="0"/>': None,
+    '<paramPoly3 aU="0" bU="1" cU="0" dU="0" aV="0" bV="0" cV="0.001" dV="0" pRange="arcLength"/>': lambda s: (s, 0.001 * s**2),
+}
+
+
+@pytest.mark.parametrize("shape", [*SHAPES, '<spiral curvStart="0" curvEnd="0.05"/>'])
+def test_reference_lines(shape):
+    """Against closed forms; the clothoid against scipy's Fresnel integrals; y = 0.001 x² against its arc length."""
+    from scipy.special import fresnel
+
+    text = f'<road length="50"><planView><geometry s="0" x="0" y="0" hdg="0" length="50">{shape}</geometry></planView></road>'
+    s = np.linspace(0.0, 50.0, 101)
+    poses = reference_line(parse_xml(text.encode(), "map")).at(s)
+    if shape.startswith("<spiral"):
+        a = math.sqrt(math.pi / (0.05 / 50.0))
+        y, x = fresnel(s / a)
+        x, y = x * a, y * a
+    elif shape.startswith("<poly3"):
+        x = poses[:, 0]
+        y = 0.001 * x**2
+        slope = 0.002 * x
+        assert np.allclose(s, (slope * np.sqrt(1 + slope**2) + np.arcsinh(slope)) / 0.004, atol=1e-5)
+    else:
+        x, y = SHAPES[shape](s)
+    assert np.allclose(poses[:, 0], x, atol=1e-9) and np.allclose(poses[:, 1], y, atol=1e-9)
+    assert np.allclose(np.diff(poses[:, 1]) / np.diff(poses[:, 0]), np.tan((poses[1:, 2] + poses[:-1, 2]) / 2.0), atol=1e-3)
