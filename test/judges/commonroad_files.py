@@ -60,7 +60,7 @@ def violations(scenario, boundary):
 
 
 def planted(path, boundary):
-    """Say whether a collision is found where a vehicle drives as another does, and a departure where it drives beside the road."""
+    """Say whether a collision is found where a vehicle drives as another does, and a departure where it drives beside."""
     scenario, _ = CommonRoadFileReader(str(path)).open()
     first = scenario.dynamic_obstacles[0]
     before = violations(scenario, boundary)
