@@ -52,7 +52,7 @@ def decode_footprint(data: bytes, what: str = "footprint") -> Floats:
 
 
 def scenario_markers(scenario: Scenario, stamp_ns: int) -> bytes:
-    """Return one scenario as a MarkerArray that replaces the one before: a line along each path, a box at its start."""
+    """Return one scenario as a MarkerArray that replaces the one before: a line along each path, a box where it begins."""
     names = tokens(vehicle.id for vehicle in scenario.vehicles)
     writer = CdrWriter().pack("I", 1 + 2 * len(names))
 
@@ -80,7 +80,8 @@ def scenario_markers(scenario: Scenario, stamp_ns: int) -> bytes:
 
     add("", 0, action=DELETE_ALL)
     for k, (name, vehicle) in enumerate(zip(names, scenario.vehicles, strict=True)):
-        colour, path = COLOURS[k % len(COLOURS)], scenario.position[k]
+        first, last = scenario.present[k].tolist()
+        colour, path = COLOURS[k % len(COLOURS)], scenario.position[k, first : last + 1]
         start = (*path[0].tolist(), float(scenario.heading[k, 0]))
         add(f"path_{name}", LINE_STRIP, (0.15, 0.0, 0.0), (*colour, 0.6), points=path)
         add(f"box_{name}", CUBE, (vehicle.length, vehicle.width, 1.5), (*colour, 0.8), start)

@@ -21,6 +21,7 @@ scenarios by the SHA-256 of the scenario's CDR bytes. QoS: reliable, transient_l
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 import json
 
 import numpy as np
@@ -28,7 +29,7 @@ import numpy as np
 from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status
 from msg_conventions.ego import ego_values
 from msg_conventions.hashes import MAP_HASH, TEMPLATE_HASH
-from msg_conventions.scenarios import digest
+from msg_conventions.scenarios import digest, messages_of
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import guarded, InputError
 from scenario_gen.types.encounter import Vehicle
@@ -36,6 +37,7 @@ from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, Scenari
 
 INFO = "scenarios/info"
 REFUSED, ADAPTATION = "refused.", "adaptation."
+MESSAGES, PRESENT = "messages", "present"  # of a scenario in which not all are there throughout
 Values = Mapping[str, str]
 
 
@@ -59,6 +61,22 @@ class ScenarioEntry:
     def road(self) -> str:
         """Name of the road; "" if it is not said, as by the nodes."""
         return self.status.values.get("road", "")
+
+    @cached_property
+    def messages(self) -> tuple[str, ...]:
+        """SHA-256 of each of the scenario's messages, in order; one, `sha256`, where all are there throughout.
+
+        Raises:
+            InputError: they are damaged.
+        """
+        text = self.status.values.get(MESSAGES)
+        if text is None:
+            return (self.sha256,)
+        with guarded(f"{INFO}: {MESSAGES} of {self.status.message}"):
+            found = json.loads(text)
+        if not (isinstance(found, list) and found and all(isinstance(sha256, str) for sha256 in found)):
+            raise InputError(f"{INFO}: {MESSAGES} of {self.status.message} is no list of SHA-256")
+        return tuple(found)
 
     @property
     def template_hash(self) -> str | None:
@@ -169,7 +187,9 @@ def decode_info(data: bytes, what: str = INFO) -> tuple[Info, ...]:
             found.append(RequestSummary(_text(values, "request", where), _count(values, "published", where), status))
         elif "sha256" in values:
             index, seed = (_count(values, key, where) for key in ("index", "seed"))
-            found.append(ScenarioEntry(_text(values, "request", where), index, seed, values["sha256"], status))
+            entry = ScenarioEntry(_text(values, "request", where), index, seed, values["sha256"], status)
+            _ = entry.messages  # they are damaged or not
+            found.append(entry)
     return tuple(found)
 
 
@@ -188,7 +208,7 @@ def scenario_entry(
 
     Args:
         scenario: the scenario.
-        data: its CDR bytes.
+        data: its CDR bytes, of all its messages.
         request: the request's id.
         node: full name of the publishing node.
         template: the template's vehicles, of which the scenario may have fewer.
@@ -199,6 +219,8 @@ def scenario_entry(
     ids = [vehicle.id for vehicle in template]
     rows = [ids.index(vehicle.id) for vehicle in scenario.vehicles]
     sha256 = digest(data)
+    several = messages_of(data) if not scenario.all_present else ()
+    spans = [[float(scenario.time[first]), float(scenario.time[last])] for first, last in scenario.present.tolist()]
     values = {
         "request": request,
         "index": str(scenario.index),
@@ -206,6 +228,8 @@ def scenario_entry(
         "sha256": sha256,
         "achieved_start": _states_text(scenario, 0),
         "achieved_end": _states_text(scenario, -1),
+        **({} if scenario.all_present else {PRESENT: json.dumps(spans)}),
+        **({MESSAGES: json.dumps([digest(message) for message in several])} if len(several) > 1 else {}),
         **(about or {}),
         **ego_values(ego),
         "asked_start": json.dumps(asked.start[rows].tolist()),

@@ -15,6 +15,7 @@
 """Encounter ⇄ `tracks`: a whole template in one message (conventions: trajectory.py).
 
 Frame `local_enu`: metres east and north of the log's origin. QoS: reliable, transient_local, depth 1.
+A vehicle that arrives late or leaves early is far below the ground meanwhile (trajectory.py).
 Accelerations are the central differences of the speeds, for whoever wants them; they are not read back.
 The encounter's name and geodetic origin do not travel: nothing is computed from them.
 """
@@ -23,9 +24,10 @@ import numpy as np
 
 from msg_conventions import trajectory
 from msg_conventions.trajectory import Trajectory
-from scenario_gen.arrays import Ints
+from scenario_gen.arrays import Bools, Ints, runs
 from scenario_gen.errors import InputError
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.presence import ALWAYS
 
 FRAME = "local_enu"
 SHORTEST_STEP_NS, LONGEST_STEP_NS = 1_000_000, 10_000_000_000
@@ -48,6 +50,7 @@ def encode_samples(encounter: Encounter, at: Ints) -> bytes:
             heading=encounter.heading[:, at],
             speed=encounter.speed[:, at],
             acceleration=np.gradient(encounter.speed, encounter.dt, axis=1)[:, at],
+            there=None if encounter.all_present else encounter.there[:, at],
         )
     )
 
@@ -86,4 +89,18 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
         position=message.position,
         heading=message.heading,
         speed=message.speed,
+        present=ALWAYS if message.there is None else _spans(message.there, message.vehicles, name),
     )
+
+
+def _spans(there: Bools, vehicles: tuple[Vehicle, ...], name: str) -> Ints:
+    """Return the first and last sample (N, 2) at which each vehicle is there, of (N, T) flags.
+
+    Raises:
+        InputError: a vehicle is never there, or comes back.
+    """
+    found = [runs(row) for row in there]
+    for vehicle, own in zip(vehicles, found, strict=True):
+        if len(own) != 1:
+            raise InputError(f"{name}: vehicle {vehicle.id} is there {len(own)} times (z tells); a vehicle comes and goes once")
+    return np.array([(begin, end - 1) for ((begin, end),) in found], dtype=np.int64)

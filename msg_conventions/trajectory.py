@@ -17,8 +17,9 @@
 Frame: `header.frame_id`. `header.stamp`: the template's first sample; what derives from a template repeats it.
 `joint_names[i]`: `<id>:<length>x<width>`, metres (a bare `<id>` is read as a default car).
 `points[k].time_from_start`: time since `header.stamp`. `points[k].transforms[i]`: pose of the footprint's centre,
-z = 0, yaw as a quaternion. `velocities[i].linear.x`: speed along the heading, m/s. `accelerations[i].linear.x`: likewise,
-m/s². All other components are zero; nothing is NaN.
+z = 0 (`ABSENT` where the vehicle is not there: far below the ground; x, y and yaw are then those of its first or last instant),
+yaw as a quaternion. `velocities[i].linear.x`: speed along the heading, m/s. `accelerations[i].linear.x`: likewise,
+m/s². All other components are zero; nothing is NaN. In `scenarios` nobody is ever absent: see scenarios.py.
 """
 
 from collections.abc import Sequence
@@ -27,9 +28,9 @@ import re
 
 import numpy as np
 
-from msg_conventions.cdr import CdrReader, CdrWriter, NANOSECONDS
+from msg_conventions.cdr import CdrReader, CdrWriter, HEADER, NANOSECONDS
 from msg_conventions.yaw import check_quaternions, quaternion, yaw
-from scenario_gen.arrays import Floats, Ints
+from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.errors import InputError
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.names import tokens
@@ -40,6 +41,7 @@ FASTEST = 1e4  # m/s: what drives is slower, and what follows from speeds can st
 MANY = 10_000  # vehicles: beyond, a message is not laid out as one table
 LONGEST_NS = 7200 * NANOSECONDS  # of an encounter or a scenario
 SMALLEST, LARGEST = 0.01, 1000.0  # metres of a footprint
+ABSENT = -1000.0  # m: z of a vehicle that is not there
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +53,7 @@ class Trajectory:
         vehicles: N identities and footprints.
         time_ns: (T,) nanoseconds from start.
         position: (N, T, 2) m; heading: (N, T) rad; speed: (N, T) m/s; acceleration: (N, T) m/s².
+        there: (N, T) whether each vehicle is there; None: all of them are.
     """
 
     stamp_ns: int
@@ -61,6 +64,7 @@ class Trajectory:
     heading: Floats
     speed: Floats
     acceleration: Floats
+    there: Bools | None = None
 
 
 def joint_names(vehicles: Sequence[Vehicle]) -> tuple[str, ...]:
@@ -119,6 +123,8 @@ def encode(trajectory: Trajectory) -> bytes:
     for name in ("transforms", "velocities", "accelerations"):
         points["n_" + name] = n
     points["transforms"][..., :2] = trajectory.position.swapaxes(0, 1)
+    if trajectory.there is not None:
+        points["transforms"][..., 2] = np.where(trajectory.there, 0.0, ABSENT).T
     points["transforms"][..., 3:] = quaternion(trajectory.heading).swapaxes(0, 1)
     points["velocities"][..., 0] = trajectory.speed.T
     points["accelerations"][..., 0] = trajectory.acceleration.T
@@ -133,6 +139,15 @@ def decode(data: bytes, what: str) -> Trajectory:
 
     Raises:
         InputError: naming `what`, where the message is damaged, lacks poses, or holds a value that is not finite or no vehicle's.
+    """
+    return decode_first(data, what)[0]
+
+
+def decode_first(data: bytes, what: str) -> tuple[Trajectory, int]:
+    """Return what the first message says, and how many bytes it takes; others may follow.
+
+    Raises:
+        InputError: as `decode`.
     """
     reader = CdrReader(data, what)
     stamp_ns, frame_id = reader.framed_header()
@@ -151,7 +166,8 @@ def decode(data: bytes, what: str) -> Trajectory:
         if (np.abs(values) > most).any():
             raise InputError(f"{what}: a {name} is {np.abs(values).max():g}; at most {most:g} is read")
     check_quaternions(pose[..., 3:], what)
-    return Trajectory(
+    there = pose[..., 2].T > 0.5 * ABSENT
+    found = Trajectory(
         stamp_ns=stamp_ns,
         frame_id=frame_id,
         vehicles=vehicles,
@@ -160,7 +176,9 @@ def decode(data: bytes, what: str) -> Trajectory:
         heading=yaw(pose[..., 3:]).T,
         speed=velocity[..., 0].T,
         acceleration=acceleration[..., 0].T,
+        there=None if there.all() else there,
     )
+    return found, len(HEADER) + reader.place
 
 
 Points = tuple[Ints, Floats, Floats, Floats]  # times (T,) [ns], poses (T, N, 7), velocities and accelerations (T, N, 6)

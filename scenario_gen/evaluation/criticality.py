@@ -56,12 +56,15 @@ class Criticality:
 
 def criticality(motion: Motion, horizon: float) -> Criticality:
     """Measure one motion; a time to collision above `horizon` [s] counts as the horizon."""
-    pairs = list(combinations(range(len(motion.vehicles)), 2))
-    conflicts = find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading)
+    pairs = [(a, b, motion.together(a, b)) for a, b in combinations(range(len(motion.vehicles)), 2)]
+    pairs = [(a, b, both) for a, b, both in pairs if both.stop > both.start]
+    conflicts = find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading, motion.present)
     encroachments = [c.entry_second - c.exit_first for c in conflicts if not c.following]
     return Criticality(
-        min_distance=min((float(footprint_distance(motion, a, b).min()) for a, b in pairs), default=float("nan")),
-        min_ttc=min((horizon, *(float(time_to_collision(motion, a, b).min()) for a, b in pairs))) if pairs else float("nan"),
+        min_distance=min((float(footprint_distance(motion, a, b)[both].min()) for a, b, both in pairs), default=float("nan")),
+        min_ttc=min((horizon, *(float(time_to_collision(motion, a, b)[both].min()) for a, b, both in pairs)))
+        if pairs
+        else float("nan"),
         pet=min(encroachments, default=float("nan")),
         order=tuple(((min(c.first, c.second), max(c.first, c.second)), c.first) for c in conflicts),
     )

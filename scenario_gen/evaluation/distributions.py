@@ -59,21 +59,24 @@ def values_of(motion: Motion) -> dict[str, Floats]:
     """Return {quantity id: all its values (n,) in one motion}, in the units of QUANTITIES (m, s, rad).
 
     Acceleration, jerk and yaw rate are differentiated from speed and heading, for recorded and generated motion alike; the
-    gap is the distance between two footprints. A motion shorter than the smoothing has no jerk.
+    gap is the distance between two footprints. A motion shorter than the smoothing has no jerk. A vehicle counts while it is
+    there, a gap while both are.
     """
-    acceleration = np.gradient(motion.speed, motion.dt, axis=1)
     width = max(1, round(SMOOTHING / motion.dt))
-    sums = np.concatenate([np.zeros((len(acceleration), 1)), np.cumsum(acceleration, axis=1)], axis=1)
-    smooth = (sums[:, width:] - sums[:, :-width]) / width
-    return {
-        "speed": motion.speed.ravel(),
-        "acceleration": acceleration.ravel(),
-        "jerk": (np.diff(smooth, axis=1) / motion.dt).ravel(),
-        "yaw_rate": np.gradient(motion.heading, motion.dt, axis=1).ravel(),
-        "gap": np.concatenate(
-            [np.zeros(0), *(footprint_distance(motion, a, b) for a, b in combinations(range(len(motion.vehicles)), 2))]
-        ),
-    }
+    found: dict[str, list[Floats]] = {quantity.id: [np.zeros(0)] for quantity in QUANTITIES}
+    for n in range(len(motion.vehicles)):
+        own = motion.own(n)
+        speed, heading = motion.speed[n, own], motion.heading[n, own]
+        acceleration = np.gradient(speed, motion.dt)
+        sums = np.concatenate([np.zeros(1), np.cumsum(acceleration)])
+        smooth = (sums[width:] - sums[:-width]) / width
+        found["speed"].append(speed)
+        found["acceleration"].append(acceleration)
+        found["jerk"].append(np.diff(smooth) / motion.dt)
+        found["yaw_rate"].append(np.gradient(heading, motion.dt))
+    for a, b in combinations(range(len(motion.vehicles)), 2):
+        found["gap"].append(footprint_distance(motion, a, b)[motion.together(a, b)])
+    return {name: np.concatenate(values) for name, values in found.items()}
 
 
 @dataclass(frozen=True, eq=False)

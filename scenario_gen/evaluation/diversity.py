@@ -17,20 +17,21 @@
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats
+from scenario_gen.arrays import Bools, Floats
 
 
-def displacements(position: Floats) -> Floats:
+def displacements(position: Floats, there: Bools | None = None) -> Floats:
     """Return (S, S): mean distance in metres between samples r and s, over vehicles and instants.
 
     Args:
         position: (S, N, T, 2) metres, at the same share of each sample's duration.
+        there: (N, T) vehicles and instants that count; None: all.
     """
     samples = position.shape[0]
     table = np.zeros((samples, samples))
     for s in range(samples - 1):
         step = position[s + 1 :] - position[s]
-        table[s, s + 1 :] = exact.hypot(step[..., 0], step[..., 1]).mean(axis=(1, 2))
+        table[s, s + 1 :] = _mean(exact.hypot(step[..., 0], step[..., 1]), there)
     return table + table.T
 
 
@@ -45,13 +46,20 @@ def diversity(table: Floats, weights: Floats) -> Floats:
         return np.asarray(total / pairs)
 
 
-def displacement_to(position: Floats, target: Floats) -> Floats:
+def _mean(distance: Floats, there: Bools | None) -> Floats:
+    """Mean (S,) of distances (S, N, T) over the vehicles and instants that count."""
+    return np.asarray(distance.mean(axis=(1, 2)) if there is None or there.all() else distance[:, there].mean(axis=1))
+
+
+def displacement_to(position: Floats, target: Floats, there: Bools | None = None) -> Floats:
     """Return (S,): mean distance in metres of samples (S, N, T, 2) to a target (N, T, 2), over vehicles and instants (ADE).
+
+    Those that count, if `there` (N, T) says so.
 
     Source: the average displacement error (Pellegrini et al. 2009).
     """
     step = position - target
-    return np.asarray(exact.hypot(step[..., 0], step[..., 1]).mean(axis=(1, 2)))
+    return _mean(exact.hypot(step[..., 0], step[..., 1]), there)
 
 
 def weighted_min(values: Floats, weights: Floats) -> Floats:

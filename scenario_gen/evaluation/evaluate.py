@@ -14,22 +14,23 @@
 
 """The evaluation of sets of scenarios against the encounter that they were generated from (paper V-B, method §7)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain
+from itertools import chain, combinations
 import math
 
 import numpy as np
 
-from scenario_gen.arrays import Floats, Ints
+from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import diversity, similarity
 from scenario_gen.evaluation.bootstrap import Bootstrap, wilson
 from scenario_gen.evaluation.criticality import Criticality, criticality
 from scenario_gen.evaluation.distributions import compare, QUANTITIES, values_of
+from scenario_gen.evaluation.dtw import Distance
 from scenario_gen.evaluation.metrics import LIMIT_CAUSES, METRICS
-from scenario_gen.evaluation.motion import at_count, at_period, Motion, of_vehicles, stacked
+from scenario_gen.evaluation.motion import at_common, at_count, at_period, COMMON, Motion, of_vehicles, stacked
 from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.template.manoeuvre import keeps
 from scenario_gen.types.encounter import Encounter
@@ -65,6 +66,7 @@ class _Reference:
     `motion` is the encounter on T even instants, `fitted` the fitted template on the same, if there is one.
     """
 
+    encounter: Encounter
     motion: Motion
     values: Mapping[str, Floats]
     critical: Criticality
@@ -139,7 +141,7 @@ def evaluate_scenarios(
     fitted = chosen(at_count(rows[oracle][0], steps), ids) if rows.get(oracle) else None
     critical = criticality(clocked, config.ttc_horizon)
     motion = chosen(at_count(encounter, steps), ids)
-    reference = _Reference(motion, values_of(clocked), critical, fitted, config, seed)
+    reference = _Reference(encounter, motion, values_of(clocked), critical, fitted, config, seed)
     found = [_measure(name, scenarios, sizes[name], reference, counts.get(name)) for name, scenarios in rows.items()]
     return Evaluation(
         encounter=encounter.name,
@@ -217,18 +219,24 @@ def _measure(name: str, scenarios: Sequence[Scenario], size: int, reference: _Re
     bootstrap = Bootstrap.draw(_pairs(scenarios), config.resamples, config.level, reference.seed)
     steps = reference.motion.speed.shape[1]
     ids = [vehicle.id for vehicle in reference.motion.vehicles]
-    position, speed, heading = stacked([chosen(at_count(scenario, steps), ids) for scenario in scenarios])
+    motions = [chosen(at_count(scenario, steps), ids) for scenario in scenarios]
+    position = np.stack([motion.position for motion in motions])
     clocked = [chosen(at_period(scenario, config.period), ids) for scenario in scenarios]
-    values |= _similarity(reference, position, speed, heading, bootstrap)
+    pairs = list(_together(reference, scenarios, motions))
+    values |= _similarity(pairs, bootstrap)
+    heading = np.stack([motion.heading for motion in motions])
     values["turn_kept"] = bootstrap.mean(_turn_kept(reference.motion.heading, heading))
     values |= _distributions(reference, clocked, bootstrap)
     values |= _criticality(reference, clocked, bootstrap)
-    table = diversity.displacements(position)
+    there: Bools = np.logical_and.reduce([reference.motion.there, *(motion.there for motion in motions)])
+    table = diversity.displacements(position, there)
     values["diversity"] = bootstrap.interval(lambda weights: diversity.diversity(table, weights))
     if fitted is not None:
-        error = diversity.displacement_to(position, fitted.position)
+        error = diversity.displacement_to(position, fitted.position, there)
         values["min_ade"] = bootstrap.interval(lambda weights: diversity.weighted_min(error, weights))
-    return Row(name, len(scenarios), values, _notes(len(scenarios), size, values, config))
+    return Row(
+        name, len(scenarios), values, _notes(len(scenarios), size, values, config, len(ids) * (len(ids) - 1) // 2 - len(pairs))
+    )
 
 
 def _pairs(scenarios: Sequence[Scenario]) -> Ints:
@@ -243,24 +251,59 @@ def _pairs(scenarios: Sequence[Scenario]) -> Ints:
     return np.array([pairs.setdefault((seed, index // 2), len(pairs)) for seed, index in numbers], dtype=np.int64)
 
 
-def _similarity(
-    reference: _Reference, position: Floats, speed: Floats, heading: Floats, bootstrap: Bootstrap
-) -> dict[str, Interval]:
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """Two vehicles while both are there, in the template and in S samples, at the same number of instants T.
+
+    `template` holds positions (2, T, 2) [m], speeds (2, T) [m/s] and headings (2, T) [rad], `samples` the same of S.
+    """
+
+    template: tuple[Floats, ...]
+    samples: tuple[Floats, ...]
+
+    def similarity(self, k: int, distance: Distance, least: float = 0.0) -> similarity.PairSimilarity:
+        """Compare one of the three, as `pair_similarity` does."""
+        one, many = self.template[k], self.samples[k]
+        if one.ndim == 2:
+            one, many = one[..., None], many[..., None]
+        target, series = np.moveaxis(one, -1, -2), np.moveaxis(many, -1, -2)
+        return similarity.pair_similarity((target[0], target[1]), (series[:, 0], series[:, 1]), distance, least)
+
+
+def _together(reference: _Reference, scenarios: Sequence[Scenario], motions: Sequence[Motion]) -> Iterator[_Pair]:
+    """Yield the pairs of vehicles that are there together, for COMMON s, in the template and in all samples (`motions`)."""
+    template, steps = reference.motion, reference.motion.speed.shape[1]
+    throughout = all(motion.always for motion in (template, *motions))
+    whole = stacked(motions)
+    for a, b in combinations(range(len(template.vehicles)), 2):
+        if throughout:
+            rows = [a, b]
+            own = template.position[rows], template.speed[rows], template.heading[rows]
+            yield _Pair(own, tuple(values[:, rows] for values in whole))
+            continue
+        names = template.vehicles[a].id, template.vehicles[b].id
+        sources: list[Encounter | Scenario] = [reference.encounter, *scenarios]
+        common = [at_common(source, names, steps) for source in sources]
+        found = [motion for motion in common if motion is not None]
+        if len(found) == len(common):
+            yield _Pair((found[0].position, found[0].speed, found[0].heading), stacked(found[1:]))
+
+
+def _similarity(pairs: Sequence[_Pair], bootstrap: Bootstrap) -> dict[str, Interval]:
     """E and the correlation: Euclidean distance for position, Manhattan for speed, as in the paper; wrapped for heading.
 
     Where nobody turns there is nothing of headings.
     """
-    motion = reference.motion
-    pairs = {
-        "position": similarity.pair_similarities(motion.position, position, "euclidean"),
-        "speed": similarity.pair_similarities(motion.speed[..., None], speed[..., None], "manhattan"),
-        "heading": similarity.pair_similarities(motion.heading[..., None], heading[..., None], "angle", TURNS),
+    compared = {
+        "position": [pair.similarity(0, "euclidean") for pair in pairs],
+        "speed": [pair.similarity(1, "manhattan") for pair in pairs],
+        "heading": [pair.similarity(2, "angle", TURNS) for pair in pairs],
     }
-    if not any(pair.template[2] for pair in pairs["heading"]):
-        del pairs["heading"]
-    found = {f"e_{what}": bootstrap.interval(partial(similarity.mean_error, of)) for what, of in pairs.items()}
+    if not any(pair.template[2] for pair in compared["heading"]):
+        del compared["heading"]
+    found = {f"e_{what}": bootstrap.interval(partial(similarity.mean_error, of)) for what, of in compared.items()}
     return found | {
-        f"correlation_{what}": bootstrap.interval(partial(similarity.mean_correlation, of)) for what, of in pairs.items()
+        f"correlation_{what}": bootstrap.interval(partial(similarity.mean_correlation, of)) for what, of in compared.items()
     }
 
 
@@ -312,8 +355,10 @@ def _rates(counts: CheckCounts, level: float) -> dict[str, Interval]:
     }
 
 
-def _notes(samples: int, size: int, values: Mapping[str, Interval], config: EvaluationConfig) -> tuple[str, ...]:
+def _notes(samples: int, size: int, values: Mapping[str, Interval], config: EvaluationConfig, apart: int) -> tuple[str, ...]:
     notes = []
+    if apart:
+        notes.append(f"E leaves out {apart} pair(s) of vehicles that are not there together for {COMMON:g} s")
     if samples < size:
         notes.append(f"measured on {samples:,} of {size:,} scenarios, in {RUNS} evenly spaced runs; candidates are all counted")
     if 1 < samples < config.enough:

@@ -20,6 +20,7 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.presence import cut
 from scenario_gen.types.scenario import Scenario
 
 MIN_CHORD = 0.5
@@ -48,6 +49,7 @@ def replay(encounter: Encounter, fit: Fit, frame_id: str = "map") -> Scenario:
         speed=state[..., 3],
         acceleration=np.gradient(state[..., 3], encounter.dt, axis=1),
         frame_id=frame_id,
+        present=cut(encounter.present, first, last + 1),
     )
 
 

@@ -31,7 +31,7 @@ from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
-from scenario_gen.fitting.kept import refuse_lost_turns
+from scenario_gen.fitting.kept import count_lost, refuse_lost_turns
 from scenario_gen.fitting.placement import check_scale, Equation, equations, find_relations, Placement, Relation, separated
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.roads.ways import draw_route, draw_u_turn, relative
@@ -46,6 +46,8 @@ _ROUNDS = 5
 _SAMPLES = 64  # points of a way
 _MOMENTS = 8  # samples of a track
 _SOLVED = 6  # assignments that are solved for the distances along their ways
+_PLACED = 10  # of them that are placed in full, until one loses no conflict
+_SWAPS = 3
 _OTHERS = 2  # other ways per vehicle that are tried in the best one
 _LATERAL_ONLY = 1e-3  # weight of staying where one is, where nothing else says so
 _LANE_CHANGE = 8.0  # m² for a way that changes lanes on a straight arm, so that none is taken without need
@@ -60,6 +62,8 @@ _WHOLE_TURN = 15.0  # the same for the whole way, driven or not
 _ARM = 30.0  # m² per rad²: how differently two vehicles' entries are turned from each other
 _OWN_SLACK = np.radians(15.0)  # a road's corner may turn by this much more or less, beyond the limit below
 _OFF = 50.0  # cost per metre beyond the road's end
+_TURNS = np.radians(15.0)  # more is a turn that has its place on the way
+_TURN_WEIGHT = 2.0  # of that place, where the place of a crossing has 1
 _TURN_TOLERANCE = MOST_CHANGE
 _HEADING_LIMIT = np.radians(50.0)  # a fitted vehicle may be turned from the template (after the rigid motion) by this on average
 _SHARPNESS_STEP = 0.25  # of the logarithm of a curvature: vehicles that differ by less share their ways
@@ -107,14 +111,23 @@ def place_at_junction(tracks: tuple[Track, ...], road: Road, config: FittingConf
     for scale in _SCALES:
         if not config.scale_low <= scale <= config.scale_high:
             continue
-        for choice in _search(tracks, ways, relations, scale):
+        best: tuple[int, Placement] | None = None
+        for choice in _search(tracks, ways, relations, scale)[:_PLACED]:
             reason = _misfit_reason(choice, scale)
             if not reason:
                 try:
-                    return _placed(tracks, road, choice, scale, relations, config)
+                    placement = _placed(tracks, road, choice, scale, relations, config)
                 except RefusedError as error:
                     reason = str(error)
+                else:
+                    lost = count_lost(tracks, placement.tracks)
+                    if best is None or lost < best[0]:
+                        best = lost, placement
+                    if lost == 0:
+                        break
             reasons.append(reason)
+        if best is not None:
+            return best[1]
     if not reasons:
         check_scale(1.0, "the template", config)
     raise RefusedError(f"the template does not fit the ways of road {road.name}: {reasons[0]}")
@@ -198,11 +211,12 @@ def _search(tracks: tuple[Track, ...], ways: list[list[_Way]], relations: tuple[
 
     best = min((chosen for chosen, _ in laid), key=lambda chosen: round(solved(chosen).cost, 6))
     order = dict(laid)[best]
-    for i in range(len(tracks)):
-        for k in order[i][:_OTHERS]:
-            other = (*best[:i], k, *best[i + 1 :])
-            if round(solved(other).cost, 6) < round(solved(best).cost, 6):
-                best = other
+    for _ in range(_SWAPS):  # one vehicle at a time, the one by which most is won
+        swapped = [(*best[:i], k, *best[i + 1 :]) for i in range(len(tracks)) for k in order[i][:_OTHERS]]
+        other = min(swapped, key=lambda chosen: round(solved(chosen).cost, 6), default=best)
+        if round(solved(other).cost, 6) >= round(solved(best).cost, 6):
+            break
+        best = other
     return sorted(found.values(), key=lambda choice: (bool(_misfit_reason(choice, scale)), round(choice.cost, 6)))
 
 
@@ -308,6 +322,7 @@ class _Solver:
         self.poses = np.stack([track.poses[instants] for track in tracks])
         self.driven = scale * np.stack([track.progress[instants] for track in tracks])
         self.cache: dict[tuple[int, int, int], tuple[Equation, ...] | None] = {}
+        self.by_turn: dict[tuple[int, int], float] = {}
 
     def solve(self, ways: dict[int, _Way]) -> _Choice:
         members = sorted(ways)
@@ -318,6 +333,12 @@ class _Solver:
                 found = self._equations(k, relation, ways[relation.a], ways[relation.b])
                 lost += found is None
                 system.extend(found or ())
+        for i in members:  # who turns does so where the way turns
+            if abs(self._turn(i)) > _TURNS and abs(ways[i].turn) > _TURNS:
+                key = (i, id(ways[i]))
+                if key not in self.by_turn:
+                    self.by_turn[key] = self.start_by_turn(i, ways[i].curve)
+                system.append(Equation(((i, 1.0),), self.by_turn[key], _TURN_WEIGHT))
         start = _least_squares(members, system)
         if not start:  # nobody is tied down: who turns most is placed by its turn, the others beside it
             i = max(members, key=lambda i: (abs(self._turn(i)), self.driven[i, -1], -i))

@@ -55,6 +55,18 @@ def _otherwise(turn: float) -> str:
     return f"{verb.removesuffix('es') if verb == 'goes' else verb.removesuffix('s')} {rest}"
 
 
+def count_lost(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> int:
+    """How many of the template's conflicts a placement has not, or in another order, each counted twice, and new ones."""
+    time = np.arange(len(tracks[0].progress), dtype=np.float64)
+    vehicles = tuple(track.vehicle for track in tracks)
+    before, after = (
+        _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2]))
+        for poses in (np.stack([track.poses for track in some]) for some in (tracks, placed))
+    )
+    gone = [pair for pair, conflict in before.items() if pair not in after or after[pair].first != conflict.first]
+    return 2 * len(gone) + len(after.keys() - before.keys())
+
+
 def find_losses(encounter: Encounter, tracks: tuple[Track, ...], placement: Placement) -> tuple[Loss, ...]:
     """What of the template's interaction the placed motion has not, or has otherwise.
 

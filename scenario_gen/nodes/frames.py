@@ -115,13 +115,16 @@ class Frames:
         if self._given_in:
             return
         motion = self._motion.trajectory
-        poses = np.column_stack((motion.position[:, instant.k], motion.heading[:, instant.k]))
-        data = encode_frames(poses, self._children, motion.frame_id, stamp_ns)
+        here = np.ones(len(self._children), dtype=bool) if motion.there is None else motion.there[:, instant.k]
+        poses = np.column_stack((motion.position[:, instant.k], motion.heading[:, instant.k]))[here]
+        children = [child for child, there in zip(self._children, here, strict=True) if there]
+        data = encode_frames(poses, children, motion.frame_id, stamp_ns)
         self._own.append(data)
         self._published += 1
         publish(self._node, self._tf, data)
-        for publisher, vehicle, frame in zip(self._footprints, motion.vehicles, self._children, strict=True):
-            publish(self._node, publisher, encode_footprint(vehicle, stamp_ns, frame))
+        for publisher, vehicle, frame, there in zip(self._footprints, motion.vehicles, self._children, here, strict=True):
+            if there:
+                publish(self._node, publisher, encode_footprint(vehicle, stamp_ns, frame))
 
     def _yield_to_others(self, data: bytes, info: dict[str, Any]) -> None:
         """Give in to whoever publishes one of these frames and has published more on /tf."""

@@ -21,7 +21,7 @@ from msg_conventions.ego import ego_messages
 from msg_conventions.hashes import template_hashes
 from msg_conventions.pictures import encode_footprint, scenario_markers
 from msg_conventions.scenario_info import encode_info, INFO, request_summary, RequestSummary, scenario_entry
-from msg_conventions.scenarios import encode_scenario
+from msg_conventions.scenarios import encode_scenario, messages_of
 from msg_conventions.topics import vehicle_topic
 from scenario_gen.fitting import FittingConfig
 from scenario_gen.parameters import parameter
@@ -88,7 +88,8 @@ class _Messages:
         self._begin(ego)
         stamp = self._encounter.start_ns
         data = encode_scenario(scenario, stamp)
-        self._send("scenarios", data)
+        for message in (data,) if scenario.all_present else messages_of(data):
+            self._send("scenarios", message)
         entry = scenario_entry(
             scenario, data, self._request, self._node, template=self._encounter.vehicles, asked=asked, ego=ego, about=self._about
         )

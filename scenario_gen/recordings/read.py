@@ -32,8 +32,8 @@ from msg_conventions.cdr import stamp_of
 from msg_conventions.changepoints import decode_changepoints, decode_posterior, segment_descriptions
 from msg_conventions.hashes import decode_hashes, hash_of
 from msg_conventions.roads import decode_map
-from msg_conventions.scenario_info import decode_info, encode_info, INFO, Info, RequestSummary, ScenarioEntry
-from msg_conventions.scenarios import decode_scenario, digest
+from msg_conventions.scenario_info import decode_info, encode_info, INFO, Info, MESSAGES, RequestSummary, ScenarioEntry
+from msg_conventions.scenarios import decode_scenario, digest, messages_of
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
@@ -124,7 +124,14 @@ class Namespace:
 
     def __init__(self, path: Path, name: str, messages: Mapping[str, Sequence[BagMessage]], shared: Sequence[bytes]) -> None:
         """Take the bag's path, the namespace's name, its messages by topic, and /diagnostics of all namespaces."""
-        self.path, self.name, self.messages, self._shared = path, name, messages, shared
+        self.path, self.name, self._recorded, self._shared = path, name, messages, shared
+
+    @cached_property
+    def messages(self) -> Mapping[str, Sequence[BagMessage]]:
+        """The messages by topic; those of one scenario are joined, so that there is one for each scenario."""
+        if not (SCENARIOS in self._recorded and INFO in self._recorded):
+            return self._recorded
+        return {**self._recorded, SCENARIOS: _joined(self._recorded[SCENARIOS], self.entries)}
 
     def data(self, topic: str) -> list[bytes]:
         """Return the messages of a topic, in order."""
@@ -152,7 +159,7 @@ class Namespace:
     @cached_property
     def _decoded_infos(self) -> tuple[list[tuple[BagMessage, tuple[Info, ...]]], InputError | None]:
         found, damage = [], None
-        for message in self.messages.get(INFO, ()):
+        for message in self._recorded.get(INFO, ()):
             try:
                 found.append((message, decode_info(message.data, message.topic)))
             except InputError as error:
@@ -361,7 +368,8 @@ class Namespace:
         if not same:
             raise InputError(f"{self.path}: the scenario with SHA-256 {entry.sha256} is not on {self.where(SCENARIOS)}")
         closing = replace(info, data=encode_info(summary.of_one_scenario(), stamp))
-        return (*self.template_messages(entry, stamp).values(), same[-1], info, closing)
+        own = [replace(same[-1], data=data) for data in messages_of(same[-1].data)] if len(entry.messages) > 1 else same[-1:]
+        return (*self.template_messages(entry, stamp).values(), *own, info, closing)
 
     # To look at: the newest template and what the nodes said of it.
 
@@ -380,7 +388,7 @@ class Namespace:
     def ego_track(self) -> Scenario | None:
         """The newest track of an ego."""
         tracks = self.data("ego/track")
-        return decode_scenario(tracks[-1], what=self.where("ego/track"))[1] if tracks else None
+        return decode_scenario(tracks[-1], what=self.where("ego/track"), late=True)[1] if tracks else None
 
     @cached_property
     def road_name(self) -> str:
@@ -454,6 +462,33 @@ def read_scenario_set(path: Path, namespace: str = "", config: BagConfig = BagCo
         raise InputError(f"{path}: no request was closed on {namespace}/{INFO}")
     with within(path):
         return found.scenario_set()
+
+
+def _joined(messages: Sequence[BagMessage], entries: Iterable[ScenarioEntry]) -> Sequence[BagMessage]:
+    """Return one message per scenario: who comes or goes is in messages of its own, which an entry names.
+
+    Where one of them is missing, what is there stays as it is: its entry then has no scenario, and that is found.
+    """
+    several = [entry for entry in entries if MESSAGES in entry.status.values]
+    if not several:
+        return messages
+    places: dict[str, list[int]] = {}
+    for k, message in enumerate(messages):
+        places.setdefault(digest(message.data), []).append(k)
+    joined = dict(enumerate(messages))
+    for entry in several:
+        try:
+            own = [places[sha256].pop(0) for sha256 in entry.messages if places.get(sha256)]
+            whole = len(own) == len(entry.messages)
+        except InputError:
+            continue
+        if not whole:
+            continue
+        data = b"".join(messages[k].data for k in own)
+        for k in own:
+            joined.pop(k)
+        joined[own[0]] = replace(messages[own[0]], data=data)
+    return [joined[k] for k in sorted(joined)]
 
 
 def _numbered(texts: Iterable[str]) -> Iterable[tuple[str, int]]:

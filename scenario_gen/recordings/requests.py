@@ -96,9 +96,17 @@ class RequestTracker:
         self._whole: dict[str, tuple[int | None, int]] = {}  # request -> seed and number of scenarios
         self._most_unmatched = most_unmatched
         self._entries = 0  # of all open requests
+        self._partial: dict[str, tuple[str, ...]] = {}  # SHA-256 of a message -> of all messages of its scenario, last: of it all
 
     def add_scenario(self, sha256: str, data: bytes = b"") -> Match | None:
-        """Take a scenario, with what is to be given back with its entry: now, if that was there."""
+        """Take a scenario, with what is to be given back with its entry: now, if that was there.
+
+        A message of a scenario that has several is kept until the others and the entry are there.
+        """
+        if sha256 in self._partial:
+            self._unmatched.setdefault(sha256, []).append(data)
+            joined = self._join(self._partial[sha256])
+            return None if joined is None else self.add_scenario(*joined)
         requests = self._awaited.get(sha256)
         if not requests:
             self._unmatched.setdefault(sha256, []).append(data)
@@ -124,6 +132,9 @@ class RequestTracker:
             self.open.setdefault(info.request, TrackedRequest(info.request)).summary = info
             return None
         entry, request, sha256 = info, info.request, info.sha256
+        parts = self._parts_of(entry)
+        if parts and (joined := self._join(parts)) is not None:
+            self._unmatched.setdefault(sha256, []).append(joined[1])
         tracked = self.open.setdefault(request, TrackedRequest(request))
         if tracked.seed is None:
             tracked.seed = entry.seed
@@ -145,6 +156,27 @@ class RequestTracker:
             return None
         tracked.came += 1  # a second one of the same bytes counts with the first
         return tracked, entry, data or b""
+
+    def _parts_of(self, entry: ScenarioEntry) -> tuple[str, ...]:
+        """Remember the messages of an entry's scenario, if there are several, with the SHA-256 of it all at the end."""
+        messages = entry.messages
+        if len(messages) == 1:
+            return ()
+        parts = (*messages, entry.sha256)
+        self._partial.update(dict.fromkeys(messages, parts))
+        while len(self._partial) > self._most_unmatched:
+            self._partial.pop(next(iter(self._partial)))
+        return parts
+
+    def _join(self, parts: tuple[str, ...]) -> tuple[str, bytes] | None:
+        """Return SHA-256 and bytes of a scenario all of whose messages have come, and forget these."""
+        *messages, sha256 = parts
+        if not all(message in self._unmatched for message in messages):
+            return None
+        data = b"".join(self._take_unmatched(message) or b"" for message in messages)
+        for message in messages:
+            self._partial.pop(message, None)
+        return sha256, data
 
     def _take_unmatched(self, sha256: str) -> bytes | None:
         waiting = self._unmatched.get(sha256)

@@ -26,7 +26,7 @@ from msg_conventions.paths import encode_route
 from msg_conventions.pictures import encode_footprint, scenario_markers
 from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.scenario_info import encode_info, INFO, request_summary, scenario_entry
-from msg_conventions.scenarios import digest, encode_scenario
+from msg_conventions.scenarios import digest, encode_scenario, messages_of
 from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.recordings.read import SCENARIOS
@@ -86,7 +86,8 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
         entry = scenario_entry(
             scenario, data, request, "/gp_sampler", template=encounter.vehicles, asked=fit.asked, ego=ego, about=about
         )
-        yield SCENARIOS, data, logged
+        for message in (data,) if scenario.all_present else messages_of(data):
+            yield SCENARIOS, message, logged
         yield INFO, encode_info(entry, stamp), logged
         yield "markers", scenario_markers(scenario, stamp), logged
         logged += SCENARIO_STEP_NS

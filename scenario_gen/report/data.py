@@ -23,7 +23,7 @@ import numpy as np
 
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.evaluation.dtw import mean_feature
-from scenario_gen.evaluation.motion import at_count
+from scenario_gen.evaluation.motion import at_common, at_count
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit
 from scenario_gen.types.generation import GenerationResult, UNIFORM, WITHOUT
@@ -113,9 +113,17 @@ def states(source: Encounter | Scenario, frames: int) -> Floats:
 def _trajectories(scenarios: Sequence[Scenario], frames: int, ids: Sequence[str], ego: Scenario | None) -> dict[str, Any]:
     return {
         "states": pack(np.stack([_whole(scenario, frames, ids, ego) for scenario in scenarios])),
+        "there": [_there(scenario, ids) for scenario in scenarios],
         "durations": [_short(scenario.time[-1]) for scenario in scenarios],
         "index": [scenario.index for scenario in scenarios],
     }
+
+
+def _there(source: Encounter | Scenario, ids: Sequence[str]) -> list[list[float]]:
+    """Return from which to which share of the duration each vehicle is there; one that is left out, throughout."""
+    own = [vehicle.id for vehicle in source.vehicles]
+    shares = source.time[source.present] / source.time[-1]
+    return [[_short(v, 5) for v in shares[own.index(known)]] if known in own else [0.0, 1.0] for known in ids]
 
 
 def _whole(scenario: Scenario, frames: int, ids: Sequence[str], ego: Scenario | None) -> Floats:
@@ -182,15 +190,18 @@ def _fit(fit: Fit, routes: Sequence[Route]) -> list[dict[str, Any]]:
 def _features(encounter: Encounter, arms: Mapping[str, Sequence[Scenario]], shared: Sequence[str]) -> list[dict[str, Any]]:
     """Return the paper's figure 5 for each pair of the `shared` vehicles: matrices of MATRIX_SIZE² bytes, 255 = 1."""
     groups: dict[str, Sequence[Encounter | Scenario]] = {"template": [encounter], **arms}
-    motions = {name: [at_count(source, MATRIX_SIZE) for source in group] for name, group in groups.items() if group}
     pairs = []
     rows = [n for n, vehicle in enumerate(encounter.vehicles) if vehicle.id in shared]
     for pair in list(combinations(rows, 2))[:MAX_PAIRS]:
+        names = encounter.vehicles[pair[0]].id, encounter.vehicles[pair[1]].id
         entry: dict[str, Any] = {"pair": list(pair), "position": {}, "speed": {}}
-        for name, group in motions.items():
-            at = [[[v.id for v in m.vehicles].index(encounter.vehicles[n].id) for n in pair] for m in group]
-            place = [np.ascontiguousarray(np.stack([m.position[i[k]].T for m, i in zip(group, at, strict=True)])) for k in (0, 1)]
-            pace = [np.stack([m.speed[i[k]][None] for m, i in zip(group, at, strict=True)]) for k in (0, 1)]
+        for name, group in groups.items():
+            common = [at_common(source, names, MATRIX_SIZE) for source in group]
+            motions = [motion for motion in common if motion is not None]
+            if not motions:
+                continue
+            place = [np.ascontiguousarray(np.stack([m.position[k].T for m in motions])) for k in (0, 1)]
+            pace = [np.stack([m.speed[k][None] for m in motions]) for k in (0, 1)]
             entry["position"][name] = _bytes(mean_feature(place[0], place[1], "euclidean"))
             entry["speed"][name] = _bytes(mean_feature(pace[0], pace[1], "manhattan"))
         pairs.append(entry)

@@ -37,6 +37,7 @@ from scenario_gen.template.tracks import Track
 from scenario_gen.types.road import Road
 
 ARM_COUNT = {"straight": 2, "curve": 2, "t_intersection": 3, "four_way": 4}
+_RAMP_ANGLE = np.radians(12.0)
 _ROOM = 6.0  # metres kept free behind the first and before the last footprint
 _SLACK = 12.0  # metres by which a way may differ from the template's
 _SHORTEST = 30.0  # metres of an arm
@@ -45,12 +46,18 @@ _SAME_ARM = np.radians(30.0)  # directions that differ by less are those of one 
 _MERGED = np.radians(45.0)  # and by so much if the road has too few arms otherwise
 _PART = np.radians(75.0)  # a vehicle that is still turning may go on by so much to an arm
 _STEADY = np.radians(6.0)  # a path that turns by less near its end shows the arm's direction
+_THROUGH = np.radians(20.0)  # who turns by less goes straight through, on one line
 _SURE = 5.0  # metres of such a path that make it sure
 _LANE_GAP = 2.0  # metres sideways that make another lane
 _MOST_BETWEEN = 4  # lanes left free between the two directions, at most
 _MOST_LANES = 8
+_WIDE_JUNCTION = 30.0  # metres from the middle to a corner between two arms that belongs to the junction
 _SWEPT = 0.6  # metres of room beside a footprint on its way through the junction
 _BESIDE = 0.4  # metres on each side of the widest vehicle in its lane
+
+
+PLAIN_LINE = MainLine(Curve(np.array([[0.0, 0.0, 0.0], [120.0, 0.0, 0.0]])), np.array([0.0, 120.0]), np.array([0.0, 120.0]))
+"""What `curve` is drawn along where there is no template."""
 
 
 def fitting_width(tracks: tuple[Track, ...], config: RoadConfig) -> RoadConfig:
@@ -70,8 +77,15 @@ def draw_bent(name: str, tracks: tuple[Track, ...], frenet: FrenetTracks, config
     Raises:
         RefusedError: it has more cells than are allowed.
     """
-    main = main_line(frenet, tracks)
-    lanes = config.lanes or frenet.lanes
+    return draw_along(name, main_line(frenet, tracks), config.lanes or frenet.lanes, config)
+
+
+def draw_along(name: str, main: MainLine, lanes: int, config: RoadConfig) -> Road:
+    """Draw the road `name` along a main line, with so many lanes in each direction.
+
+    Raises:
+        RefusedError: it has more cells than are allowed.
+    """
     half = lanes * config.lane_width
     run = max(config.arm_length - main.shape.length / 2.0, _ROOM) if config.arm_length else _ROOM
     line = _axis(name, main, run)
@@ -117,6 +131,58 @@ class _ArmPlan:
         yaw = self.pose[2]
         xy = self.pose[:2] + left * np.array([-exact.sin(yaw), exact.cos(yaw)])
         return np.array([*xy, yaw + np.pi if inward else yaw])
+
+
+def draw_merge(tracks: tuple[Track, ...] | None, frenet: FrenetTracks | None, config: RoadConfig) -> Road:
+    """Draw a straight main road and a ramp that joins it from the side of its outermost lane, where the template changes to it.
+
+    Raises:
+        RefusedError: nobody in the template changes from the outermost lane of its direction to the next, or others keep to it.
+    """
+    lanes, along, before, after, sharpness = max(config.lanes, 1), 1.0, 2.0 * _SHORTEST, 2.0 * _SHORTEST, 0.02
+    if tracks is not None and frenet is not None:
+        who = _merging(tracks, frenet)
+        outermost = int(frenet.lane[who[0]].max())
+        others = frenet.lane[[i for i in range(len(tracks)) if i not in who]]
+        lanes = max(int(others.max(initial=0)) + 1, outermost, config.lanes)
+        along = float(frenet.direction[who[0]])
+        half = np.array([[track.vehicle.length / 2.0] for track in tracks])
+        station = along * frenet.station
+        join = float(np.median([station[i][np.argmax(frenet.change[i] >= 0.5)] for i in who]))
+        before, after = join - float((station - half).min()), float((station + half).max()) - join
+        sharpness = max(sharpness_of(tracks[i]) for i in who)
+    reach = [config.arm_length or max(size + _ROOM + _SLACK, _SHORTEST) for size in (before, after)]
+    width = config.lane_width
+    side = -1.0 if config.traffic_side == "right" else 1.0  # of the dividing line on which the traffic to the east drives
+    west, east = (_ArmPlan(np.array([x, 0.0, yaw]), lanes, lanes) for x, yaw in ((-reach[0], np.pi), (reach[1], 0.0)))
+    joined = np.array([0.0, side * (lanes - 0.5) * width, 0.0])
+    yaw = np.pi - side * _RAMP_ANGLE  # out along the ramp
+    out = np.array([exact.cos(yaw), exact.sin(yaw)])
+    ramp = np.array([*(joined[:2] + reach[0] * out), yaw + np.pi])
+    sketch = Sketch()
+    sketch.strip(Curve(np.array([[-reach[0], 0.0, 0.0], [reach[1], 0.0, 0.0]])), -lanes * width, lanes * width)
+    sketch.strip(Curve(np.stack((ramp, np.array([*joined[:2], ramp[2]])))), -width / 2.0, width / 2.0)
+    target = east.lane(lanes - 1, config, inward=False)
+    way = draw_route(ramp, target, lambda _: True, sharpness)
+    if way is not None:
+        sketch.sweep(way, 1.0, width)
+    entries = [arm.lane(k, config, inward=True) for arm in (west, east) for k in range(lanes)]
+    exits = [arm.lane(k, config, inward=False) for arm in (west, east) for k in range(lanes)]
+    return sketch.raster("merge", np.array([*entries, ramp]), np.array(exits), config)
+
+
+def _merging(tracks: tuple[Track, ...], frenet: FrenetTracks) -> list[int]:
+    """The vehicles that come from the outermost lane of their direction and leave it for the next."""
+    for sign in (1, -1):
+        own = [i for i in range(len(tracks)) if frenet.direction[i] == sign]
+        outermost = max((int(frenet.lane[i].max()) for i in own), default=0)
+        who = [i for i in own if frenet.lane[i, 0] == outermost and frenet.lane[i, 1] < outermost]
+        if who and all(outermost not in frenet.lane[i] for i in own if i not in who):
+            return who
+    raise RefusedError(
+        "road merge: nobody in the template leaves the outermost lane of its direction for the next one, so nobody would use the "
+        "ramp; choose straight or curve"
+    )
 
 
 def _finished(name: str, sketch: Sketch, arms: list[_ArmPlan], config: RoadConfig) -> Road:
@@ -213,10 +279,13 @@ def _ends(i: int, track: Track, centre: Floats) -> list[_End]:
         along = poses if inward else poses[::-1]
         steady = np.flatnonzero(np.abs(along[:, 2] - along[0, 2]) > _STEADY)
         last = int(steady[0]) if len(steady) else len(along) - 1
+        nearest = int(np.argmin(np.square(along[:, :2] - centre).sum(axis=1)))
+        last = min(last, nearest)  # not beyond the junction
         yaw = float(np.median(along[: last + 1, 2])) + (np.pi if inward else 0.0)
         out = np.array([exact.cos(yaw), exact.sin(yaw)])
         away = float(((along[0, :2] - centre) * out).sum())
-        found.append(_End(i, inward, yaw, along[last, :2], away, last * 0.5, float(np.sign(turn)) * (-1.0 if inward else 1.0)))
+        at = along[nearest if abs(turn) < _THROUGH else last, :2]
+        found.append(_End(i, inward, yaw, at, away, last * 0.5, float(np.sign(turn)) * (-1.0 if inward else 1.0)))
     if track.still:
         return [max(found, key=lambda end: end.away)]  # it stands on the arm on which it is
     return found
@@ -287,11 +356,10 @@ def _lanes(plan: _Plan, centre: Floats, config: RoadConfig) -> tuple[float, dict
     lanes: dict[tuple[int, bool], int] = {}
     lines: list[tuple[float, float]] = []  # offset, and where it lies in widths from the dividing line
     innermost = {}
+    sure = [end for end in plan.members if end.away > 0.0 and end.steady >= _SURE / 2.0] or plan.members
     for inward in (True, False):
         sign = keep if inward else -keep  # lanes in lie to the left of who looks outward
-        offsets = sorted(
-            (sign * float(((end.at - centre) * left).sum()), end.vehicle) for end in plan.members if end.inward == inward
-        )
+        offsets = sorted((sign * float(((end.at - centre) * left).sum()), end.vehicle) for end in sure if end.inward == inward)
         lane = 0
         group: list[float] = []
         for offset, vehicle in offsets:
@@ -307,11 +375,18 @@ def _lanes(plan: _Plan, centre: Floats, config: RoadConfig) -> tuple[float, dict
         free = min(max(round(between / width) - 1, 0), _MOST_BETWEEN)
         shift = {True: (free + 1) // 2, False: free // 2}
         lanes = {end: lane + shift[end[1]] for end, lane in lanes.items()}
-    for end in plan.members:
+    for end in sure:
         sign = keep if end.inward else -keep
         offset = float(((end.at - centre) * left).sum())
         lines.append((offset, sign * (lanes[end.vehicle, end.inward] + 0.5) * width))
-    return float(np.mean([offset - own for offset, own in lines])) if lines else 0.0, lanes
+    middle = float(np.mean([offset - own for offset, own in lines])) if lines else 0.0
+    for end in plan.members:  # who has not come to its end of the junction takes the lane that is nearest to where it would
+        if (end.vehicle, end.inward) not in lanes:
+            sign = keep if end.inward else -keep
+            nearest = round(sign * (float(((end.at - centre) * left).sum()) - middle) / width - 0.5)
+            most = max([lane for (_, inward), lane in lanes.items() if inward == end.inward], default=0)
+            lanes[end.vehicle, end.inward] = min(max(nearest, 0), most)
+    return middle, lanes
 
 
 def _draw_arms(sketch: Sketch, arms: list[_ArmPlan], config: RoadConfig) -> None:
@@ -328,18 +403,36 @@ def _draw_arms(sketch: Sketch, arms: list[_ArmPlan], config: RoadConfig) -> None
         sketch.strip(Curve(np.stack((start, arm.pose))), -rights * width, lefts * width)
         inner.append((start, float(-rights * width), float(lefts * width)))
     middle = []
-    for k, (pose, _, high) in enumerate(inner):
+    for k, (pose, right, high) in enumerate(inner):
         other, low, _ = inner[(k + 1) % len(inner)]
         one, two = pose[2], other[2]
-        a = pose[:2] + high * np.array([-exact.sin(one), exact.cos(one)])
+        normal = np.array([-exact.sin(one), exact.cos(one)])
+        a = pose[:2] + high * normal
         b = other[:2] + low * np.array([-exact.sin(two), exact.cos(two)])
+        middle += [a, pose[:2] + right * normal]
         turn = float((two - one) % (2.0 * np.pi))
         if 0.05 < turn < np.radians(165.0):
             gap = b - a
             along = float(gap[0] * exact.sin(two) - gap[1] * exact.cos(two)) / exact.sin(turn)
             corner = a + along * np.array([exact.cos(one), exact.sin(one)])
             sketch.corner(corner, one, two, config.corner_radius)
-            middle.append(corner)
-        else:
-            middle += [a, b]
-    sketch.drivable.append(np.array(middle))
+            if abs(along) < _WIDE_JUNCTION:
+                middle.append(corner)
+    sketch.drivable.append(_hull(np.array(middle)))
+
+
+def _hull(points: Floats) -> Floats:
+    """The convex hull (H, 2) of points (M, 2), counter-clockwise (Andrew 1979)."""
+    order = points[np.lexsort((points[:, 1], points[:, 0]))]
+    halves = []
+    for row in (order, order[::-1]):
+        half: list[Floats] = []
+        for point in row:
+            while len(half) > 1:
+                u, v = half[-1] - half[-2], point - half[-1]
+                if u[0] * v[1] - u[1] * v[0] > 0.0:
+                    break
+                half.pop()
+            half.append(point)
+        halves += half[:-1]
+    return np.array(halves)

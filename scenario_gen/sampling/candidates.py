@@ -112,8 +112,8 @@ class Batch:
         for n, v in enumerate(self.vehicles):
             spline = v.speed.spline
             states(
-                self.curve[n], self.arc[n], v.path.spacing, spline.breaks, spline.pieces, self.speed[n], tau, pace, slope,
-                counts, out[n],
+                self.curve[n], self.arc[n], v.path.spacing, spline.breaks, spline.first, spline.pieces, self.speed[n],
+                tau, pace, slope, counts, out[n],
             )  # fmt: skip
         return out
 

@@ -25,6 +25,7 @@ from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.road import Road
 
 LENGTH_SHARE = 0.25  # of the route, at most: what varies more slowly between given ends hardly varies
+SHORTEST_LENGTH = 15.0  # m; drivers do not wander within less, so on a short route there is little to draw
 SHORTEST_ROUTE = 3.0  # m; a shorter one is driven as planned
 ROOM_SIGMAS = 2.0  # a deviation of so many standard deviations still leaves the footprint on the road
 MAX_ROOM_SIGMAS = 5.0  # more room than so many standard deviations is not looked for
@@ -50,7 +51,7 @@ def lateral_covariance_root(path: BasePath, room: Floats, config: SamplingConfig
     nodes, sigma = len(path.node), config.lateral_sigma
     if sigma == 0.0 or path.length < SHORTEST_ROUTE:
         return np.zeros((nodes, 0))
-    length = min(config.lateral_length, LENGTH_SHARE * path.length)
+    length = min(config.lateral_length, max(LENGTH_SHARE * path.length, SHORTEST_LENGTH))
     inside = np.unique(path.anchor)
     inside = inside[(inside > 1.0) & (inside < path.length - 1.0)]
     ends = np.array([0.0, path.length])

@@ -176,12 +176,13 @@ def _pose(c: Floats, j: int, h: float, x: float, out: Floats) -> None:
     out[2] = exact.arctan2(dy, dx)
 
 
-@kernel(F3, F2, F, F1, F3, F2, F2, F2, F2, I1, OUT3)
+@kernel(F3, F2, F, F1, I1, F3, F2, F2, F2, F2, I1, OUT3)
 def states(
     curve: Floats,
     arc: Floats,
     h: float,
     breaks: Floats,
+    first: Ints,
     pieces: Floats,
     speed: Floats,
     tau: Floats,
@@ -197,8 +198,9 @@ def states(
         arc: (S, G) arc lengths [m].
         h: node spacing [m].
         breaks: (m + 1,) template times [s] between the pieces of the speed.
+        first: (m,) the first of the four coefficients of each piece.
         pieces: (m, 4, 4) the pieces of a spline, see `SpeedSpline.pieces`.
-        speed: (S, m + 3) coefficients [m/s].
+        speed: (S, n) coefficients [m/s].
         tau: (S, T) template times [s], ascending.
         pace: (S, T) rate of the sample's clock there.
         slope: (S, T) 1/s, its derivative.
@@ -217,7 +219,7 @@ def states(
                     for power in range(4):
                         p[power] = 0.0
                         for q in range(4):
-                            p[power] += pieces[i, power, q] * speed[s, i + q]
+                            p[power] += pieces[i, power, q] * speed[s, first[i] + q]
                     fresh = False
                 if i == m - 1 or t < breaks[i + 1]:
                     break

@@ -116,7 +116,7 @@ class _Drive:
 
     def mean(self, clock: Clock, config: SamplingConfig) -> _Mean | str:
         """The mean's coefficients on this clock, with what they keep to; or why there are none."""
-        spline, rate = self.spline, clock.at(self.spline.breaks)[1:]
+        spline, rate = self.spline, clock.at(self.spline.stations)[1:]
         motion, target = Motion.of(spline, *rate), self.target(clock)
         at, pace = spline.middle, clock.at(spline.middle)[1]
         top = config.max_speed * pace

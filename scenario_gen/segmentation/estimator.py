@@ -29,7 +29,7 @@ from scenario_gen.segmentation.estimates import estimate, hidden_channels, mean_
 from scenario_gen.segmentation.hdp_hmm.chain import TRACE
 from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.segmentation.hdp_hmm.smoother import log_densities, smooth
-from scenario_gen.segmentation.series import segment_series, usual_distances, without_outliers
+from scenario_gen.segmentation.series import segment_visible, usual_distances, without_outliers
 
 Data = Any  # an array (T, D) or what becomes one, or a list of them
 
@@ -147,12 +147,12 @@ class StickyHDPHMM:
         if len(x) < LEAST_SAMPLES:
             raise EstimatorError(f"X has n_samples = {len(x)}; at least {LEAST_SAMPLES} are needed")
         seed = int(np.random.default_rng().integers(2**62)) if self.random_state is None else int(self.random_state)
+        self._usual = usual_distances(x, ends)
+        visible = without_outliers(x, self._usual, ends)
         with as_value_error():
-            posterior = segment_series(x, config, seed, ends=tuple(ends.tolist()))
+            posterior = segment_visible(visible, config, seed, ends, np.zeros(x.shape[1]))
         self.posterior_ = posterior
         self.n_features_in_ = x.shape[1]
-        self._usual = usual_distances(np.where(np.isnan(x).all(axis=0), 0.0, x))
-        visible = without_outliers(x, self._usual)
         emissions = estimate(visible, ends, posterior, config)
         self.labels_ = posterior.labels.copy()
         self.changepoints_ = posterior.changepoints
@@ -276,7 +276,7 @@ class StickyHDPHMM:
             )
         used = self.posterior_.channels
         absent = np.isnan(self.means_).all(axis=0)
-        visible = np.where(absent, 0.0, without_outliers(x, self._usual))
+        visible = np.where(absent, 0.0, without_outliers(x, self._usual, ends))
         with as_value_error():
             problem, rows = regressed(visible, ends, self._config())
         hidden = hidden_channels(problem)[:, used]

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenario_gen.segmentation.online import OnlineConfig, OnlineSegmenter
+from scenario_gen.segmentation.online import Changepoint, OnlineConfig, OnlineSegmenter
 from scenario_gen.segmentation.trends import course
 from scenario_gen.types.segmentation import LiveChangepoints
 
@@ -48,16 +48,27 @@ class LiveSegmenter:
             self._start_ns = sample.stamp_ns
         self._past.append(sample)
         found = self._online.push(sample.position, sample.speed)
-        return self._states([changepoint.sample for changepoint in found]) if found else None
+        return self._states(found) if found else None
 
     def _follows(self, last: "Sample", sample: "Sample") -> bool:
         return sample.stamp_ns == last.stamp_ns + self._dt_ns and sample.vehicles == last.vehicles
 
-    def _states(self, samples: Sequence[int]) -> LiveChangepoints:
-        time_ns = np.array(samples, dtype=np.int64) * self._dt_ns
+    def _states(self, found: Sequence[Changepoint]) -> LiveChangepoints:
+        time_ns = np.array([changepoint.sample for changepoint in found], dtype=np.int64) * self._dt_ns
         at = (self._start_ns + time_ns - self._past[0].stamp_ns) // self._dt_ns
         position = np.stack([sample.position for sample in self._past], axis=1)
         speed = np.stack([sample.speed for sample in self._past], axis=1)
         heading = np.array([course(xy, v, self._dt_ns * 1e-9)[0] for xy, v in zip(position, speed, strict=True)])
         vehicles = self._past[-1].vehicles
-        return LiveChangepoints(self._start_ns, vehicles, time_ns, position[:, at], heading[:, at], speed[:, at])
+        ended = [changepoint.ended for changepoint in found]
+        return LiveChangepoints(
+            self._start_ns,
+            vehicles,
+            time_ns,
+            position[:, at],
+            heading[:, at],
+            speed[:, at],
+            probability=np.array([changepoint.probability for changepoint in found]),
+            label=np.array([segment.label for segment in ended], dtype=np.int64),
+            label_probability=np.array([segment.probability[segment.labels == segment.label][0] for segment in ended]),
+        )

@@ -71,10 +71,10 @@ class Posterior:
         return ess(list(self.trace))
 
     @classmethod
-    def constant(cls, samples: int) -> "Posterior":
-        """The posterior of a series that does not vary: one primitive, with certainty."""
-        zeros = np.zeros(samples, np.int64)
-        return cls(zeros, zeros[None], np.zeros(samples), np.array([samples]), np.zeros(1, np.int64), (), np.zeros(0, np.bool_))
+    def constant(cls, ends: Ints) -> "Posterior":
+        """The posterior of sequences that do not vary: one primitive, with certainty; they end before the samples `ends` (Q,)."""
+        zeros = np.zeros(int(ends[-1]), np.int64)
+        return cls(zeros, zeros[None], np.zeros(len(zeros)), ends, np.zeros(1, np.int64), (), np.zeros(0, np.bool_))
 
     def part(self, start: int, stop: int) -> "Posterior":
         """Return the posterior of the samples start..stop alone."""

@@ -31,7 +31,7 @@ from scenario_gen.segmentation.trends import course, Trends
 from scenario_gen.types.encounter import Tracks, Vehicle
 from scenario_gen.types.segmentation import Segmentation
 
-DRIVING_SAMPLER = SamplerConfig(weight=0.5, chains=3, sweeps=90)
+DRIVING_SAMPLER = SamplerConfig(weight=0.5, chains=3, sweeps=60)
 
 
 @dataclass(frozen=True)

@@ -69,11 +69,20 @@ def segment_series(
     if stops[-1] != len(x) or (np.diff(np.concatenate([[0], stops])) < 1).any():
         raise InputError(f"the ends of the sequences must rise to the number of samples, {len(x)}; they are {stops.tolist()}")
     known = np.zeros(x.shape[1]) if blur is None else np.asarray(blur)
+    return segment_visible(without_outliers(x, usual_distances(x, stops), stops), config, seed, stops, known)
+
+
+def segment_visible(x: Floats, config: SamplerConfig, seed: int, ends: Ints, known: Floats) -> Posterior:
+    """`segment_series` of x (T, D), finite or NaN, whose outliers are NaN already; known (D,) see `standardised`.
+
+    Raises:
+        InputError: a sequence is too short for the order.
+    """
     scaled, unknown, channels = standardised(x, known)
     if not len(channels):
-        return Posterior.constant(len(x))
-    problem = Problem.build(scaled, stops, config, unknown)
-    return sample(problem, config, seed, stops, channels)
+        return Posterior.constant(ends)
+    problem = Problem.build(scaled, ends, config, unknown)
+    return sample(problem, config, seed, ends, channels)
 
 
 def standardised(x: Floats, known: Floats) -> tuple[Floats, Floats, Ints]:
@@ -83,15 +92,13 @@ def standardised(x: Floats, known: Floats) -> tuple[Floats, Floats, Ints]:
     10⁴, a linear combination of those before it would make every covariance singular and adds nothing.
 
     Args:
-        x: (T, D), NaN where nothing was measured.
+        x: (T, D), NaN where nothing was measured, single outliers among that (`without_outliers`).
         known: (D,) spread below which differences mean nothing.
 
     Returns:
         (T, D') series, (D',) variance to which each channel is known, and which channels (D',) they are.
     """
-    few = (~np.isnan(x)).sum(axis=0) < 2
-    whole = np.where(few, 0.0, x)
-    whole = without_outliers(whole, usual_distances(whole))
+    whole = measured_twice(x)
     spread, centre = np.nanstd(whole, axis=0), np.nanmean(whole, axis=0)
     inner = inner_spread(whole)
     varies = spread > 1e-9 * np.maximum(np.nanmax(np.abs(whole), axis=0), 1e-300)
@@ -112,33 +119,46 @@ def inner_spread(x: Floats) -> Floats:
     return np.asarray(np.nanstd(np.clip(x, low, high), axis=0))
 
 
-def usual_distances(x: Floats) -> Floats:
-    """(D,) usual distance of a sample of x (T, D) from the median of the four before it, or a tenth of the channel's spread."""
-    before, _ = _from_medians(x)
+def measured_twice(x: Floats) -> Floats:
+    """Return x (T, D) with zeros in the channels that were measured less than twice, and tell nothing."""
+    return np.where((~np.isnan(x)).sum(axis=0) < 2, 0.0, x)
+
+
+def usual_distances(x: Floats, ends: Ints) -> Floats:
+    """(D,) usual distance of a sample of x (T, D) from the median of the four before it, or a tenth of the channel's spread.
+
+    Sequences end before the samples `ends` (Q,); what is before the first of one counts for nothing.
+    """
+    x = measured_twice(x)
+    before, _ = _from_medians(x, ends)
     with np.errstate(all="ignore"):
         return np.asarray(np.fmax(1.4826 * np.nanmedian(np.abs(before), axis=0), 0.1 * inner_spread(x)))
 
 
-def without_outliers(x: Floats, usual: Floats) -> Floats:
+def without_outliers(x: Floats, usual: Floats, ends: Ints) -> Floats:
     """Replace single cells of x (T, D) by NaN that lie far beyond the medians of the four samples before and the four after.
 
-    Far is FAR times `usual` (D,), see `usual_distances`. A lost sensor's 10⁶ would set the scale of all else, and a state of
-    one sample costs less than noise of any tails can explain.
+    Sequences end before the samples `ends` (Q,); a cell is compared with its own sequence only. Far is FAR times `usual` (D,),
+    see `usual_distances`. A lost sensor's 10⁶ would set the scale of all else, and a state of one sample costs less than noise
+    of any tails can explain.
     """
-    before, after = _from_medians(x)
+    before, after = _from_medians(x, ends)
     before, after = np.where(np.isnan(before), after, before), np.where(np.isnan(after), before, after)  # at the ends: one side
     nearest = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
     return np.where((nearest > FAR * usual) & (usual > 0.0), np.nan, x)
 
 
-def _from_medians(x: Floats) -> tuple[Floats, Floats]:
+def _from_medians(x: Floats, ends: Ints) -> tuple[Floats, Floats]:
     """Distances of x (T, D) from the medians of the four samples before and the four after; NaN where there are none."""
     gap = np.full((SIDE, x.shape[1]), np.nan)
-    windows = np.sort(sliding_window_view(np.concatenate([gap, x, gap]), SIDE, axis=0), axis=-1)  # NaN come last
+    pieces = np.split(x, ends[:-1])
+    apart = np.concatenate([gap, *(part for piece in pieces for part in (piece, gap))])
+    windows = np.sort(sliding_window_view(apart, SIDE, axis=0), axis=-1)  # NaN come last
     seen = np.maximum((~np.isnan(windows)).sum(axis=-1, keepdims=True), 1)
     low, high = (np.take_along_axis(windows, place, axis=-1)[..., 0] for place in ((seen - 1) // 2, seen // 2))
     median = 0.5 * (low + high)
-    return x - median[: len(x)], x - median[SIDE + 1 :]
+    at = np.arange(len(x)) + SIDE * np.repeat(np.arange(len(ends)), np.diff(ends, prepend=0))  # with the gaps before it
+    return x - median[at], x - median[at + SIDE + 1]
 
 
 def independent(x: Floats) -> Ints:

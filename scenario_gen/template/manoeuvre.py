@@ -23,7 +23,7 @@ from scenario_gen.template.tracks import Track
 
 MOST_CHANGE: Final = np.radians(25.0)  # a manoeuvre is kept if its turn differs by no more, and it has the same name
 _STRAIGHT, _ROUND = np.radians(30.0), np.radians(150.0)
-_DOUBT: Final = np.radians(10.0)  # turns that differ by less are the same manoeuvre, on whichever side of a threshold they lie
+_DOUBT: Final = np.radians(15.0)  # turns that differ by less are the same manoeuvre, on whichever side of a threshold they lie
 _WINDOW = 8.0  # metres over which a bend's curvature is taken
 _GENTLEST, _TIGHTEST = 0.005, 0.17  # 1/m
 

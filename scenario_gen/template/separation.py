@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -23,8 +24,9 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
-from scenario_gen.template.tracks import clean_tracks, Track
+from scenario_gen.template.tracks import clean_tracks, presence_of, Track
 from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
+from scenario_gen.types.presence import together
 
 _ROUNDS = 400
 _ALONG = 0.3  # how readily a vehicle is set forward or back on its path
@@ -85,8 +87,7 @@ def smallest_gaps(tracks: Sequence[Track]) -> Floats:
     poses = [track.poses for track in tracks]
     for i in range(len(tracks)):
         for j in range(i):
-            gap, _ = footprint_gap(tracks[i].vehicle, poses[i], tracks[j].vehicle, poses[j])
-            gaps[i, j] = gaps[j, i] = gap.min()
+            gaps[i, j] = gaps[j, i] = _worst(tracks, poses, i, j)[0]
     return gaps
 
 
@@ -110,14 +111,15 @@ def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sid
     base = [track.poses for track in tracks]
     poses = list(base)
     ease = np.array([_ALONG, sideways])
+    pairs = _near_pairs(tracks, base, clearance + 2.0 * max_shift)
+    known: dict[tuple[int, int], tuple[float, int, int, int, Floats]] = {}
     for _ in range(_ROUNDS):
-        worst = (clearance - 1e-3, -1, -1, 0, np.zeros(2))
-        for i in range(n):
-            for j in range(i):
-                gap, axis = footprint_gap(tracks[i].vehicle, poses[i], tracks[j].vehicle, poses[j])
-                at = int(np.argmin(gap))
-                if gap[at] < worst[0]:
-                    worst = (float(gap[at]), i, j, at, axis[at])
+        for i, j in pairs:
+            if (i, j) not in known:
+                known[i, j] = _worst(tracks, poses, i, j)
+        worst = min(known.values(), key=lambda found: found[0], default=None)
+        if worst is None or worst[0] >= clearance - 1e-3:
+            worst = (clearance, -1, -1, 0, np.zeros(2))
         gap_now, i, j, at, normal = worst
         if i < 0:
             break
@@ -132,6 +134,7 @@ def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sid
             raise RefusedError(_too_close(tracks[i], tracks[j], gap_now, clearance, max_shift))
         for k in (i, j):
             poses[k] = _place(tracks[k], shift[k]).poses
+        known = {pair: found for pair, found in known.items() if i not in pair and j not in pair}
     else:
         raise RefusedError(_too_close(tracks[i], tracks[j], gap_now, clearance, max_shift))
     moved = exact.hypot(*shift.T)
@@ -144,6 +147,30 @@ def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sid
         if moved[k] > 1e-3
     )
     return Separation(tuple(_place(tracks[k], shift[k]) for k in range(n)), frozen(moved), notes)
+
+
+def _near_pairs(tracks: Sequence[Track], poses: Sequence[Floats], room: float) -> list[tuple[int, int]]:
+    """Pairs (i, j), j < i, that are there together, and whose footprints come within `room` [m] of each other at most."""
+    found = []
+    for i in range(len(tracks)):
+        for j in range(i):
+            both = presence_of(tracks[i]) & presence_of(tracks[j])
+            reach = (_diagonal(tracks[i].vehicle) + _diagonal(tracks[j].vehicle)) / 2.0
+            if both.any() and exact.hypot(*(poses[i] - poses[j])[both, :2].T).min() < room + reach:
+                found.append((i, j))
+    return found
+
+
+def _diagonal(vehicle: Vehicle) -> float:
+    return float(exact.hypot(vehicle.length, vehicle.width))
+
+
+def _worst(tracks: Sequence[Track], poses: Sequence[Floats], i: int, j: int) -> tuple[float, int, int, int, Floats]:
+    """The least gap [m] of two vehicles while both are there, who they are, the sample, and the axis (2,)."""
+    gap, axis = footprint_gap(tracks[i].vehicle, poses[i], tracks[j].vehicle, poses[j])
+    gap = np.where(presence_of(tracks[i]) & presence_of(tracks[j]), gap, np.inf)
+    at = int(np.argmin(gap))
+    return float(gap[at]), i, j, at, axis[at]
 
 
 def _lever(yaw: float, normal: Floats) -> Floats:
@@ -194,3 +221,16 @@ def own_paths(encounter: Encounter) -> Separation:
         if track.deviation > 1.0
     ]
     return replace(separation, notes=(*notes, *separation.notes))
+
+
+@once_per_encounter
+def least_gap(encounter: Encounter) -> float:
+    """Return the least gap [m] of any two vehicles while both are there, negative if they overlap; inf if never two are."""
+    poses = np.concatenate([encounter.position, encounter.heading[..., None]], axis=-1)
+    least = np.inf
+    for a, b in combinations(range(len(poses)), 2):
+        common = together(encounter.present, a, b)
+        if common.stop > common.start:
+            gap, _ = footprint_gap(encounter.vehicles[a], poses[a, common], encounter.vehicles[b], poses[b, common])
+            least = min(least, float(gap.min()))
+    return least

@@ -72,6 +72,9 @@ class LiveChangepoints:
         position: (N, K, 2) m.
         heading: (N, K) rad: the course over ground.
         speed: (N, K) m/s.
+        probability: (K,) that each is a changepoint rather than noise.
+        label: (K,) what the segment was that it ends: a class of segments of this stretch, numbered as they were first seen.
+        label_probability: (K,) of that class.
     """
 
     start_ns: int
@@ -80,3 +83,6 @@ class LiveChangepoints:
     position: Floats
     heading: Floats
     speed: Floats
+    probability: Floats
+    label: Ints
+    label_probability: Floats

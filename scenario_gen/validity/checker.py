@@ -95,7 +95,8 @@ class Checker:
         arrays = (encounter.position[kept], encounter.heading[kept], encounter.present[kept])
         conflicts = find_conflicts(vehicles, encounter.time, *arrays)
         own = [replace(wait, vehicle=kept.index(wait.vehicle)) for wait in waits if wait.vehicle != ego]
-        return cls(road, BoundaryStates(asked.start[kept], asked.end[kept]), conflicts, own, limits)
+        known = (limits or Limits()).for_template(encounter)
+        return cls(road, BoundaryStates(asked.start[kept], asked.end[kept]), conflicts, own, known)
 
     @property
     def not_applicable(self) -> tuple[str, ...]:
@@ -182,7 +183,7 @@ class Checker:
     def _overlaps(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
         n, limits = len(half), self.limits
         out = np.zeros((n * (n - 1) // 2, 3))
-        bounds = (limits.min_clearance, limits.time_resolution)
+        bounds = (limits.clearance, limits.time_resolution)
         if scenario.all_present:
             apart.first_contacts(scenario.time, control, scenario.heading, half, *bounds, out)
         else:  # who is not there meets nobody
@@ -197,11 +198,11 @@ class Checker:
         for pair, (status, time, gap) in zip(combinations(range(n), 2), out.tolist(), strict=True):
             if status != apart.PROVEN:
                 if status == apart.UNPROVEN:
-                    what = f"cannot be proven more than {limits.min_clearance:g} m apart (gap {gap:.6f} m)"
+                    what = f"cannot be proven more than {limits.clearance:g} m apart (gap {gap:.6f} m)"
                 elif gap <= 0.0:
                     what = f"overlap by {-gap:.3f} m"
                 else:
-                    what = f"come within {gap:.3f} m; {limits.min_clearance:g} m must be exceeded"
+                    what = f"come within {gap:.3f} m; {limits.clearance:g} m must be exceeded"
                 yield Violation(Cause.OVERLAP, time, pair, f"vehicles {pair[0]} and {pair[1]}: footprints {what} at {time:.3f} s")
 
     def _exits(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:

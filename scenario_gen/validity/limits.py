@@ -14,9 +14,13 @@
 
 """What a valid scenario must keep to; every limit is a parameter."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from scenario_gen.parameters import parameter, Parameters
+from scenario_gen.template.separation import least_gap
+from scenario_gen.types.encounter import Encounter
+
+_SHARE_OF_GAP, _MOST_CLEARANCE = 0.5, 0.5  # of the template's least gap; m
 
 
 @dataclass(frozen=True)
@@ -36,10 +40,11 @@ class Limits(Parameters):
     )
     stand_duration: float = parameter(1.0, "shortest stand or creep that counts as a wait", unit="s", low=0.01)
     min_clearance: float = parameter(
-        0.0,
-        "smallest gap between two footprints, by their best separating axis; a gap of 0 (touching) is an overlap",
+        -1.0,
+        "smallest gap between two footprints, by their best separating axis; a gap of 0 (touching) is an overlap; -1: half the "
+        "template's own least gap, at most 0.5 m",
         unit="m",
-        low=0.0,
+        low=-1.0,
     )
     slip: float = parameter(
         0.2, "displacement over time may differ from speed along heading by this, ahead and sideways", unit="m/s", low=0.0
@@ -55,3 +60,14 @@ class Limits(Parameters):
     time_resolution: float = parameter(
         1e-6, "what cannot be proven over an interval this short is refused", unit="s", low=1e-9, high=1.0
     )
+
+    @property
+    def clearance(self) -> float:
+        """Gap [m] that must be exceeded; 0 where it follows a template and none is known."""
+        return max(self.min_clearance, 0.0)
+
+    def for_template(self, encounter: Encounter) -> "Limits":
+        """Return the limits of scenarios of a template, whose own least gap says how near vehicles may come to one another."""
+        if self.min_clearance >= 0.0:
+            return self
+        return replace(self, min_clearance=min(max(_SHARE_OF_GAP * least_gap(encounter), 0.0), _MOST_CLEARANCE))

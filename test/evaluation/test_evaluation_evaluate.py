@@ -27,6 +27,7 @@ from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig, replay
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import CheckCounts, Evaluation
 from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.presence import ALWAYS
 from scenario_gen.types.scenario import BoundaryStates, Cause, ScenarioSet, Verdict, Violation
 
 T = 121
@@ -112,6 +113,40 @@ def test_vanished_conflicts_are_counted_for_themselves():
     assert (found.value("x", "conflicts"), found.value("x", "vanished_conflicts")) == (0.5, 0.5)
     assert found.value("x", "order_kept") == 1.0  # of those that are there
     assert any("0.5 of the template's 1 conflict(s) vanish" in note for note in found.row("x").notes)
+
+
+def late(source, n, first):
+    """The encounter or scenario, vehicle n of which arrives at sample `first`."""
+    present = source.present.copy()
+    present[n, 0] = first
+    return replace(source, present=present)
+
+
+def test_who_arrives_late_is_measured_while_there():
+    whole = crossing()
+    encounter, made = late(whole, 1, 40), [late(sample, 1, 40) for sample in samples(whole, 3)]
+    found = evaluate_scenarios(encounter, {"x": made, "oracle": [late(replayed(whole), 1, 40)]}, changepoints=K, config=QUICK)
+    # for the pair the same as where both are there from then on
+    cut = replace(
+        whole, position=whole.position[:, 40:], heading=whole.heading[:, 40:], speed=whole.speed[:, 40:], present=ALWAYS
+    )
+    rows = [replayed_from(sample, 40) for sample in samples(whole, 3)]
+    after = evaluate_scenarios(cut, {"x": rows}, changepoints=K, config=QUICK)
+    for key in ("e_position", "e_speed"):
+        assert found.value("x", key) == pytest.approx(after.value("x", key), rel=0.03), key
+    for key in ("min_distance", "min_ttc"):
+        assert found.value("x", key) == pytest.approx(after.value("x", key), rel=1e-9), key
+    assert found.value("oracle", "e_position") < 1e-6 and found.value("oracle", "js_gap") < 1e-9
+    alone = late(encounter, 1, 115)
+    last = evaluate_scenarios(alone, {"x": [late(replayed(whole), 1, 115)]}, changepoints=K, config=QUICK)
+    assert any("E leaves out 1 pair(s)" in note for note in last.row("x").notes)
+    assert math.isnan(last.value("x", "e_position")) and math.isfinite(last.value("x", "js_speed"))
+
+
+def replayed_from(scenario, first):
+    """The scenario from an instant on."""
+    parts = {name: getattr(scenario, name)[:, first:] for name in ("position", "heading", "speed", "acceleration")}
+    return replace(scenario, time=scenario.time[first:] - scenario.time[first], present=ALWAYS, **parts)
 
 
 def test_missing_and_empty_rows():

@@ -15,6 +15,7 @@
 """The report in headless Chromium: no errors, no requests, it plays, scrubs and switches; nothing is wider than a phone."""
 
 from base64 import b64decode
+from dataclasses import replace
 import io
 
 from browser_tab import DESKTOP, PHONE, Tab
@@ -176,4 +177,24 @@ def test_an_ego_is_drawn_as_its_template_track(browser, tmp_path):
     tab.part("play").click()
     tab.wait(lambda: tab.picture("stage") != before)
     assert tab.troubles == []
+    tab.page.close()
+
+
+def test_who_arrives_late_is_not_shown_before(browser, tmp_path):
+    case = report_case(3, without=False)
+
+    def late(motion):
+        present = motion.present.copy()
+        present[1, 0] = 60
+        return replace(motion, present=present)
+
+    made = replace(case.generated, scenarios=tuple(map(late, case.generated.scenarios)))
+    write_report(
+        tmp_path / "late.html", ReportInput([replace(case, encounter=late(case.encounter), generated=made, oracle=None)])
+    )
+    tab = Report(browser, tmp_path / "late.html", DESKTOP)
+    tab.page.wait_for_timeout(300)
+    assert "not there" in tab.part("readout").inner_text()
+    tab.part("scrub").fill("800")
+    assert "not there" not in tab.part("readout").inner_text() and tab.troubles == []
     tab.page.close()

@@ -37,7 +37,7 @@ def spline(stands=STANDS):
 
 
 def plain(basis):
-    m = len(basis.breaks)
+    m = len(basis.stations)
     return Motion.of(basis, np.ones(m), np.zeros(m), np.zeros(m))
 
 
@@ -55,14 +55,16 @@ def target(speed, length=None, ends=None):
 def test_basis_is_scipys():
     basis, c = spline(), np.random.default_rng(0).normal(size=spline().size)
     other, x = BSpline(basis.knots, c, 3), np.linspace(0.0, 20.0, 997)
-    for k in range(4):
+    for k in range(3):  # a knot that stands twice has no third
         assert basis.design(x, k) @ c == pytest.approx((other.derivative(k) if k else other)(x), abs=1e-9)
     whole = other.antiderivative()
     assert basis.driven(x) @ c == pytest.approx(whole(x) - whole(0.0), abs=1e-9)
     assert basis.length @ c == pytest.approx(whole(20.0) - whole(0.0))
     i = 7
     dt = 0.6 * (basis.breaks[i + 1] - basis.breaks[i])
-    assert basis.pieces[i] @ c[i : i + 4] @ dt ** np.arange(4) == pytest.approx(float(other(basis.breaks[i] + dt)))
+    assert basis.pieces[i] @ c[basis.first[i] : basis.first[i] + 4] @ dt ** np.arange(4) == pytest.approx(
+        float(other(basis.breaks[i] + dt))
+    )
     hat = np.interp(x, [0.0, 6.0, 9.0, 20.0], [0.0, 1.0, 0.0, 0.0])
     found = basis.projected(np.array([0.0, 6.0, 9.0, 20.0]), np.array([0.0, 1.0, 0.0, 0.0]))
     assert found == pytest.approx(np.trapezoid(basis.design(x) * hat[:, None], x, axis=0), abs=1e-3)
@@ -178,7 +180,7 @@ def test_motion_on_a_slowed_clock_is_the_chain_rule():
     clock = clock_of(grid, 1.0 + 0.2 * np.sin(0.5 * grid) ** 2)
     c = 8.0 + np.random.default_rng(5).normal(size=basis.size)
     tau = basis.breaks[5:-5]
-    motion = Motion.of(basis, *clock.at(basis.breaks)[1:])
+    motion = Motion.of(basis, *clock.at(basis.stations)[1:])
     h = 1e-3
 
     def speed(at):

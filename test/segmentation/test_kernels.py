@@ -18,14 +18,15 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from scipy.special import gammainccinv
-from scipy.stats import multivariate_normal
+from scipy.special import gammainccinv, gammaln
+from scipy.stats import kstest, multivariate_normal, norm
 
 from scenario_gen.segmentation.hdp_hmm.chain import update_outer
 from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
-from scenario_gen.segmentation.hdp_hmm.emission import accumulate, BLOCK, block_likelihood, block_log_likelihood
+from scenario_gen.segmentation.hdp_hmm.emission import accumulate, BLOCK, block_likelihood, block_log_likelihood, log_gammas
 from scenario_gen.segmentation.hdp_hmm.observed import observed_log_likelihood
 from scenario_gen.segmentation.hdp_hmm.problem import moving_mean, new_top, Place, Prior, Problem, unexplained
+from scenario_gen.segmentation.hdp_hmm.random import beyond, normal, TAIL
 from scenario_gen.segmentation.hdp_hmm.start import kmeans
 from scenario_gen.segmentation.posterior import matched_labels
 from scenario_gen.segmentation.trends import chi2_above
@@ -137,3 +138,16 @@ def test_a_chain_goes_on_from_the_labels_it_ended_with():
     start = Place(np.repeat([2, 5], 30), problem.observed)
     place, _, samples, _ = problem.run(config, Prior(np.eye(2), 25.0, 0.1), start, new_top(8), 0, 1, 3)
     np.testing.assert_array_equal(place.labels, samples[-1])
+
+
+def test_normal_numbers_are_normal_also_far_out():
+    state = np.array([11], np.uint64)
+    drawn = np.array([normal(state) for _ in range(40_000)])
+    assert kstest(drawn, "norm").pvalue > 0.01
+    far = np.abs(np.array([beyond(state) for _ in range(4000)]))
+    assert kstest(far, lambda x: 1.0 - norm.sf(x) / norm.sf(TAIL)).pvalue > 0.01
+
+
+def test_log_gammas_are_those_of_scipy():
+    for a, d in ((3.0, 1), (5.0, 6), (200.0, 24), (150.0, 200)):
+        assert log_gammas(a, d) == pytest.approx(gammaln(a - 0.5 * np.arange(d)).sum(), rel=1e-13)

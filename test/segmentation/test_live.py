@@ -20,7 +20,7 @@ import pytest
 from msg_conventions import trajectory
 from msg_conventions.changepoints import encode_live_changepoints
 from scenario_gen.logs import Sample
-from scenario_gen.segmentation import LiveSegmenter
+from scenario_gen.segmentation import LiveSegmenter, OnlineSegmenter
 from scenario_gen.types.encounter import Vehicle
 
 TICK = 100_000_000
@@ -44,12 +44,18 @@ def test_changepoints_come_soon_with_the_states_there(samples):
     found = found_in(samples)
     at = np.concatenate([f.time_ns for _, f in found]) * 1e-9
     assert np.abs(at - [10.0, 15.0, 25.0, 30.0]).max() <= 0.4
+    online = OnlineSegmenter(2, 0.1)
+    alone = [change for sample in samples for change in online.push(sample.position, sample.speed)]
+    assert [p for _, f in found for p in f.probability] == [change.probability for change in alone]
+    assert [label for _, f in found for label in f.label] == [change.ended.label for change in alone]
+    assert found[-1][1].label[-1] > 0  # what accelerates at 2 m/s² is another class than what is steady
     assert max(stamp - START - int(f.time_ns[-1]) for stamp, f in found) <= 1.5e9
     for _, f in found:
         assert f.start_ns == START
         index = int(f.time_ns[0]) // TICK
         assert np.array_equal(f.position[:, 0], samples[index].position)
         assert np.abs(f.heading).max() < 0.2
+        assert (f.probability > 0.9).all() and (f.label_probability > 0.0).all() and (f.label_probability <= 1.0).all()
         message = trajectory.decode(encode_live_changepoints(f), "changepoints/live")
         assert np.array_equal(message.time_ns, f.time_ns) and np.array_equal(message.position, f.position)
         assert (message.stamp_ns, message.frame_id) == (START, "local_enu")

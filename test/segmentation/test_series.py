@@ -22,6 +22,7 @@ import pytest
 from scenario_gen.errors import InputError
 from scenario_gen.segmentation import SamplerConfig, segment_series
 from scenario_gen.segmentation.posterior import ess, r_hat
+from scenario_gen.segmentation.series import usual_distances, without_outliers
 
 
 def two_states(seed: int, dimensions: int = 2) -> tuple[np.ndarray, np.ndarray]:
@@ -232,6 +233,19 @@ def test_single_outliers_are_no_states(size):
     rng = np.random.default_rng(0)
     x[rng.uniform(size=len(x)) < 0.01] += size
     assert found_as_drawn(segment_series(x, seed=0), labels)
+
+
+def test_outliers_are_told_by_their_own_sequence():
+    x = np.random.default_rng(2).normal(size=(100, 1)) + np.where(np.arange(100) < 50, 0.0, 100.0)[:, None]
+    x[49] = 60.0  # the last of the first sequence, on the way to the second
+    for ends, hidden in (([50, 100], [49]), ([100], [])):
+        usual = usual_distances(x, np.array(ends))
+        assert np.flatnonzero(np.isnan(without_outliers(x, usual, np.array(ends)))).tolist() == hidden
+
+
+def test_sequences_that_do_not_vary_keep_their_ends():
+    posterior = segment_series(np.ones((10, 2)), ends=(4, 10))
+    assert posterior.ends.tolist() == [4, 10] and posterior.labels.tolist() == [0] * 10
 
 
 def test_a_sequence_shorter_than_the_order_is_named():

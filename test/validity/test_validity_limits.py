@@ -23,7 +23,7 @@ import pytest
 
 from scenario_gen.errors import InputError
 from scenario_gen.template.interaction import Conflict, find_conflicts, Wait
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Cause
 from scenario_gen.validity import Checker, Limits
 
@@ -269,3 +269,18 @@ def test_a_batch_is_answered_in_order():
     scenarios = [good(), good(straight(-50, 0, 0, 50, TIME)), good()]
     verdicts = Checker(ROAD, None, None, None).check(scenarios)
     assert [verdict.valid for verdict in verdicts] == [True, False, True]
+
+
+def test_the_least_gap_follows_the_template_unless_it_is_given():
+    time = np.arange(51) * 0.1
+    position = np.stack([np.column_stack([5.0 * time, np.zeros(51)]), np.column_stack([5.0 * time, np.full(51, 2.5)])])
+    beside = Encounter("beside", (Vehicle("a"), Vehicle("b")), 0, 100_000_000, position, np.zeros((2, 51)), np.full((2, 51), 5.0))
+    assert Limits().clearance == 0.0  # nothing is known of a template
+    assert Limits().for_template(beside).clearance == pytest.approx(0.3)  # half of 2.5 m less the width
+    far = replace(beside, position=position + np.array([[[0.0, 0.0]], [[0.0, 8.0]]]))
+    assert Limits().for_template(far).clearance == 0.5
+    overlapping = replace(beside, position=position * np.array([1.0, 0.2]))
+    assert Limits().for_template(overlapping).clearance == 0.0
+    assert Limits(min_clearance=0.1).for_template(beside).clearance == 0.1
+    late = replace(beside, present=np.array([[0, 20], [10, 50]]), position=position)
+    assert Limits().for_template(late).clearance == pytest.approx(0.3)

@@ -27,7 +27,8 @@ function clock(set, sample) {
 }
 
 function speeds(set, sample, vehicle) {
-  return Array.from({ length: set.frames }, (_, f) => +set.values[set.offset(sample, vehicle, f) + 3].toFixed(2));
+  const at = (f) => +set.values[set.offset(sample, vehicle, f) + 3].toFixed(2);
+  return Array.from({ length: set.frames }, (_, f) => (set.there(sample, vehicle, f / (set.frames - 1)) ? at(f) : null));
 }
 
 /** Figure 3: speed over time on the colours of its primitives, and the probability of a changepoint below. */

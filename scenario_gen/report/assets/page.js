@@ -113,7 +113,8 @@ class Player {
     const { data, set, sample, view } = this;
     const share = this.time / this.duration;
     const states = data.vehicles.map((_, n) => set.state(sample, n, share));
-    view.box = this.frame(states);
+    const here = data.vehicles.map((_, n) => set.there(sample, n, share));
+    view.box = this.frame(states.filter((_, n) => here[n]));
     const context = view.begin();
     view.road(data.road, this.picture);
     const ghosts = this.find("ghosts").checked;
@@ -129,11 +130,15 @@ class Player {
       set.path(context, view, sample, n, Math.max(0, share - 3 / this.duration), share);
       if (ghosts) {
         for (let s = 0; s < set.samples; s += 1) {
-          if (s !== sample && !isEgo(data, n)) view.footprint(set.state(s, n, this.time / set.durations[s]), vehicle, vehicleColour(n), 0.08, false);
+          if (s !== sample && !isEgo(data, n) && set.there(s, n, this.time / set.durations[s])) view.footprint(set.state(s, n, this.time / set.durations[s]), vehicle, vehicleColour(n), 0.08, false);
         }
       }
     });
     data.vehicles.forEach((vehicle, n) => {
+      if (!here[n]) {
+        this.readouts[n].textContent = "not there";
+        return;
+      }
       if (isEgo(data, n)) {
         view.outline(states[n], vehicle, vehicleColour(n));
         view.label(states[n].x, states[n].y, "ego", vehicleColour(n));

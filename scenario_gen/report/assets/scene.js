@@ -22,11 +22,19 @@ class Trajectories {
     this.values = Float32Array.from(whole, (value, i) => low[i % 4] + step[i % 4] * value);
     [this.samples, this.vehicles, this.frames] = shape;
     this.durations = packed.durations;
+    this.presence = packed.there; // of each sample and vehicle, from which to which share of the duration; without: throughout
     this.index = packed.index || [0];
   }
 
   offset(sample, vehicle, frame) {
     return ((sample * this.vehicles + vehicle) * this.frames + frame) * 4;
+  }
+
+  /** Whether a vehicle is there at a share (0 to 1) of the sample's duration. */
+  there(sample, vehicle, share) {
+    if (!this.presence) return true;
+    const [from, to] = this.presence[sample][vehicle];
+    return share >= from - 1e-4 && share <= to + 1e-4;
   }
 
   /** The state of a vehicle at a share (0 to 1) of the sample's duration. */

@@ -60,8 +60,8 @@ class Motion:
     With r = dt/dτ the speed is u / r; the rest is the chain rule.
 
     Attributes:
-        rate: (m + 1,) r at the spline's breaks.
-        acceleration, jerk: (m + 1, n) rows.
+        rate: (b,) r at the spline's stations.
+        acceleration, jerk: (b, n) rows.
     """
 
     rate: Floats
@@ -70,9 +70,9 @@ class Motion:
 
     @classmethod
     def of(cls, spline: SpeedSpline, rate: Floats, slope: Floats, bend: Floats) -> "Motion":
-        """Take r, r' and r'' (m + 1,) at the spline's breaks."""
+        """Take r, r' and r'' (b,) at the spline's stations."""
         r, a, b = rate[:, None], slope[:, None], bend[:, None]
-        u, du, ddu = (spline.design(spline.breaks, k) for k in range(3))
+        u, du, ddu = (spline.design(spline.stations, k) for k in range(3))
         cubed = r * r * r
         acceleration = du / (r * r) - u * a / cubed
         jerk = ddu / cubed - (3.0 * du * a + u * b) / (cubed * r) + 3.0 * u * a * a / (cubed * r * r)
@@ -145,7 +145,7 @@ def _smoothness(spline: SpeedSpline) -> Floats:
 
 def mean_speed(spline: SpeedSpline, target: Target, motion: Motion, bounds: Bounds) -> Floats | None:
     """Coefficients (n,) [m/s] of the mean speed, None if none meets the bounds."""
-    n, m = spline.size, len(spline.breaks)
+    n, m = spline.size, len(spline.stations)
     reach = spline.driven(target.anchor_time)
     hessian = _smoothness(spline) + ANCHOR_WEIGHT * exact.matmul(reach.T, reach)
     linear = spline.projected(target.time, target.speed) + ANCHOR_WEIGHT * exact.matmul(reach.T, target.anchor)
@@ -168,7 +168,7 @@ def mean_speed(spline: SpeedSpline, target: Target, motion: Motion, bounds: Boun
         return value if abs(float(exact.matmul(spline.length, value)) - target.length) < 1e-6 else None
     quadratic = np.zeros((n + m, n + m))
     quadratic[:n, :n] = 2.0 * hessian
-    price = JERK_PRICE * np.gradient(spline.breaks)
+    price = JERK_PRICE * np.gradient(spline.stations)
     constraints = np.vstack([np.hstack([a, b]) for a, b, _ in rows])
     right = np.concatenate([c for _, _, c in rows])
     cones = [clarabel.ZeroConeT(len(known) + 1), clarabel.NonnegativeConeT(len(right) - len(known) - 1)]

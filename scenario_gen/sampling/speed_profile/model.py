@@ -123,13 +123,13 @@ def speed_model(
     """
     longer = _spread_length(spline)
     factor = _conditioned(spline, _process(spline, mean, time, speed, sigma, length))
-    unit, m = np.eye(spline.size), len(spline.breaks)
+    unit, m = np.eye(spline.size), len(spline.stations)
     free = ~fixed_coefficients(spline, (0.0, 0.0))[0]
     rows = np.vstack([unit[free], motion.acceleration, motion.jerk])
     low = np.concatenate([np.zeros(int(free.sum())), np.full(m, -bounds.braking), np.full(m, -bounds.jerk)])
     high = np.concatenate([bounds.most[free], np.full(m, bounds.speeding), np.full(m, bounds.jerk)])
     order = np.repeat([1.0, 2.0, 3.0], [int(free.sum()), m, m])
-    at = np.concatenate([spline.middle[free], spline.breaks, spline.breaks])
+    at = np.concatenate([spline.middle[free], spline.stations, spline.stations])
     driven = exact.matmul(rows, mean)
     jerky = order == 3.0
     low = np.where(jerky, np.minimum(JERK_ROOM * low, driven), np.minimum(low, driven))  # the mean itself is always kept

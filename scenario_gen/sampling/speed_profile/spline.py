@@ -24,11 +24,12 @@ from itertools import pairwise
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, frozen
+from scenario_gen.arrays import Bools, Floats, frozen, frozen_ints, Ints
 
 KNOT_SPACING = 0.4  # s; what a driver does with the pedals is slower
 MOST_KNOTS = 600  # of long encounters the knots are farther apart
 DEGREE = 3
+_BEFORE = 1e-9  # s
 _GAUSS_X = np.array([-0.8611363115940526, -0.3399810435848563, 0.3399810435848563, 0.8611363115940526])
 _GAUSS_W = np.array([0.3478548451374538, 0.6521451548625461, 0.6521451548625461, 0.3478548451374538])
 
@@ -36,6 +37,9 @@ _GAUSS_W = np.array([0.3478548451374538, 0.6521451548625461, 0.6521451548625461,
 @dataclass(frozen=True, eq=False)
 class SpeedSpline:
     """A clamped cubic B-spline basis, and which of its functions reach into a stand.
+
+    Where a stand begins or ends a knot stands twice: acceleration is continuous there, and jerk may jump, as when a foot leaves
+    the brake.
 
     Attributes:
         knots: (n + 4,) seconds on the template's clock, the first and the last four times.
@@ -51,8 +55,7 @@ class SpeedSpline:
         spacing = max(KNOT_SPACING, (end - start) / MOST_KNOTS)
         cuts = sorted({start, end, *(t for stand in stands for t in stand if start < t < end)})
         inner = [np.linspace(a, b, max(round((b - a) / spacing), 1) + 1)[:-1] for a, b in pairwise(cuts)]
-        breaks = np.append(np.concatenate(inner), end)
-        knots = np.concatenate([[start] * DEGREE, breaks, [end] * DEGREE])
+        knots = np.sort(np.concatenate([[start] * DEGREE, *inner, cuts[1:-1], [end] * (DEGREE + 1)]))
         low, high = knots[: -DEGREE - 1], knots[DEGREE + 1 :]
         still = np.zeros(len(low), dtype=np.bool_)
         for a, b in stands:
@@ -67,7 +70,18 @@ class SpeedSpline:
     @cached_property
     def breaks(self) -> Floats:
         """(m + 1,) distinct knots [s]."""
-        return frozen(self.knots[DEGREE:-DEGREE])
+        return frozen(np.unique(self.knots))
+
+    @cached_property
+    def first(self) -> Ints:
+        """(m,) the first of the four basis functions that are not zero between two breaks."""
+        return frozen_ints(np.searchsorted(self.knots, self.breaks[:-1], side="right") - 1 - DEGREE)
+
+    @cached_property
+    def stations(self) -> Floats:
+        """(b,) seconds at which a derivative of the speed can be largest: the breaks, and just before those where jerk jumps."""
+        inner = self.knots[DEGREE + 1 : -DEGREE - 1]
+        return frozen(np.sort(np.concatenate([self.breaks, inner[1:][np.diff(inner) == 0.0] - _BEFORE])))
 
     @cached_property
     def middle(self) -> Floats:
@@ -77,7 +91,7 @@ class SpeedSpline:
     def design(self, at: Floats, derivative: int = 0) -> Floats:
         """Values (q, n) of all basis functions, or of their derivatives, at times (q,) [s] inside the basis' interval."""
         t, degree = self.knots, DEGREE - derivative
-        cell = np.clip(np.searchsorted(self.breaks, at, side="right") - 1, 0, len(self.breaks) - 2) + DEGREE
+        cell = self.first[np.clip(np.searchsorted(self.breaks, at, side="right") - 1, 0, len(self.breaks) - 2)] + DEGREE
         basis = np.zeros((len(at), len(t) - 1))
         basis[np.arange(len(at)), cell] = 1.0
         for p in range(1, degree + 1):  # Cox and de Boor
@@ -133,7 +147,7 @@ class SpeedSpline:
         for power in range(4):
             rows = self.design(inside, power) / factorial[power]
             for i in range(len(out)):
-                out[i, power] = rows[i, i : i + 4]
+                out[i, power] = rows[i, self.first[i] : self.first[i] + 4]
         return frozen(out)
 
     def _quadrature(self) -> tuple[Floats, Floats]:

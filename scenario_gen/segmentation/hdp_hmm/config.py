@@ -39,7 +39,7 @@ class SamplerConfig(Parameters):
     chains: int = parameter(3, "independent chains, each from a start of its own", low=1, high=16)
     sweeps: int = parameter(600, "most Gibbs sweeps of each chain; it ends when the chains agree", low=10, high=100_000)
     r_hat: float = parameter(1.1, "split R-hat below which, on every trace, chains agree; 1: run all sweeps", low=1.0, high=10.0)
-    moves: int = parameter(3, "split or merge moves tried in a sweep", low=0, high=100)
+    moves: int = parameter(8, "split or merge moves tried in a sweep", low=0, high=100)
     dof: float = parameter(
         0.0, "degrees of freedom of Student-t noise; 0: from the data; 1000 or more: Gaussian", low=0.0, high=1e9
     )

@@ -27,7 +27,7 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import kernel
-from scenario_gen.segmentation.hdp_hmm.random import log_gamma_draw, normal, State
+from scenario_gen.segmentation.hdp_hmm.random import gamma_draw, normal, State
 
 BLOCK = 64
 LEAST_LOG = -300.0
@@ -36,7 +36,8 @@ LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 TO_INTEGER = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer, which its lowest bits then hold
 ONE_BITS = 1023 << 52  # the bits of 1.0
 ROOT_BITS = 0x3FE6A09E667F3BCD  # the bits of √½: mantissas lie in √½ .. √2
-LN2 = 6.93147180559945309417e-01
+LN2, LOG_PI = 6.93147180559945309417e-01, 1.14472988584940017414
+MOST_PRODUCT = 1e100
 
 
 @kernel(inline=True)
@@ -115,11 +116,39 @@ def log_marginal(factor: Floats, n: float, p: int, nu: float) -> float:
     """
     m = factor.shape[0]
     d = m - p
-    value: float = -0.5 * n * d * exact.log(math.pi)
-    for i in range(p):
-        value -= d * exact.log(factor[i, i])
-    for i in range(d):
-        value += exact.lgamma(0.5 * (nu + n - i)) - (nu + n) * exact.log(factor[p + i, p + i])
+    value: float = log_gammas(0.5 * (nu + n), d) - 0.5 * n * d * LOG_PI
+    value -= d * log_diagonal(factor[:p, :p]) + (nu + n) * log_diagonal(factor[p:, p:])
+    return value
+
+
+@kernel(inline=True)
+def log_diagonal(matrix: Floats) -> float:
+    """Return Σ log of the diagonal of `matrix` (n, n), as the logarithm of products, which cost less."""
+    value, product = 0.0, 1.0
+    for i in range(len(matrix)):
+        product *= matrix[i, i]
+        if not 1.0 / MOST_PRODUCT < product < MOST_PRODUCT:
+            value += exact.log(product)
+            product = 1.0
+    return value + exact.log(product)
+
+
+@kernel(inline=True)
+def log_gammas(a: float, d: int) -> float:
+    """Return log Γ(a) + log Γ(a - 1/2) + ... + log Γ(a - (d - 1) / 2), every second one by Γ(x + 1) = x Γ(x) from the least."""
+    value = 0.0
+    for least in range(max(d - 2, 0), d):
+        x = a - 0.5 * least
+        base, ratio, product = exact.lgamma(x), 1.0, 1.0
+        value += base
+        for step in range(least // 2):
+            ratio *= x + step
+            product *= ratio
+            value += base
+            if product > MOST_PRODUCT:
+                base, value = base + exact.log(ratio), value + exact.log(product)
+                ratio, product = 1.0, 1.0
+        value += exact.log(product)
     return value
 
 
@@ -132,19 +161,16 @@ def draw_emission(state: State, factor: Floats, n: float, p: int, nu: float, coe
     """
     m = factor.shape[0]
     d = m - p
-    logdet = 0.0
     for i in range(d):
         for j in range(i):
             coef[i, p + j] = normal(state)
-        shape = 0.5 * (nu + n - (d - 1 - i))
-        coef[i, p + i] = exact.exp(0.5 * (log_gamma_draw(state, shape) + exact.log(2.0)))
+        coef[i, p + i] = math.sqrt(2.0 * gamma_draw(state, 0.5 * (nu + n - (d - 1 - i))))
         for j in range(i + 1, d):
             coef[i, p + j] = 0.0
         for q in range(p):
             coef[i, q] = -normal(state)
         solve_row(factor, p, coef, i)
-        logdet += exact.log(coef[i, p + i])
-    return logdet
+    return log_diagonal(coef[:, p:])
 
 
 @kernel(inline=True)
@@ -243,14 +269,13 @@ def mean_emission(factor: Floats, n: float, p: int, nu: float, blur: Floats, coe
     m = factor.shape[0]
     d = m - p
     root = math.sqrt(nu + n)
-    shape[0] = 0.0
     for i in range(d):
         for j in range(d):
             coef[i, p + j] = root if i == j else 0.0
         for q in range(p):
             coef[i, q] = 0.0
         solve_row(factor, p, coef, i)
-        shape[0] += exact.log(coef[i, p + i])
+    shape[0] = log_diagonal(coef[:, p:])
     shape[1] = blurred(coef, blur)
 
 

@@ -78,6 +78,21 @@ def without_hidden(v: Floats, hidden: Bools, coef: Floats, factor: Floats, shift
 
 
 @kernel(inline=True)
+def log_radial(square: float, n: float, weight: float, dof: float) -> float:
+    """Return log p(y) as far as it depends on the squared whitened residual.
+
+    Args:
+        square: squared whitened residual.
+        n: observed channels times `weight`.
+        weight: what a sample counts for.
+        dof: degrees of freedom of Student-t noise; 0: Gaussian.
+    """
+    if dof > 0.0:
+        return -0.5 * (dof + n) * exact.log(1.0 + weight * square / dof)
+    return -0.5 * weight * square
+
+
+@kernel(inline=True)
 def observed_log_likelihood(
     v: Floats, hidden: Bools, coef: Floats, shape: Floats, weight: float, dof: float, out: Floats
 ) -> None:
@@ -92,10 +107,7 @@ def observed_log_likelihood(
     for k in range(states):
         total, half = without_hidden(v, hidden, coef[k], factor, shift)
         total += shape[k, 1] * seen / d
-        if dof > 0.0:
-            out[k] = weight * (shape[k, 0] - half) - 0.5 * (dof + weight * seen) * exact.log(1.0 + weight * total / dof)
-        else:
-            out[k] = weight * (shape[k, 0] - half - 0.5 * total)
+        out[k] = weight * (shape[k, 0] - half) + log_radial(total, weight * seen, weight, dof)
 
 
 @kernel(inline=True)

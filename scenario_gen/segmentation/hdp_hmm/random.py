@@ -18,6 +18,7 @@ The state is one uint64 in an array of length 1, seeded from a numpy SeedSequenc
 the same seed gives the same bytes on every thread and with every version of numpy.
 """
 
+from decimal import Decimal, localcontext
 import math
 from typing import Any
 
@@ -33,34 +34,73 @@ _STEP = np.uint64(0x9E3779B97F4A7C15)
 _MIX1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX2 = np.uint64(0x94D049BB133111EB)
 _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
+_LAYER, _SIGN = np.uint64(255), np.uint64(256)
+
+
+def _layers() -> tuple[Floats, Floats]:
+    """(257,) edges and heights of 256 layers of equal area under exp(-x²/2), the widest first (Doornik 2005, ZIGNOR).
+
+    In decimal numbers, whose functions are rounded correctly, so that every machine has the same table.
+    """
+    with localcontext(prec=30):
+        last, area = Decimal("3.6541528853610087963519472518"), Decimal("0.0049286732339746549315909")
+        edges, heights = [area / (-last * last / 2).exp(), last], [Decimal(0), (-last * last / 2).exp()]
+        for _ in range(LAYERS - 2):
+            heights.append(heights[-1] + area / edges[-1])
+            edges.append((-2 * heights[-1].ln()).sqrt())
+        return np.array([*map(float, edges), 0.0]), np.array([*map(float, heights), 1.0])
+
+
+LAYERS = 256
+EDGES, HEIGHTS = _layers()
+TAIL = float(EDGES[1])
+
+
+@kernel(inline=True)
+def next_bits(state: State) -> np.uint64:
+    """64 random bits."""
+    state[0] += _STEP
+    x = state[0]
+    x = (x ^ (x >> _S30)) * _MIX1
+    x = (x ^ (x >> _S27)) * _MIX2
+    mixed: np.uint64 = x ^ (x >> _S31)
+    return mixed
 
 
 @kernel(inline=True)
 def uniform(state: State) -> float:
     """Uniform on (0, 1), never 0 and never 1."""
-    state[0] += _STEP
-    x = state[0]
-    x = (x ^ (x >> _S30)) * _MIX1
-    x = (x ^ (x >> _S27)) * _MIX2
-    x = x ^ (x >> _S31)
-    return (float(x >> _S11) + 0.5) * 1.1102230246251565e-16
+    return (float(next_bits(state) >> _S11) + 0.5) * 1.1102230246251565e-16
 
 
 @kernel(inline=True)
 def normal(state: State) -> float:
-    """Return a standard normal number (Box-Muller)."""
-    return math.sqrt(-2.0 * exact.log(uniform(state))) * exact.cos(6.283185307179586 * uniform(state))
+    """Return a standard normal number, by the layers of a ziggurat (Marsaglia & Tsang 2000; Doornik 2005)."""
+    while True:
+        bits = next_bits(state)
+        layer = np.int64(bits & _LAYER)
+        x: float = (float(bits >> _S11) + 0.5) * 1.1102230246251565e-16 * EDGES[layer]
+        if x >= EDGES[layer + 1]:
+            if layer == 0:
+                x = beyond(state)
+            elif HEIGHTS[layer] + uniform(state) * (HEIGHTS[layer + 1] - HEIGHTS[layer]) >= exact.exp(-0.5 * x * x):
+                continue
+        return x if bits & _SIGN else -x
 
 
 @kernel(inline=True)
-def log_gamma_draw(state: State, shape: float) -> float:
-    """Logarithm of a Gamma(shape, 1) draw (Marsaglia & Tsang 2000, with their squeeze); the logarithm survives shapes near 0."""
-    boost = 0.0
-    a = shape
-    if a < 1.0:
-        boost = exact.log(uniform(state)) / a
-        a += 1.0
-    d = a - 1.0 / 3.0
+def beyond(state: State) -> float:
+    """Return a standard normal number above `TAIL` (Marsaglia 1964)."""
+    while True:
+        x = -exact.log(uniform(state)) / TAIL
+        if -2.0 * exact.log(uniform(state)) > x * x:
+            return TAIL + x
+
+
+@kernel(inline=True)
+def gamma_draw(state: State, shape: float) -> float:
+    """Gamma(shape, 1) for a shape of 1 or more (Marsaglia & Tsang 2000, with their squeeze)."""
+    d = shape - 1.0 / 3.0
     c = 1.0 / math.sqrt(9.0 * d)
     while True:
         x = normal(state)
@@ -69,7 +109,15 @@ def log_gamma_draw(state: State, shape: float) -> float:
             v = v * v * v
             u = uniform(state)
             if u < 1.0 - 0.0331 * x**4 or exact.log(u) < 0.5 * x * x + d - d * v + d * exact.log(v):
-                return exact.log(d * v) + boost
+                return d * v
+
+
+@kernel(inline=True)
+def log_gamma_draw(state: State, shape: float) -> float:
+    """Logarithm of a Gamma(shape, 1) draw, which survives shapes near 0."""
+    if shape < 1.0:
+        return exact.log(gamma_draw(state, shape + 1.0)) + exact.log(uniform(state)) / shape
+    return exact.log(gamma_draw(state, shape))
 
 
 @kernel(inline=True)
@@ -97,18 +145,27 @@ def pick(share: Floats, u: float, without: int) -> int:
 
 @kernel(inline=True)
 def dirichlet_draw(state: State, weights: Floats, out: Floats) -> None:
-    """Dirichlet(weights) into `out`, both (L,); no entry is below 1e-100, so that backward messages never vanish."""
+    """Dirichlet(weights) into `out`, both (L,); no entry is below 1e-100, so that backward messages never vanish.
+
+    `weights` are overwritten. A Gamma(a, 1) draw of a < 1 is one of a + 1 times u^(1/a): of that the logarithm is kept, until
+    the largest is known, for all may be too small for a number.
+    """
     n = len(weights)
     top = -np.inf
     for k in range(n):
-        out[k] = log_gamma_draw(state, weights[k])
+        a = weights[k]
+        out[k] = 0.0
+        if a < 1.0:
+            out[k] = exact.log(uniform(state)) / a
+            a += 1.0
+        weights[k] = gamma_draw(state, a)
         top = max(top, out[k])
     total = 0.0
     for k in range(n):
-        out[k] = max(exact.exp(out[k] - top), 1e-100)
+        out[k] = weights[k] if out[k] == top else weights[k] * exact.exp(max(out[k] - top, -700.0))
         total += out[k]
     for k in range(n):
-        out[k] /= total
+        out[k] = max(out[k] / total, 1e-100)
 
 
 @kernel(inline=True)

@@ -22,7 +22,7 @@ from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.kernels import B2, F, F1, F2, F3, I1, kernel, OUT1, OUT2
 from scenario_gen.segmentation.hdp_hmm.emission import add_sample
-from scenario_gen.segmentation.hdp_hmm.observed import without_hidden
+from scenario_gen.segmentation.hdp_hmm.observed import log_radial, without_hidden
 
 LEAST_LOG = -600.0
 
@@ -55,12 +55,11 @@ def log_densities(v: Floats, hidden: Bools, coef: Floats, weight: float, dof: fl
                 continue
             square, half = without_hidden(v[t], hidden[t], coef[k], factor, shift)
             n = weight * seen
+            out[t, k] = weight * (whole - half) + log_radial(square, n, weight, dof)
             if dof > 0.0:
-                out[t, k] = exact.lgamma(0.5 * (dof + n)) - exact.lgamma(0.5 * dof) - 0.5 * n * exact.log(math.pi * dof)
-                out[t, k] -= 0.5 * (dof + n) * exact.log(1.0 + weight * square / dof)
+                out[t, k] += exact.lgamma(0.5 * (dof + n)) - exact.lgamma(0.5 * dof) - 0.5 * n * exact.log(math.pi * dof)
             else:
-                out[t, k] = -0.5 * (n * exact.log(2.0 * math.pi) + weight * square)
-            out[t, k] += weight * (whole - half)
+                out[t, k] -= 0.5 * n * exact.log(2.0 * math.pi)
 
 
 @kernel(inline=True)

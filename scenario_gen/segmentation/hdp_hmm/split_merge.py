@@ -25,7 +25,14 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import kernel
-from scenario_gen.segmentation.hdp_hmm.emission import add_sample, log_marginal, mean_emission, posterior_factor, square
+from scenario_gen.segmentation.hdp_hmm.emission import (
+    add_sample,
+    BLOCK,
+    block_log_likelihood,
+    log_marginal,
+    mean_emission,
+    posterior_factor,
+)
 from scenario_gen.segmentation.hdp_hmm.random import log_beta_draw, State, uniform
 from scenario_gen.segmentation.hdp_hmm.transitions import count_transitions, log_transitions
 
@@ -36,8 +43,8 @@ MOST_LOG_RATIO, CERTAIN, LEAST_PRODUCT = 200.0, 1e150, 1e-150
 
 
 @kernel(inline=True)
-def members_of(labels: Ints, ends: Ints, i: int, j: int, index: Ints, opens: Ints) -> int:
-    """Fill index (T,) with the samples of states i and j, opens (T,) with 1 where a run of them begins; returns their number."""
+def members_of(labels: Ints, ends: Ints, i: int, j: int, index: Ints, opens: Ints) -> None:
+    """Fill the head of index (T,) with the samples of states i and j, that of opens (T,) with 1 where a run of them begins."""
     found = 0
     before = -2
     sequence = 0
@@ -50,41 +57,71 @@ def members_of(labels: Ints, ends: Ints, i: int, j: int, index: Ints, opens: Int
         if t + 1 == ends[sequence]:
             sequence += 1
             before = -2
-    return found
+
+
+@kernel(inline=True)
+def fit_side(v: Floats, mass: Floats, index: Ints, side: Ints, which: int, outer: Floats, sums: Floats) -> None:
+    """Fill outer (M, M) and sums (2,) with the statistics of the samples on side `which`."""
+    outer[:] = 0.0
+    sums[:] = 0.0
+    for r in range(len(index)):
+        t = index[r]
+        if side[r] == which and mass[t] > 0.0:
+            add_sample(v[t], mass[t], outer)
+            sums[0] += 1.0
+            sums[1] += mass[t]
 
 
 @kernel(inline=True)
 def fit_sides(
-    v: Floats,
-    mass: Floats,
-    index: Ints,
-    side: Ints,
-    outer: Floats,
-    sums: Floats,
+    v: Floats, mass: Floats, index: Ints, side: Ints, whole: Floats, total: Floats, outer: Floats, sums: Floats
 ) -> None:
-    """Fill outer (2, M, M) and sums (2, 2) with the statistics of both sides; samples with side -1 are left out."""
-    outer[:] = 0.0
-    sums[:] = 0.0
-    for r in range(len(index)):
-        s, t = side[r], index[r]
-        if s >= 0 and mass[t] > 0.0:
-            add_sample(v[t], mass[t], outer[s])
-            sums[s, 0] += 1.0
-            sums[s, 1] += mass[t]
+    """Fill outer (2, M, M) and sums (2, 2) with both sides' statistics: the rarer's, and what it leaves of all.
+
+    Args:
+        v: (T, M) samples.
+        mass: (T,).
+        index: (n,) samples of both.
+        side: (n,) 0 or 1.
+        whole: (M, M) statistics of all n.
+        total: (2,) likewise.
+        outer: output.
+        sums: output.
+    """
+    rare = 1 if 2 * side.sum() <= len(side) else 0
+    fit_side(v, mass, index, side, rare, outer[rare], sums[rare])
+    rest = 1 - rare
+    for i in range(len(whole)):
+        for j in range(i + 1):
+            outer[rest, i, j] = whole[i, j] - outer[rare, i, j]
+    for i in range(2):
+        sums[rest, i] = total[i] - sums[rare, i]
 
 
 @kernel(inline=True)
 def likelihood_ratios(
-    v: Floats, mass: Floats, index: Ints, coef: Floats, shape: Floats, weight: float, anchors: Ints, ratio: Floats
+    vt: Floats, mass: Floats, coef: Floats, shape: Floats, weight: float, anchors: Ints, work: Floats, ratio: Floats
 ) -> None:
-    """Fill ratio (n,) with the likelihood of side 1 over that of side 0; at the anchors there is no doubt."""
-    for r in range(len(index)):
-        t = index[r]
-        ratio[r] = 1.0
-        if mass[t] > 0.0:
-            a = shape[0, 0] - 0.5 * mass[t] * (square(coef[0], v[t]) + shape[0, 1])
-            b = shape[1, 0] - 0.5 * mass[t] * (square(coef[1], v[t]) + shape[1, 1])
-            ratio[r] = exact.exp(min(max(weight * (b - a), -MOST_LOG_RATIO), MOST_LOG_RATIO))
+    """Fill ratio (n,) with the likelihood of side 1 over that of side 0; at the anchors there is no doubt.
+
+    Args:
+        vt: (M, n) samples.
+        mass: (n,).
+        coef: (2, D, M) emissions.
+        shape: (2, 2), see `block_log_likelihood`.
+        weight: what a sample counts for.
+        anchors: (2,).
+        work: (3, BLOCK).
+        ratio: output.
+    """
+    alike = weight * (shape[1, 0] - shape[0, 0])
+    shape[:, 0] = 0.0
+    for start in range(0, len(mass), BLOCK):
+        stop = min(start + BLOCK, len(mass))
+        block_log_likelihood(vt, start, stop, coef, shape, weight, 0.0, work[:2], work[2])
+        for r in range(start, stop):
+            log_ratio = alike + mass[r] * (work[1, r - start] - work[0, r - start])
+            ratio[r] = exact.exp(min(max(log_ratio, -MOST_LOG_RATIO), MOST_LOG_RATIO)) if mass[r] > 0.0 else 1.0
     ratio[anchors[0]] = 1.0 / CERTAIN
     ratio[anchors[1]] = CERTAIN
 
@@ -143,6 +180,8 @@ def propose_sides(
     index: Ints,
     opens: Ints,
     anchors: Ints,
+    whole: Floats,
+    total: Floats,
     g0: Floats,
     p: int,
     nu: float,
@@ -154,13 +193,19 @@ def propose_sides(
 ) -> float:
     """Draw sides (n,) for the samples `index` (n,), or take them as given; returns the log-probability of drawing them.
 
-    Everything but the last draw depends on the samples and the two anchors only, so that it is the same there and back.
+    Everything but the last draw depends on the samples, their statistics `whole` (M, M) and `total` (2,), and the two anchors
+    only, so that it is the same there and back.
     """
     m, n = g0.shape[0], len(index)
     d = m - p
     outer, sums, factor = np.empty((2, m, m)), np.empty((2, 2)), np.empty((m, m))
     coef, shape = np.empty((2, d, m)), np.empty((2, 2))
-    ratio, message = np.empty(n), np.empty(n)
+    ratio, message, scratch = np.empty(n), np.empty(n), np.empty((3, BLOCK))
+    members, masses = np.empty((m, n)), np.empty(n)
+    for r in range(n):
+        masses[r] = mass[index[r]]
+        for i in range(m):
+            members[i, r] = v[index[r], i]
     work = np.full(n, -1, np.int64)
     for s in range(2):
         r = anchors[s]
@@ -174,11 +219,14 @@ def propose_sides(
                 break
             work[r + step] = s
     for turn in range(ROUNDS + 1):
-        fit_sides(v, mass, index, work, outer, sums)
+        if turn > 0:
+            fit_sides(v, mass, index, work, whole, total, outer, sums)
         for s in range(2):
+            if turn == 0:
+                fit_side(v, mass, index, work, s, outer[s], sums[s])
             posterior_factor(outer[s], sums[s, 1], g0, weight, blur, factor)
             mean_emission(factor, weight * sums[s, 0], p, nu, blur, coef[s], shape[s])
-        likelihood_ratios(v, mass, index, coef, shape, weight, anchors, ratio)
+        likelihood_ratios(members, masses, coef, shape, weight, anchors, scratch, ratio)
         if turn < ROUNDS:
             best_sides(ratio, opens, stay, message, work)
     return draw_sides(state, ratio, opens, stay, message, side, given)
@@ -255,6 +303,32 @@ def place_anchors(side: Ints, pair: Ints, splits: bool, anchors: Ints) -> None:
 
 
 @kernel(inline=True)
+def divided(labels: Ints, index: Ints, side: Ints, i: int, j: int) -> Ints:
+    """(T,) labels with the samples `index` (n,) in state i or j, by their side (n,)."""
+    after = labels.copy()
+    for r in range(len(index)):
+        after[index[r]] = j if side[r] == 1 else i
+    return after
+
+
+@kernel(inline=True)
+def united(labels: Ints, i: int, j: int) -> Ints:
+    """(T,) labels with state j made part of state i."""
+    after = labels.copy()
+    for t in range(len(labels)):
+        if labels[t] == j:
+            after[t] = i
+    return after
+
+
+@kernel(inline=True)
+def sides_of(labels: Ints, index: Ints, j: int, side: Ints) -> None:
+    """Fill side (n,) with 1 where sample `index` (n,) is in state j, else 0."""
+    for r in range(len(index)):
+        side[r] = 1 if labels[index[r]] == j else 0
+
+
+@kernel(inline=True)
 def log_pair(found: int, left: int, right: int, used: int, empty: int) -> float:
     """Logarithm of how often a merge draws a pair and its anchors, over how often the split that undoes it does.
 
@@ -316,37 +390,38 @@ def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read fro
     if not draw_pair(state, counts, splits, pair):
         return False
     i, j = pair[0], pair[1]
+    m, found = len(g0), counts[i] + counts[j]
     index, opens = np.empty(len(labels), np.int64), np.empty(len(labels), np.int64)
-    found = members_of(labels, ends, i, j, index, opens)
-    index, opens = index[:found], opens[:found]
-    side, anchors = np.empty(found, np.int64), np.zeros(2, np.int64)
-    for r in range(found):
-        side[r] = 1 if labels[index[r]] == j else 0
-    place_anchors(side, pair, splits, anchors)
+    side, anchors, after = np.zeros(found, np.int64), np.empty(2, np.int64), labels
+    whole, total = outer[i] + outer[j], sums[i] + sums[j]
     stay = min(max(top[2], LEAST_STAY), MOST_STAY)
-    gain, given = 0.0, side.copy()
-    if splits:
-        gain -= propose_sides(state, v, mass, index, opens, anchors, g0, p, nu, weight, blur, stay, side, False)
-    else:
-        side[:] = 0
-    after = labels.copy()
-    for r in range(found):
-        after[index[r]] = j if side[r] == 1 else i
-    m = len(g0)
     two_outer, two_sums, two_factors, two_own = np.zeros((2, m, m)), np.zeros((2, 2)), np.empty((2, m, m)), np.zeros(2)
-    fit_sides(v, mass, index, side, two_outer, two_sums)
+    gain, n_after = 0.0, n.copy()
+    if splits:
+        members_of(labels, ends, i, j, index, opens)
+        place_anchors(side, pair, True, anchors)
+        gain -= propose_sides(
+            state, v, mass, index[:found], opens[:found], anchors, whole, total, g0, p, nu, weight, blur, stay, side, False
+        )
+        fit_sides(v, mass, index[:found], side, whole, total, two_outer, two_sums)
+        after = divided(labels, index[:found], side, i, j)
+        count_transitions(after, ends, n_after)
+    else:
+        two_outer[0], two_sums[0] = whole, total
+        n_after[i] += n_after[j]
+        n_after[j] = 0
+        n_after[:, i] += n_after[:, j]
+        n_after[:, j] = 0
     for s in range(2):
         posterior_factor(two_outer[s], two_sums[s, 1], g0, weight, blur, two_factors[s])
         two_own[s] = log_marginal(two_factors[s], weight * two_sums[s, 0], p, nu)
     gain += two_own[0] + two_own[1] - own[i] - own[j]
-    n_after = np.empty_like(n)
-    count_transitions(after, ends, n_after)
     a, both = top[0] / n.shape[1], beta[i] + beta[j]
     here, there = (0 if splits else predecessors(n, j)), (predecessors(n_after, j) if splits else 0)
     share_i, share_j = log_beta_draw(state, a + predecessors(n_after, i), a + there)
     gain += log_share(a, predecessors(n_after, i), there, share_i, share_j)
     gain -= log_share(a, predecessors(n, i), here, exact.log(beta[i] / both), exact.log(beta[j] / both))
-    used, right = (counts > 0).sum(), side.sum() if splits else given.sum()
+    used, right = (counts > 0).sum(), side.sum() if splits else counts[j]
     if splits:
         gain += log_pair(found, found - right, right, used, len(counts) - used)
     else:
@@ -356,11 +431,16 @@ def split_or_merge(  # noqa: PLR0915 - one step of Metropolis-Hastings, read fro
     beta[i], beta[j] = max(both * exact.exp(share_i), 1e-100), max(both * exact.exp(share_j), 1e-100)
     gain += log_transitions(n_after, top[1], top[2], beta)
     if not splits and gain >= threshold:
-        gain += propose_sides(state, v, mass, index, opens, anchors, g0, p, nu, weight, blur, stay, given, True)
+        members_of(labels, ends, i, j, index, opens)
+        sides_of(labels, index[:found], j, side)
+        place_anchors(side, pair, False, anchors)
+        gain += propose_sides(
+            state, v, mass, index[:found], opens[:found], anchors, whole, total, g0, p, nu, weight, blur, stay, side, True
+        )
     if not gain >= threshold:
         beta[i], beta[j] = keep_i, keep_j
         return False
-    labels[:] = after
+    labels[:] = after if splits else united(labels, i, j)
     n[:] = n_after
     for s in range(2):
         outer[pair[s]], sums[pair[s]] = two_outer[s], two_sums[s]

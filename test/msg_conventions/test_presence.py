@@ -1,0 +1,160 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Messages of vehicles that arrive late or leave early: no phantoms, and the same scenario again."""
+
+from dataclasses import replace
+import json
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from msg_conventions.scenario_info import decode_info, encode_info, scenario_entry
+from msg_conventions.scenarios import decode_scenario, digest, encode_scenario, messages_of
+from msg_conventions.tracks import decode_tracks, encode_tracks
+from msg_conventions.trajectory import decode, encode
+from scenario_gen.errors import InputError
+from scenario_gen.recordings.requests import RequestTracker
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.scenario import BoundaryStates, Scenario
+
+TIME = np.round(0.1 * np.arange(41), 9)
+FIELDS = ("position", "heading", "speed", "acceleration", "present")
+
+
+def scenario(present):
+    rng = np.random.Generator(np.random.PCG64(1))
+    n = len(present)
+    vehicles = tuple(Vehicle(f"v{i}") for i in range(n))
+    arrays = (rng.uniform(-9, 9, (n, 41, 2)), *(rng.uniform(0, 3, (n, 41)) for _ in range(3)))
+    return Scenario(vehicles, TIME, *arrays, seed=4, index=7, present=np.array(present))
+
+
+@st.composite
+def presences(draw):
+    rows = st.tuples(st.integers(0, 39), st.integers(1, 40)).filter(lambda row: row[0] < row[1])
+    return [(0, 40), *draw(st.lists(st.one_of(st.just((0, 40)), rows), min_size=1, max_size=4))]
+
+
+@given(presences())
+@settings(deadline=None)
+def test_a_scenario_comes_back_from_its_messages(present):
+    before = scenario(present)
+    _, after = decode_scenario(encode_scenario(before, 5), seed=4, index=7)
+    assert after.vehicles == before.vehicles
+    assert after.time.tobytes() == before.time.tobytes()
+    for name in FIELDS:
+        assert getattr(after, name).tobytes() == getattr(before, name).tobytes()
+
+
+@given(presences())
+@settings(deadline=None)
+def test_who_takes_every_message_for_itself_sees_each_vehicle_where_it_is_and_nobody_else(present):
+    """A consumer that knows the standard type and nothing of presence."""
+    made = scenario(present)
+    seen = {}
+    for message in messages_of(encode_scenario(made, 5)):
+        heard = decode(message, "scenarios")
+        for vehicle, xy in zip(heard.vehicles, heard.position, strict=True):
+            seen |= {(vehicle.id, t): tuple(place) for t, place in zip(heard.time_ns.tolist(), xy.tolist(), strict=True)}
+    there = {
+        (vehicle.id, round(t * 1e9)): tuple(place)
+        for vehicle, xy, row in zip(made.vehicles, made.position.tolist(), made.there, strict=True)
+        for t, place, is_there in zip(TIME.tolist(), xy, row, strict=True)
+        if is_there
+    }
+    assert seen == there
+
+
+def test_all_present_is_one_message_as_ever():
+    data = encode_scenario(scenario([(0, 40), (0, 40)]), 5)
+    assert messages_of(data) == (data,)
+    assert len(messages_of(encode_scenario(scenario([(0, 40), (0, 40), (5, 40), (0, 40)]), 5))) == 3
+
+
+def test_a_message_alone_that_begins_late_is_no_scenario():
+    late = messages_of(encode_scenario(scenario([(0, 40), (5, 40)]), 5))[1]
+    with pytest.raises(InputError, match=r"begins at 0.5 s.*arrives late"):
+        decode_scenario(late)
+    _, alone = decode_scenario(late, late=True)  # as the track of an ego
+    assert alone.present.tolist() == [[1, 36]]
+
+
+def test_messages_of_two_scenarios_are_not_one():
+    data = encode_scenario(scenario([(0, 40), (0, 40)]), 5)
+    with pytest.raises(InputError, match="not one scenario"):
+        decode_scenario(data + data)
+
+
+def entry_of(made, data):
+    asked = BoundaryStates(np.zeros((len(made.vehicles), 4)), np.zeros((len(made.vehicles), 4)))
+    entry = scenario_entry(made, data, "1", "/gp_sampler", template=made.vehicles, asked=asked)
+    (found,) = decode_info(encode_info(entry, 5))
+    return found
+
+
+def test_the_entry_says_who_is_there_when_and_which_messages_are_the_scenario():
+    made = scenario([(0, 40), (5, 30)])
+    data = encode_scenario(made, 5)
+    entry = entry_of(made, data)
+    assert entry.sha256 == digest(data)
+    assert entry.messages == tuple(map(digest, messages_of(data)))
+    assert json.loads(entry.status.values["present"]) == [[0.0, 4.0], [0.5, 3.0]]
+    whole = scenario([(0, 40), (0, 40)])
+    entry = entry_of(whole, encode_scenario(whole, 5))
+    assert entry.messages == (entry.sha256,)
+    assert not {"present", "messages"} & set(entry.status.values)
+    damaged = replace(entry, status=replace(entry.status, values={**entry.status.values, "messages": "[1]"}))
+    with pytest.raises(InputError, match="no list of SHA-256"):
+        decode_info(encode_info(damaged, 5))
+
+
+@given(st.permutations(range(4)))
+@settings(deadline=None)
+def test_a_scenario_is_whole_in_whatever_order_its_messages_and_its_entry_come(order):
+    made = scenario([(0, 40), (5, 30), (0, 12)])
+    data = encode_scenario(made, 5)
+    tracker, matches = RequestTracker(), []
+    for k in order:
+        if k < 3:
+            message = messages_of(data)[k]
+            matches.append(tracker.add_scenario(digest(message), message))
+        else:
+            matches.append(tracker.add_info(entry_of(made, data)))
+    (match,) = [match for match in matches if match]
+    assert match[2] == data
+    assert match[0].came == 1
+
+
+def test_tracks_come_back_and_show_nobody_on_the_ground_who_is_not_there():
+    made = scenario([(0, 40), (5, 40), (0, 20)])
+    arrays = (made.position, made.heading, made.speed)
+    encounter = Encounter("tracks", made.vehicles, 5, 100_000_000, *arrays, present=made.present)
+    data = encode_tracks(encounter)
+    again = decode_tracks(data)
+    for name in ("position", "heading", "speed", "present"):
+        assert getattr(again, name).tobytes() == getattr(encounter, name).tobytes()
+    assert encode_tracks(again) == data
+    assert (decode(data, "tracks").there == encounter.there).all()
+
+
+def test_tracks_in_which_a_vehicle_comes_back_are_refused():
+    made = scenario([(0, 40), (0, 40)])
+    heard = decode(encode_scenario(made, 5), "scenarios")
+    there = made.there.copy()
+    there[1, 10:20] = False
+    with pytest.raises(InputError, match="vehicle v1 is there 2 times"):
+        decode_tracks(encode(replace(heard, there=there)))
