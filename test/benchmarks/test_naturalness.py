@@ -90,6 +90,7 @@ def test_the_list_of_cuts_is_whole_and_its_last_third_is_apart():
             assert (file, vehicle) != (other, name) or end <= begin or until <= start, (file, vehicle, start)
 
 
+@pytest.mark.long()
 def test_the_classifier_tells_rough_from_calm_and_calm_from_calm_not():
     time = 0.1 * np.arange(101)
     rng = np.random.default_rng(0)
