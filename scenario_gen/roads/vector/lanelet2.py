@@ -30,8 +30,8 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.geodesy import local_frame
+from scenario_gen.markup import Element, finite, read_xml
 from scenario_gen.roads.vector.network import Draft, network_of
-from scenario_gen.roads.vector.xml import Element, finite, read_xml
 from scenario_gen.types.lanes import LaneNetwork
 
 _FOR_CARS = ("road", "highway", "play_street", "exit")  # subtypes that cars may use, if no participant is named
