@@ -29,7 +29,19 @@ PACKAGE = ROOT / "scenario_gen"
 
 # The data flow, first to last; modules of one tuple may import each other.
 ORDER = (
-    ("errors", "documents", "arrays", "cancelling", "interrupts", "folders", "kernels", "compiling", "parameters", "terminal"),
+    (
+        "errors",
+        "documents",
+        "markup",
+        "arrays",
+        "cancelling",
+        "interrupts",
+        "folders",
+        "kernels",
+        "compiling",
+        "parameters",
+        "terminal",
+    ),
     ("exact",),
     ("types",),
     ("geodesy", "curve", "storage"),

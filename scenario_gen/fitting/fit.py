@@ -124,4 +124,6 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
             return ways[name](tracks, road, config)
         except RefusedError as error:
             reasons.append(str(error))
+    if order != ("search",):  # what stands against it on one road, or at a junction where the road has one
+        reasons = reasons[-1:] if len(arms_of(road)) > 2 else reasons[:1]
     raise RefusedError(f"the template does not fit road {road.name}: " + "; ".join(reasons))

@@ -47,6 +47,7 @@ _SAMPLES = 64  # points of a way
 _MOMENTS = 8  # samples of a track
 _SOLVED = 6  # assignments that are solved for the distances along their ways
 _PLACED = 10  # of them that are placed in full, until one loses no conflict
+_SWAPS = 3
 _OTHERS = 2  # other ways per vehicle that are tried in the best one
 _LATERAL_ONLY = 1e-3  # weight of staying where one is, where nothing else says so
 _LANE_CHANGE = 8.0  # m² for a way that changes lanes on a straight arm, so that none is taken without need
@@ -210,11 +211,12 @@ def _search(tracks: tuple[Track, ...], ways: list[list[_Way]], relations: tuple[
 
     best = min((chosen for chosen, _ in laid), key=lambda chosen: round(solved(chosen).cost, 6))
     order = dict(laid)[best]
-    for i in range(len(tracks)):
-        for k in order[i][:_OTHERS]:
-            other = (*best[:i], k, *best[i + 1 :])
-            if round(solved(other).cost, 6) < round(solved(best).cost, 6):
-                best = other
+    for _ in range(_SWAPS):  # one vehicle at a time, the one by which most is won
+        swapped = [(*best[:i], k, *best[i + 1 :]) for i in range(len(tracks)) for k in order[i][:_OTHERS]]
+        other = min(swapped, key=lambda chosen: round(solved(chosen).cost, 6), default=best)
+        if round(solved(other).cost, 6) >= round(solved(best).cost, 6):
+            break
+        best = other
     return sorted(found.values(), key=lambda choice: (bool(_misfit_reason(choice, scale)), round(choice.cost, 6)))
 
 

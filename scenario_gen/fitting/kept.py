@@ -63,8 +63,8 @@ def count_lost(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> int:
         _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2]))
         for poses in (np.stack([track.poses for track in some]) for some in (tracks, placed))
     )
-    gone = sum(pair not in after or after[pair].first != conflict.first for pair, conflict in before.items())
-    return 2 * gone + sum(pair not in before for pair in after)
+    gone = [pair for pair, conflict in before.items() if pair not in after or after[pair].first != conflict.first]
+    return 2 * len(gone) + len(after.keys() - before.keys())
 
 
 def find_losses(encounter: Encounter, tracks: tuple[Track, ...], placement: Placement) -> tuple[Loss, ...]:

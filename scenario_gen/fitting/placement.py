@@ -105,25 +105,44 @@ def share_with_room(road: Road, track: Track, every: int = 5) -> Floats:
 
 
 def max_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:
-    """How far [m] the worst sampled footprint (twice a second, and the ends) is from a pose with room.
+    """How far [m] the worst sampled footprint (twice a second while it is there, and the ends) is from a pose with room.
 
     Raises:
-        RefusedError: one is farther than `max_move`; the message names vehicle, sample and place.
+        RefusedError: one is farther than `max_move`; the message names every such vehicle with time, place and distance, and what
+            can be done.
     """
     farthest = 0.0
+    astray = []
     for track in tracks:
+        first, last = track.present.tolist()
         poses = track.poses
-        for t in sorted({0, len(poses) - 1, *range(0, len(poses), 5)}):
+        worst, at = 0.0, first
+        for t in sorted({first, last, *range(first, last + 1, 5)}):
             answer = nearest_pose_with_room(road, poses[t], track.vehicle.length, track.vehicle.width, max_move)
             if answer is None:
-                raise RefusedError(
-                    f"vehicle {track.vehicle.id} is more than {max_move:g} m from any pose with room on road {road.name} "
-                    f"at sample {t} (x {poses[t, 0]:.1f}, y {poses[t, 1]:.1f})"
-                )
-            farthest = max(farthest, answer[1])
+                answer = nearest_pose_with_room(road, poses[t], track.vehicle.length, track.vehicle.width, _LOOKED)
+            away = np.inf if answer is None else answer[1]
+            if away > worst:
+                worst, at = away, t
+            if worst > _LOOKED:
+                break
+        farthest = max(farthest, worst)
+        if worst > max_move:
+            far = f"{worst:.1f} m" if worst <= _LOOKED else f"more than {_LOOKED:g} m"
+            x, y = poses[at, :2]
+            astray.append(f"vehicle {track.vehicle.id} is {far} from any pose with room at sample {at} (x {x:.1f}, y {y:.1f})")
+    if astray:
+        ids = ", ".join(text.split(" ", 2)[1] for text in astray)
+        remedy = (
+            "the map is another one, or lies elsewhere"
+            if len(astray) == len(tracks) > 1
+            else f"set fitting.max_move to more, mend the map there, or leave {ids} out (log.vehicles names who is kept)"
+        )
+        raise RefusedError(f"on road {road.name} {'; '.join(astray)}; at most {max_move:g} m is bridged; {remedy}")
     return farthest
 
 
+_LOOKED = 12.0  # metres within which a pose with room is looked for, to say how far it is
 _SAME_LANE = 1.75  # metres
 _SAME_WAY = np.radians(30.0)
 _ANGLE = np.radians(15.0)
@@ -200,6 +219,8 @@ def equations(relation: Relation, one: Curve, two: Curve, scale: float) -> tuple
         return (Equation(((a, 1.0), (b, -1.0)), lb - la, 2.0),)
     if relation.kind is Kind.SHARED_END:
         if float(exact.hypot(*(one.points[-1, :2] - two.points[-1, :2]))) > 0.5:
+            return None
+        if float(exact.hypot(*(one.points[0, :2] - two.points[0, :2]))) <= 0.5:  # they come from different lanes
             return None
         return (Equation(((a, 1.0), (b, -1.0)), (one.length - la) - (two.length - lb), 1.0),)
     found = crossings(one, two, _ANGLE)

@@ -14,19 +14,24 @@
 
 """rosbag2 bags, MCAP and SQLite: per-vehicle fixes and speeds, odometry, or tracks that are encounters already."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+import math
 from pathlib import Path
+
+import numpy as np
 
 from scenario_gen.errors import InputError
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, RawLog, Rows, Segment
 from scenario_gen.recordings.samples import decode_sample, decode_tracks, FIX, ODOMETRY, TRACKS, TWIST
+from scenario_gen.recordings.tracked import decode_tracked, TRACKED, VEHICLES
 from scenario_gen.storage.bag import open_bag
 from scenario_gen.storage.config import BagConfig
 from scenario_gen.types.encounter import Encounter
 
-USED = (FIX, TWIST, ODOMETRY, TRACKS)
+USED = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED)
 
 
 @dataclass
@@ -45,6 +50,9 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     label = str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
     tracks = [topic for topic in topics if topic.type == TRACKS]
     name = paths[0].stem if paths[0].is_file() else paths[0].name
+    tracked = [topic for topic in topics if topic.type == TRACKED]
+    if tracked and not tracks:
+        return read_tracked(tracked, name, label, others=[topic.name for topic in topics if topic.type != TRACKED])
     if tracks:
         return read_tracks(tracks, name, label, others=[topic.name for topic in topics if topic not in tracks])
     return read_streams(topics, name, label, config)
@@ -78,7 +86,7 @@ def read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
     if not found:
         raise InputError(
             f"{paths[0]}: no topic to read. It has {listing(seen)}. Needed is {FIX} with {TWIST}, or {ODOMETRY}, one per "
-            f"vehicle, or a topic named tracks of {TRACKS}; the parameter topics chooses by name"
+            f"vehicle, or a topic named tracks of {TRACKS}, or {TRACKED}; the parameter topics chooses by name"
         )
     return [found[name] for name in sorted(found)]
 
@@ -188,3 +196,43 @@ def read_tracks(topics: list[Topic], name: str, label: str, others: list[str]) -
             f"read from {', '.join(topic.name for topic in topics)}; the parameter topics can choose {', '.join(others)}"
         )
     return RawLog(name, False, (), row, tuple(segments), tuple(notes), encounters=tuple(encounters))
+
+
+def read_tracked(topics: list[Topic], name: str, label: str, others: list[str]) -> RawLog:
+    """Read the objects that a perception tracks; those that are no vehicles are counted and left out.
+
+    Raises:
+        InputError: a message is damaged, or there are several topics or frames.
+    """
+    if len(topics) > 1:
+        raise InputError(f"{label} has {listing({t.name: t.type for t in topics})}; choose one with the parameter topics")
+    topic, kinds, frames = topics[0], Counter[str](), set()
+    vehicles: dict[str, Rows] = {}
+    sizes: dict[str, list[tuple[float, float]]] = {}
+    left_out: dict[str, str] = {}
+    for row, (received, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
+        stamp, frame, objects = decode_tracked(data, f"{label}, topic {topic.name}, message {row + 1}")
+        frames.add(frame)
+        if len(frames) > 1:
+            raise InputError(f"{label}, topic {topic.name}, message {row + 1}: frame {frame!r} is not that of those before")
+        for thing in objects:
+            if thing.kind not in VEHICLES:
+                left_out.setdefault(thing.id, thing.kind)
+                continue
+            rows = vehicles.setdefault(thing.id, Rows())
+            rows.fixes.append((stamp or received, row, *thing.position, thing.heading))
+            rows.speeds.append((stamp or received, row, thing.speed))
+            sizes.setdefault(thing.id, []).append(thing.size)
+    kinds.update(left_out.values())
+    notes = [f"read from {topic.name} in frame {next(iter(frames), '')!r}"]
+    if kinds:
+        counted = ", ".join(f"{count} × {kind}" for kind, count in sorted(kinds.items()))
+        notes.append(f"who is no car, truck, bus or trailer was left out: {counted}")
+    if others:
+        notes.append(f"the parameter topics can choose {', '.join(others)}")
+    found = []
+    for vehicle, rows in vehicles.items():
+        length, width = (value if value > 0.0 else math.nan for value in np.median(np.array(sizes[vehicle]), axis=0).tolist())
+        found.append(replace(rows.observations(vehicle), length=length, width=width))
+    segment = Segment(0, f"{label}, topic {topic.name}", "message", 1)
+    return RawLog(name, False, tuple(found), len(topic.data), (segment,), tuple(notes))

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from scenario_gen.errors import InputError
 from scenario_gen.parameters import parameter, Parameters
 
-FORMATS = ("auto", "spmd", "table", "bag")
+FORMATS = ("auto", "spmd", "table", "bag", "argoverse2", "interaction", "ind", "highd", "commonroad")
 
 
 @dataclass(frozen=True)

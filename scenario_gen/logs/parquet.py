@@ -64,6 +64,23 @@ def read_columns(path: Path, before: int, config: LogConfig) -> tuple[pd.DataFra
     return pd.DataFrame(frame), found
 
 
+def read_table(path: Path, names: list[str], before: int, config: LogConfig) -> pd.DataFrame:
+    """Read some columns as they stand; `before` rows were read from other files; a column that is missing is left out.
+
+    Raises:
+        InputError: the file is damaged or too large.
+    """
+    with guarded(f"{path} cannot be read as a Parquet table"):
+        schema = parquet.read_schema(path)
+    there = [name for name in names if name in schema.names]
+    batches = read_batches(path, schema, there, before, config)
+    frame = {}
+    for name in there:
+        with guarded(f"{path}, column {name!r} cannot be read"):
+            frame[name] = to_series(pa.chunked_array([batch.column(name) for batch in batches]))
+    return pd.DataFrame(frame)
+
+
 def read_batches(path: Path, schema: pa.Schema, names: list[str], before: int, config: LogConfig) -> list[Any]:
     """Read some columns batch by batch; texts as dictionaries, so that one that repeats takes its room once.
 

@@ -24,6 +24,8 @@ from pathlib import Path
 import numpy as np
 
 from scenario_gen.errors import guarded, InputError, needs
+from scenario_gen.logs.adapters import commonroad
+from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.encounters import Piece, pieces_of
@@ -268,7 +270,23 @@ def is_table(path: Path) -> bool:
     return path.suffix.lower() in TABLES
 
 
-ACCEPTS = {"bag": is_bag, "spmd": is_spmd, "table": is_table}  # asked in this order: a headerless table is SPMD
+def is_known(path: Path, name: str) -> bool:
+    """Return whether a table's header is that of a public data set (`adapters.formats`)."""
+    if not is_table(path):
+        return False
+    from scenario_gen.logs.adapters.tracks import recognised
+
+    return recognised(path) == name
+
+
+PUBLIC = ("argoverse2", "interaction", "ind", "highd")
+ACCEPTS: dict[str, Callable[[Path], bool]] = {  # asked in this order: a headerless table is SPMD
+    "bag": is_bag,
+    "commonroad": is_commonroad,
+    "spmd": is_spmd,
+    **{name: partial(is_known, name=name) for name in PUBLIC},
+    "table": is_table,
+}
 
 
 def reader(name: str) -> Reader:
@@ -278,6 +296,12 @@ def reader(name: str) -> Reader:
         from scenario_gen.logs import bag
 
         return bag.read
+    if name == "commonroad":
+        return commonroad.read
+    if name in PUBLIC:
+        from scenario_gen.logs.adapters import tracks
+
+        return partial(tracks.read, name=name)
     from scenario_gen.logs import tables
 
     return partial(tables.read, spmd=name == "spmd")
@@ -296,7 +320,7 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
     if not name:
         raise InputError(
             f"{paths[0]} is none of the known logs: {', '.join(TABLES)} tables and SPMD files, "
-            "rosbag2 folders, .mcap, .db3; set the parameter format if its name misleads"
+            "CommonRoad scenarios, rosbag2 folders, .mcap, .db3; set the parameter format if its name misleads"
         )
     return reader(name)(files, config)
 

@@ -169,7 +169,7 @@ def from_frame(frame: pd.DataFrame, paths: Sequence[Path], segments: tuple[Segme
     check_vehicles(str(paths[0]), frame["vehicle"].nunique(), config)
     geographic = "lat" in frame
     usable = frame["time_ok"].to_numpy() & (frame["vehicle"] != "").to_numpy()
-    rows = np.arange(len(frame))
+    rows = frame["row"].to_numpy() if "row" in frame else np.arange(len(frame))
     reason = np.where(frame["time_ok"].to_numpy(), "no vehicle", "stamp is not a number")
     dropped = tuple((str(why), int(row)) for why, row in zip(reason[~usable], rows[~usable], strict=True))
     position = ("lat", "lon") if geographic else ("x", "y")

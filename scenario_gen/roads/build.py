@@ -21,7 +21,7 @@ from scenario_gen.roads.builtin import BUILT_IN, draw, draw_corridor, draw_paper
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.nav2 import read_map
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
-from scenario_gen.roads.shaped import bends, draw_bent, draw_junction, fitting_width
+from scenario_gen.roads.shaped import bends, draw_along, draw_bent, draw_junction, draw_merge, fitting_width, PLAIN_LINE
 from scenario_gen.roads.vector.read import is_vector_map, READERS, vector_road
 from scenario_gen.template.frenet import main_line, to_frenet
 from scenario_gen.template.separation import own_paths
@@ -71,14 +71,20 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
 def _built_in(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -> Road:
     """A built-in road in plain sizes, or shaped to a template."""
     if tracks is None:
-        return draw(name, layout_for(name, None, config), config)
+        if name == "curve":
+            return draw_along(name, PLAIN_LINE, max(config.lanes, 1), config)
+        return draw_merge(None, None, config) if name == "merge" else draw(name, layout_for(name, None, config), config)
     config = fitting_width(tracks, config)
     try:
         frenet = to_frenet(tracks)
     except RefusedError:  # turns or crossings: a junction's template
         if name in ("t_intersection", "four_way") and not any(track.makes_u_turn for track in tracks):
             return draw_junction(name, tracks, junction_centre(tracks), config)
+        if name == "merge":
+            raise
         return draw(name, layout_for(name, tracks, config), config)
+    if name == "merge":
+        return draw_merge(tracks, frenet, config)
     if bends(name, main_line(frenet, tracks)):
         return draw_bent(name, tracks, frenet.spread(), config)
     return draw(name, layout_for(name, tracks, config), config)

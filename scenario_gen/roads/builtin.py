@@ -35,6 +35,7 @@ _ARMS = {
     "curve": ("west", "east"),
     "t_intersection": ("west", "east", "south"),
     "four_way": ("west", "east", "south", "north"),
+    "merge": ("west", "east"),
 }
 _OUTWARD = {"west": np.pi, "east": 0.0, "south": -np.pi / 2.0, "north": np.pi / 2.0}
 

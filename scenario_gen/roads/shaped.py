@@ -37,6 +37,7 @@ from scenario_gen.template.tracks import Track
 from scenario_gen.types.road import Road
 
 ARM_COUNT = {"straight": 2, "curve": 2, "t_intersection": 3, "four_way": 4}
+_RAMP_ANGLE = np.radians(12.0)
 _ROOM = 6.0  # metres kept free behind the first and before the last footprint
 _SLACK = 12.0  # metres by which a way may differ from the template's
 _SHORTEST = 30.0  # metres of an arm
@@ -53,6 +54,10 @@ _MOST_LANES = 8
 _WIDE_JUNCTION = 30.0  # metres from the middle to a corner between two arms that belongs to the junction
 _SWEPT = 0.6  # metres of room beside a footprint on its way through the junction
 _BESIDE = 0.4  # metres on each side of the widest vehicle in its lane
+
+
+PLAIN_LINE = MainLine(Curve(np.array([[0.0, 0.0, 0.0], [120.0, 0.0, 0.0]])), np.array([0.0, 120.0]), np.array([0.0, 120.0]))
+"""What `curve` is drawn along where there is no template."""
 
 
 def fitting_width(tracks: tuple[Track, ...], config: RoadConfig) -> RoadConfig:
@@ -72,8 +77,15 @@ def draw_bent(name: str, tracks: tuple[Track, ...], frenet: FrenetTracks, config
     Raises:
         RefusedError: it has more cells than are allowed.
     """
-    main = main_line(frenet, tracks)
-    lanes = config.lanes or frenet.lanes
+    return draw_along(name, main_line(frenet, tracks), config.lanes or frenet.lanes, config)
+
+
+def draw_along(name: str, main: MainLine, lanes: int, config: RoadConfig) -> Road:
+    """Draw the road `name` along a main line, with so many lanes in each direction.
+
+    Raises:
+        RefusedError: it has more cells than are allowed.
+    """
     half = lanes * config.lane_width
     run = max(config.arm_length - main.shape.length / 2.0, _ROOM) if config.arm_length else _ROOM
     line = _axis(name, main, run)
@@ -119,6 +131,58 @@ class _ArmPlan:
         yaw = self.pose[2]
         xy = self.pose[:2] + left * np.array([-exact.sin(yaw), exact.cos(yaw)])
         return np.array([*xy, yaw + np.pi if inward else yaw])
+
+
+def draw_merge(tracks: tuple[Track, ...] | None, frenet: FrenetTracks | None, config: RoadConfig) -> Road:
+    """Draw a straight main road and a ramp that joins it from the side of its outermost lane, where the template changes to it.
+
+    Raises:
+        RefusedError: nobody in the template changes from the outermost lane of its direction to the next, or others keep to it.
+    """
+    lanes, along, before, after, sharpness = max(config.lanes, 1), 1.0, 2.0 * _SHORTEST, 2.0 * _SHORTEST, 0.02
+    if tracks is not None and frenet is not None:
+        who = _merging(tracks, frenet)
+        outermost = int(frenet.lane[who[0]].max())
+        others = frenet.lane[[i for i in range(len(tracks)) if i not in who]]
+        lanes = max(int(others.max(initial=0)) + 1, outermost, config.lanes)
+        along = float(frenet.direction[who[0]])
+        half = np.array([[track.vehicle.length / 2.0] for track in tracks])
+        station = along * frenet.station
+        join = float(np.median([station[i][np.argmax(frenet.change[i] >= 0.5)] for i in who]))
+        before, after = join - float((station - half).min()), float((station + half).max()) - join
+        sharpness = max(sharpness_of(tracks[i]) for i in who)
+    reach = [config.arm_length or max(size + _ROOM + _SLACK, _SHORTEST) for size in (before, after)]
+    width = config.lane_width
+    side = -1.0 if config.traffic_side == "right" else 1.0  # of the dividing line on which the traffic to the east drives
+    west, east = (_ArmPlan(np.array([x, 0.0, yaw]), lanes, lanes) for x, yaw in ((-reach[0], np.pi), (reach[1], 0.0)))
+    joined = np.array([0.0, side * (lanes - 0.5) * width, 0.0])
+    yaw = np.pi - side * _RAMP_ANGLE  # out along the ramp
+    out = np.array([exact.cos(yaw), exact.sin(yaw)])
+    ramp = np.array([*(joined[:2] + reach[0] * out), yaw + np.pi])
+    sketch = Sketch()
+    sketch.strip(Curve(np.array([[-reach[0], 0.0, 0.0], [reach[1], 0.0, 0.0]])), -lanes * width, lanes * width)
+    sketch.strip(Curve(np.stack((ramp, np.array([*joined[:2], ramp[2]])))), -width / 2.0, width / 2.0)
+    target = east.lane(lanes - 1, config, inward=False)
+    way = draw_route(ramp, target, lambda _: True, sharpness)
+    if way is not None:
+        sketch.sweep(way, 1.0, width)
+    entries = [arm.lane(k, config, inward=True) for arm in (west, east) for k in range(lanes)]
+    exits = [arm.lane(k, config, inward=False) for arm in (west, east) for k in range(lanes)]
+    return sketch.raster("merge", np.array([*entries, ramp]), np.array(exits), config)
+
+
+def _merging(tracks: tuple[Track, ...], frenet: FrenetTracks) -> list[int]:
+    """The vehicles that come from the outermost lane of their direction and leave it for the next."""
+    for sign in (1, -1):
+        own = [i for i in range(len(tracks)) if frenet.direction[i] == sign]
+        outermost = max((int(frenet.lane[i].max()) for i in own), default=0)
+        who = [i for i in own if frenet.lane[i, 0] == outermost and frenet.lane[i, 1] < outermost]
+        if who and all(outermost not in frenet.lane[i] for i in own if i not in who):
+            return who
+    raise RefusedError(
+        "road merge: nobody in the template leaves the outermost lane of its direction for the next one, so nobody would use the "
+        "ramp; choose straight or curve"
+    )
 
 
 def _finished(name: str, sketch: Sketch, arms: list[_ArmPlan], config: RoadConfig) -> Road:

@@ -51,6 +51,7 @@ _JERK_SHARE, _LEAST_JERK = 1.2, 1.0  # of the template's largest jerk; m/s³
 _BEND_SHARE, _LEAST_BEND = 1.2, 2.0  # of the template's largest lateral acceleration; m/s²
 _SMOOTH = 0.5  # s, over which that is taken
 _TIME_SHARE = 1.0 / 3.0  # of the duration, at most: what varies more slowly between given ends hardly varies
+_LEAST_REST = SHORTEST_WAIT - 0.2  # s: behind it a vehicle is still too slow to be seen moving for a while
 _FREE_SLIDE = 1.5  # m, by which changepoints may be passed from their place before the clock is stretched
 _SAID_PACE, _SAID_SLIDE, _SAID_JERK = 0.02, 0.3, 0.2  # slowing, m and m/s³ from which on they are said
 
@@ -283,8 +284,9 @@ def _at_rest(knots: SpeedKnots, times: Floats) -> list[tuple[float, float]]:
     """The parts of stands in which the speed is zero: lines are rounded, so a vehicle leaves a little before theirs do."""
     rest = []
     for a, b in knots.stretches(knots.still):
-        room = max(min(SMOOTHING, 0.5 * (b - a - SHORTEST_WAIT)), 0.0)
-        rest.append((a + room if a > times[0] else a, b - room if b < times[-1] else b))
+        moves = (a > times[0], b < times[-1])
+        room = max(min(SMOOTHING, (b - a - _LEAST_REST) / max(sum(map(int, moves)), 1)), 0.0)
+        rest.append((a + room if moves[0] else a, b - room if moves[1] else b))
     return rest
 
 

@@ -155,10 +155,14 @@ def _near_pairs(tracks: Sequence[Track], poses: Sequence[Floats], room: float) -
     for i in range(len(tracks)):
         for j in range(i):
             both = presence_of(tracks[i]) & presence_of(tracks[j])
-            reach = sum(float(exact.hypot(t.vehicle.length, t.vehicle.width)) / 2.0 for t in (tracks[i], tracks[j]))
+            reach = (_diagonal(tracks[i].vehicle) + _diagonal(tracks[j].vehicle)) / 2.0
             if both.any() and exact.hypot(*(poses[i] - poses[j])[both, :2].T).min() < room + reach:
                 found.append((i, j))
     return found
+
+
+def _diagonal(vehicle: Vehicle) -> float:
+    return float(exact.hypot(vehicle.length, vehicle.width))
 
 
 def _worst(tracks: Sequence[Track], poses: Sequence[Floats], i: int, j: int) -> tuple[float, int, int, int, Floats]:

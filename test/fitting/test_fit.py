@@ -281,7 +281,10 @@ def test_anchors_without_room_are_moved_and_said_and_far_ones_refused():
     assert any("vehicle 0: its start had no room and was moved by 0.15 m" in note for note in fit.notes)
     drivable[96:120] = False
     far = Road("far", drivable, 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
-    with pytest.raises(RefusedError, match="vehicle 0 is more than 3 m"):
+    with pytest.raises(
+        RefusedError,
+        match=r"vehicle 0 is 5\.\d m from any pose with room at sample 0 .*at most 3 m is bridged; set fitting.max_move",
+    ):
         fit_template(encounter, every(encounter), far, FittingConfig(placement="identity"))
 
 

@@ -24,8 +24,8 @@ import numpy as np
 
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
+from scenario_gen.markup import Element, finite, read_xml
 from scenario_gen.roads.vector.network import Draft, network_of
-from scenario_gen.roads.vector.xml import Element, finite, read_xml
 from scenario_gen.types.lanes import LaneNetwork
 
 _SKIPPED = frozenset(

@@ -30,8 +30,8 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.geodesy import local_frame
+from scenario_gen.markup import Element, finite, read_xml
 from scenario_gen.roads.vector.network import Draft, network_of
-from scenario_gen.roads.vector.xml import Element, finite, read_xml
 from scenario_gen.types.lanes import LaneNetwork
 
 _FOR_CARS = ("road", "highway", "play_street", "exit")  # subtypes that cars may use, if no participant is named
@@ -270,6 +270,8 @@ def _may_change(border: _Border, *, to_right: bool) -> bool:
     for key in (f"lane_change:{'right' if to_right else 'left'}", "lane_change"):
         if key in tags:
             return tags[key] in ("yes", "true")
+    if tags.get("type") not in ("line_thin", "line_thick"):
+        return False
     from_left, from_right = _CHANGE.get(tags.get("subtype", ""), (False, False))
     if not border.forth:
         from_left, from_right = from_right, from_left

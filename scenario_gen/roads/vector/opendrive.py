@@ -28,9 +28,9 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
+from scenario_gen.markup import Element, read_xml
 from scenario_gen.roads.vector.network import Draft, MOST_SECTIONS, network_of
 from scenario_gen.roads.vector.plan_view import Cubics, cubics, reference_line, ReferenceLine
-from scenario_gen.roads.vector.xml import Element, read_xml
 from scenario_gen.types.lanes import LaneNetwork
 
 _FOR_CARS = frozenset(

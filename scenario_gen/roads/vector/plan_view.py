@@ -25,7 +25,7 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import InputError
-from scenario_gen.roads.vector.xml import Element
+from scenario_gen.markup import Element
 
 _STEP = 1.0  # metres of a spiral that one rule of Gauss integrates
 _GAUSS = (  # five points on [0, 1], exact for degree 9
@@ -65,7 +65,13 @@ def cubics(records: list[Element], offset: str) -> Cubics:
 
 @dataclass(frozen=True, eq=False)
 class ReferenceLine:
-    """The plan view of a road: pieces of geometry, one after the other."""
+    """The plan view of a road: pieces of geometry, one after the other.
+
+    Attributes:
+        begin: (K,) metres along the road at which each piece begins.
+        pieces: K elements.
+        length: of the road, metres.
+    """
 
     begin: Floats
     pieces: tuple[Element, ...]

@@ -22,6 +22,7 @@ import numpy as np
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.documents import shown
 from scenario_gen.errors import InputError, of_system
+from scenario_gen.markup import finite
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.vector.commonroad import read_commonroad
 from scenario_gen.roads.vector.lanelet2 import read_lanelet2
@@ -29,7 +30,6 @@ from scenario_gen.roads.vector.network import extent, part_of
 from scenario_gen.roads.vector.opendrive import read_opendrive
 from scenario_gen.roads.vector.place import best_part
 from scenario_gen.roads.vector.raster import road_of
-from scenario_gen.roads.vector.xml import finite
 from scenario_gen.template.tracks import Track
 from scenario_gen.types.lanes import LaneNetwork
 from scenario_gen.types.road import Road

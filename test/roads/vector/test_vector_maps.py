@@ -22,10 +22,10 @@ import pytest
 
 from scenario_gen import geodesy
 from scenario_gen.errors import InputError, RefusedError
+from scenario_gen.markup import parse_xml
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.vector.plan_view import reference_line
 from scenario_gen.roads.vector.read import read_network
-from scenario_gen.roads.vector.xml import parse_xml
 
 
 def middles(network):
@@ -188,7 +188,7 @@ def test_a_broken_map_is_refused_with_its_name_and_place(tmp_path, suffix, text,
 
 
 def test_too_many_elements_are_refused(monkeypatch):
-    monkeypatch.setattr("scenario_gen.roads.vector.xml.MOST_ELEMENTS", 50)
+    monkeypatch.setattr("scenario_gen.markup.MOST_ELEMENTS", 50)
     with pytest.raises(InputError, match="more than 50 elements"):
         parse_xml(b"<a>" + b"<b/>" * 60 + b"</a>", "map")
 

@@ -1,0 +1,136 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""CommonRoad scenarios (XML, 2018b and 2020a): the dynamic obstacles' trajectories.
+
+| quantity | element | unit |
+|---|---|---|
+| vehicle | obstacle, dynamicObstacle: attribute id | |
+| class | type: car, truck, bus, taxi, … | |
+| length, width | shape/rectangle/length, width | m |
+| time | initialState, trajectory/state: time/exact, times commonRoad: timeStepSize | s |
+| position | position/point/x, y; the rectangle's middle | m |
+| heading | orientation/exact | rad, counter-clockwise from +x |
+| speed | velocity/exact | m/s |
+
+Source: CommonRoad's documentation of the XML format, 2018b and 2020a. An interval
+(intervalStart, intervalEnd) counts as its middle.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+import math
+from pathlib import Path
+
+import numpy as np
+
+from scenario_gen.errors import InputError
+from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
+from scenario_gen.markup import Element, read_xml
+
+KINDS = ("car", "truck", "bus", "taxi", "priorityvehicle")
+_SKIPPED = frozenset(("lanelet", "trafficSign", "trafficLight", "intersection", "planningProblem", "staticObstacle"))
+
+
+def is_commonroad(path: Path) -> bool:
+    """Return whether a file's name and beginning say CommonRoad."""
+    if path.suffix.lower() != ".xml":
+        return False
+    with path.open("rb") as file:
+        return b"<commonRoad" in file.read(4096)
+
+
+def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
+    """Read the trajectories of one scenario.
+
+    Raises:
+        InputError: it is broken, has no trajectories, or a state lacks its position or time; names file and line.
+    """
+    if len(paths) != 1:
+        raise InputError(f"{paths[0]} and {len(paths) - 1} more: scenarios have clocks of their own; give one at a time")
+    path = paths[0]
+    check_size(str(path), path.stat().st_size, 0, config)
+    root = read_xml(path, str(path), _SKIPPED)
+    if root.tag != "commonRoad":
+        raise InputError(f"{root.place}: the root of a CommonRoad file is <commonRoad>")
+    step = root.number("timeStepSize")
+    if not 1e-3 <= step <= 10.0:
+        raise InputError(f"{root.place}: timeStepSize is {step:g} s; 0.001 to 10 are read")
+    vehicles: list[Observations] = []
+    left_out: Counter[str] = Counter()
+    row = 0
+    obstacles = [*root.all("obstacle"), *root.all("dynamicObstacle")]
+    check_vehicles(str(path), len(obstacles), config)
+    for obstacle in obstacles:
+        kind = obstacle.first("type")
+        said = kind.text.strip() if kind is not None else "unknown"
+        states = [state for tag in ("initialState",) for state in obstacle.all(tag)]
+        trajectory = obstacle.first("trajectory")
+        states += trajectory.all("state") if trajectory is not None else []
+        if said.lower() not in KINDS or trajectory is None:
+            left_out[said if said.lower() not in KINDS else f"{said} without a trajectory"] += 1
+            continue
+        check_size(str(path), 0, row + len(states), config)
+        vehicles.append(_observations(obstacle, states, step, row))
+        row += len(states)
+    if not vehicles:
+        raise InputError(f"{path}: no car, truck or bus with a trajectory in it")
+    notes = ["read as CommonRoad"]
+    if left_out:
+        counted = ", ".join(f"{count} × {said}" for said, count in sorted(left_out.items()))
+        notes.append(f"who is no car, truck or bus that drives was left out: {counted}")
+    return RawLog(path.stem, False, tuple(vehicles), row, (Segment(0, str(path), "state", 1),), tuple(notes))
+
+
+def _observations(obstacle: Element, states: list[Element], step: float, row: int) -> Observations:
+    values = np.array([_state(state) for state in states]).reshape(-1, 5)
+    stamps = np.round(values[:, 0] * (step * 1e9)).astype(np.int64)
+    rows = np.arange(row, row + len(states))
+    box = obstacle.first("shape", "rectangle")
+    length, width = (box.one(name).value() if box is not None else math.nan for name in ("length", "width"))
+    return Observations(
+        id=obstacle.get("id"),
+        fix_ns=stamps,
+        fix=values[:, 1:3],
+        fix_row=rows,
+        heading=values[:, 3],
+        speed_ns=stamps,
+        speed=values[:, 4],
+        speed_row=rows,
+        length=length,
+        width=width,
+    )
+
+
+def _state(state: Element) -> tuple[float, float, float, float, float]:
+    """Steps, x, y, heading, speed; NaN for heading and speed where they are not said."""
+    point = state.first("position", "point") or state.first("position", "rectangle", "center")
+    if point is None:
+        raise InputError(f"{state.place} has no position that is a point")
+    heading, speed = _exact(state, "orientation"), _exact(state, "velocity")
+    time = _exact(state, "time")
+    if math.isnan(time):
+        raise InputError(f"{state.place} has no time")
+    return time, point.one("x").value(), point.one("y").value(), heading, abs(speed)
+
+
+def _exact(state: Element, tag: str) -> float:
+    element = state.first(tag)
+    if element is None:
+        return math.nan
+    value = element.first("exact")
+    if value is not None:
+        return value.value()
+    return (element.one("intervalStart").value() + element.one("intervalEnd").value()) / 2.0

@@ -1,0 +1,249 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Public recordings: small files written to their definitions give the positions, speeds, headings and sizes that went in."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from scenario_gen.errors import InputError
+from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs.adapters.formats import FORMATS
+
+SIZES = {"7": (4.5, 1.8), "8": (12.0, 2.5)}
+T = np.arange(0.0, 8.0, 0.1)
+
+
+def motion(vehicle, t):
+    """Two that meet: x, y, vx, vy, heading; the first drives east at 8 m/s, the second north-west at 5 m/s."""
+    if vehicle == "7":
+        return -30.0 + 8.0 * t, 0.0 * t, 8.0, 0.0, 0.0
+    c = 5.0 / math.sqrt(2.0)
+    return 20.0 - c * t, -10.0 + c * t, -c, c, 0.75 * math.pi
+
+
+def argoverse2(folder):
+    rows = []
+    for track, kind in (("7", "vehicle"), ("8", "bus"), ("9", "pedestrian"), ("AV", "static")):
+        x, y, vx, vy, heading = motion(track, T)
+        rows += [(True, track, kind, 2, k, x[k], y[k], heading, vx, vy, "s1", 0, 0, len(T), "7", "austin") for k in range(len(T))]
+    names = (
+        "observed track_id object_type object_category timestep position_x position_y heading velocity_x velocity_y scenario_id"
+    )
+    names += " start_timestamp end_timestamp num_timestamps focal_track_id city"
+    path = folder / "scenario_s1.parquet"
+    pd.DataFrame(rows, columns=names.split()).to_parquet(path)
+    return path, {"pedestrian", "static"}
+
+
+def interaction(folder):
+    rows = []
+    for track, size in SIZES.items():
+        x, y, vx, vy, heading = motion(track, T)
+        rows += [(track, k + 1, 100 * (k + 1), "car", x[k], y[k], vx, vy, heading, *size) for k in range(len(T))]
+    names = "track_id frame_id timestamp_ms agent_type x y vx vy psi_rad length width"
+    pd.DataFrame(rows, columns=names.split()).to_csv(folder / "vehicle_tracks_000.csv", index=False)
+    walker = [("P1", k, 100 * k, "pedestrian/bicycle", 0.0, 0.0, 0.0, 1.0) for k in range(5)]
+    pd.DataFrame(walker, columns=names.split()[:8]).to_csv(folder / "pedestrian_tracks_000.csv", index=False)
+    return folder, {"pedestrian/bicycle"}
+
+
+def levelx(folder, tracks, classes):
+    tracks.to_csv(folder / "00_tracks.csv", index=False)
+    classes.to_csv(folder / "00_tracksMeta.csv", index=False)
+    pd.DataFrame({"recordingId": [0], "frameRate": [25]}).to_csv(folder / "00_recordingMeta.csv", index=False)
+
+
+def ind(folder):
+    rows = []
+    for track in (*SIZES, "9"):
+        x, y, vx, vy, heading = motion(track, np.arange(200) / 25.0)
+        length, width = SIZES.get(track, (0.0, 0.0))
+        turned = math.degrees(heading) % 360.0
+        rows += [(0, int(track), k, k, x[k], y[k], turned, width, length, vx, vy, 0.0, 0.0) for k in range(200)]
+    names = "recordingId trackId frame trackLifetime xCenter yCenter heading width length xVelocity yVelocity"
+    names += " xAcceleration yAcceleration"
+    classes = pd.DataFrame({"recordingId": 0, "trackId": [7, 8, 9], "class": ["car", "truck_bus", "bicycle"]})
+    levelx(folder, pd.DataFrame(rows, columns=names.split()), classes)
+    return folder / "00_tracks.csv", {"bicycle"}
+
+
+def highd(folder):
+    """Y grows downwards, x and y are the box's upper left corner; all drive along x."""
+    rows = []
+    for track, (length, width) in SIZES.items():
+        sign = 1.0 if track == "7" else -1.0
+        for k in range(200):
+            x, y = sign * (-40.0 + 10.0 * k / 25.0), 4.0 if track == "7" else 8.0  # ours; y is up
+            rows.append((k + 1, int(track), x - length / 2.0, -y - width / 2.0, length, width, 10.0 * sign, 0.0, 0.0, 0.0, 2))
+    names = "frame id x y width height xVelocity yVelocity xAcceleration yAcceleration laneId"
+    classes = pd.DataFrame({"id": [7, 8], "class": ["Car", "Truck"]})
+    levelx(folder, pd.DataFrame(rows, columns=names.split()), classes)
+    return folder, set()
+
+
+def commonroad(folder):
+    text = ""
+    for track, kind in (("7", "car"), ("8", "bus"), ("9", "pedestrian")):
+        x, y, vx, vy, heading = motion(track, T)
+        length, width = SIZES.get(track, (0.5, 0.5))
+
+        def state(tag, k, x=x, y=y, heading=heading, speed=math.hypot(vx, vy)):
+            return (
+                f"<{tag}><position><point><x>{float(x[k])!r}</x><y>{float(y[k])!r}</y></point></position>"
+                f"<orientation><exact>{heading}</exact></orientation>"
+                f"<time><exact>{k}</exact></time><velocity><exact>{speed}</exact></velocity></{tag}>"
+            )
+
+        states = "".join(state("state", k) for k in range(1, len(T)))
+        text += (
+            f'<dynamicObstacle id="{track}"><type>{kind}</type><shape><rectangle><length>{length}</length>'
+            f"<width>{width}</width></rectangle></shape>{state('initialState', 0)}"
+            f"<trajectory>{states}</trajectory></dynamicObstacle>"
+        )
+    path = folder / "scenario.xml"
+    path.write_text(f'<?xml version="1.0"?><commonRoad commonRoadVersion="2020a" timeStepSize="0.1">{text}</commonRoad>')
+    return path, {"pedestrian"}
+
+
+def tracked(folder):
+    """Write a bag of autoware_perception_msgs/TrackedObjects."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+
+    from scenario_gen.recordings.tracked import LABELS, store, TRACKED
+
+    types = store().types
+
+    def make(name, **values):
+        return types[name](**values)
+
+    def zero(name, count):
+        return make(f"geometry_msgs/msg/{name}", **dict.fromkeys(("x", "y", "z", "w")[:count], 0.0))
+
+    def with_covariance(kind, **values):
+        body = make(f"geometry_msgs/msg/{kind}", **values)
+        return make(f"geometry_msgs/msg/{kind}WithCovariance", covariance=np.zeros(36), **{kind.lower(): body})
+
+    path = folder / "perception"
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        connection = bag.add_connection("/perception/object_recognition/tracking/objects", TRACKED, typestore=store())
+        for k, t in enumerate(T):
+            objects = []
+            for track, label in (("7", "car"), ("8", "bus"), ("9", "pedestrian")):
+                x, y, vx, vy, heading = motion(track, T)
+                length, width = SIZES.get(track, (0.5, 0.5))
+                point, turn = zero("Point", 3), zero("Quaternion", 4)
+                point.x, point.y, turn.z, turn.w = float(x[k]), float(y[k]), math.sin(heading / 2.0), math.cos(heading / 2.0)
+                linear, size = zero("Vector3", 3), zero("Vector3", 3)
+                linear.x, size.x, size.y = math.hypot(vx, vy), length, width
+                kinematics = make(
+                    "autoware_perception_msgs/msg/TrackedObjectKinematics",
+                    pose_with_covariance=with_covariance("Pose", position=point, orientation=turn),
+                    twist_with_covariance=with_covariance("Twist", linear=linear, angular=zero("Vector3", 3)),
+                    acceleration_with_covariance=with_covariance("Accel", linear=zero("Vector3", 3), angular=zero("Vector3", 3)),
+                    orientation_availability=2,
+                    is_stationary=False,
+                )
+                shape = make(
+                    "autoware_perception_msgs/msg/Shape",
+                    type=0,
+                    footprint=make("geometry_msgs/msg/Polygon", points=[]),
+                    dimensions=size,
+                )
+                kind = make("autoware_perception_msgs/msg/ObjectClassification", label=LABELS.index(label), probability=0.9)
+                doubt = make("autoware_perception_msgs/msg/ObjectClassification", label=0, probability=0.1)
+                number = make("unique_identifier_msgs/msg/UUID", uuid=np.full(16, int(track), dtype=np.uint8))
+                objects.append(
+                    make(
+                        "autoware_perception_msgs/msg/TrackedObject",
+                        object_id=number,
+                        existence_probability=1.0,
+                        classification=[doubt, kind],
+                        kinematics=kinematics,
+                        shape=shape,
+                    )
+                )
+            stamp = make("builtin_interfaces/msg/Time", sec=int(t), nanosec=round((t % 1.0) * 1e9))
+            message = make(TRACKED, header=make("std_msgs/msg/Header", stamp=stamp, frame_id="map"), objects=objects)
+            bag.write(connection, round(t * 1e9), store().serialize_cdr(message, TRACKED))
+    return path, {"pedestrian"}
+
+
+MADE = {f.__name__: f for f in (argoverse2, interaction, ind, highd, commonroad, tracked)}
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_what_was_written_is_read(tmp_path, name):
+    path, left_out = MADE[name](tmp_path)
+    result = read_log(path)
+    (encounter,) = result.encounters
+    ids = [bytes([int(track)] * 16).hex() if name == "tracked" else track for track in SIZES]
+    assert [vehicle.id for vehicle in encounter.vehicles] == ids
+    for said in left_out:
+        assert any(f"1 × {said}" in note for note in result.quality.notes), result.quality.notes
+    for n, track in enumerate(SIZES):
+        vehicle = encounter.vehicles[n]
+        if name != "argoverse2":  # which says no sizes
+            assert (vehicle.length, vehicle.width) == SIZES[track]
+        if name == "highd":
+            sign = 1.0 if track == "7" else -1.0
+            assert np.allclose(encounter.heading[n] % (2 * math.pi), 0.0 if sign > 0 else math.pi, atol=0.01)
+            assert np.allclose(encounter.speed[n], 10.0, atol=0.1)
+            assert abs(encounter.position[n, 5, 1] - (4.0 if track == "7" else 8.0)) < 0.1
+            assert np.sign(encounter.position[n, -1, 0] - encounter.position[n, 0, 0]) == sign
+            continue
+        start = encounter.start_ns * 1e-9 - (0.1 if name == "interaction" else 0.0)
+        x, y, vx, vy, heading = motion(track, start + encounter.time)
+        assert np.abs(encounter.position[n] - np.column_stack((x, y))).max() < 0.1
+        assert np.allclose(encounter.speed[n], math.hypot(vx, vy), atol=0.1)
+        assert np.allclose(encounter.heading[n], heading, atol=0.05)
+
+
+def test_every_column_has_a_unit_and_every_format_its_source():
+    for known in FORMATS.values():
+        assert known.source and all(quantity.unit for quantity in known.columns.values())
+        assert LogConfig(format=known.name).format == known.name
+
+
+def test_what_is_missing_is_named(tmp_path):
+    path, _ = ind(tmp_path)
+    (tmp_path / "00_recordingMeta.csv").unlink()
+    with pytest.raises(InputError, match=r"00_recordingMeta\.csv beside it, which is not there"):
+        read_log(path)
+    with pytest.raises(InputError, match=r"lacks columns of INTERACTION: agent_type"):
+        read_log(path, LogConfig(format="interaction"))
+
+
+def test_two_recordings_are_refused(tmp_path):
+    interaction(tmp_path)
+    (tmp_path / "vehicle_tracks_001.csv").write_bytes((tmp_path / "vehicle_tracks_000.csv").read_bytes())
+    with pytest.raises(InputError, match="give one at a time"):
+        read_log(tmp_path)
+
+
+def test_a_broken_scenario_is_named_with_its_line(tmp_path):
+    path, _ = commonroad(tmp_path)
+    text = path.read_text()
+    for old, new, said in (
+        ("<exact>3</exact>", "<exact>three</exact>", "line 1, <exact>: 'three' is no number"),
+        ("<point>", "<circle>", "not XML"),
+        ('timeStepSize="0.1"', 'timeStepSize="0"', "timeStepSize is 0 s"),
+        ("<commonRoad ", "<!DOCTYPE x []><commonRoad ", "document type"),
+    ):
+        path.write_text(text.replace(old, new, 1))
+        with pytest.raises(InputError, match=said):
+            read_log(path)
