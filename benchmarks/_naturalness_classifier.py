@@ -45,8 +45,8 @@ GROUPS = {
     "longitudinal": ("speed", "acceleration", "jerk"),
     "lateral": ("yaw rate", "lateral acceleration"),
 }
-FOLDS, RATIO = 5, 3
-"""Folds, and generated windows for each recorded one."""
+FOLDS, RATIO, FEW = 5, 2, 4000
+"""Folds; generated windows for each recorded one; windows below which the folds are drawn twice."""
 
 
 @dataclass(frozen=True)
@@ -141,8 +141,8 @@ def told_apart(sets: Sequence[Windows], series: Sequence[str], *, importances: b
     falls: dict[str, list[float]] = {FEATURES[k]: [] for k in columns}
     rng = np.random.default_rng(0)
     with threadpool_limits(1):  # threads that wait for each other on a busy machine cost a hundred times the work
-        for train, test in folds(group, len(names), rng):
-            model = HistGradientBoostingClassifier(max_iter=100, max_leaf_nodes=15, min_samples_leaf=10, random_state=0)
+        for train, test in folds(group, len(names), rng, 2 if len(data) < FEW else 1):
+            model = HistGradientBoostingClassifier(max_leaf_nodes=8, max_bins=64, min_samples_leaf=10, random_state=0)
             model.fit(data[train], label[train], sample_weight=weight[train])
 
             def area(table: Floats, model: HistGradientBoostingClassifier = model, test: Ints = test) -> float:
@@ -160,7 +160,7 @@ def told_apart(sets: Sequence[Windows], series: Sequence[str], *, importances: b
     )
 
 
-def folds(group: Ints, count: int, rng: np.random.Generator, repeats: int = 2) -> Iterator[tuple[Ints, Ints]]:
+def folds(group: Ints, count: int, rng: np.random.Generator, repeats: int) -> Iterator[tuple[Ints, Ints]]:
     """Yield train and test rows: whole groups together, `repeats` times with other groups together."""
     for _ in range(repeats):
         of_group = rng.permutation(count) % FOLDS

@@ -31,6 +31,7 @@ from time import process_time
 import numpy as np
 
 from benchmarks._planning_maps import clutter, enters_blocked, lane, optimum, recorded_maps, road_of, t_intersection
+from benchmarks._planning_obstructed import CAR, dubins_length, first_path, obstructed, rrt_connect
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.arrays import Floats
@@ -40,6 +41,7 @@ from scenario_gen.roads.connectivity import common_component, component_at, comp
 from scenario_gen.routing import plan_routes, PlanningConfig
 from scenario_gen.routing.search.ompl.solve import PLANNERS, solve
 from scenario_gen.routing.search.planner import Budget, BudgetSpentError, path_length, plan_with_retry, Query
+from scenario_gen.routing.search.pose_planner import PoseRrtStarConnect
 from scenario_gen.routing.search.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
@@ -52,7 +54,12 @@ FEW, MORE, MANY = sized((20_000, 100_000, 1_000_000), quick=(8000, 9000, 10_000)
 QUERIES, QUERIES_OF_A_MAP = sized((100_000, 500), quick=(100, 2))
 MAPS = sized(None, quick=1)
 TURNS = sized(10, quick=2)
+OBSTRUCTED, MEASURED = sized((200, 40), quick=(2, 1))  # feasible roads, and those of them on which lengths are compared
+WITHIN, PROOF = sized(
+    (1.0, 4.0), quick=(1.0, 1.0)
+)  # [s] of CPU time to solve a road, and of ours with another seed to prove it feasible
 STEP = RrtStarConnectConfig(step=5.0, pull=False)
+OWN_STEP = RrtStarConnectConfig(pull=False)
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 Case = tuple[Road, Floats, float]
 
@@ -63,8 +70,8 @@ def run() -> list[Row]:
     for road, ends in (lane(), t_intersection(), clutter()):
         cases[road.name] = road, ends, optimum(road, ends)
         _warm(road, ends)
-    rows = _field(cases["clutter"][0]) + _first(cases) + _curves(cases) + _throughput(cases)
-    return rows + _soundness() + _recorded() + _drivable()
+    rows = _field(cases["clutter"][0]) + _first(cases) + _first_own_step(cases) + _curves(cases) + _throughput(cases)
+    return rows + _soundness() + _recorded() + _drivable() + _obstructed()
 
 
 def _warm(road: Road, ends: Floats) -> None:
@@ -115,6 +122,24 @@ def _first(cases: dict[str, Case]) -> list[Row]:
             peer = f"OMPL RRTConnect, {how}: {1e3 * median(theirs):.2f} ms"
             label = f"{name}: first path, speed-up{', state by state' if theirs is states else ''}"
             rows.append(Row(label, median(theirs) / median(ours), "×", "higher", target, peer))
+    return rows
+
+
+def _first_own_step(cases: dict[str, Case]) -> list[Row]:
+    """Time to the first path with each planner's own step; what compiled OMPL took in C++ is the target."""
+    rows = []
+    for name, target in (("T", 0.05), ("clutter", 0.23)):
+        road, ends, _ = cases[name]
+        ours, theirs = list[float](), list[float]()
+        for seed in range(SEEDS):
+            started = process_time()
+            RrtStarConnect(OWN_STEP).plan(road, Query(*ends), Budget(10**7, first=True), seed)
+            ours.append(process_time() - started)
+            started = process_time()
+            _ompl(road, ends, "ompl_rrt_connect", 60.0, first=True)
+            theirs.append(process_time() - started)
+        peer = f"OMPL RRTConnect, our compiled exact edge check in it: {1e3 * median(theirs):.2f} ms"
+        rows.append(Row(f"{name}: first path, own step", 1e3 * median(ours), "ms", "lower", target, peer))
     return rows
 
 
@@ -276,3 +301,53 @@ def _drivable() -> list[Row]:
             Row(f"drivable, {name} turn: length", float(route.length[-1]), "m", "lower", None, f"shortest {shortest:.2f} m")
         )
     return rows
+
+
+def _obstructed() -> list[Row]:
+    """Roads with something in the way: solved within a second, time to the first path, its length, the published route."""
+    ours, theirs, excess, routes, bends = list[float](), list[float](), list[float](), list[float](), list[float]()
+    feasible, seed = 0, 0
+    while feasible < OBSTRUCTED:
+        case = obstructed(seed)
+        seed += 1
+        if case is None:
+            continue
+        clearance_in_cells(case.road)
+        found, (path, took) = first_path(case, WITHIN, 0), rrt_connect(case, WITHIN)
+        if found is None and not len(path) and first_path(case, PROOF, 1) is None:
+            continue
+        feasible += 1
+        ours += [found[0]] if found else []
+        theirs += [took] if len(path) else []
+        started = process_time()
+        try:
+            (route,) = plan_routes(case.road, _straight_fit(case.query.start, case.query.goal), PlanningConfig(), 0)
+        except RefusedError:
+            continue
+        routes.append(process_time() - started)
+        bends.append(float(np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max()))
+        if len(excess) < MEASURED and len(path):
+            simplified = [rrt_connect(case, WITHIN, simplify=True)[0] for _ in range(3)]
+            lengths = [dubins_length(case, each) for each in simplified if len(each)]
+            plan = PoseRrtStarConnect().plan(case.road, case.query, Budget(20 * PlanningConfig().iterations), 0)
+            excess += [float(plan.step.sum()) / median(lengths)] if lengths else []
+    share, peer = 100.0 * len(ours) / feasible, f"OMPL RRTConnect {100.0 * len(theirs) / feasible:.1f} %"
+    within = 100.0 * float(np.mean(np.array(excess) <= 1.02)) if excess else float("nan")
+    told = f"OMPL RRTConnect {1e3 * median(theirs):.1f} ms, with Python callbacks" if theirs else ""
+    return [
+        Row(f"obstructed: solved within {WITHIN:g} s, of {feasible} feasible roads", share, "%", "higher", 99.0, peer),
+        Row("obstructed: first path", 1e3 * median(ours), "ms", "lower", 5.0, told),
+        Row("obstructed: length over the median of OMPL's, simplified", median(excess or [np.inf]), "×", "lower", 1.02),
+        Row("obstructed: roads on which that is at most 1.02", within, "%", "higher"),
+        Row("obstructed: routes published, with side and margin kept", 100.0 * len(routes) / feasible, "%", "higher", 99.0),
+        Row("obstructed: time of such a route", 1e3 * median(routes or [np.inf]), "ms", "lower"),
+        Row("obstructed: largest curvature of a route, median", median(bends or [np.inf]), "1/m", "lower"),
+    ]
+
+
+def _straight_fit(start: Floats, goal: Floats) -> Fit:
+    """A fit of one vehicle without a changepoint."""
+    poses = np.stack((start, goal))
+    fitted = FittedVehicle(poses, np.zeros(2), np.zeros(1, dtype=bool), 1.0, "straight")
+    states = BoundaryStates(*(np.append(pose, 5.0)[None] for pose in poses))
+    return Fit((Vehicle("a", *CAR),), (fitted,), np.array([0, 1]), states, ())

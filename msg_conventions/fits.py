@@ -19,7 +19,7 @@ states asked of every scenario, speed included. Speeds in between are the templa
 What the fitting decided travels on the diagnostics, a status for each vehicle. QoS: reliable, transient_local, depth 1.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 import json
 import math
 
@@ -32,6 +32,7 @@ from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import guarded, InputError
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit, FittedVehicle, Loss
+from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates
 
 
@@ -85,12 +86,14 @@ def decode_asked(data: bytes, what: str = "fit") -> dict[str, tuple[Floats, Floa
     return {vehicle.id: (asked.start[k], asked.end[k]) for k, vehicle in enumerate(vehicles)}
 
 
-def fit_statuses(fit: Fit, node: str, more: Mapping[str, str] | None = None) -> tuple[Status, ...]:
-    """Return what the fitting decided: one status per vehicle, one for the notes; each with what `more` says of it."""
+def fit_statuses(fit: Fit, node: str, more: Mapping[str, str] | None = None, routes: Sequence[Route] = ()) -> tuple[Status, ...]:
+    """Return what was decided: a status per vehicle, with figures of its route, one for the notes; each with what `more` says."""
+    planned = [route.figures() for route in routes] or [{}] * len(fit.fitted)
+    remarks = [route.remarks(vehicle.id) for vehicle, route in zip(fit.vehicles, routes, strict=False)]
     per_vehicle = tuple(
         Status(
             f"{node}: fit of {vehicle.id}",
-            Level.OK if float(fitted.moved.max()) < 1.0 else Level.WARN,
+            Level.OK if float(fitted.moved.max()) < 1.0 and not (remarks and remarks[k]) else Level.WARN,
             f"{fitted.manoeuvre}, scale {fitted.scale:.3f}, moved by at most {float(fitted.moved.max()):.2f} m",
             {
                 "manoeuvre": fitted.manoeuvre,
@@ -98,12 +101,14 @@ def fit_statuses(fit: Fit, node: str, more: Mapping[str, str] | None = None) -> 
                 "moved_m": json.dumps(fitted.moved.tolist()),
                 "stands": json.dumps([bool(value) for value in fitted.stands]),
                 "turned_rad": json.dumps(list(fitted.turned) if np.isfinite(fitted.turned).all() else None),
+                **{key: json.dumps(value) for key, value in planned[k].items()},
                 **(more or {}),
             },
         )
-        for vehicle, fitted in zip(fit.vehicles, fit.fitted, strict=True)
+        for k, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True))
     )
-    notes = {f"note.{k}": note for k, note in enumerate(fit.notes)}
+    sentences = (*fit.notes, *(said for each in remarks for said in each))
+    notes = {f"note.{k}": note for k, note in enumerate(sentences)}
     lost = {f"lost.{k}": json.dumps([loss.kind, list(loss.vehicles), loss.said]) for k, loss in enumerate(fit.lost)}
     said = f"template fitted to the road, {len(lost)} things of it are lost" if lost else "template fitted to the road"
     level = Level.WARN if any(loss.kind != "arm" for loss in fit.lost) else Level.OK

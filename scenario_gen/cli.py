@@ -98,7 +98,10 @@ def parameters() -> None:
 def generate(
     log: LogArgument,
     road: Annotated[
-        list[str], typer.Option(help="straight, t_intersection, four_way, corridor, or a nav2 map's YAML; repeatable")
+        list[str],
+        typer.Option(
+            help="straight, curve, t_intersection, four_way, merge, roundabout, corridor, or a nav2 map's YAML; repeatable"
+        ),
     ],
     count: Annotated[int, typer.Option(min=1, help="scenarios per encounter and road")] = 50,
     seed: Annotated[int, typer.Option(min=0, help="same seed, same scenarios")] = 0,

@@ -142,7 +142,11 @@ def _bytes(path: Path, what: str) -> bytes:
 
 
 def parse_xml(data: bytes, what: str, skip: frozenset[str] = frozenset()) -> Element:
-    """Return the root element of XML in memory; arguments and errors as in `read_xml`."""
+    """Return the root element of XML in memory; arguments as in `read_xml`.
+
+    Raises:
+        InputError: as there.
+    """
     parser: Any = expat.ParserCreate()
     parser.buffer_text = True
     root = Element("", {}, 0, what)

@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 import json
 from pathlib import Path
+from typing import Any
 
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import read_evaluations
@@ -63,8 +64,15 @@ def write_results(
         with BagWriter(folder / BAG) as bag:
             add_results(bag, {name: replace(case, provenance=provenance) for name, case in zip(names, cases, strict=True)})
     write_report(folder / REPORT, ReportInput(cases, title, quality, provenance))
-    figures = {"provenance": dict(provenance), "cases": [json.loads(case.evaluation.to_json()) for case in cases]}
+    figures = {"provenance": dict(provenance), "cases": [_figures(case) for case in cases]}
     write_text(folder / FIGURES, json.dumps(figures, indent=2) + "\n")
+
+
+def _figures(case: GenerationResult) -> dict[str, Any]:
+    """Return a case's evaluation and, by vehicle, how its route was planned."""
+    vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
+    figures: dict[str, Any] = json.loads(case.evaluation.to_json())
+    return figures | {"routes": {vehicle.id: route.figures() for vehicle, route in vehicles}}
 
 
 def write_evaluation(folder: Path, cases: Sequence[GenerationResult], bag: Path, config: BagConfig) -> None:

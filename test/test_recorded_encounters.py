@@ -43,7 +43,7 @@ def test_the_recorded_encounters_are_there(data):
 def recheck(case: GenerationResult) -> list[str]:
     """Return what the independent oracle finds wrong with the published scenarios."""
     encounter = case.encounter
-    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
+    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
     waits = find_waits(encounter)
     return [
         f"scenario {scenario.index}: {violation}"

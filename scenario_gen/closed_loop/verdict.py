@@ -14,6 +14,7 @@
 
 """The verdict on one drive: what went wrong, when and by whose doing, and how close it was."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 import math
@@ -22,17 +23,18 @@ from typing import Any
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats
+from scenario_gen.arrays import Bools, Floats
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
 from scenario_gen.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.evaluation.motion import Motion
-from scenario_gen.roads.clearance import clearance_in_cells
+from scenario_gen.roads.clearance import clearance_in_cells, footprint_fits
 from scenario_gen.template.interaction import find_conflicts
 from scenario_gen.types.road import Road
 from scenario_gen.validity import collision as apart
 from scenario_gen.validity import containment as inside
 from scenario_gen.validity.dynamics import control_points
 
+PARTS = 200  # of a step, to which the beginning of a contact is told
 RESOLUTION = 1e-6  # seconds; what cannot be told apart over such an interval counts as a contact
 JERK_OVER = 0.5  # seconds over which the change of acceleration is taken
 
@@ -190,7 +192,28 @@ def _contact(drive: Drive, i: int, j: int) -> float | None:
     control_points(time, position, heading, speed, control)
     half = np.array([(0.5 * motion.vehicles[k].length, 0.5 * motion.vehicles[k].width) for k in pair])
     apart.first_contacts(time, control, heading, half, 0.0, RESOLUTION, out)
-    return None if out[0, 0] == apart.PROVEN else float(out[0, 1])
+    return (
+        None if out[0, 0] == apart.PROVEN else _first(drive, pair, float(out[0, 1]), lambda m: footprint_distance(m, 0, 1) <= 0.0)
+    )
+
+
+def _first(drive: Drive, rows: list[int], found: float, wrong: Callable[[Motion], Bools]) -> float:
+    """Time [s] at which something begins to be wrong, to a PART of its step; what the proof gives is any instant of it."""
+    motion, step = drive.motion, float(drive.motion.time[1])
+    k = min(int(found / step + 1e-9), len(motion.time) - 2)
+    start = float(motion.time[k])
+    u = np.linspace(0.0, max(found - start, 0.0) / step, PARTS + 1)[:, None]
+    v, w = 1.0 - u, 3.0 - 2.0 * u
+    position = []
+    for i in rows:
+        yaw, speed = motion.heading[i, k : k + 2], motion.speed[i, k : k + 2]
+        way = step * speed[:, None] * np.stack([exact.cos(yaw), exact.sin(yaw)], axis=1)
+        p, q = motion.position[i, k], motion.position[i, k + 1]
+        position.append((1.0 + 2.0 * u) * v * v * p + u * v * v * way[0] + u * u * w * q - u * u * v * way[1])
+    heading = motion.heading[rows, k, None] + u[:, 0] * (motion.heading[rows, k + 1] - motion.heading[rows, k])[:, None]
+    vehicles = tuple(motion.vehicles[i] for i in rows)
+    flags = wrong(Motion(vehicles, step / PARTS, np.stack(position), heading, np.zeros_like(heading)))
+    return start + float(u[np.argmax(flags), 0]) * step if flags.any() else found
 
 
 def _collision(drive: Drive, at: float, who: int) -> Collision:
@@ -231,7 +254,14 @@ def _off_road(drive: Drive, road: Road) -> float:
         RESOLUTION,
         out,
     )
-    return math.nan if out[0, 0] == inside.PROVEN else float(out[0, 1])
+    if out[0, 0] == inside.PROVEN:
+        return math.nan
+
+    def off(fine: Motion) -> Bools:
+        poses = np.column_stack([fine.position[0], fine.heading[0]])
+        return ~footprint_fits(road, poses, vehicle.length, vehicle.width)
+
+    return _first(drive, ego, float(out[0, 1]), off)
 
 
 def _goal_time(loop: ClosedLoop, drive: Drive) -> float:

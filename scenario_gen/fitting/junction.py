@@ -31,10 +31,11 @@ from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
-from scenario_gen.fitting.kept import count_lost, refuse_lost_turns
+from scenario_gen.fitting.kept import count_lost, find_unused, refuse_lost_turns
 from scenario_gen.fitting.placement import check_scale, Equation, equations, find_relations, Placement, Relation, separated
+from scenario_gen.roads.arms import ring_of
 from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.roads.ways import draw_route, draw_u_turn, relative
+from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn, relative
 from scenario_gen.template.manoeuvre import in_words, manoeuvre_of, MOST_CHANGE, sharpness_of, turn_of
 from scenario_gen.template.tracks import Track
 from scenario_gen.types.encounter import Vehicle
@@ -174,9 +175,10 @@ def _all_ways(vehicle: Vehicle, road: Road, *, u_turns: bool, sharpness: float |
         return bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all())
 
     everything: list[_Way] = []
+    ring = ring_of(road)
     for e, entry in enumerate(road.entries):
         for x, leave in enumerate(road.exits):
-            curve = draw_route(entry, leave, fits, sharpness)
+            curve = draw_ring_route(entry, leave, *ring, fits) if ring else draw_route(entry, leave, fits, sharpness)
             if curve is not None:
                 everything.append(_Way(e, x, curve, float(curve.points[-1, 2] - curve.points[0, 2])))
             elif u_turns:
@@ -365,6 +367,8 @@ class _Solver:
     def start_by_turn(self, i: int, curve: Curve) -> float:
         """The start on a way that makes the vehicle turn where the way turns; on a straight one, its middle."""
         most = max(curve.length - float(self.driven[i, -1]), 0.0)
+        if max(abs(self._turn(i)), abs(float(curve.points[-1, 2] - curve.points[0, 2]))) < _TURNS:
+            return most / 2.0
         starts = np.linspace(0.0, most, int(np.ceil(most)) + 1)
         off = curve.at((starts[:, None] + self.driven[i]).ravel())[:, 2].reshape(len(starts), -1) - self.poses[i][:, 2]
         alike = exact.hypot(
@@ -467,5 +471,6 @@ def _placed(
     notes.append(f"assignment chosen at a cost of {choice.cost:.1f} m²")
     refuse_lost_turns(tracks, tuple(placed), road.name)
     n = len(tracks)
-    placement = Placement(tuple(placed), frozen(np.full(n, scale)), tuple(manoeuvres), frozen(np.zeros(n)), tuple(notes))
+    unused = find_unused(road, [way.curve.points[k] for way in choice.ways.values() for k in (0, -1)])
+    placement = Placement(tuple(placed), frozen(np.full(n, scale)), tuple(manoeuvres), frozen(np.zeros(n)), tuple(notes), unused)
     return separated(placement, config, sideways=0.0, own=tracks)

@@ -14,6 +14,7 @@
 
 """Is the manoeuvre kept? Turns, conflicts, who goes first and who is beside whom, of template and fit, over whole paths."""
 
+from collections.abc import Iterable
 from itertools import combinations
 
 import numpy as np
@@ -22,11 +23,13 @@ from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints, wrap_angle
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.placement import Placement
+from scenario_gen.roads.arms import arms_of, unused_arms
 from scenario_gen.template.interaction import Conflict, find_conflicts
 from scenario_gen.template.manoeuvre import in_words, keeps, turn_of
 from scenario_gen.template.tracks import Track
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Loss
+from scenario_gen.types.road import Road
 
 _LONG = 1.0  # s side by side that count
 _NEAREST, _FARTHEST = 1.0, 6.0  # metres sideways between centres of two vehicles that are beside each other
@@ -65,6 +68,21 @@ def count_lost(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> int:
     )
     gone = [pair for pair, conflict in before.items() if pair not in after or after[pair].first != conflict.first]
     return 2 * len(gone) + len(after.keys() - before.keys())
+
+
+def find_unused(road: Road, used: Iterable[Floats]) -> tuple[Loss, ...]:
+    """That arms of a junction are not used, given the poses (3,) at which vehicles' ways enter and leave it."""
+    arms, unused = len(arms_of(road)), len(unused_arms(road, used))
+    if not unused:
+        return ()
+    verb = "is" if unused == 1 else "are"
+    return (
+        Loss(
+            "arm",
+            (),
+            f"{unused} of the {arms} arms of road {road.name} {verb} not used: nobody in the template comes or goes there",
+        ),
+    )
 
 
 def find_losses(encounter: Encounter, tracks: tuple[Track, ...], placement: Placement) -> tuple[Loss, ...]:

@@ -27,7 +27,7 @@ from scenario_gen.arrays import Floats, frozen, wrap_angle
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
-from scenario_gen.fitting.kept import refuse_lost_turns
+from scenario_gen.fitting.kept import find_unused, refuse_lost_turns
 from scenario_gen.fitting.placement import check_scale, Placement, separated, share_with_room
 from scenario_gen.roads.arms import arms_of, reverse
 from scenario_gen.roads.clearance import footprint_fits
@@ -111,7 +111,9 @@ def _on_axis(tracks: tuple[Track, ...], frenet: FrenetTracks, axis: _Axis, road:
     notes = tuple(_note(track, i, frenet) for i, track in enumerate(tracks))
     if scale != 1.0:
         notes = (f"scaled by {scale:.3f} to fit the road's length", *notes)
-    placement = Placement(placed, frozen(np.full(len(tracks), scale)), manoeuvres, frozen(np.zeros(len(tracks))), notes)
+    ends = [axis.line.points[k] for k in (0, -1)]
+    unused = find_unused(road, ends)
+    placement = Placement(placed, frozen(np.full(len(tracks), scale)), manoeuvres, frozen(np.zeros(len(tracks))), notes, unused)
     return separated(placement, config, sideways=0.0, own=tracks)
 
 

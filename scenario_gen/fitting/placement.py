@@ -225,6 +225,21 @@ def equations(relation: Relation, one: Curve, two: Curve, scale: float) -> tuple
         return (Equation(((a, 1.0), (b, -1.0)), (one.length - la) - (two.length - lb), 1.0),)
     found = crossings(one, two, _ANGLE)
     if len(found) == 0:
+        found = _merging(one, two)
+    if len(found) == 0:
         return None
     at_a, at_b = found[len(found) // 2]
     return (Equation(((a, 1.0),), float(at_a) - la, 1.0), Equation(((b, 1.0),), float(at_b) - lb, 1.0))
+
+
+def _merging(one: Curve, two: Curve) -> Floats:
+    """(1, 2) stations from which on two routes run in one lane, as in a roundabout; (0, 2) if they never do so."""
+    s = np.arange(0.0, one.length, 1.0)
+    poses = one.at(s)
+    station, offset = two.project(poses[:, :2])
+    same = (np.abs(offset) < 1.0) & (np.abs(wrap_angle(two.at(station)[:, 2] - poses[:, 2])) < _SAME_WAY)
+    same &= (station > 0.0) & (station < two.length)
+    if not same.any() or same[0]:
+        return np.zeros((0, 2))
+    first = int(np.argmax(same))
+    return np.array([[s[first], station[first]]])

@@ -67,7 +67,7 @@ class LogConfig(Parameters):
     min_presence: float = parameter(
         3.0, "shortest time for which a vehicle is there that arrives late or leaves early", unit="s", low=0.5, high=600.0
     )
-    whole: bool = parameter(True, "cut an encounter to the time in which all its vehicles are there")
+    whole: bool = parameter(False, "cut an encounter to the time in which all its vehicles are there")
     size_limit: int = parameter(256, "largest log that is read, counted decompressed", unit="MiB", low=1, high=1_000_000)
     row_limit: int = parameter(2_000_000, "most rows or messages of a log", low=1)
     vehicle_limit: int = parameter(10_000, "most vehicles of a log", low=2)

@@ -34,7 +34,7 @@ from scenario_gen.errors import InputError
 from scenario_gen.parameters import parameter, Parameters, updated
 
 LIVE = "live"
-ROADS = ("straight", "curve", "t_intersection", "four_way", "merge", "corridor")
+ROADS = ("straight", "curve", "t_intersection", "four_way", "merge", "roundabout", "corridor")
 LEVELS = ("debug", "info", "warn", "error", "fatal")
 OTHER_NAMES = {"log": "log_path", "road": "road_name"}  # of arguments, as the nodes call them
 OF_LAUNCH = ("namespace", "params", "composed", "respawn", "log_level", "rviz")  # what is no parameter of a node

@@ -113,7 +113,7 @@ class Planner(StageNode):
         for topic, data in made.items():
             self.outputs.send(topic, data)
         self.get_logger().info(f"planned {len(routes)} routes through {len(anchors)} anchors")
-        statuses = fit_statuses(fit, self.get_fully_qualified_name(), template_hashes(messages))
+        statuses = fit_statuses(fit, self.get_fully_qualified_name(), template_hashes(messages), routes)
         self.diagnostics.report(*statuses, stamp_ns=encounter.start_ns)
 
     async def _get_plan(self, request: GetPlan.Request, response: GetPlan.Response) -> GetPlan.Response:

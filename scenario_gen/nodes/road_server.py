@@ -45,7 +45,9 @@ from scenario_gen.roads import build_road, RoadConfig
 class Config(Parameters):
     """The road server's parameters."""
 
-    road_name: str = parameter("t_intersection", "straight, t_intersection, four_way, corridor, or a map_server YAML file")
+    road_name: str = parameter(
+        "t_intersection", "straight, curve, t_intersection, four_way, merge, roundabout, corridor, or a map_server YAML file"
+    )
     wait_for_tracks: bool = parameter(False, "publish nothing until tracks say what the road is sized to")
     road: RoadConfig = field(default_factory=RoadConfig)
 

@@ -73,7 +73,7 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
         yield vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}"), stamp
     statuses = (
         segmentation_status(result.segmentation, "/segmenter", result.encounter.duration),
-        *fit_statuses(fit, "/planner", hashes),
+        *fit_statuses(fit, "/planner", hashes, result.routes),
     )
     yield "diagnostics", encode_diagnostics(statuses, stamp), stamp
     ego = result.generated.ego

@@ -24,6 +24,7 @@ from scenario_gen.report.data import case_data
 from scenario_gen.report.html import render_page
 from scenario_gen.types.evaluation import Evaluation, Interval
 from scenario_gen.types.generation import GenerationResult, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.route import legs_in_words, Route
 from scenario_gen.types.scenario import ScenarioSet
 
 SIGNIFICANT = 0.03
@@ -82,7 +83,8 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
     evaluation = case.evaluation
     duration = case.encounter.duration
     bounds = [*(float(case.encounter.time[i]) for i in (0, *case.segmentation.changepoints)), duration]
-    vehicles = zip(case.encounter.vehicles, case.fit.fitted, strict=True) if case.fit else ()
+    routes: Sequence[Route | None] = case.routes or [None] * len(case.encounter.vehicles)
+    vehicles = zip(case.encounter.vehicles, case.fit.fitted, routes, strict=True) if case.fit else ()
     return {
         "index": index,
         "case": case,
@@ -108,9 +110,18 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
             )
         ],
         "vehicles": [
-            {"id": v.id, "manoeuvre": f.manoeuvre, "scale": f.scale, "moved": float(f.moved.max()), "dwells": int(sum(f.stands))}
-            for v, f in vehicles
+            {
+                "id": v.id,
+                "manoeuvre": f.manoeuvre,
+                "scale": f.scale,
+                "moved": float(f.moved.max()),
+                "dwells": int(sum(f.stands)),
+                "route": r.figures() if r else {},
+            }
+            for v, f, r in vehicles
         ],
+        "remarks": [said for v, r in zip(case.encounter.vehicles, case.routes, strict=False) for said in r.remarks(v.id)],
+        "legs": legs_in_words(case.routes),
     }
 
 

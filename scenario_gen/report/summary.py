@@ -24,6 +24,7 @@ from rich.text import Text
 from scenario_gen.errors import printable
 from scenario_gen.types.evaluation import formatted, Interval
 from scenario_gen.types.generation import GenerationResult, WITH, WITHOUT
+from scenario_gen.types.route import legs_in_words
 from scenario_gen.types.scenario import Cause
 
 
@@ -61,11 +62,15 @@ def _case(case: GenerationResult) -> list[Text]:
     )
     kept = [] if found is None else _not_kept(found.values)
     remark = case.segmentation.remark(case.encounter.duration)
+    vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
+    routes = [said for vehicle, route in vehicles for said in route.remarks(vehicle.id)]
+    legs = legs_in_words(case.routes)
+    if legs:
+        figures.append(f"  routes: {legs}")
     return [
         title,
         figures,
-        *(Text(f"  {line}", style="yellow") for line in kept),
-        *([Text(f"  {remark}", style="yellow")] if remark else []),
+        *(Text(f"  {printable(line)}", style="yellow") for line in (*kept, *routes, *([remark] if remark else []))),
     ]
 
 

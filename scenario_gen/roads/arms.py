@@ -14,6 +14,7 @@
 
 """The arms of a road: where lanes in and lanes out lie side by side, and the line between them."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,8 @@ from scenario_gen.types.road import Road
 
 _PARALLEL = np.radians(3.0)
 _LEVEL = 0.5  # metres along the arm by which the ends of its lanes may differ
+_LARGEST_ISLAND = 60.0  # metres
+RING_ROOM = 0.5  # metres that a roundabout's lane is wider on each side
 _WIDEST = 40.0  # metres sideways
 
 
@@ -68,6 +71,37 @@ def arms_of(road: Road) -> tuple[Arm, ...]:
         pose = leave + middle * np.array([-exact.sin(leave[2]), exact.cos(leave[2]), 0.0])
         arms.append(Arm(frozen(pose), frozen(np.sort(in_offset - middle)), frozen(np.sort(out_offset - middle))))
     return tuple(arms)
+
+
+def unused_arms(road: Road, used: Iterable[Floats]) -> list[Arm]:
+    """The arms by which none of the given poses (3,) [m, m, rad] comes or goes; none on a road of two arms."""
+    arms = arms_of(road)
+    poses = list(used)
+    if len(arms) < 3:
+        return []
+    return [arm for arm in arms if not any(_beside(arm.pose, way) for pose in poses for way in (pose, reverse(pose)))]
+
+
+def ring_of(road: Road) -> tuple[Floats, float] | None:
+    """Centre (2,) [m] of a roundabout and the radius [m] of its lane: three arms or more that point to an island's middle."""
+    arms = arms_of(road)
+    if len(arms) < 3:
+        return None
+    normal = np.array([[-exact.sin(arm.pose[2]), exact.cos(arm.pose[2])] for arm in arms])
+    reach = (normal * np.stack([arm.pose[:2] for arm in arms])).sum(axis=1)
+    centre = exact.lstsq(normal, reach)
+    if np.abs((normal * centre).sum(axis=1) - reach).max() > _LEVEL or road.drivable_at(centre[None])[0]:
+        return None
+    out = np.arange(0.0, _LARGEST_ISLAND, road.resolution / 2.0)
+    islands = []
+    for arm in arms:
+        along = np.array([exact.cos(arm.pose[2]), exact.sin(arm.pose[2])])
+        free = road.drivable_at(centre + out[:, None] * along)
+        islands.append(float(out[np.argmax(free)]) if free.any() else 0.0)
+    width = 2.0 * min(float(np.abs(offsets).min()) for arm in arms for offsets in (arm.inward, arm.outward))
+    if max(islands) - min(islands) > 1.0 or min(islands) < 2.0:
+        return None
+    return frozen(centre), float(np.median(islands)) + width / 2.0 + RING_ROOM
 
 
 def _beside(pose: Floats, other: Floats) -> bool:

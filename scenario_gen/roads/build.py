@@ -16,12 +16,23 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.roads.builtin import BUILT_IN, draw, draw_corridor, draw_paper, junction_centre, layout_for
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.nav2 import read_map
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
-from scenario_gen.roads.shaped import bends, draw_along, draw_bent, draw_junction, draw_merge, fitting_width, PLAIN_LINE
+from scenario_gen.roads.shaped import (
+    bends,
+    draw_along,
+    draw_bent,
+    draw_junction,
+    draw_merge,
+    draw_roundabout,
+    fitting_width,
+    PLAIN_LINE,
+)
 from scenario_gen.roads.vector.read import is_vector_map, READERS, vector_road
 from scenario_gen.template.frenet import main_line, to_frenet
 from scenario_gen.template.separation import own_paths
@@ -34,7 +45,8 @@ def build_road(name_or_path: str, encounter: Encounter | None = None, config: Ro
     """Return the road `name_or_path`, with the obstacles of `config` drawn into it.
 
     Args:
-        name_or_path: `straight`, `curve`, `t_intersection`, `four_way`, `corridor`, or the path of a nav2 map_server YAML,
+        name_or_path: `straight`, `curve`, `t_intersection`, `four_way`, `merge`, `roundabout`, `corridor`, or the path of a
+            nav2 map_server YAML,
             or of a vector map (.osm, .xodr, .xml), of which `#box=x0,y0,x1,y1`, `#lanelet=ID` or `#junction=ID` chooses a part.
         encounter: the template, to which built-in roads are sized (None: plain sizes), and for which the best place on a vector
             map is searched; `corridor` cannot do without.
@@ -73,8 +85,12 @@ def _built_in(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -
     if tracks is None:
         if name == "curve":
             return draw_along(name, PLAIN_LINE, max(config.lanes, 1), config)
+        if name == "roundabout":
+            return draw_roundabout(None, np.zeros(2), config)
         return draw_merge(None, None, config) if name == "merge" else draw(name, layout_for(name, None, config), config)
     config = fitting_width(tracks, config)
+    if name == "roundabout":
+        return draw_roundabout(tracks, junction_centre(tracks), config)
     try:
         frenet = to_frenet(tracks)
     except RefusedError:  # turns or crossings: a junction's template

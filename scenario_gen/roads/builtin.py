@@ -36,6 +36,7 @@ _ARMS = {
     "t_intersection": ("west", "east", "south"),
     "four_way": ("west", "east", "south", "north"),
     "merge": ("west", "east"),
+    "roundabout": ("west", "east", "south", "north"),
 }
 _OUTWARD = {"west": np.pi, "east": 0.0, "south": -np.pi / 2.0, "north": np.pi / 2.0}
 

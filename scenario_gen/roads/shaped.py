@@ -28,15 +28,18 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats, wrap_angle
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
+from scenario_gen.roads.arms import RING_ROOM
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.sketch import Sketch
-from scenario_gen.roads.ways import draw_route, extended
+from scenario_gen.roads.ways import draw_ring_route, draw_route, extended
 from scenario_gen.template.frenet import FrenetTracks, main_line, MainLine
 from scenario_gen.template.manoeuvre import sharpness_of, turn_of
 from scenario_gen.template.tracks import Track
 from scenario_gen.types.road import Road
 
-ARM_COUNT = {"straight": 2, "curve": 2, "t_intersection": 3, "four_way": 4}
+ARM_COUNT = {"straight": 2, "curve": 2, "t_intersection": 3, "four_way": 4, "roundabout": 4}
+_RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane
+_RING_LATERAL, _RING_FASTEST = 3.0, 4.0  # m/s² at the template's fastest: as it is sized, and at most
 _RAMP_ANGLE = np.radians(12.0)
 _ROOM = 6.0  # metres kept free behind the first and before the last footprint
 _SLACK = 12.0  # metres by which a way may differ from the template's
@@ -268,6 +271,60 @@ def draw_junction(name: str, tracks: tuple[Track, ...], centre: Floats, config: 
                 inside = way.cut(track.vehicle.length / 2.0, way.length - track.vehicle.length / 2.0)
                 sketch.sweep(inside, track.vehicle.length, track.vehicle.width + 2.0 * _SWEPT)
     return _finished(name, sketch, arms, config)
+
+
+def draw_roundabout(tracks: tuple[Track, ...] | None, centre: Floats, config: RoadConfig) -> Road:
+    """Draw a roundabout of one lane, as large as the template's speeds need, with arms where it comes and goes.
+
+    Args:
+        tracks: the template's; None: plain sizes.
+        centre: (2,) [m] of the template's junction.
+        config: how it is drawn.
+
+    Raises:
+        RefusedError: the template drives too fast for it, side by side, or by more than four arms.
+    """
+    fastest, plans = 6.0, [_Plan(k * np.pi / 2.0, []) for k in range(4)]
+    if tracks is not None:
+        fastest = max(float(track.speed[track.present[0] : track.present[1] + 1].max()) for track in tracks)
+        plans = _arms("roundabout", tracks, [end for i, track in enumerate(tracks) for end in _ends(i, track, centre)])
+    radius = float(np.clip(np.square(fastest) / _RING_LATERAL, *_RING))
+    if fastest > np.sqrt(_RING_FASTEST * radius):
+        possible = float(np.sqrt(_RING_FASTEST * _RING[1]))
+        raise RefusedError(
+            f"road roundabout: the template drives up to {fastest:.1f} m/s, and the largest one ({_RING[1]:g} m) allows "
+            f"{possible:.1f} m/s; choose four_way or curve"
+        )
+    turn = np.pi - plans[0].yaw
+    sketch, arms, width = Sketch(), [], config.lane_width
+    for plan in plans:
+        most = max((lane for lane in _lanes(plan, centre, config)[1].values()), default=0) if plan.members else 0
+        both = len({end.inward for end in plan.members}) == 2
+        if tracks is not None and most > 0 and not both:
+            raise RefusedError(f"road roundabout has one lane, and the template drives in {most + 1} beside each other")
+        needs = [end.away + tracks[end.vehicle].vehicle.length / 2.0 for end in plan.members] if tracks is not None else []
+        reach = config.arm_length or max(max(needs, default=0.0) + _ROOM + 2.0 * _SLACK, radius + _SHORTEST)
+        yaw = plan.yaw + turn
+        out = np.array([exact.cos(yaw), exact.sin(yaw)])
+        arm = _ArmPlan(np.array([*(reach * out), yaw]), 1, 1)
+        sketch.strip(Curve(np.array([[*(radius * out), yaw], arm.pose])), -width, width)
+        arms.append(arm)
+    around = np.linspace(0.0, 2.0 * np.pi, 97)
+    unit = np.column_stack((exact.cos(around), exact.sin(around)))
+    half = width / 2.0 + RING_ROOM
+    sketch.drivable.append((radius + half) * unit)
+    sketch.islands.append((radius - half) * unit)
+    length, wide = 5.0, 2.0
+    if tracks is not None:
+        length, wide = (max(getattr(track.vehicle, name) for track in tracks) for name in ("length", "width"))
+    for a in arms:
+        for b in arms:
+            way = draw_ring_route(
+                a.lane(0, config, inward=True), b.lane(0, config, inward=False), np.zeros(2), radius, lambda _: True
+            )
+            if way is not None:
+                sketch.sweep(way.cut(length / 2.0, way.length - length / 2.0), length, wide + 2.0 * _SWEPT)
+    return _finished("roundabout", sketch, arms, config)
 
 
 def _ends(i: int, track: Track, centre: Floats) -> list[_End]:

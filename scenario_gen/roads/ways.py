@@ -40,6 +40,7 @@ _PLAIN = 0.09  # 1/m, where nothing is known of the vehicle
 _LAST = (0.13, 0.155, 0.18, _TIGHTEST)  # 1/m, with short ramps: what a car can just drive
 _STEEPEST_SHIFT = 0.05  # 1/m, curvature of a change of lanes on the way
 _WIDEST_SHIFT = 12.0  # metres sideways
+_FLARE = 14.0  # metres, radius of the bends into a roundabout and out of it
 _TIGHTEST_U_TURN = 6.0  # metres
 
 
@@ -89,6 +90,48 @@ def draw_u_turn(entry: Floats, leave: Floats, apex: float, fits: Fits) -> Curve 
     signed = np.copysign(radius, left)
     arc = np.column_stack((signed * exact.sin(angle), signed * (1.0 - exact.cos(angle)), angle))
     return _accepted(_joined(entry, apex, arc, apex - ahead), fits)
+
+
+def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float, fits: Fits) -> Curve | None:
+    """The way from an entry pose (3,) to an exit pose about a roundabout, or None if there is none.
+
+    Args:
+        entry: where it begins; who has the centre on the left goes about it counter-clockwise, else clockwise.
+        leave: where it ends.
+        centre: (2,) [m] of the roundabout.
+        radius: [m] of its lane.
+        fits: whether poses (M, 3) have room.
+    """
+    ahead, left = relative(entry, centre)
+    behind, right = relative(leave, centre)
+    side = 1.0 if left > 0.0 else -1.0
+    if ahead < radius or -behind < radius or right * side < 0.0:
+        return None
+    bends = []
+    for distance, aside in ((ahead, abs(left)), (-behind, abs(right))):
+        along = float(np.sqrt(np.square(radius + _FLARE) - np.square(aside + _FLARE)))  # from the bend's centre to the ring's
+        if distance - along < 0.5:
+            return None
+        bends.append((distance - along, float(exact.arctan2(along, aside + _FLARE))))
+    (before, first), (after, last) = bends
+    about = float(((leave[2] - entry[2]) * side + first + last) % (2.0 * np.pi))
+    pieces = ((before, 0.0), (_FLARE * first, -side / _FLARE), (radius * about, side / radius), (_FLARE * last, -side / _FLARE))
+    yaw, steps = [0.0], []
+    for length, curvature in (*pieces, (after, 0.0)):
+        count = max(round(length / _STEP), 1)
+        yaw += (yaw[-1] + curvature * length * np.arange(1, count + 1) / count).tolist()
+        steps += [length / count] * count
+    lengths = np.array(steps)
+    turned = np.array(yaw)
+    middle = (turned[1:] + turned[:-1]) / 2.0
+    xy = np.vstack(
+        (np.zeros((1, 2)), np.cumsum(lengths[:, None] * np.column_stack((exact.cos(middle), exact.sin(middle))), axis=0))
+    )
+    end = np.array(relative(entry, leave[:2]))
+    if exact.hypot(*(xy[-1] - end)) > 1.0:
+        return None
+    xy += np.linspace(0.0, 1.0, len(xy))[:, None] * (end - xy[-1])  # what rounding leaves
+    return _accepted(Curve(np.column_stack((_placed(entry, xy), entry[2] + turned))), fits)
 
 
 def relative(pose: Floats, xy: Floats) -> tuple[float, float]:

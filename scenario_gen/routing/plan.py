@@ -53,7 +53,8 @@ SOFT_WEIGHT = 0.1  # weight of an anchor that is no waypoint
 FIRMNESS = ((1.0, 12), (10.0, 12), (100.0, 12), (1000.0, 24))  # by which a guess is held, ever more firmly, and rounds for each
 DIRECT_HOLD, PATH_HOLD = 0.3, 0.1
 GUIDE_STRIDE = 10  # poses of a guide that are left out between two
-AGAINST, ASIDE = 3.0, 1.0  # how dear it is to leave a leg's direct line towards oncoming traffic, and the other way
+AGAINST = 3.0  # times as dear as the other way it is to leave a leg's direct line towards oncoming traffic
+HALF_LANE = 1.75  # [m] that far towards it is one's own side
 LACK = 1.0  # price of a metre without the room wished for, beside the metre itself
 ROOMY = 0.05  # [m] more on every side than a footprint needs
 TIGHTEST = 0.97  # share of the largest curvature that a search may use: smoothing needs some
@@ -131,6 +132,26 @@ def deviations(route: Route, fitted: FittedVehicle) -> Floats:
     return np.asarray(exact.hypot(*(route.points[route.anchor, :2] - fitted.anchors[:, :2]).T))
 
 
+def farthest(points: Floats, path: Floats) -> float:
+    """Largest distance [m] between two polylines (M, 2 or more), from a point of either to the other; NaN: there is no path."""
+    if not len(path):
+        return float("nan")
+    one, other = points[:, :2], path[:, :2]
+    return max(float(_from_line(one, other).max()), float(_from_line(other, one).max()))
+
+
+def _from_line(points: Floats, line: Floats) -> Floats:
+    """Distance (M,) of points (M, 2) to a polyline (P, 2)."""
+    if len(line) == 1:
+        return np.asarray(exact.hypot(*(points - line[0]).T))
+    edge = np.diff(line, axis=0)
+    square = np.maximum(np.square(edge).sum(axis=1), 1e-12)
+    rel = points[:, None] - line[None, :-1]
+    along = np.clip((rel * edge).sum(axis=-1) / square, 0.0, 1.0)
+    off = rel - along[..., None] * edge
+    return np.asarray(np.sqrt(np.square(off).sum(axis=-1)).min(axis=1))
+
+
 def make_planner(config: PlanningConfig) -> Planner:
     """The geometric planner that `config` names."""
     if config.planner == "rrt_star_connect":
@@ -164,7 +185,8 @@ def _route(task: _Task) -> Route:
         curve = smooth(task.road, task.vehicle, anchors[0], anchors[-1], targets, held, task.config, rounds)
         if curve.curvature <= task.config.max_curvature and not len(curve.off_road):
             route = _sampled(task, curve.poses, curve.length)
-            return replace(route, joined=len(legs) - searched, searched=searched, left_out=left_out)
+            far = farthest(route.points, task.fitted.path)
+            return replace(route, joined=len(legs) - searched, searched=searched, left_out=left_out, farthest=far)
     assert curve is not None
     raise RefusedError(_reason(task, curve))
 
@@ -281,13 +303,15 @@ def _searched_poses(task: _Task, a: int, b: int, start: Floats, end: Floats, pat
     """
     config, vehicle = task.config, task.vehicle
     guide = next(candidates(start, end, config.max_curvature))[::GUIDE_STRIDE]
-    left, right = (AGAINST, ASIDE) if config.traffic_side == "right" else (ASIDE, AGAINST)
-    wishes = Wishes(config.margin, LACK, guide, config.keep_side * left, config.keep_side * right)
+    free = Wishes(config.margin, LACK, guide, *_sides(config, config.keep_side * AGAINST, config.keep_side))
+    most_left, most_right = _sides(config, HALF_LANE, np.inf)
+    own = replace(free, about=_own_side(guide, config), most_left=most_left, most_right=most_right)
+    attempts = [(own, ROOMY), (free, ROOMY), (free, 0.0)] if config.keep_side > 0.0 else [(free, ROOMY), (free, 0.0)]
     planner = PoseRrtStarConnect(config.pose)
     where = f"between {task.name(a)} and {task.name(b)}"
     limit = TIGHTEST * config.max_curvature
     error: RefusedError | None = None
-    for extra in (ROOMY, 0.0):
+    for wishes, extra in attempts:
         query = PoseQuery(start, end, vehicle.length + 2.0 * extra, vehicle.width + 2.0 * extra, limit)
         try:
             try:
@@ -308,6 +332,18 @@ def _searched_poses(task: _Task, a: int, b: int, start: Floats, end: Floats, pat
             error = RefusedError(f"{task.name(a if reason.end == 'start' else b)} is blocked: {reason}")
     assert error is not None
     raise error
+
+
+def _sides(config: PlanningConfig, against: float, away: float) -> tuple[float, float]:
+    """What holds left and right, of what holds towards oncoming traffic and away from it."""
+    return (against, away) if config.traffic_side == "right" else (away, against)
+
+
+def _own_side(guide: Floats, config: PlanningConfig) -> Floats:
+    """Poses on a guide (G, 3), and some metres beside it, away from oncoming traffic."""
+    sign = 1.0 if config.traffic_side == "right" else -1.0
+    aside = sign * np.column_stack((exact.sin(guide[:, 2]), -exact.cos(guide[:, 2]), np.zeros(len(guide))))
+    return np.concatenate([guide + metres * aside for metres in (0.0, 1.0, 2.0, 3.0)])
 
 
 def _radius(task: _Task, start: Floats, end: Floats) -> float:

@@ -63,7 +63,7 @@ class Lane:
 
     @cached_property
     def outline(self) -> Floats:
-        """(2 M, 2) metres: the left border forth and the right border back."""
+        """(2M, 2) metres: the left border forth and the right border back."""
         return frozen(np.concatenate((self.left, self.right[::-1])))
 
 

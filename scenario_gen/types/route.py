@@ -14,9 +14,15 @@
 
 """A route: the geometry one vehicle drives, without time."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+import math
+from typing import Any
 
 from scenario_gen.arrays import canonical_poses, Floats, frozen, frozen_ints, Ints
+
+FAR_OFF = 1.5
+"""Metres between a route and its fitted path from which on it is said."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +36,7 @@ class Route:
         joined: legs between waypoints that a direct curve joined at once; None where it is not known (a bag).
         searched: legs that were searched for; likewise.
         left_out: anchors that no free way leads through, so that the route passes them as near as it may.
+        farthest: largest distance [m] between the route and the fitted path, seen from either; NaN where it is not known.
     """
 
     points: Floats
@@ -38,8 +45,39 @@ class Route:
     joined: int | None = None
     searched: int | None = None
     left_out: tuple[int, ...] = ()
+    farthest: float = float("nan")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", canonical_poses(self.points, continuous=True))
         object.__setattr__(self, "anchor", frozen_ints(self.anchor))
         object.__setattr__(self, "length", frozen(self.length))
+
+    def figures(self) -> dict[str, Any]:
+        """Return what is known of how it was planned, ready for JSON: legs, anchors left out, distance to the fitted path [m]."""
+        return {
+            "legs_joined": self.joined,
+            "legs_searched": self.searched,
+            "anchors_left_out": list(self.left_out),
+            "farthest_from_fit_m": None if math.isnan(self.farthest) else round(self.farthest, 3),
+        }
+
+    def remarks(self, vehicle: str) -> list[str]:
+        """Return sentences about what a user should know: far from the fitted path, anchors left out."""
+        said = []
+        if self.farthest > FAR_OFF:
+            said.append(f"vehicle {vehicle}: its route passes {self.farthest:.1f} m from its fitted path")
+        if self.left_out:
+            which = ", ".join(str(k) for k in self.left_out)
+            said.append(
+                f"vehicle {vehicle}: no free way leads through its changepoint {which} as fitted; its route passes beside"
+            )
+        return said
+
+
+def legs_in_words(routes: Sequence[Route]) -> str:
+    """Return how many legs of some routes were joined at once and how many searched for; nothing where it is not known."""
+    known = [(route.joined, route.searched) for route in routes if route.joined is not None and route.searched is not None]
+    if not known:
+        return ""
+    joined, searched = (sum(int(each[k]) for each in known) for k in (0, 1))
+    return f"{joined} legs joined at once, {searched} searched for"

@@ -165,9 +165,22 @@ class Checker:
             ends = zip(scenario.position[:, k].tolist(), scenario.speed[:, k].tolist(), asked.tolist(), strict=True)
             for i, ((x, y), speed, (x_asked, y_asked, _, speed_asked)) in enumerate(ends):
                 distance, difference = exact.hypot(x - x_asked, y - y_asked), abs(speed - speed_asked)
-                if distance > limits.position_tolerance + 1e-9 or difference > limits.speed_tolerance + 1e-9:
+                far, off = self._within_a_step(scenario, i, k)
+                if distance > limits.position_tolerance + far + 1e-9 or difference > limits.speed_tolerance + off + 1e-9:
                     message = f"vehicle {i}: {name} is {distance:.3f} m and {difference:.3f} m/s from what was asked"
                     yield Violation(Cause.BOUNDARY_STATE, float(scenario.time[scenario.present[i, k]]), (i,), message)
+
+    @staticmethod
+    def _within_a_step(scenario: Scenario, i: int, k: int) -> tuple[float, float]:
+        """Metres and m/s that vehicle i drives and changes in one step where it comes or goes within the scenario, else 0.
+
+        It comes and goes between two instants, and is shown from the first one after it came to the last one before it went.
+        """
+        at = int(scenario.present[i, k])
+        if at in {0, len(scenario.time) - 1}:
+            return 0.0, 0.0
+        step = float(scenario.time[at + 1] - scenario.time[at]) if k else float(scenario.time[at] - scenario.time[at - 1])
+        return step * float(scenario.speed[i, at]), step * abs(float(scenario.acceleration[i, at]))
 
     def _dynamics(self, scenario: Scenario) -> Iterator[Violation]:
         out = np.empty((len(scenario.vehicles), len(dynamics.Check), 4))

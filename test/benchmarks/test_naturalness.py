@@ -17,7 +17,7 @@
 import numpy as np
 import pytest
 
-from benchmarks._naturalness_classifier import FEATURES, windows
+from benchmarks._naturalness_classifier import FEATURES, GROUPS, told_apart, Windows, windows
 from benchmarks._naturalness_cuts import cuts
 from benchmarks._naturalness_motion import displacement, extrema, keeps_turn, roughness, sign_changes, Signals, turns
 
@@ -88,3 +88,21 @@ def test_the_list_of_cuts_is_whole_and_its_last_third_is_apart():
     for k, (file, vehicle, start, end) in enumerate(times):
         for other, name, begin, until in times[:k]:
             assert (file, vehicle) != (other, name) or end <= begin or until <= start, (file, vehicle, start)
+
+
+@pytest.mark.long()
+def test_the_classifier_tells_rough_from_calm_and_calm_from_calm_not():
+    time = 0.1 * np.arange(101)
+    rng = np.random.default_rng(0)
+
+    def drives(noise):
+        phase, size = rng.uniform(0.0, 6.0), rng.uniform(0.5, 2.0)
+        return [drive(8.0 + size * np.sin(time + phase) + rng.normal(0.0, noise, 101)) for _ in range(2)]
+
+    calm = [drives(0.01) for _ in range(8)]
+    alike = [Windows(str(k), windows(one), windows(other)) for k, (one, other) in enumerate(calm)]
+    rough = [Windows(str(k), windows(one), windows(drives(0.05)[0])) for k, (one, _) in enumerate(calm)]
+    told = told_apart(rough, GROUPS["longitudinal"], importances=True)
+    assert told.area > 0.95 and told.giveaways(1).startswith(("jerk", "acceleration", "speed: high"))
+    assert told_apart(alike, GROUPS["longitudinal"]).area < 0.75
+    assert told_apart(rough[:4], GROUPS["lateral"]) is None  # fewer than folds

@@ -17,13 +17,13 @@
 from dataclasses import replace
 from itertools import combinations
 
-from driving_worlds import Anything, as_scenario, draw_scenario, PERIOD, Witness
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lengths import LONG
 import numpy as np
 import pytest
 
+from benchmarks._driving_worlds import Anything, as_scenario, draw_scenario, PERIOD, Witness
 from scenario_gen.closed_loop.certified import certified
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose

@@ -14,12 +14,12 @@
 
 """The Gymnasium environment keeps Gymnasium's promises, is deterministic, and runs many at once."""
 
-from driving_worlds import draw_scenario
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import SyncVectorEnv
 import numpy as np
 import pytest
 
+from benchmarks._driving_worlds import draw_scenario
 from scenario_gen.closed_loop.environment import DriveEnv
 from scenario_gen.closed_loop.trials import Trial
 from scenario_gen.errors import InputError

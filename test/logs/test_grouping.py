@@ -46,7 +46,8 @@ def test_a_vehicle_that_is_there_for_most_of_it_shortens_the_encounter(tmp_path)
 
 
 def test_a_vehicle_that_is_there_for_little_is_left_out(tmp_path):
-    found, quality = groups(tmp_path, car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0, 4, 20, 0, 8))
+    cars = (car("1", 0, 20, 0, 0, 8), car("2", 0, 20, 0, 4, 8), car("3", 0, 4, 20, 0, 8))
+    found, quality = groups(tmp_path, *cars, whole=True)
     assert found == [("1,2", 20.0)]
     assert quality.notes == ("vehicle 3 is in no encounter: there for 4.0 s",)
 

@@ -18,6 +18,7 @@ It proves nothing (an instant between two of its own goes unseen), but shares no
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from itertools import combinations
 
@@ -85,6 +86,8 @@ def oracle_violations(
 ) -> list[str]:
     """Return a sentence for each thing wrong with `scenario` at instants at most `dt` [s] apart; None skips a check."""
     limits = limits or Limits()
+    if not scenario.all_present:
+        return list(_while_there(scenario, road, asked, conflicts or (), waits or (), limits, dt))
     fields = (scenario.time, scenario.position, scenario.heading, scenario.speed, scenario.acceleration)
     if not all(np.isfinite(values).all() for values in fields) or not (np.diff(scenario.time) > 0).all():
         return ["not_finite: a value is not finite or time does not increase"]
@@ -100,6 +103,40 @@ def oracle_violations(
         *_orders(instants, position, boxes, conflicts or ()),
         *_stands(scenario, instants, velocity, asked, waits or (), limits),
     ]
+
+
+def _while_there(scenario, road, asked, conflicts, waits, limits, dt):
+    """Each vehicle, and each pair while both are there, as a scenario of its own; orders only of who is there throughout."""
+    always = [i for i, (first, last) in enumerate(scenario.present) if (first, last) == (0, len(scenario.time) - 1)]
+    for rows in [[i] for i in range(len(scenario.vehicles))] + [list(p) for p in combinations(range(len(scenario.vehicles)), 2)]:
+        first, last = scenario.present[rows, 0].max(), scenario.present[rows, 1].min()
+        if last <= first:
+            continue
+        own = slice(first, last + 1)
+        values = (getattr(scenario, name)[rows, own] for name in ("position", "heading", "speed", "acceleration"))
+        part = Scenario(tuple(scenario.vehicles[i] for i in rows), scenario.time[own], *values)
+        if len(rows) == 2:
+            both = [
+                replace(c, first=rows.index(c.first), second=rows.index(c.second))
+                for c in conflicts
+                if {c.first, c.second} == set(rows)
+            ]
+            yield from oracle_violations(part, None, None, both if set(rows) <= set(always) else None, None, limits, dt)
+            continue
+        states = None if asked is None else BoundaryStates(asked.start[rows], asked.end[rows])
+        wide = limits
+        if rows[0] not in always:  # it comes and goes between two instants
+            step = np.diff(part.time).max()
+            far, off = step * part.speed.max(), step * np.abs(part.acceleration).max()
+            wide = replace(
+                limits, position_tolerance=limits.position_tolerance + far, speed_tolerance=limits.speed_tolerance + off
+            )
+        alone = [
+            replace(wait, vehicle=0, start=0.0 if wait.start == part.time[0] else wait.start)
+            for wait in waits
+            if wait.vehicle == rows[0]
+        ]
+        yield from oracle_violations(part, road, states, None, alone, wide, dt)
 
 
 def _overlaps(instants, boxes, limits):

@@ -270,6 +270,8 @@ def _may_change(border: _Border, *, to_right: bool) -> bool:
     for key in (f"lane_change:{'right' if to_right else 'left'}", "lane_change"):
         if key in tags:
             return tags[key] in ("yes", "true")
+    if tags.get("type") not in ("line_thin", "line_thick"):
+        return False
     from_left, from_right = _CHANGE.get(tags.get("subtype", ""), (False, False))
     if not border.forth:
         from_left, from_right = from_right, from_left

@@ -111,7 +111,7 @@ class Chains:
         return self._curves[chain]
 
     def near(self, pose: Floats) -> list[int]:
-        """Lanes that pass a pose (3,) nearby, about its way; the nearest first."""
+        """Lanes that pass a pose (3,) x, y [m], yaw [rad] nearby, about its way; the nearest first."""
         away = exact.hypot(self.points[:, 0] - pose[0], self.points[:, 1] - pose[1])
         fits = (away <= NEAR) & (np.abs(wrap_angle(self.yaws - pose[2])) <= _HEADING)
         found: dict[int, float] = {}
@@ -239,7 +239,7 @@ def _beside(network: LaneNetwork, one: tuple[int, ...], other: tuple[int, ...]) 
 
 
 def changed_curve(one: Curve, other: Curve, at: Floats) -> Curve | None:
-    """A curve that changes smoothly (x³(10 − 15x + 6x²)) from one curve to another around a place (2,)."""
+    """A curve that changes smoothly (x³(10 − 15x + 6x²)) from one curve to another around a place (2,) [m]."""
     station = float(one.project(at[None])[0][0])
     _, offset = other.project(one.at(np.array([station]))[:, :2])
     width = abs(float(offset[0]))

@@ -65,7 +65,13 @@ def cubics(records: list[Element], offset: str) -> Cubics:
 
 @dataclass(frozen=True, eq=False)
 class ReferenceLine:
-    """The plan view of a road: pieces of geometry, one after the other."""
+    """The plan view of a road: pieces of geometry, one after the other.
+
+    Attributes:
+        begin: (K,) metres along the road at which each piece begins.
+        pieces: K elements.
+        length: of the road, metres.
+    """
 
     begin: Floats
     pieces: tuple[Element, ...]

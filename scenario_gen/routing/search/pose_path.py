@@ -122,7 +122,7 @@ def _prices(
         a, b = (0.0, path[k, 4]) if path[k, 3] == 0.0 else (path[k, 4], 0.0)
         _, price[k] = follow(
             clearance, blocked, path[k - 1, 0], path[k - 1, 1], path[k - 1, 2], word, a, b, 0.0, setting[TURN],
-            setting[HALF_LENGTH], setting[HALF_WIDTH], setting[SWEEP], setting[WISH : WISH + 4], guide, low, high,
+            setting[HALF_LENGTH], setting[HALF_WIDTH], setting[SWEEP], setting[WISH : WISH + 6], guide, low, high,
         )  # fmt: skip
 
 
@@ -170,7 +170,7 @@ def shorten(  # noqa: PLR0912
             continue
         free, cost = follow(
             clearance, blocked, path[i, 0], path[i, 1], path[i, 2], word, a, b, c, radius, setting[HALF_LENGTH],
-            setting[HALF_WIDTH], setting[SWEEP], setting[WISH : WISH + 4], guide, low, high,
+            setting[HALF_WIDTH], setting[SWEEP], setting[WISH : WISH + 6], guide, low, high,
         )  # fmt: skip
         if free < np.inf or cost >= old - 1e-3:
             continue

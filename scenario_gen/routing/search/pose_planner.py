@@ -13,7 +13,6 @@
 # limitations under the License.
 """RRT*-Connect in the vehicle's own space: from pose to pose for a rectangle that turns no tighter than a curvature allows."""
 
-from contextlib import suppress
 from dataclasses import dataclass, field
 import math
 from time import thread_time
@@ -22,7 +21,6 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, wrap_angle
-from scenario_gen.errors import RefusedError
 from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.roads.clearance import clearance_in_cells, footprint_fits, to_cells, to_metres
 from scenario_gen.roads.connectivity import common_component, component_cells
@@ -30,7 +28,7 @@ from scenario_gen.routing.search import pose_tree as trees
 from scenario_gen.routing.search import tree_nodes as shared
 from scenario_gen.routing.search.planner import BlockedError, Budget, BudgetSpentError, NoWayError, Query
 from scenario_gen.routing.search.pose_path import shorten, trace
-from scenario_gen.routing.search.rrt_star_connect import RrtStarConnect
+from scenario_gen.routing.search.rrt_star_connect import RrtStarConnect, RrtStarConnectConfig, string_pulled
 from scenario_gen.routing.search.sweep import blocked_before, SWEEP
 from scenario_gen.types.road import Road
 
@@ -40,6 +38,7 @@ BATCH = 64  # iterations between two looks at the clock
 DISCS = (0.0, 0.25, 0.05)  # [m] by which the discs are wider than the footprint whose paths are sampled about, one after another
 DISC_BUDGET = 5000  # iterations for such a path
 ANOTHER = 512  # iterations after which another one is taken, if there is no path yet
+DISC = RrtStarConnect(RrtStarConnectConfig(pull=False))
 NOWHERE = np.empty((0, 3))
 
 
@@ -56,6 +55,7 @@ class PoseSearchConfig(Parameters):
     about: float = parameter(0.7, "share of samples about a path that is known, a disc's or the best so far", low=0.0, high=0.95)
     spread: float = parameter(1.0, "how far from it", unit="m", low=0.05, high=20.0)
     yaw_spread: float = parameter(0.4, "and from its heading", unit="rad", low=0.01, high=3.2)
+    improve: int = parameter(200, "iterations for a better path, once there is one", low=0, high=10_000_000)
     shortcuts: int = parameter(
         150, "pairs of poses between which a shorter curve is tried, whenever a better path is found", low=0
     )
@@ -71,6 +71,9 @@ class Wishes:
         guide: (G, 3) poses of a line to keep to; none: no side is dearer than the other.
         left: price of a metre driven a metre left of it.
         right: likewise right of it.
+        most_left: farthest left of it [m]; what lies beyond is closed.
+        most_right: likewise right of it.
+        about: (G, 3) poses to sample about; none: those of a disc's path.
     """
 
     room: float = 0.0
@@ -78,6 +81,9 @@ class Wishes:
     guide: Floats = field(default_factory=lambda: NOWHERE)
     left: float = 0.0
     right: float = 0.0
+    most_left: float = math.inf
+    most_right: float = math.inf
+    about: Floats = field(default_factory=lambda: NOWHERE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +123,7 @@ class _Search:
 
     def __init__(self, road: Road, query: PoseQuery, wishes: Wishes, config: PoseSearchConfig, seed: int) -> None:
         cell = road.resolution
-        self.road, self.query = road, query
+        self.road, self.query, self.wishes = road, query, wishes
         self.clearance, self.blocked = clearance_in_cells(road), blocked_before(road)
         self.ends = np.stack([_in_cells(road, pose) for pose in (query.start, query.goal)])
         self.free_cells = np.zeros(1, dtype=np.int64)
@@ -129,7 +135,8 @@ class _Search:
         self.setting[trees.TURN] = 1.0 / (query.curvature * cell)
         self.setting[[trees.HALF_LENGTH, trees.HALF_WIDTH]] = 0.5 * query.length / cell, 0.5 * query.width / cell
         self.setting[trees.SWEEP] = SWEEP / cell
-        self.setting[trees.WISH : trees.WISH + 4] = wishes.room / cell, wishes.lack, wishes.left * cell, wishes.right * cell
+        prices = wishes.room / cell, wishes.lack, wishes.left * cell, wishes.right * cell
+        self.setting[trees.WISH : trees.WISH + 6] = *prices, wishes.most_left / cell, wishes.most_right / cell
         self.setting[[trees.ABOUT, trees.SPREAD, trees.YAW_SPREAD]] = config.about, config.spread / cell, config.yaw_spread
         self.counter = np.zeros(shared.COUNTERS, dtype=np.int64)
         self.counter[shared.CONNECTION] = -1
@@ -204,7 +211,9 @@ class PoseRrtStarConnect:
         self.config = config
 
     def plan(self, road: Road, query: PoseQuery, budget: Budget, seed: int, wishes: Wishes = Wishes()) -> PosePlan:
-        """Return the best path found within the budget; with one in iterations it depends on the seed only.
+        """Return the best path found within the budget: its iterations are those for a first path, `improve` more follow.
+
+        With a budget in iterations the answer depends on the seed only.
 
         Raises:
             BlockedError: the footprint has no room at start or goal.
@@ -222,10 +231,10 @@ class PoseRrtStarConnect:
                     f"{query.length:.2f} m by {query.width:.2f} m",
                 )
         search = _Search(road, query, wishes, self.config, seed)
-        look = 1  # iteration at which the way of a disc is looked for
+        look, end = 1, 0  # iterations at which the way of a disc is looked for, and at which enough was made for a better path
         search.grow(1)  # the direct curve
         best: Floats | None = None
-        cost, known, batch = np.inf, np.inf, BATCH
+        cost, known = np.inf, np.inf
         history: list[tuple[int, float, float]] = []
         straight = float(exact.hypot(*(search.ends[1] - search.ends[0])[:2]))
         while not (budget.cancelled and budget.cancelled()):
@@ -237,15 +246,17 @@ class PoseRrtStarConnect:
                     history.append((int(search.counter[shared.ITERATION]), thread_time() - started, cost * road.resolution))
                     if search.about is not NOWHERE:
                         search.about = np.ascontiguousarray(path[:, :3])
-                search.setting[shared.STEP] = self.config.stride / road.resolution
+                if len(history) <= 1:
+                    search.setting[shared.STEP] = self.config.stride / road.resolution
+                    end = int(search.counter[shared.ITERATION]) + self.config.improve
             if best is not None and (budget.first or cost <= straight * (1.0 + 1e-9) or search.about is NOWHERE):
                 break
             done = int(search.counter[shared.ITERATION])
             if best is None and done >= look:
                 self._look_around(search, seed, look)
                 look += ANOTHER
-            if budget.iterations is not None:
-                batch = min(BATCH, budget.iterations - done)
+            most = budget.iterations if best is None else end
+            batch = BATCH if most is None else min(BATCH, most - done)
             if batch <= 0 or (budget.seconds is not None and thread_time() - started >= budget.seconds):
                 break
             search.grow(batch)
@@ -272,24 +283,32 @@ class PoseRrtStarConnect:
             NoWayError: there is none, so that there is none for the footprint.
         """
         road, query = search.road, search.query
-        # what connected components may miss between cells' centres is no proof
-        radius = max(0.5 * min(query.width, query.length) - 0.75 * road.resolution, 0.0)
-        label = common_component(road, query.start[:2], query.goal[:2], radius)
-        if label is None:
-            (x0, y0), (x1, y1) = query.start[:2], query.goal[:2]
-            raise NoWayError(
-                f"no way leads from ({x0:.2f}, {y0:.2f}) m to ({x1:.2f}, {y1:.2f}) m on road {road.name!r}: it is too narrow "
-                f"for a width of {query.width:.2f} m"
-            )
-        cells = component_cells(road, radius, label)[0]
-        about = NOWHERE
-        for wider in (DISCS[(look // ANOTHER) % len(DISCS)], 0.0):
-            disc = Query(query.start[:2], query.goal[:2], 0.5 * min(query.width, query.length) + wider)
-            with suppress(RefusedError):
-                line = RrtStarConnect().plan(road, disc, Budget(DISC_BUDGET, first=True), seed + look).path
-                about = along(line, PIECE)
-                break
-        search.sample_from(cells if len(cells) else np.zeros(1, dtype=np.int64), about, self.config.gamma_factor)
+        half = 0.5 * min(query.width, query.length)
+        last = max(half - 0.75 * road.resolution, 0.0)  # connected components may miss a gap between cells' centres
+        for radius in (half + DISCS[(look // ANOTHER) % len(DISCS)], half, last):
+            disc = Query(query.start[:2], query.goal[:2], radius)
+            try:
+                line = DISC.plan(road, disc, Budget(DISC_BUDGET, first=True), seed + look).path
+            except (BlockedError, NoWayError):
+                if radius > last:
+                    continue
+                (x0, y0), (x1, y1) = disc.start, disc.goal
+                raise NoWayError(
+                    f"no way leads from ({x0:.2f}, {y0:.2f}) m to ({x1:.2f}, {y1:.2f}) m on road {road.name!r}: it is too narrow "
+                    f"for a width of {query.width:.2f} m"
+                ) from None
+            except BudgetSpentError:
+                if radius > last:
+                    continue
+                line = np.stack((disc.start, disc.goal))
+            field = clearance_in_cells(road)
+            taut = string_pulled(field, to_cells(road, line), radius / road.resolution, 1)
+            cells = component_cells(road, radius, common_component(road, disc.start, disc.goal, radius) or 0)[0]
+            if not len(cells):
+                cells = np.flatnonzero(road.drivable)
+            about = search.wishes.about if len(search.wishes.about) else along(to_metres(road, taut), PIECE)
+            search.sample_from(cells, about, self.config.gamma_factor)
+            return
 
 
 def along(line: Floats, spacing: float) -> Floats:

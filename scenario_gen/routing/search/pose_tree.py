@@ -61,8 +61,8 @@ COLUMNS = 10
 # further settings, beside those of `tree_nodes`: radius of the arcs, half length and half width of the footprint, distance
 # between two poses that are checked, what is wished for (see `sweep.follow`), share of samples about a known path, their spread
 # sideways [cells] and in heading [rad], cost of the path that was shortened last
-TURN, HALF_LENGTH, HALF_WIDTH, SWEEP, WISH, ABOUT, SPREAD, YAW_SPREAD, LENGTH = 11, 12, 13, 14, 15, 19, 20, 21, 22
-SETTINGS = 23
+TURN, HALF_LENGTH, HALF_WIDTH, SWEEP, WISH, ABOUT, SPREAD, YAW_SPREAD, LENGTH = 11, 12, 13, 14, 15, 21, 22, 23, 24
+SETTINGS = 25
 DIMENSIONS = 4.0  # d of eq 10, of a ball that small Dubins curves reach: along 1, heading 1, sideways 2 (Karaman & Frazzoli 2013)
 TRAPPED, ADVANCED, REACHED = 0, 1, 2
 NEAR = 256  # most nodes of a near set
@@ -168,7 +168,7 @@ def _edge(
     """`sweep.follow` from node m on."""
     return follow(
         clearance, blocked, node[m, X], node[m, Y], node[m, YAW], word, a, b, c, setting[TURN], setting[HALF_LENGTH],
-        setting[HALF_WIDTH], setting[SWEEP], setting[WISH : WISH + 4], guide, low, high,
+        setting[HALF_WIDTH], setting[SWEEP], setting[WISH : WISH + 6], guide, low, high,
     )  # fmt: skip
 
 

@@ -26,7 +26,7 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.kernels import F, F2, I2, kernel, OUT2
 from scenario_gen.roads.clearance import clearance_in_cells, CONTACT, to_cells
-from scenario_gen.routing.search.dubins import TURNS
+from scenario_gen.routing.search.dubins import shortest, TURNS
 from scenario_gen.types.road import Road
 
 SWEEP = 0.2  # [m] between two poses that are compared with the grid
@@ -137,19 +137,16 @@ def room_beside(
 
 
 @kernel(inline=True)
-def off_side(x: float, y: float, guide: Floats, left: float, right: float) -> float:
-    """How dear it is to be at (x, y), by the offset from a guide (G, 3) [cells, rad]: `left` and `right` per cell of offset."""
-    best, found = np.inf, -1
+def offset_from(x: float, y: float, guide: Floats) -> float:
+    """How far (x, y) lies left of a guide (G, 3) [cells, rad], at its nearest pose."""
+    best, found = np.inf, 0
     for k in range(guide.shape[0]):
         dx, dy = x - guide[k, 0], y - guide[k, 1]
         square = dx * dx + dy * dy
         if square < best:
             best, found = square, k
-    if found < 0:
-        return 0.0
     yaw = guide[found, 2]
-    offset = exact.cos(yaw) * (y - guide[found, 1]) - exact.sin(yaw) * (x - guide[found, 0])
-    return float(left * offset if offset > 0.0 else -right * offset)
+    return float(exact.cos(yaw) * (y - guide[found, 1]) - exact.sin(yaw) * (x - guide[found, 0]))
 
 
 @kernel(inline=True)
@@ -175,8 +172,8 @@ def follow(
         half_length: of the footprint.
         half_width: likewise.
         sweep: largest distance between two poses that are looked at.
-        wish: (4,) room wished for beside the footprint, what its lack costs per length, what a cell left of the guide costs, and
-            right of it.
+        wish: (6,) room wished for beside the footprint, what its lack costs per length, what a cell left of the guide costs, and
+            right of it; how far left and right of it one may be at all.
         guide: (G, 3) x, y, yaw; none: no side is dearer.
         low: scratch, see `swept_free`.
         high: likewise.
@@ -212,7 +209,10 @@ def follow(
             gone += h
             since += h
             if since >= 5.0 * sweep and guide.shape[0] > 0:
-                since, dear = 0.0, off_side(x, y, guide, wish[2], wish[3])
+                since, offset = 0.0, offset_from(x, y, guide)
+                if offset > wish[4] or offset < -wish[5]:
+                    return gone, cost
+                dear = max(wish[2] * offset, -wish[3] * offset)
             lack = max(wish[0] - beside, 0.0) / wish[0] if wish[0] > 0.0 else 0.0
             cost += h * (1.0 + wish[1] * lack + dear)
     return np.inf, cost
@@ -267,3 +267,33 @@ def sweep_is_free(road: Road, poses: Floats, length: float, width: float) -> Flo
     )
     out[:, 1] *= road.resolution
     return out
+
+
+@kernel(F2, I2, F, F, F, F, F, F, F, F, F, F)
+def curve_length(
+    clearance: Floats, blocked: Ints, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius: float,
+    half_length: float, half_width: float, sweep: float,
+) -> float:  # fmt: skip
+    """Length of the shortest Dubins curve between two poses if a footprint can follow it, else infinity; all in cells.
+
+    Args:
+        clearance: (H, W).
+        blocked: (H, W + 1) from `blocked_before`.
+        x0: of the first pose, which must itself be free.
+        y0: likewise.
+        yaw0: likewise.
+        x1: of the second pose.
+        y1: likewise.
+        yaw1: likewise.
+        radius: of the arcs.
+        half_length: of the footprint.
+        half_width: likewise.
+        sweep: largest distance between two poses that are looked at.
+    """
+    rows = scratch_rows(half_length, half_width, sweep)
+    word, a, b, c = shortest(x0, y0, yaw0, x1, y1, yaw1, radius)
+    free, cost = follow(
+        clearance, blocked, x0, y0, yaw0, word, a, b, c, radius, half_length, half_width, sweep, np.zeros(6), np.empty((0, 3)),
+        np.empty(rows), np.empty(rows),
+    )  # fmt: skip
+    return cost if free == np.inf else np.inf

@@ -1,0 +1,104 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Lock-step over DDS: how many times faster than real time a planner of one command per step drives, and a period's spread."""
+
+from collections.abc import Callable
+from pathlib import Path
+import tempfile
+import time
+from typing import Any
+
+import numpy as np
+
+from benchmarks._messages_processes import environment, nodes
+from scenario_gen.nodes.domain import free_domain
+from scenario_gen.recordings.write import write_recording
+from scenario_gen.types.generation import GenerationResult
+
+
+def lock_step(made: GenerationResult, steps: int) -> float:
+    """Return seconds of the drive per second of real time, after 20 steps to warm up."""
+    import os
+
+    with tempfile.TemporaryDirectory() as name, free_domain() as domain:
+        bag = write_recording(Path(name) / "bag", made)
+        os.environ.update(environment(domain))
+        parameters = ["-p", f"bag:={bag}", "-p", "lock_step:=true", "-p", "drive.overtime:=10.0"]
+        with nodes(Path(name), domain, {"traffic": parameters}):
+            return _calls(domain, steps)
+
+
+def real_time(made: GenerationResult, periods: int) -> float:
+    """Return the 99th percentile [ms] of what a period of 100 ms lasts too long or too short, in real time."""
+    import os
+
+    with tempfile.TemporaryDirectory() as name, free_domain() as domain:
+        bag = write_recording(Path(name) / "bag", made)
+        os.environ.update(environment(domain))
+        parameters = ["-p", f"bag:={bag}", "-p", "wait_for_ego:=false", "-p", "drive.overtime:=10.0"]
+        with nodes(Path(name), domain, {"traffic": parameters}):
+            return _periods(domain, periods)
+
+
+def _calls(domain: int, steps: int) -> float:
+    from std_srvs.srv import Trigger
+
+    from msg_conventions.driving import encode_twist
+    from scenario_gen.nodes.topics import create_publisher
+
+    def work(node: Any, spin: Callable[[Any], None]) -> float:
+        publisher, client = create_publisher(node, "ego/cmd_vel"), node.create_client(Trigger, "/traffic/step")
+        client.wait_for_service(60.0)
+        while publisher.get_subscription_count() < 1:
+            time.sleep(0.05)
+        began, done = 0.0, 0
+        for k in range(steps + 20):
+            if k == 20:
+                began = time.perf_counter()
+            publisher.publish(encode_twist(0.2, 0.0))
+            answer = client.call_async(Trigger.Request())
+            spin(answer)
+            done += k >= 20 and answer.result().success
+        return 0.1 * done / (time.perf_counter() - began)
+
+    return _with_node(domain, work)
+
+
+def _periods(domain: int, periods: int) -> float:
+    from scenario_gen.nodes.topics import create_subscription
+
+    def work(node: Any, spin: Callable[[Any], None]) -> float:
+        at: list[float] = []
+        create_subscription(node, "/clock", lambda _: at.append(time.perf_counter()))
+        while len(at) < periods + 6:
+            node.executor.spin_once(timeout_sec=0.01)
+        return float(np.quantile(np.abs(np.diff(at[5:]) - 0.1), 0.99)) * 1e3
+
+    return _with_node(domain, work)
+
+
+def _with_node(domain: int, work: Callable[[Any, Callable[[Any], None]], float]) -> float:
+    import rclpy
+
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = rclpy.create_node("drive_benchmark", context=context)
+    executor = rclpy.executors.SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    try:
+        return work(node, executor.spin_until_future_complete)
+    finally:
+        node.destroy_node()
+        context.try_shutdown()

@@ -1,0 +1,153 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Roads with something in the way, and OMPL's RRTConnect in Dubins space as the peer on them.
+
+Half of the roads have two to five parked cars at random places and angles, half are slaloms of walls that leave 2.6 to 4 m. OMPL
+checks motions with our compiled exact sweep of the rectangle, so that its Python does not stand in its way.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from time import process_time
+from typing import Any
+
+import numpy as np
+from ompl import base, geometric, util
+
+from benchmarks._planning_maps import road_of
+from scenario_gen.arrays import Floats
+from scenario_gen.errors import RefusedError
+from scenario_gen.roads.clearance import clearance_in_cells, footprint_fits, to_cells
+from scenario_gen.roads.obstacles import Obstacle, with_obstacles
+from scenario_gen.routing.search.planner import Budget
+from scenario_gen.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect
+from scenario_gen.routing.search.sweep import blocked_before, curve_length, SWEEP
+from scenario_gen.types.road import Road
+
+LENGTH, WIDTH, WALL = 80.0, 8.0, 1.0  # [m]
+CELL = 0.2  # [m]
+CAR = (4.8, 1.9)  # [m]
+CURVATURE = 0.225  # [1/m]
+REACH = 100.0  # [m] OMPL's longest motion; with its own, 16 m, the goal's tree, measured forwards, never meets the other
+
+
+@dataclass(frozen=True, eq=False)
+class Obstructed:
+    """A road, and from where to where."""
+
+    road: Road
+    query: PoseQuery
+
+
+def obstructed(seed: int) -> Obstructed | None:
+    """The road of a seed; None if its start or goal is blocked."""
+    rng = np.random.default_rng(seed)
+    y = (np.arange(int((WIDTH + 2.0 * WALL) / CELL)) + 0.5) * CELL
+    drivable = np.repeat(((y > WALL) & (y < WALL + WIDTH))[:, None], int(LENGTH / CELL), axis=1)
+    there = []
+    if seed % 2 == 0:
+        for _ in range(int(rng.integers(2, 6))):
+            place = rng.uniform((15.0, WALL), (LENGTH - 15.0, WALL + WIDTH))
+            there.append(Obstacle(*map(float, (*place, rng.uniform(0.0, np.pi), rng.uniform(3.8, 5.0), rng.uniform(1.7, 2.0)))))
+    else:
+        gap, count, pitch, side = rng.uniform(2.6, 4.0), int(rng.integers(2, 5)), rng.uniform(9.0, 16.0), int(rng.integers(2))
+        depth = WIDTH - gap
+        for k in range(count):
+            middle = WALL + 0.5 * depth if (k + side) % 2 == 0 else WALL + WIDTH - 0.5 * depth
+            angle = 0.5 * np.pi + rng.uniform(-0.2, 0.2)
+            there.append(Obstacle(*map(float, (20.0 + k * pitch, middle, angle, depth, rng.uniform(1.0, 2.0)))))
+    road = with_obstacles(road_of(f"obstructed {seed}", drivable, CELL), tuple(there))
+    ends = np.array([[4.0, WALL + 0.25 * WIDTH, 0.0], [LENGTH - 4.0, WALL + 0.25 * WIDTH, 0.0]])
+    ends[:, 1] += rng.uniform(-0.5, 0.5, 2)
+    if not footprint_fits(road, ends, *CAR).all():
+        return None
+    return Obstructed(road, PoseQuery(ends[0], ends[1], *CAR, CURVATURE))
+
+
+def rrt_connect(case: Obstructed, seconds: float, reach: float = REACH, *, simplify: bool = False) -> tuple[Floats, float]:
+    """OMPL's path (P, 3) in cells, no row if it found none in so much CPU time, and the time without the simplifier's."""
+    util.setLogLevel(util.LOG_NONE)
+    started = process_time()
+    road, query = case.road, case.query
+    clearance, blocked, cell = clearance_in_cells(road), blocked_before(road), road.resolution
+    radius = 1.0 / (query.curvature * cell)
+    shape = (0.5 * query.length / cell, 0.5 * query.width / cell, SWEEP / cell)
+    space = base.DubinsStateSpace(radius)
+    bounds = base.RealVectorBounds(2)
+    for axis, extent in enumerate(road.drivable.shape[::-1]):
+        bounds.setLow(axis, 0.0)
+        bounds.setHigh(axis, float(extent))
+    space.setBounds(bounds)
+    information = base.SpaceInformation(space)
+
+    def free(a: Any, b: Any) -> bool:
+        x, y, yaw = a.getX(), a.getY(), a.getYaw()
+        return curve_length(clearance, blocked, x, y, yaw, b.getX(), b.getY(), b.getYaw(), radius, *shape) < np.inf
+
+    def valid(_: Any) -> bool:
+        return True  # the sweep of a motion says so of all its poses
+
+    class Motions(base.MotionValidator):  # type: ignore[misc]
+        """The exact sweep of the rectangle."""
+
+        def checkMotion(self, a: Any, b: Any, *_: Any) -> bool:  # noqa: N802 - OMPL's name
+            return free(a, b)
+
+    motions = Motions(information)
+    information.setStateValidityChecker(valid)
+    information.setMotionValidator(motions)
+    information.setup()
+    problem = base.ProblemDefinition(information)
+    states = []
+    for pose in (query.start, query.goal):
+        state = space.allocState()
+        x, y = to_cells(road, pose[:2])
+        state.setXY(float(x), float(y))
+        state.setYaw(float(pose[2]))
+        states.append(state)
+    problem.setStartAndGoalStates(*states)
+    search = geometric.RRTConnect(information)
+    search.setRange(reach / cell)
+    search.setProblemDefinition(problem)
+    search.setup()
+    search.solve(base.PlannerTerminationCondition(lambda: process_time() - started > seconds))
+    took = process_time() - started
+    if not problem.hasExactSolution():
+        return np.empty((0, 3)), took
+    path = problem.getSolutionPath()
+    if simplify:
+        geometric.PathSimplifier(information).simplifyMax(path)
+    vertices = [path.getState(k) for k in range(path.getStateCount())]
+    return np.array([[s.getX(), s.getY(), s.getYaw()] for s in vertices]), took
+
+
+def dubins_length(case: Obstructed, path: Floats) -> float:
+    """Length [m] of a chain of Dubins curves (P, 3) in cells, infinity if it is not free: judged by the same sweep for all."""
+    road, query = case.road, case.query
+    cell = road.resolution
+    shape = (1.0 / (query.curvature * cell), 0.5 * query.length / cell, 0.5 * query.width / cell, SWEEP / cell)
+    clearance, blocked = clearance_in_cells(road), blocked_before(road)
+    return cell * float(
+        np.sum([curve_length(clearance, blocked, *(float(v) for v in (*a, *b, *shape))) for a, b in pairwise(path)])
+    )
+
+
+def first_path(case: Obstructed, seconds: float, seed: int) -> tuple[float, float] | None:
+    """Our first path: CPU seconds it took, and its length [m]; None if it took longer, or there is none."""
+    started = process_time()
+    try:
+        plan = PoseRrtStarConnect().plan(case.road, case.query, Budget(None, seconds, first=True), seed)
+    except RefusedError:
+        return None
+    return process_time() - started, float(plan.step.sum())

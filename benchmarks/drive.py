@@ -1,0 +1,268 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Closed loop: what two planners come to, the witness as ego, egos that do anything, throughput, lock-step over DDS."""
+
+from collections.abc import Callable
+import os
+import sys
+from time import process_time
+
+import numpy as np
+
+from benchmarks._driving_worlds import Anything, draw_scenario, Witness
+from benchmarks._sampling_cases import cases, Prepared
+from benchmarks._size import sized
+from benchmarks.row import Row
+from scenario_gen.arrays import Floats
+from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, REPLAY
+from scenario_gen.closed_loop.ego import Pose
+from scenario_gen.closed_loop.results import as_json
+from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, State
+from scenario_gen.closed_loop.trials import Outcome, rates, run_trials, Trial
+from scenario_gen.closed_loop.verdict import judge
+from scenario_gen.evaluation.bootstrap import wilson
+from scenario_gen.types.generation import GenerationResult
+
+PLANNERS = "scenario_gen.closed_loop.planners"
+BAD, GOOD = f"{PLANNERS}:ConstantSpeed", f"{PLANNERS}:IdmFollower"
+WITNESSES = sized(1000, quick=4)
+RUNS = sized(10_000, quick=5)
+FAR = Pose(1e4, 1e4, 0.0, 0.0)
+PATIENCE = 3000  # steps after which others that the ego has left alone count as stuck
+
+
+def run(count: int = sized(200, quick=2)) -> list[Row]:
+    """Measure; `count` drives of each planner."""
+    trials, made = recorded(max(WITNESSES, count))
+    rows = []
+    if trials:
+        rows += planners(spread(trials, count)) + witnesses(spread(trials, WITNESSES))
+    return rows + anything() + speed() + dds(made)
+
+
+def recorded(count: int) -> tuple[list[Trial], GenerationResult | None]:
+    """Scenarios of every recorded encounter on every road that takes it, each vehicle in turn the ego's; and one result."""
+    prepared = [case for case in cases() if isinstance(case, Prepared)]
+    trials: list[Trial] = []
+    made = None
+    for case in prepared:
+        each = max(1, -(-count // max(len(prepared) * len(case.encounter.vehicles), 1)))
+        found = case.sample(each)
+        if made is None or len(case.encounter.vehicles) == 4:
+            made = GenerationResult(case.encounter, case.segmentation, case.road, case.fit, case.routes, found)
+        for scenario in found.scenarios:
+            for ego in range(len(scenario.vehicles)):
+                name = f"{case.name} on {case.road_name} {scenario.index} {ego}"
+                trials += [Trial(name, scenario, ego, case.road)]
+    return trials, made
+
+
+def after(steps: int) -> Callable[[State], bool]:
+    """End a drive after so many steps."""
+    return lambda state: state.step >= steps
+
+
+def spread(trials: list[Trial], count: int) -> list[Trial]:
+    """Return so many of the trials, spread over all."""
+    return [trials[k] for k in np.unique(np.linspace(0, len(trials) - 1, count).round().astype(int)).tolist()]
+
+
+def planners(trials: list[Trial]) -> list[Row]:
+    """What constant speed and the follower come to; the same bytes in two runs and for two workers."""
+    bad, good = (run_trials(trials, name) for name in (BAD, GOOD))
+    found = {"constant speed": rates(bad), "IDM follower": rates(good)}
+    rows = [
+        Row(f"{name}: {what}", rate.share.value, "", "lower" if what != "goals" else "higher", None, str(rate))
+        for name, each in found.items()
+        for what, rate in each.items()
+    ]
+    apart = found["constant speed"]["collisions"].share.low - found["IDM follower"]["collisions"].share.high
+    rows.append(Row("collisions: constant speed's lower bound less IDM's upper", apart, "", "higher", 0.0))
+    again = run_trials(trials[:40], GOOD, workers=2)
+    config = ClosedLoopConfig()
+    same = as_json(good[:40], GOOD, config) == as_json(again, GOOD, config)
+    rows.append(Row("same bytes in a second run, with two workers", float(same), "", "higher", 1.0))
+    wrong, beyond = dense([*bad, *good])
+    return [
+        *rows,
+        Row("collisions at 1 ms that the verdict lacks", float(wrong), "", "lower", 0.0, f"{len(bad) + len(good)} drives"),
+        Row(
+            "collisions of the verdict that 1 ms does not show",
+            float(beyond),
+            "",
+            "lower",
+            0.0,
+            "deeper than nothing for less",
+        ),
+    ]
+
+
+def dense(outcomes: list[Outcome]) -> tuple[int, int]:
+    """Compare with separating axes at every millisecond: collisions that the verdict lacks, and those it has beyond."""
+    lacking = beyond = 0
+    for outcome in outcomes:
+        hit = seen_at(outcome.drive)
+        verdict = outcome.verdict.collision
+        lacking += hit is not None and (verdict is None or verdict.time > hit + 1e-3)
+        beyond += verdict is not None and (hit is None or hit > verdict.time + 2e-3)
+    return lacking, beyond
+
+
+def seen_at(drive: Drive) -> float | None:
+    """First millisecond [s] at which the ego's box overlaps another's, by plain numpy on the motion's definition."""
+    motion, ego = drive.motion, drive.ego
+    first = None
+    for i in range(len(motion.vehicles)):
+        steps = np.flatnonzero(drive.here[i][:-1] & drive.here[i][1:])
+        if i == ego or not len(steps):
+            continue
+        near = np.hypot(*(motion.position[i] - motion.position[ego]).T)
+        reach = 15.0 + motion.speed[[i, ego]].sum(axis=0) * (motion.time[1] - motion.time[0])
+        steps = steps[near[steps] < reach[steps]]
+        if not len(steps):
+            continue
+        a, b = (instants(drive, n, steps) for n in (ego, i))
+        hits = overlapping(
+            a, b, motion.vehicles[ego].length, motion.vehicles[ego].width, motion.vehicles[i].length, motion.vehicles[i].width
+        )
+        if hits.any():
+            k, m = (int(v[0]) for v in np.nonzero(hits))
+            at = float(motion.time[steps[k]] + 1e-3 * m)
+            first = at if first is None else min(first, at)
+    return first
+
+
+def instants(drive: Drive, n: int, steps: np.ndarray) -> Floats:
+    """Poses (S, M, 3) of a vehicle at every millisecond of some steps: cubic position, linear heading."""
+    motion = drive.motion
+    h = float(motion.time[1] - motion.time[0])
+    u = (np.arange(round(h * 1e3) + 1) / round(h * 1e3))[None, :, None]
+    p, q = motion.position[n][steps][:, None], motion.position[n][steps + 1][:, None]
+    yaw = motion.heading[n]
+    way = motion.speed[n][:, None] * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
+    v, w = way[steps][:, None], way[steps + 1][:, None]
+    xy = (1 + 2 * u) * (1 - u) ** 2 * p + u * (1 - u) ** 2 * h * v + u * u * (3 - 2 * u) * q + u * u * (u - 1) * h * w
+    turn = yaw[steps][:, None] + u[..., 0] * (yaw[steps + 1] - yaw[steps])[:, None]
+    return np.concatenate([xy, turn[..., None]], axis=-1)
+
+
+def overlapping(a: Floats, b: Floats, la: float, wa: float, lb: float, wb: float) -> np.ndarray:
+    """Whether boxes at poses (..., 3) overlap. Source: separating axes."""
+    offset = b[..., :2] - a[..., :2]
+    apart = np.zeros(a.shape[:-1], dtype=np.bool_)
+    for yaw in (a[..., 2], a[..., 2] + np.pi / 2, b[..., 2], b[..., 2] + np.pi / 2):
+        c, s = np.cos(yaw), np.sin(yaw)
+        reach = np.zeros_like(yaw)
+        for pose, length, width in ((a, la, wa), (b, lb, wb)):
+            turn = yaw - pose[..., 2]
+            reach += 0.5 * (length * np.abs(np.cos(turn)) + width * np.abs(np.sin(turn)))
+        apart |= np.abs(offset[..., 0] * c + offset[..., 1] * s) >= reach
+    return ~apart
+
+
+def witnesses(trials: list[Trial]) -> list[Row]:
+    """The witness as ego, in replay and reactive."""
+    rows = []
+    for policy in (REPLAY, REACTIVE):
+        hits = off = missed = 0
+        deviation = 0.0
+        for trial in trials:
+            scenario, ego = trial.scenario, int(trial.ego)
+            loop = ClosedLoop(scenario, ego, trial.road, ClosedLoopConfig(policy=policy))
+            drive = loop.drive(Witness(scenario, ego), after(len(scenario.time) - 1))
+            verdict = judge(loop, drive)
+            hits += verdict.collision is not None or verdict.among_others > 0
+            off += verdict.off_road == verdict.off_road
+            missed += verdict.goal != verdict.goal
+            deviation = max(deviation, float(np.abs(drive.motion.position - scenario.position).max()))
+        name = f"witness as ego, {policy}"
+        of = f"{len(trials)} drives"
+        rows += [
+            Row(f"{name}: collisions", float(hits), "", "lower", 0.0, of),
+            Row(f"{name}: off the road", float(off), "", "lower", 0.0, of),
+            Row(f"{name}: goal not reached", float(missed), "", "lower", 0.0, of),
+            Row(f"{name}: largest distance from the certified motion", 100.0 * deviation, "cm", "lower", 5.0, of),
+        ]
+    return rows
+
+
+def anything() -> list[Row]:
+    """Drawn scenarios of 2 to 5 vehicles with egos that do anything, then leave."""
+    contacts = stuck = forced = 0
+    for seed in range(RUNS):
+        scenario = draw_scenario(seed)
+        ego = seed % len(scenario.vehicles)
+        loop, planner = ClosedLoop(scenario, ego), Anything(seed)
+        steps = len(scenario.time) // 2 + seed % 50
+        drive = loop.drive(planner, after(steps))
+        verdict = judge(loop, drive)
+        contacts += verdict.among_others
+        forced += verdict.forced > 0
+        state = loop.start()
+        planner.reset(loop.task())
+        for _ in range(40):
+            state = loop.step(state, planner.act(loop.observe(state)))
+        others = [i for i in range(len(scenario.vehicles)) if i != ego]
+        for _ in range(PATIENCE):
+            if (state.clock[others] >= scenario.time[-1]).all():
+                break
+            state = loop.step(state, FAR)
+        else:
+            stuck += 1
+    bounds = wilson(forced, RUNS, 0.95)
+    said = f"{forced} of {RUNS}, {100 * bounds.low:.1f} to {100 * bounds.high:.1f} %"
+    return [
+        Row("ego doing anything: contacts among the others", float(contacts), "", "lower", 0.0, f"{RUNS} runs"),
+        Row("ego doing anything: runs with a circle without the ego", float(stuck), "", "lower", 0.0, f"{RUNS} runs"),
+        Row("ego doing anything: runs with braking beyond the strongest", bounds.value, "", "lower", None, said),
+    ]
+
+
+def speed() -> list[Row]:
+    """Vehicle-steps per CPU second in process, the ego among them, with a planner that costs nothing."""
+    rows = []
+    for vehicles in (2, 4):
+        drawn = [draw_scenario(seed, vehicles) for seed in range(sized(20, quick=1))]
+        loops = [ClosedLoop(scenario, 0) for scenario in drawn if len(scenario.vehicles) == vehicles]
+        best = 0.0
+        for _ in range(3):
+            began, steps = process_time(), 0
+            for loop in loops:
+                drive = loop.drive(Witness(loop.scenario, 0), after(60))
+                steps += drive.here.size
+            best = max(best, steps / (process_time() - began))
+        rows.append(Row(f"in process, reactive, {vehicles} vehicles", best, "vehicle-steps/s", "higher", 20_000.0))
+    return rows
+
+
+def dds(made: GenerationResult | None) -> list[Row]:
+    """Lock-step and real time over DDS, where rclpy is."""
+    try:
+        import rclpy  # noqa: F401
+    except ImportError:
+        print("no rclpy: nothing is measured over DDS", file=sys.stderr)
+        return []
+    if made is None:
+        return []
+    from benchmarks._drive_dds import lock_step, real_time
+
+    count = len(made.encounter.vehicles)
+    faster = lock_step(made, sized(100, quick=3))
+    late = real_time(made, sized(200, quick=10))
+    load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
+    return [
+        Row(f"lock-step over DDS, {count} vehicles at 10 Hz", faster, "× real time", "higher", 20.0, load),
+        Row("real time, 99th percentile of the period's error", late, "ms", "lower", 10.0, load),
+    ]

@@ -1,0 +1,127 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Roads shaped to a template: what it needs is there, what it cannot use is refused, and the fit keeps the manoeuvres."""
+
+import numpy as np
+import pytest
+
+from scenario_gen.curve import Curve
+from scenario_gen.errors import RefusedError
+from scenario_gen.fitting import fit_template
+from scenario_gen.roads import build_road
+from scenario_gen.roads.arms import arms_of, ring_of
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.segmentation import Segmentation
+
+T = 140
+
+
+def motion(xy, speed, start=0.0):
+    """(T, 3) poses and (T,) speeds at constant speed on a curve through points."""
+    curve = Curve.through(np.asarray(xy, dtype=np.float64))
+    return curve.at(start + speed * 0.1 * np.arange(T)), np.full(T, float(speed))
+
+
+def line(yaw, x=0.0, y=0.0):
+    s = np.arange(0.0, 200.0, 1.0)
+    return np.column_stack((x + s * np.cos(yaw), y + s * np.sin(yaw)))
+
+
+def bend(angle, radius, before):
+    """Along x for `before` metres, then an arc of `angle` [rad], then straight on."""
+    a = np.linspace(0.0, angle, 60)[1:]
+    r = np.copysign(radius, angle)
+    first = np.column_stack((np.arange(0.0, before, 1.0), np.zeros(int(np.ceil(before)))))
+    arc = np.column_stack((before + r * np.sin(a), r * (1.0 - np.cos(a))))
+    rest = np.arange(1.0, 120.0)[:, None] * np.array([np.cos(angle), np.sin(angle)])
+    return np.vstack((first, arc, arc[-1] + rest))
+
+
+def made(*motions, width=1.9):
+    poses, speed = np.stack([m[0] for m in motions]), np.stack([m[1] for m in motions])
+    vehicles = tuple(Vehicle(str(i), 4.8, width) for i in range(len(poses)))
+    return Encounter("made", vehicles, 0, 100_000_000, poses[..., :2], poses[..., 2], speed)
+
+
+def fitted(encounter, road_name):
+    labels = np.repeat(np.arange(4), T // 4)
+    pieces = Segmentation(labels, np.array([35, 70, 105]), np.zeros(T), ("piece",) * 4)
+    road = build_road(road_name, encounter)
+    return road, fit_template(encounter, pieces, road)
+
+
+@pytest.mark.parametrize("angle", [-75.0, -50.0, 48.0, 68.0, 95.0])
+@pytest.mark.parametrize("road_name", ["t_intersection", "four_way"])
+def test_a_turn_of_any_angle_is_kept_and_its_conflict_too(angle, road_name):
+    encounter = made(motion(bend(np.radians(angle), 14.0, 40.0), 8.0), motion(line(np.pi, 95.0, 3.5), 7.0))
+    _, fit = fitted(encounter, road_name)
+    for vehicle in fit.fitted:
+        assert np.degrees(vehicle.turned[1]) == pytest.approx(np.degrees(vehicle.turned[0]), abs=15.0)
+        assert np.ptp(np.diff(vehicle.path[:, 2])) < 0.1
+    assert not [loss for loss in fit.lost if loss.kind in ("turn", "conflict", "order")]
+
+
+def test_who_crosses_needs_four_arms_and_a_road_of_three_is_refused():
+    encounter = made(motion(line(0.0), 8.0), motion(line(np.radians(70.0), 25.0, -40.0), 8.0))
+    road, fit = fitted(encounter, "four_way")
+    assert len(arms_of(road)) == 4 and fit.lost == ()
+    with pytest.raises(RefusedError, match="t_intersection has 3 arms, and the template comes and goes by 4"):
+        build_road("t_intersection", encounter)
+
+
+def test_an_arm_that_nobody_uses_is_said():
+    _, fit = fitted(made(motion(line(0.0), 8.0, 20.0), motion(line(0.0), 8.0)), "four_way")
+    assert [loss.said for loss in fit.lost] == [
+        "2 of the 4 arms of road four_way are not used: nobody in the template comes or goes there"
+    ]
+
+
+def test_lanes_are_as_wide_as_the_widest_vehicle_needs():
+    for name in ("straight", "four_way", "curve"):
+        _, fit = fitted(made(motion(line(0.0), 8.0, 20.0), motion(line(np.pi, 100.0, 4.0), 8.0), width=3.3), name)
+        assert fit.fitted[0].moved.max() == 0.0
+
+
+def test_a_merge_is_used_by_who_changes_lanes_and_refused_where_nobody_does():
+    x = np.arange(0.0, 200.0, 0.5)
+    t = np.clip((x - 50.0) / 50.0, 0.0, 1.0)
+    joining = np.column_stack((x, -3.5 + 3.5 * t**3 * (10.0 - 15.0 * t + 6.0 * t * t)))
+    road, fit = fitted(made(motion(line(0.0), 10.0, 18.0), motion(joining, 10.0)), "merge")
+    away = [abs(np.degrees(f.path[0, 2]) % 360.0) for f in fit.fitted]
+    assert away[0] == pytest.approx(0.0, abs=0.5) and 8.0 < away[1] < 20.0  # the second comes up the ramp
+    assert len(road.entries) == len(road.exits) + 1
+    with pytest.raises(RefusedError, match="nobody would use the ramp"):
+        build_road("merge", made(motion(line(0.0), 8.0, 20.0), motion(line(0.0), 8.0)))
+
+
+def test_a_roundabout_is_sized_to_the_speed_and_gone_about():
+    for speed in (8.0, 9.5):
+        road, fit = fitted(made(motion(line(0.0), speed, 18.0), motion(line(0.0), speed)), "roundabout")
+        centre, radius = ring_of(road)
+        assert radius == pytest.approx(max(speed**2 / 3.0, 13.0), abs=0.5)
+        for vehicle in fit.fitted:
+            assert np.hypot(*(vehicle.path[:, :2] - centre).T).min() > radius - 0.5
+            assert abs(vehicle.turned[1]) < np.radians(25.0)
+    with pytest.raises(RefusedError, match=r"drives up to 18\.0 m/s"):
+        build_road("roundabout", made(motion(line(0.0), 18.0, 20.0), motion(line(0.0), 18.0)))
+
+
+def test_roads_without_a_template_are_of_their_kind():
+    assert ring_of(build_road("roundabout")) is not None
+    first, second = arms_of(build_road("curve"))
+    turn = (np.degrees(second.pose[2] - first.pose[2]) + 360.0) % 360.0 - 180.0
+    assert abs(turn) == pytest.approx(20.0, abs=1.0)
+    merge = build_road("merge")
+    assert len(merge.entries) == 3 and len(merge.exits) == 2

@@ -1,0 +1,73 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Ways: they begin and end where asked, bend as asked, and their curvature is continuous."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from scenario_gen.roads.shaped import PLAIN_LINE
+from scenario_gen.roads.ways import draw_ring_route, draw_route, extended, line_between
+
+
+def anywhere(_):
+    return True
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    turn=st.floats(0.2, 2.6).flatmap(lambda t: st.sampled_from((t, -t))),
+    before=st.floats(60.0, 120.0),
+    after=st.floats(60.0, 120.0),
+    yaw=st.floats(-3.0, 3.0),
+    sharpness=st.floats(0.03, 0.17),
+)
+def test_a_way_joins_two_lanes_with_the_asked_curvature_and_no_jump_of_it(turn, before, after, yaw, sharpness):
+    corner = before * np.array([np.cos(yaw), np.sin(yaw)])
+    leave = np.array([*(corner + after * np.array([np.cos(yaw + turn), np.sin(yaw + turn)])), yaw + turn])
+    way = draw_route(np.array([0.0, 0.0, yaw]), leave, anywhere, sharpness)
+    assert way is not None
+    assert way.points[0] == pytest.approx([0.0, 0.0, yaw], abs=1e-6)
+    assert way.points[-1] == pytest.approx(leave, abs=1e-4)
+    bend = np.diff(way.points[:, 2]) / np.diff(way.station)
+    if 1.5 * abs(turn) / sharpness < 60.0:  # there is room for it
+        assert np.abs(bend).max() == pytest.approx(sharpness, rel=0.05)
+    assert np.abs(np.diff(bend)).max() < 0.35 * np.abs(bend).max()
+
+
+def test_a_line_between_two_poses_takes_the_bends_of_a_shape():
+    shape = extended(PLAIN_LINE.shape, 0.9, 0.0)
+    start, end = np.array([3.0, -2.0, 0.4]), np.zeros(3)
+    road = extended(shape, 0.0, 15.0)
+    cos, sin = np.cos(0.4), np.sin(0.4)
+    local = road.points[-1]
+    end = np.array([3.0 + local[0] * cos - local[1] * sin, -2.0 + local[0] * sin + local[1] * cos, 0.4 + local[2]])
+    line, at = line_between(shape, start, end)
+    assert at == pytest.approx(15.0, abs=0.01)
+    assert line.length == pytest.approx(road.length, abs=0.01)
+    assert line_between(shape, start, end + np.array([0.0, 0.0, 1.0])) is None  # 57° more than the shape turns
+
+
+@pytest.mark.parametrize(("leave", "turn"), [(0.0, 0.0), (np.pi / 2.0, np.pi / 2.0), (-np.pi / 2.0, -np.pi / 2.0)])
+def test_a_roundabout_is_gone_about_in_the_direction_of_traffic(leave, turn):
+    out = np.array([np.cos(leave), np.sin(leave)])
+    goal = np.array([*(70.0 * out + 1.75 * np.array([out[1], -out[0]])), leave])
+    way = draw_ring_route(np.array([-70.0, -1.75, 0.0]), goal, np.zeros(2), 20.0, anywhere)
+    assert way is not None
+    assert way.points[-1, 2] - way.points[0, 2] == pytest.approx(turn, abs=0.02)
+    assert np.hypot(*way.points[:, :2].T).min() == pytest.approx(20.0, abs=0.3)
+    angle = np.unwrap(np.arctan2(way.points[:, 1], way.points[:, 0]))
+    assert angle[-1] > angle[0]  # counter-clockwise where traffic keeps right
