@@ -140,7 +140,7 @@ def _rows(scenario: Scenario, members: set[str]) -> list[int]:
 
 
 def outline(scenario: Scenario, n: int, parts: Sequence[float] = (-0.5, 0.0, 0.5)) -> Floats:
-    """Return points (P, 2) of the outline of a vehicle's footprint at every instant at which it is there."""
+    """Return points (P, 2) [m] of the outline of a vehicle's footprint at every instant at which it is there."""
     first, last = scenario.present[n].tolist()
     vehicle = scenario.vehicles[n]
     x, y = scenario.position[n, first : last + 1].T

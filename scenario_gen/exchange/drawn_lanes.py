@@ -71,7 +71,7 @@ def drawn_lanes(road: Road, axis: Curve | None, side: str, scenarios: Sequence[S
     """
     arms = arms_of(road)
     widths = [np.abs(offsets) for arm in arms for offsets in (arm.inward, arm.outward)]
-    lanes = sum(map(len, widths))
+    lanes = len(np.concatenate(widths)) if arms else 0
     if len(arms) < 2 or lanes != len(road.entries) + len(road.exits) or not all(map(len, widths)):
         return None
     width = 2.0 * min(float(offsets.min()) for offsets in widths)
@@ -130,7 +130,7 @@ def _line(arm: Arm, k: int, axis: Curve | None, road: Road) -> Curve:
     if axis is not None and k < 2:
         return (axis if k == 0 else axis.reversed()).cut(0.0, axis.length / 2.0, STEP)
     x, y, yaw = arm.pose.tolist()
-    length = road.resolution * float(sum(road.drivable.shape))
+    length = road.resolution * float(road.drivable.shape[0] + road.drivable.shape[1])
     end = [x - length * float(exact.cos(yaw)), y - length * float(exact.sin(yaw)), yaw + np.pi]
     return Curve(np.array([[x, y, yaw + np.pi], end]))
 

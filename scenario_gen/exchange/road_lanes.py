@@ -26,9 +26,9 @@ from scenario_gen.exchange.drawn_lanes import drawn_lanes
 from scenario_gen.exchange.lanes import LaneMap
 from scenario_gen.recordings.provenance import read_parameters
 from scenario_gen.roads import RoadConfig
+from scenario_gen.roads.axis import bent_axis
 from scenario_gen.roads.build import build_road
 from scenario_gen.roads.builtin import BUILT_IN
-from scenario_gen.roads.shaped import bent_axis
 from scenario_gen.template.tracks import clean_tracks
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.road import Road

@@ -125,7 +125,7 @@ def drive(path):
     last = problem.goal.state_list[0].time_step.end
     length = planner.coordinate_system.convert_to_curvilinear_coords(*problem.goal.state_list[0].position.center)[0]
     length -= planner.x_0_cl[0][0]
-    cruise = max(problem.initial_state.velocity, 1.5 * length / (last * scenario.dt), SLOWEST)
+    cruise = max(problem.initial_state.velocity, 3.0 * length / (last * scenario.dt), SLOWEST)
     planned = None
     while not planner.goal_reached():
         step = len(planner.record_state_list) - 1
