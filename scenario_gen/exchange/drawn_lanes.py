@@ -42,6 +42,7 @@ SHORTEST = 0.5  # metres of an arm
 EVEN = 1e-3  # metres by which lanes may lie elsewhere than side by side
 STRAIGHT_ON = 0.52  # rad, 30°: a way that turns by less goes straight on
 MOST_WIDER = 1.2  # metres by which an edge of a way is moved out at most
+STRAIGHT_LINE = 1e-6  # by which the cosine of an arm's direction to a straight road may differ from 1
 MARGIN = 0.05  # metres between a footprint and its way's edge
 
 
@@ -66,7 +67,7 @@ def drawn_lanes(road: Road, axis: Curve | None, side: str, scenarios: Sequence[S
         run_out: metres by which arms are continued straight on beyond their ends.
 
     Returns:
-        None if its lanes do not lie side by side in arms.
+        None if its lanes do not lie side by side in arms, or from one of them no way leads on.
     """
     arms = arms_of(road)
     widths = [np.abs(offsets) for arm in arms for offsets in (arm.inward, arm.outward)]
@@ -84,6 +85,8 @@ def drawn_lanes(road: Road, axis: Curve | None, side: str, scenarios: Sequence[S
     extra = HALF_DIAGONAL * road.resolution
     if len(arms) == 2:
         line = axis or _between(arms)
+        if line is None:
+            return None
         strip = _arm_strip(
             "main road", _Side(line, line.length + run_out, len(arms[0].inward), len(arms[1].inward)), width, extra, side, run_out
         )
@@ -95,7 +98,10 @@ def drawn_lanes(road: Road, axis: Curve | None, side: str, scenarios: Sequence[S
             return None
         sides.append(found)
     strips = [_arm_strip(f"arm {k + 1}", one, width, extra, side, run_out) for k, one in enumerate(sides)]
-    ways = {places: way for places in _places(sides) if (way := _way(sides, places, width, side)) is not None}
+    drawn = ((places, _way(sides, places, width, side)) for places in _places(sides))
+    ways = {places: way for places, way in drawn if way is not None and road.drivable_at(way.points[:, :2]).all()}
+    if {places[0] for places in ways} != set(range(len(sides))):  # ways lead otherwise, as about an island
+        return None
     used = _used(ways, sides, width, scenarios)
     joints = []
     for places, way in ways.items():
@@ -109,10 +115,13 @@ def drawn_lanes(road: Road, axis: Curve | None, side: str, scenarios: Sequence[S
     return LaneMap(tuple(strips), tuple(joints), side, "", derived=False)
 
 
-def _between(arms: Sequence[Arm]) -> Curve:
-    """Return the straight line from the first arm's end to the second's."""
+def _between(arms: Sequence[Arm]) -> Curve | None:
+    """Return the straight line from the first arm's end to the second's; None if they do not lie on one."""
     ends = np.stack([arm.pose[:2] for arm in arms[:2]])
     yaw = float(exact.arctan2(*(ends[1] - ends[0])[::-1]))
+    headings = np.array([arms[0].pose[2] + np.pi, arms[1].pose[2]])
+    if (exact.cos(headings - yaw) < 1.0 - STRAIGHT_LINE).any():
+        return None
     return Curve(np.column_stack((ends, np.full(2, yaw))))
 
 
