@@ -12,7 +12,7 @@ SOURCED := $(if $(AMENT_PREFIX_PATH),$(shell $(PYTHON) -c 'import os, rclpy, sys
 	print("yes" if not wheel and any(rclpy.__file__.startswith(path + os.sep) for path in paths) else "")' 2>/dev/null))
 LOCKED := -r requirements.lock $(if $(SOURCED),,-r requirements-ros.lock)
 
-.PHONY: demo test soak bench audit licences core counts docs install tools clean
+.PHONY: demo test soak bench judges audit licences core counts docs install tools clean
 
 demo: $(READY)
 	$(BIN)/scenario-gen demo --ros --out out/demo
@@ -33,12 +33,23 @@ bench: $(READY)
 
 # Known vulnerabilities of all that is locked. It fails, too, where it could not look everything up.
 audit: .venv-audit/.ready
-	.venv-audit/bin/python test/packaging/audit.py requirements.lock requirements-ros.lock requirements-bench.lock requirements-audit.lock requirements-docs.lock
+	.venv-audit/bin/python test/packaging/audit.py requirements.lock requirements-ros.lock requirements-bench.lock requirements-audit.lock requirements-docs.lock requirements-judges-commonroad.lock requirements-judges-asam.lock
 
 .venv-audit/.ready: requirements-audit.lock
 	$(PYTHON) -m venv .venv-audit
 	.venv-audit/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-audit.lock
 	@touch .venv-audit/.ready
+
+# What is exported, before other people's programs (CommonRoad's, ASAM's), each locked in an environment of its own; CommonRoad's
+# planner has wheels for Python 3.11 alone: make judges JUDGE_PYTHON=python3.11.
+JUDGE_PYTHON ?= $(PYTHON)
+judges: $(READY) .venv-judges-commonroad/.ready .venv-judges-asam/.ready
+	$(BIN)/python -m benchmarks bridges
+
+.venv-judges-%/.ready: requirements-judges-%.lock
+	$(JUDGE_PYTHON) -m venv .venv-judges-$*
+	.venv-judges-$*/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-judges-$*.lock
+	@touch .venv-judges-$*/.ready
 
 # The core without any extra, in an environment of its own.
 core: $(READY)
@@ -85,4 +96,4 @@ tools:
 	  echo "Not here, and the tests that need it will be skipped: $$need"
 
 clean:
-	rm -rf .venv .venv-audit .venv-docs build install log out
+	rm -rf .venv .venv-audit .venv-docs .venv-judges-* build install log out

@@ -125,7 +125,7 @@ def _lanelet(root: Element, lane: Lane, lane_map: LaneMap) -> None:
     for tag, beside in (("adjacentLeft", lane.left_of), ("adjacentRight", lane.right_of)):
         if beside is not None:
             add(lanelet, tag, ref=beside[0], drivingDir="same" if beside[1] else "opposite")
-    add(lanelet, "laneletType", "unknown" if lane_map.derived else "urban")
+    add(lanelet, "laneletType", "unknown" if lane_map.is_derived(lane.strip) else "urban")
     if lane.turn:
         add(lanelet, "laneletType", "intersection")
     add(lanelet, "userOneWay", "vehicle")

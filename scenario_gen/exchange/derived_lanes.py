@@ -15,13 +15,15 @@
 """Lanes of a road that has none: along what the scenarios drive, as wide as a lane where the grid leaves room."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from shapely import covers, make_valid, Polygon, polygons, prepare, union_all
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats
+from scenario_gen.arrays import Floats, frozen
 from scenario_gen.curve import Curve
-from scenario_gen.exchange.lanes import LaneMap, Strip
+from scenario_gen.exchange.lanes import LaneMap, lanes_of, Strip
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import Scenario
 
@@ -61,6 +63,30 @@ def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: 
     return LaneMap(tuple(strips), (), "right", origin, derived=True)
 
 
+def with_all_footprints(lane_map: LaneMap, scenarios: Sequence[Scenario], road: Road, lane_width: float) -> LaneMap:
+    """Return a map with a derived lane added along the path of every vehicle that leaves its lanes somewhere in a scenario."""
+    rings = [np.concatenate([lane.left, lane.right[::-1]]) for lane in lanes_of(lane_map)]
+    area = union_all(make_valid([Polygon(ring) for ring in rings]))
+    prepare(area)
+    outside: dict[str, Curve] = {}
+    for scenario in scenarios:
+        for n, vehicle in enumerate(scenario.vehicles):
+            if vehicle.id not in outside and not covers(area, polygons(footprints(scenario, n))).all():
+                outside[vehicle.id] = driven_path(scenario, n)
+    if not outside:
+        return lane_map
+    strips = [_lane(f"along vehicle {name}", path, {name}, scenarios, road, lane_width, 0.0) for name, path in outside.items()]
+    if lane_map.side == "left":
+        strips = [replace(s, offset=s.offset - s.right[0], left=s.right, right=s.left) for s in strips]
+    origin = f"{lane_map.origin}, and a derived one along the path of vehicle {', '.join(outside)}, which leaves them"
+    return replace(lane_map, strips=(*lane_map.strips, *strips), added=len(strips), origin=origin)
+
+
+def footprints(scenario: Scenario, n: int) -> Floats:
+    """Return the corners (T, 4, 2) [m] of a vehicle's footprint at every instant at which it is there."""
+    return np.stack(np.split(outline(scenario, n, (-0.5, 0.5)), 4), axis=1)[:, [0, 1, 3, 2]]
+
+
 def driven_path(scenario: Scenario, n: int) -> Curve:
     """Return the path of a vehicle, points `STEP` apart; of one that stands throughout, a metre ahead of it."""
     first, last = scenario.present[n].tolist()
@@ -87,28 +113,33 @@ def _lane(
     name: str, path: Curve, members: set[str], scenarios: Sequence[Scenario], road: Road | None, lane_width: float, run_out: float
 ) -> Strip:
     """Return the strip of one lane, which holds every footprint of its members."""
-    corners = np.concatenate([_corners(scenario, n) for scenario in scenarios for n in _rows(scenario, members)])
+    corners = np.concatenate([outline(scenario, n) for scenario in scenarios for n in _rows(scenario, members)])
     station, offset = path.project(corners)
     reference = path.cut(float(station.min()) - run_out, float(station.max()) + run_out, STEP)
-    at = np.clip(np.searchsorted(reference.station, station - station.min() + run_out), 1, len(reference.points) - 1)
     sides = []
     for sign in (1.0, -1.0):
         wide = _room(reference, sign, road, lane_width / 2.0, run_out)
-        needed = np.zeros(len(wide))
-        np.maximum.at(needed, at, np.maximum(sign * offset, 0.0) + MARGIN)
-        np.maximum.at(needed, at - 1, np.maximum(sign * offset, 0.0) + MARGIN)
-        padded = np.pad(needed, NEAR)
-        needed = np.max([padded[k : k + len(needed)] for k in range(2 * NEAR + 1)], axis=0)
+        needed = widest_near(reference, station - station.min() + run_out, np.maximum(sign * offset, 0.0) + MARGIN)
         sides.append(np.maximum(wide, needed))
     left, right = sides
     return Strip(name, reference.points, left, (left + right)[None], np.zeros((0, len(left))))
+
+
+def widest_near(line: Curve, station: Floats, wide: Floats) -> Floats:
+    """Return (M,) for each point of a line the largest of distances (P,) [m] at stations (P,) [m] within `NEAR` points of it."""
+    found = np.zeros(len(line.points))
+    at = np.clip(np.searchsorted(line.station, station), 1, len(line.points) - 1)
+    np.maximum.at(found, at, wide)
+    np.maximum.at(found, at - 1, wide)
+    padded = np.pad(found, NEAR)
+    return frozen(np.max([padded[k : k + len(found)] for k in range(2 * NEAR + 1)], axis=0))
 
 
 def _rows(scenario: Scenario, members: set[str]) -> list[int]:
     return [n for n, vehicle in enumerate(scenario.vehicles) if vehicle.id in members]
 
 
-def _corners(scenario: Scenario, n: int) -> Floats:
+def outline(scenario: Scenario, n: int, parts: Sequence[float] = (-0.5, 0.0, 0.5)) -> Floats:
     """Return points (P, 2) of the outline of a vehicle's footprint at every instant at which it is there."""
     first, last = scenario.present[n].tolist()
     vehicle = scenario.vehicles[n]
@@ -116,7 +147,7 @@ def _corners(scenario: Scenario, n: int) -> Floats:
     yaw = scenario.heading[n, first : last + 1]
     cos, sin = exact.cos(yaw), exact.sin(yaw)
     found = []
-    for u in (-0.5, 0.0, 0.5):
+    for u in parts:
         for v in (-0.5, 0.5):
             along, across = u * vehicle.length, v * vehicle.width
             found.append(np.column_stack((x + along * cos - across * sin, y + along * sin + across * cos)))

@@ -26,6 +26,8 @@ from scenario_gen.arrays import Floats, frozen
 DECIMALS = 6
 """Of the metres of a lane's edges: rounded, lanes that follow or lie beside each other have the very same points there."""
 
+OVERLAP = 2e-5  # metres
+
 
 @dataclass(frozen=True, eq=False)
 class Strip:
@@ -67,12 +69,21 @@ class Strip:
 
 @dataclass(frozen=True)
 class Joint:
-    """Strip `by` leads through the junction from the end of strip `start` to the end of strip `goal`; `turn` says which way."""
+    """A way through the junction, one lane wide.
+
+    Attributes:
+        by: index of its strip.
+        start, goal: indices of the strips from whose end and to whose end it leads.
+        turn: "left", "straight" or "right".
+        from_lane, to_lane: places of the lanes that it joins, from the middle outwards.
+    """
 
     by: int
     start: int
     goal: int
     turn: str
+    from_lane: int
+    to_lane: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +96,7 @@ class LaneMap:
         side: of traffic, "right" or "left": on that side of a strip's middle lanes run with the reference line.
         origin: what the lanes are: true ones of a road, or derived from what; for people.
         derived: whether they are derived.
+        added: how many strips at the end are derived, among true ones.
     """
 
     strips: tuple[Strip, ...]
@@ -92,6 +104,11 @@ class LaneMap:
     side: str
     origin: str
     derived: bool
+    added: int = 0
+
+    def is_derived(self, strip: int) -> bool:
+        """Whether the strip of an index is derived."""
+        return self.derived or strip >= len(self.strips) - self.added
 
     @property
     def along(self) -> str:
@@ -140,23 +157,24 @@ Place = tuple[int, str, int]  # strip, side, place
 
 
 def lanes_of(lane_map: LaneMap) -> tuple[Lane, ...]:
-    """Return every lane of a map, joined as its strips are: lanes of one place from the middle follow each other."""
+    """Return every lane of a map, joined as its strips are."""
     places = list(_places(lane_map))
     number = {place: k + 1 for k, place in enumerate(places)}
     after: dict[Place, list[int]] = {place: [] for place in places}
     before: dict[Place, list[int]] = {place: [] for place in places}
     turns = {joint.by: joint.turn for joint in lane_map.joints}
     for joint in lane_map.joints:
-        for start, by, goal in joined(lane_map, joint):
-            for one, other in pairwise((start, by, goal)):
-                after[one].append(number[other])
-                before[other].append(number[one])
+        for one, other in pairwise(joined(lane_map, joint)):
+            after[one].append(number[other])
+            before[other].append(number[one])
     found = []
     for place in places:
         strip, side, k = place
         edges = lane_map.strips[strip].edges(side)[k : k + 2]
         if side == lane_map.against:
             edges = edges[:, ::-1]
+        if strip in turns:
+            edges = _overlapping(edges)
         inner, outer = edges if lane_map.side == "right" else edges[::-1]
         across = number.get((strip, lane_map.against if side == lane_map.along else lane_map.along, 0))
         inward = (number[strip, side, k - 1], True) if k else (across, False) if across else None
@@ -181,13 +199,19 @@ def lanes_of(lane_map: LaneMap) -> tuple[Lane, ...]:
     return tuple(found)
 
 
-def joined(lane_map: LaneMap, joint: Joint) -> Iterator[tuple[Place, Place, Place]]:
-    """Yield, for each lane of a way through the junction, the lane it comes from, itself, and the one it leads to."""
+def _overlapping(edges: Floats) -> Floats:
+    """Return edges (2, M, 2) [m] that reach `OVERLAP` farther at both ends: else roundings would be gaps between lanes."""
+    made = edges.copy()
+    for end, next_to in ((0, 1), (-1, -2)):
+        step = made[:, end] - made[:, next_to]
+        made[:, end] += OVERLAP * step / exact.hypot(step[:, 0], step[:, 1])[:, None]
+    return made
+
+
+def joined(lane_map: LaneMap, joint: Joint) -> tuple[Place, Place, Place]:
+    """Return the lane that a way through the junction comes from, its own, and the one that it leads to."""
     along, against = lane_map.along, lane_map.against
-    counts = [len(getattr(lane_map.strips[joint.start], along)), len(getattr(lane_map.strips[joint.by], along))]
-    counts.append(len(getattr(lane_map.strips[joint.goal], against)))
-    for k in range(min(counts)):
-        yield (joint.start, along, k), (joint.by, along, k), (joint.goal, against, k)
+    return (joint.start, along, joint.from_lane), (joint.by, along, 0), (joint.goal, against, joint.to_lane)
 
 
 def _places(lane_map: LaneMap) -> Iterator[Place]:

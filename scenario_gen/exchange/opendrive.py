@@ -89,7 +89,7 @@ def _road(root: Element, lane_map: LaneMap, k: int, strip: Strip, joint: Joint |
     if joint is not None:
         add(link, "predecessor", elementType="road", elementId=ROADS + joint.start, contactPoint="end")
         add(link, "successor", elementType="road", elementId=ROADS + joint.goal, contactPoint="end")
-    elif lane_map.joints:
+    elif lane_map.joints and not lane_map.is_derived(k):
         add(link, "successor", elementType="junction", elementId=JUNCTION)
     add(add(road, "type", s=0.0, type="town"), "speed", max="no limit")
     view = add(road, "planView")
@@ -118,10 +118,10 @@ def _road(root: Element, lane_map: LaneMap, k: int, strip: Strip, joint: Joint |
 
 def _lane_links(lane_map: LaneMap, joint: Joint | None, side: str, place: int) -> tuple[int | None, int | None]:
     """Return the ids of the lanes before and after a lane of a connecting road."""
-    for start, by, goal in joined(lane_map, joint) if joint else ():
-        if by[1:] == (side, place):
-            return lane_id(*start[1:]), lane_id(*goal[1:])
-    return None, None
+    if joint is None:
+        return None, None
+    start, by, goal = joined(lane_map, joint)
+    return (lane_id(*start[1:]), lane_id(*goal[1:])) if by[1:] == (side, place) else (None, None)
 
 
 def _lane(
@@ -147,8 +147,8 @@ def _junction(root: Element, lane_map: LaneMap) -> None:
             connectingRoad=ROADS + joint.by,
             contactPoint="start",
         )
-        for start, by, _ in joined(lane_map, joint):
-            add(connection, "laneLink", **{"from": lane_id(*start[1:]), "to": lane_id(*by[1:])})
+        start, by, _ = joined(lane_map, joint)
+        add(connection, "laneLink", **{"from": lane_id(*start[1:]), "to": lane_id(*by[1:])})
 
 
 Curve3 = tuple[float, ...]  # aU … dU, aV … dV, in the piece's own frame

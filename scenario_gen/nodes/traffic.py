@@ -364,6 +364,10 @@ class Traffic(Node):  # type: ignore[misc]
     def _publish(self, topic: str, data: bytes) -> None:
         publish(self, self._out[topic], data)
 
+    def _is_heard(self, topic: str) -> bool:
+        """Whether somebody listens: what is dear to make and not latched is made for nobody else."""
+        return int(self._out[topic].get_subscription_count()) > 0
+
     def _tell(self) -> None:
         """Publish where everyone is now."""
         loop, state = self._loop, self._states[-1]
@@ -380,10 +384,11 @@ class Traffic(Node):  # type: ignore[misc]
         poses: Floats = state.vehicles[here, :3]
         self._publish("/tf", encode_frames(poses, [self._children[i] for i in here], frame, stamp))
         vehicles = loop.scenario.vehicles
-        markers = driving.encode_traffic_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp)
-        self._publish("traffic/markers", markers)
+        if self._is_heard("traffic/markers"):
+            markers = driving.encode_traffic_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp)
+            self._publish("traffic/markers", markers)
         every = max(round(GRID_EVERY / loop.config.step), 1)
-        if state.step % every == 0 and loop.road is not None:
+        if state.step % every == 0 and loop.road is not None and self._is_heard("traffic/local_map"):
             grid = local_map(loop, state)
             self._publish("traffic/local_map", driving.encode_local_map(grid.blocked, grid.resolution, grid.origin, frame, stamp))
 

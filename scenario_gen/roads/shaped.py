@@ -32,7 +32,7 @@ from scenario_gen.roads.arms import RING_ROOM
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.sketch import Sketch
 from scenario_gen.roads.ways import draw_ring_route, draw_route, extended
-from scenario_gen.template.frenet import FrenetTracks, main_line, MainLine
+from scenario_gen.template.frenet import FrenetTracks, main_line, MainLine, to_frenet
 from scenario_gen.template.manoeuvre import sharpness_of, turn_of
 from scenario_gen.template.tracks import Track
 from scenario_gen.types.road import Road
@@ -111,6 +111,18 @@ def draw_along(name: str, main: MainLine, lanes: int, config: RoadConfig) -> Roa
             pair = (along, yaw) if way * side > 0.0 else (yaw, along)
             sketch.corner(corner, *pair, config.corner_radius)
     return _finished(name, sketch, arms, config)
+
+
+def bent_axis(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> Curve | None:
+    """The dividing line of the main road that `draw_bent` draws for a template; None if the road `name` is not drawn so."""
+    try:
+        frenet = to_frenet(tracks)
+    except RefusedError:  # a junction's template
+        return None
+    main = main_line(frenet, tracks)
+    if not bends(name, main):
+        return None
+    return _axis(name, main, max(config.arm_length - main.shape.length / 2.0, _ROOM) if config.arm_length else _ROOM)
 
 
 def _axis(name: str, main: MainLine, run: float) -> Curve:

@@ -285,7 +285,7 @@ def _at_rest(knots: SpeedKnots, times: Floats) -> list[tuple[float, float]]:
     rest = []
     for a, b in knots.stretches(knots.still):
         moves = (a > times[0], b < times[-1])
-        room = max(min(SMOOTHING, (b - a - _LEAST_REST) / max(sum(map(int, moves)), 1)), 0.0)
+        room = max(min(SMOOTHING, (b - a - _LEAST_REST) / max(int(moves[0]) + int(moves[1]), 1)), 0.0)
         rest.append((a + room if moves[0] else a, b - room if moves[1] else b))
     return rest
 

@@ -18,62 +18,63 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shapely import box, contains_xy, Polygon, union_all
+from shapely import box, Polygon, union_all
 from small_scenarios import crossing, moving
 
-from scenario_gen.exchange.derived_lanes import derived_lanes
+from scenario_gen.exchange.derived_lanes import derived_lanes, footprints
 from scenario_gen.exchange.lanes import lanes_of
 from scenario_gen.exchange.road_lanes import lane_map_of, true_lanes
 from scenario_gen.roads import RoadConfig
 from scenario_gen.roads.build import build_road
-
-CONFIGS = [RoadConfig(), RoadConfig(lanes=2, traffic_side="left"), RoadConfig(lanes=3, corner_radius=11.0, lane_width=3.1)]
 
 
 def area_of(lanes):
     return union_all([Polygon(np.concatenate([lane.left, lane.right[::-1]])) for lane in lanes])
 
 
-@pytest.mark.parametrize("config", CONFIGS, ids=["plain", "left-hand", "wide"])
-@pytest.mark.parametrize("name", ["straight", "t_intersection", "four_way"])
-def test_true_lanes_are_the_drivable_cells(name, config):
+def lanes_on(name, config):
     road = build_road(name, None, config)
-    lane_map = true_lanes(road, name, None, config, run_out=1.0)  # the last cells reach beyond the ends of arms
-    assert lane_map is not None and not lane_map.derived and lane_map.side == config.traffic_side
-    area = area_of(lanes_of(lane_map))
-    assert area.geom_type == "Polygon" and not area.interiors  # one piece, without a gap between lanes
+    lane_map = true_lanes(road, name, None, config, [], 1.0)
+    assert lane_map is not None and not lane_map.derived and not lane_map.added and lane_map.side == config.traffic_side
+    return road, lanes_of(lane_map)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+@pytest.mark.parametrize("name", ["straight", "t_intersection", "four_way"])
+def test_true_lanes_lie_on_the_road_and_fill_its_arms(name, side):
+    road, lanes = lanes_on(name, RoadConfig(lanes=2, traffic_side=side))
     rows, columns = np.nonzero(road.drivable)
     low = road.origin + road.resolution * np.column_stack((columns, rows))
-    edge = area.buffer(-0.3)
-    at_edge = ~contains_xy(area.buffer(-0.8), *(low + road.resolution / 2.0).T)
-    cells = union_all([box(x, y, x + road.resolution, y + road.resolution) for x, y in low[at_edge]])
-    assert cells.difference(area.buffer(1e-5)).area < 1e-9  # every cell lies in lanes; a cell is 0.2 m in float32
+    cells = union_all(box(*low.T, *(low + road.resolution).T))
     size = np.array(road.drivable.shape[::-1]) * road.resolution
-    on_grid = area & box(*road.origin, *(road.origin + size))
-    assert on_grid.difference(union_all([cells.buffer(2.0 * road.resolution), edge])).area < 1e-9  # and none far beyond them
+    area = area_of(lanes) & box(*road.origin, *(road.origin + size))
+    assert area.difference(cells.buffer(2.0 * road.resolution)).area < 1e-6
+    arms = area_of([lane for lane in lanes if not lane.turn])
+    assert arms.area > 0.7 * cells.area and cells.difference(area_of(lanes)).area < 0.04 * cells.area
 
 
 @pytest.mark.parametrize("name", ["t_intersection", "four_way"])
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_lanes_lead_from_entries_to_exits_in_their_direction(name, side):
-    config = RoadConfig(lanes=2, traffic_side=side)
-    road = build_road(name, None, config)
-    lanes = lanes_of(true_lanes(road, name, None, config, run_out=0.0))
+    road, lanes = lanes_on(name, RoadConfig(lanes=2, traffic_side=side))
     starts = [lane for lane in lanes if not lane.predecessors]
     ends = [lane for lane in lanes if not lane.successors]
     for poses, which, at in ((road.entries, starts, 0), (road.exits, ends, -1)):
         assert len(which) == len(poses)
         for x, y, yaw in poses:
-            lane = min(which, key=lambda one: np.hypot(*(one.middle[at] - (x, y))))
-            assert np.hypot(*(lane.middle[at] - (x, y))) < road.resolution
+            ahead = np.array([np.cos(yaw), np.sin(yaw)])
+            place = np.array([x, y]) + (1.0 if at else -1.0) * ahead  # arms go on by a metre
+            lane = min(which, key=lambda one: np.hypot(*(one.middle[at] - place)))
+            assert np.hypot(*(lane.middle[at] - place)) < road.resolution
             step = lane.middle[at + 1 if at == 0 else at] - lane.middle[at if at == 0 else at - 1]
-            assert step @ (np.cos(yaw), np.sin(yaw)) > 0.99 * np.hypot(*step)
+            assert step @ ahead > 0.99 * np.hypot(*step)
     by_id = {lane.id: lane for lane in lanes}
     arms = len(road.entries) // 2
     assert sum(bool(lane.turn) for lane in lanes) == 2 * arms * (arms - 1)
     for lane in lanes:
-        for other in lane.successors:  # the very same points
-            assert np.array_equal(lane.left[-1], by_id[other].left[0]) and np.array_equal(lane.right[-1], by_id[other].right[0])
+        for other in lane.successors:
+            assert np.allclose(lane.left[-1], by_id[other].left[0], atol=1e-4)
+            assert np.allclose(lane.right[-1], by_id[other].right[0], atol=1e-4)
             assert lane.id in by_id[other].predecessors
         if lane.left_of is not None:
             other, same = by_id[lane.left_of[0]], lane.left_of[1]
@@ -87,11 +88,24 @@ def test_a_road_that_is_not_what_its_name_says_has_derived_lanes():
     road = build_road("t_intersection", None, config)
     drivable = road.drivable.copy()
     drivable[tuple(np.argwhere(drivable)[0])] = False
-    assert true_lanes(replace(road, drivable=drivable), "t_intersection", None, config, 0.0) is None
-    assert true_lanes(road, "four_way", None, config, 0.0) is None
+    assert true_lanes(replace(road, drivable=drivable), "t_intersection", None, config, [], 0.0) is None
+    assert true_lanes(road, "four_way", None, config, [], 0.0) is None
     made = lane_map_of(replace(road, drivable=drivable), "t_intersection", None, {}, [crossing()], 10.0)
     assert made.derived and "derived" in made.origin
-    assert not lane_map_of(road, "", None, {}, [crossing()], 10.0).derived  # a nameless map of ours is known by its cells
+    assert not lane_map_of(road, "", None, {}, [], 10.0).derived  # a nameless map of ours is known by its cells
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_who_leaves_the_true_lanes_gets_a_lane_and_that_is_said(side):
+    config = RoadConfig(traffic_side=side)
+    road = build_road("straight", None, config)
+    y = float(road.entries[0, 1])
+    scenario = moving([[10.0, y, 0.0, 8.0, 0.0, 0.0], [10.0, y - 3.0 if side == "right" else y + 3.0, 0.0, 8.0, 0.0, 0.0]])
+    lane_map = true_lanes(road, "straight", None, config, [scenario], 5.0)
+    assert lane_map.added == 1 and "along the path of vehicle 2, which leaves them" in lane_map.origin
+    area = area_of(lanes_of(lane_map))
+    for n in range(2):
+        assert all(area.covers(Polygon(corners)) for corners in footprints(scenario, n))
 
 
 def test_derived_lanes_hold_every_footprint_and_followers_share_one():

@@ -31,6 +31,8 @@ LOCKS = (
     "requirements-bench.lock",
     "requirements-audit.lock",
     "requirements-docs.lock",
+    "requirements-judges-commonroad.lock",
+    "requirements-judges-asam.lock",
 )
 
 

@@ -36,10 +36,10 @@ from msg_conventions.fits import anchor_stamps, decode_fit
 from msg_conventions.paths import decode_route
 from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import decode_info
-from msg_conventions.scenarios import decode_scenario, digest
+from msg_conventions.scenarios import decode_scenario, digest, messages_of
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.errors import InputError
-from scenario_gen.recordings.read import read_scenario_set
+from scenario_gen.recordings.read import read_recording, read_scenario_set
 from scenario_gen.recordings.write import write_recording
 from scenario_gen.storage.bag import bag_topics, read_messages
 from scenario_gen.storage.reindex import reindex
@@ -275,3 +275,21 @@ def test_bags_of_genuine_rosbag2_are_read_alike_in_both_storages(data: Path, nam
         assert sum(topic.count for topic in bag_topics(folder)) == len(messages)
         read[storage] = Counter((m.topic, m.type) for m in messages)
     assert read["mcap"] == read["sqlite3"]
+
+
+def test_scenarios_of_vehicles_that_come_and_go_are_read_back_whole(run, tmp_path):
+    present = np.array([[0, 60], [20, 50]])
+    scenarios = tuple(replace(scenario, present=present) for scenario in run.generated.scenarios)
+    late = replace(run, encounter=replace(run.encounter, present=present), generated=replace(run.generated, scenarios=scenarios))
+    folder = write_recording(tmp_path / "bag", late)
+    assert sum(message.topic == "/scenarios" for message in read_messages(folder)) == 2 * len(scenarios)
+    found = read_recording(folder).namespaces[""]
+    assert not found.missing
+    assert not found.unknown
+    assert found.encounter.present.tolist() == present.tolist()
+    for before, after in zip(scenarios, found.scenario_set().scenarios, strict=True):
+        for name in ("position", "heading", "speed", "acceleration", "present"):
+            assert getattr(before, name).tobytes() == getattr(after, name).tobytes()
+    (info, (entry,)), summary = found.infos[2], found.summaries[0]
+    alone = found.messages_of(info, entry, summary)
+    assert [message.data for message in alone if message.topic == "/scenarios"] == list(messages_of(found.data("scenarios")[2]))

@@ -1,0 +1,173 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Bridges: exported scenarios before other people's programs, and back again. The judges are installed by `make judges`."""
+
+from collections.abc import Iterator, Sequence
+import json
+import os
+from pathlib import Path
+import subprocess
+import tempfile
+from typing import Any
+
+import numpy as np
+
+from benchmarks._size import sized
+from benchmarks.row import Row
+from scenario_gen.batch import generate_all
+from scenario_gen.demo import ROADS
+from scenario_gen.exchange.cases import Case, Exported, read_cases
+from scenario_gen.exchange.commonroad import write_commonroad
+from scenario_gen.exchange.config import ExportConfig
+from scenario_gen.exchange.export import export_bag
+from scenario_gen.exchange.importing import read_scenario_file
+from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.recordings.write import write_recording
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.scenario import Scenario
+
+ROOT = Path(__file__).resolve().parents[1]
+DATA = Path(os.environ.get("SCENARIO_GEN_DATA", ROOT.parent / "shared" / "data"))
+PER_DEMO, PER_CASE, CASES, PROBLEMS = sized(50, 2), sized(5, 1), sized(20, 1), sized(40, 1)
+ON = ("t_intersection", "corridor", "four_way", "straight")
+DRIVES = 15.0  # metres that a vehicle must drive to make an ego
+
+
+def run() -> list[Row]:
+    """Export the demo's scenarios and those of recorded encounters; let every judge that is here look at them."""
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        bags = list(_bags(folder))
+        rows = [Row("bridges.cases", len(bags), "cases", "higher")]
+        for target in ("commonroad", "openscenario"):
+            for k, bag in enumerate(bags):
+                export_bag(bag, folder / target / str(k), target)
+            rows += _round_trip(folder / target, bags, target)
+        rows += _commonroad(folder / "commonroad")
+        rows += _asam(folder / "openscenario")
+        problems = _problems(bags, folder / "problems")
+        return [*rows, *_driven(folder / "problems", problems)]
+
+
+def _bags(folder: Path) -> Iterator[Path]:
+    """Yield a bag of each case: the demo's, and recorded ones as long as there are fewer than `CASES`."""
+    for case, road in ROADS.items():
+        yield from _bag(folder, read_log(bundled(case)).encounters, (road,), PER_DEMO)
+    recorded = 0
+    for path in sorted((DATA / "trajectories").glob("*/encounter_*.csv")) if DATA.is_dir() else ():
+        for road in ON:
+            if recorded < CASES:
+                for bag in _bag(folder, read_log(path).encounters[:1], (road,), PER_CASE):
+                    recorded += 1
+                    yield bag
+
+
+def _bag(folder: Path, encounters: Sequence[Encounter], roads: Sequence[str], count: int) -> Iterator[Path]:
+    pairs = [(encounter, road) for encounter in encounters for road in roads]
+    made, _ = generate_all(pairs, PipelineConfig(), count=count, seed=7)
+    for case in made:
+        if case.generated.scenarios:
+            yield write_recording(folder / f"bag_{len(list(folder.glob('bag_*')))}", case)
+
+
+def _round_trip(folder: Path, bags: Sequence[Path], target: str) -> list[Row]:
+    """Return the largest differences of positions and speeds after writing and importing."""
+    place = speed = 0.0
+    for k, bag in enumerate(bags):
+        entries = json.loads((folder / str(k) / "export.json").read_text())["scenarios"]
+        known = {one.sha256: one.others for case in read_cases(bag) for one in case.scenarios}
+        for entry in entries:
+            scenario: Scenario = known[entry["sha256"]]
+            for n, track in enumerate(read_scenario_file(folder / str(k) / entry["files"][0]).tracks):
+                there = slice(int(scenario.present[n, 0]), int(scenario.present[n, 1]) + 1)
+                place = max(place, float(np.abs(track.rows[:, 1:3] - scenario.position[n, there]).max()))
+                speed = max(speed, float(np.abs(track.rows[:, 3] - scenario.speed[n, there]).max()))
+    return [
+        Row(f"bridges.{target}.round_trip.position", place, "m", "lower", 1e-3),
+        Row(f"bridges.{target}.round_trip.speed", speed, "m/s", "lower", 1e-2),
+    ]
+
+
+def _judged(environment: str, program: str, *arguments: str) -> Any:
+    """Return what a judge says; None if its environment is not here."""
+    python = ROOT / f".venv-judges-{environment}" / "bin" / "python"
+    if not python.is_file():
+        return None
+    run = subprocess.run([python, ROOT / "test" / "judges" / program, *arguments], capture_output=True, text=True, check=False)
+    lines = [line for line in run.stdout.splitlines() if line.startswith("{")]
+    if not lines:
+        raise RuntimeError(f"{program} said nothing: {run.stderr[-500:]}")
+    return json.loads(lines[-1])
+
+
+def _commonroad(folder: Path) -> list[Row]:
+    found = _judged("commonroad", "commonroad_files.py", "check", str(folder))
+    if found is None:
+        return []
+    peer = f"commonroad-io 2024.3, drivability checker 2025.4.0: {found['files']} files"
+    return [
+        Row("bridges.commonroad.schema_errors", len(found["invalid"]), "files", "lower", 0, peer),
+        Row("bridges.commonroad.read_error", found["read_error"], "m", "lower", 1e-6, peer),
+        Row("bridges.commonroad.collisions", len(found["collisions"]), "files", "lower", 0, peer),
+        Row("bridges.commonroad.off_road", len(found["off_road"]), "files", "lower", 0, peer),
+        Row("bridges.commonroad.planted_not_found", len(found["not_found"]), "files", "lower", 0, peer),
+    ]
+
+
+def _asam(folder: Path) -> list[Row]:
+    found = _judged("asam", "asam_files.py", str(folder))
+    if found is None:
+        return []
+    rows = []
+    for kind, name in (("xosc", "openscenario"), ("xodr", "opendrive")):
+        peer = f"asam-qc-{name}: {found[kind]} files, {found['rules'].get(kind, 0)} rules"
+        issues = sum(path.endswith(kind) for path in found["issues"])
+        rows.append(Row(f"bridges.{name}.files_with_issues", issues, "files", "lower", 0, peer))
+    return rows
+
+
+def _problems(bags: Sequence[Path], folder: Path) -> int:
+    """Write planning problems, one after the other from each case and each vehicle that drives; return how many."""
+    folder.mkdir()
+    found: list[list[tuple[Case, Exported]]] = []
+    for bag in bags:
+        for vehicle in [v.id for case in read_cases(bag) for v in case.scenarios[0].others.vehicles]:
+            cases = read_cases(bag, ExportConfig(ego=vehicle))
+            found.append([(case, one) for case in cases for one in case.scenarios if _drives(one)])
+    written = 0
+    for turn in range(max(map(len, found), default=0)):
+        for group in found:
+            if turn < len(group) and written < PROBLEMS:
+                data, _ = write_commonroad(*group[turn])
+                (folder / f"problem_{written:02d}.xml").write_bytes(data)
+                written += 1
+    return written
+
+
+def _drives(one: Exported) -> bool:
+    ego = one.ego
+    return ego is not None and float(np.abs(np.diff(ego.position[0], axis=0)).sum()) >= DRIVES
+
+
+def _driven(folder: Path, problems: int) -> list[Row]:
+    found = _judged("commonroad", "commonroad_files.py", "drive", str(folder)) if problems else None
+    if found is None:
+        return []
+    peer = f"commonroad-reactive-planner 2025.1: {found['reached']} of {found['problems']} problems"
+    for name, (how, step) in found["outcomes"].items():
+        peer += "" if how == "reached" else f"; {name}: {how} at step {step}"
+    return [Row("bridges.commonroad.problems_solved", found["reached"] / found["problems"], "share", "higher", 0.9, peer)]

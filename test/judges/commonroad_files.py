@@ -1,0 +1,163 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Judge CommonRoad files by other people's programs, in the environment of requirements-judges-commonroad.lock.
+
+`python commonroad_files.py check FOLDER`: the schema (lxml), commonroad-io's reading against the file's own numbers, and the
+drivability checker: collisions, who leaves the road, and whether both are found where they are planted.
+`python commonroad_files.py drive FOLDER`: commonroad-reactive-planner at each planning problem. One JSON object on the last line.
+"""
+
+import json
+from pathlib import Path
+import sys
+import warnings
+import xml.etree.ElementTree as ET
+
+from commonroad.common.file_reader import CommonRoadFileReader
+import commonroad.scenario_definition
+from commonroad_dc.boundary.boundary import create_road_boundary_obstacle
+from commonroad_dc.collision.collision_detection.pycrcc_collision_dispatch import create_collision_object
+from commonroad_rp.reactive_planner import ReactivePlanner
+from commonroad_rp.utility.config import ReactivePlannerConfiguration
+from commonroad_rp.utility.utils_coordinate_system import create_coordinate_system, create_initial_ref_path
+from lxml import etree
+import numpy as np
+
+SCHEMA = Path(commonroad.scenario_definition.__path__[0]) / "xml_definition_files" / "XML_commonRoad_XSD.xsd"
+AHEAD, COMFORT, SLOWEST = 30.0, 2.0, 2.5  # metres looked ahead, m/s² across, m/s
+BEYOND = 60.0  # metres of reference path beyond its end
+
+
+def read_error(path, scenario):
+    """Return by how much [m] positions that commonroad-io read differ from those written."""
+    worst = 0.0
+    for obstacle in ET.parse(path).getroot().iter("dynamicObstacle"):
+        known = scenario.obstacle_by_id(int(obstacle.attrib["id"]))
+        for state in [obstacle.find("initialState"), *obstacle.iterfind("trajectory/state")]:
+            k = int(state.find("time/exact").text)
+            place = [float(state.find(f"position/point/{axis}").text) for axis in "xy"]
+            worst = max(worst, float(np.abs(known.state_at_time(k).position - place).max()))
+    return worst
+
+
+def violations(scenario, boundary):
+    """Return how many pairs collide and how many vehicles leave the road."""
+    things = [create_collision_object(obstacle) for obstacle in scenario.dynamic_obstacles]
+    pairs = sum(a.collide(b) for k, a in enumerate(things) for b in things[:k])
+    return pairs, sum(thing.collide(boundary) for thing in things)
+
+
+def planted(path, boundary):
+    """Say whether a collision is found where a vehicle drives as another does, and a departure where it drives beside."""
+    scenario, _ = CommonRoadFileReader(str(path)).open()
+    first = scenario.dynamic_obstacles[0]
+    before = violations(scenario, boundary)
+    across = np.array([-np.sin(first.initial_state.orientation), np.cos(first.initial_state.orientation)])
+    departure = False
+    for _ in range(6):  # 5 m, 10 m, … beside: a road may be wide
+        first.translate_rotate(5.0 * across, 0.0)
+        departure = departure or violations(scenario, boundary)[1] > before[1]
+    if len(scenario.dynamic_obstacles) < 2:
+        return None, departure
+    scenario, _ = CommonRoadFileReader(str(path)).open()
+    first, second = scenario.dynamic_obstacles[:2]
+    first.translate_rotate(second.initial_state.position - first.initial_state.position, 0.0)
+    return violations(scenario, boundary)[0] > before[0], departure
+
+
+def check(folder):
+    schema = etree.XMLSchema(etree.parse(str(SCHEMA)))
+    found = {"files": 0, "invalid": [], "read_error": 0.0, "collisions": [], "off_road": [], "not_found": []}
+    for path in sorted(folder.rglob("*.xml")):
+        found["files"] += 1
+        if not schema.validate(etree.parse(str(path))):
+            found["invalid"].append(path.name)
+        scenario, _ = CommonRoadFileReader(str(path)).open()
+        found["read_error"] = max(found["read_error"], read_error(path, scenario))
+        _, boundary = create_road_boundary_obstacle(scenario, method="aligned_triangulation")
+        pairs, off = violations(scenario, boundary)
+        found["collisions"] += [path.name] * bool(pairs)
+        found["off_road"] += [path.name] * bool(off)
+        found["not_found"] += [path.name] * (False in planted(path, boundary))
+    return found
+
+
+def reference_path(scenario, problem):
+    """Return the route planner's path, continued straight on."""
+    path = create_initial_ref_path(scenario.lanelet_network, problem)
+    step = path[-1] - path[-5]
+    step /= np.hypot(*step)
+    return np.vstack([path, path[-1] + np.arange(1.0, BEYOND)[:, None] * step])
+
+
+def desired_speed(planner, cruise):
+    """Return the speed that the bends ahead allow, for the planner itself does not slow down for them."""
+    s, path, curvature = planner.x_0_cl[0][0], planner.coordinate_system.ref_pos, planner.coordinate_system.ref_curv
+    ahead = np.abs(curvature[(path > s - 2.0) & (path < s + AHEAD)])
+    return max(SLOWEST, min(cruise, float(np.sqrt(COMFORT / max(ahead.max(initial=1e-6), 1e-6)))))
+
+
+def drive(path):
+    """Return how the reactive planner fares with a file's problem, and after how many steps."""
+    scenario, problems = CommonRoadFileReader(str(path)).open()
+    (problem,) = problems.planning_problem_dict.values()
+    config = ReactivePlannerConfiguration()
+    config.debug.logging_level, config.debug.multiproc = "CRITICAL", False
+    config.planning.time_steps_computation, config.planning.dt = 20, scenario.dt
+    config.planning.__post_init__()
+    config.update(scenario=scenario, planning_problem=problem)
+    planner = ReactivePlanner(config)
+    planner.set_reference_path(coordinate_system=create_coordinate_system(reference_path(scenario, problem)))
+    planner.reset(coordinate_system=planner.coordinate_system)
+    planner.record_state_and_input(planner.x_0)
+    last = problem.goal.state_list[0].time_step.end
+    length = planner.coordinate_system.convert_to_curvilinear_coords(*problem.goal.state_list[0].position.center)[0]
+    length -= planner.x_0_cl[0][0]
+    cruise = max(problem.initial_state.velocity, 1.5 * length / (last * scenario.dt), SLOWEST)
+    planned = None
+    while not planner.goal_reached():
+        step = len(planner.record_state_list) - 1
+        if step >= last:
+            return "late", step
+        k = step % config.planning.replanning_frequency
+        if planned is None or k == 0:
+            planner.set_desired_velocity(desired_velocity=desired_speed(planner, cruise), current_speed=planner.x_0.velocity)
+            planned, k = planner.plan(), 0
+            if not planned:
+                return "no trajectory", step
+        planner.record_state_and_input(planned[0].state_list[1 + k])
+        planner.reset(
+            initial_state_cart=planner.record_state_list[-1],
+            initial_state_curv=(planned[1][1 + k], planned[2][1 + k]),
+            collision_checker=planner.collision_checker,
+            coordinate_system=planner.coordinate_system,
+        )
+    return "reached", len(planner.record_state_list) - 1
+
+
+def drive_all(folder):
+    outcomes = {}
+    for path in sorted(folder.rglob("*.xml")):
+        try:
+            outcomes[path.name] = drive(path)
+        except Exception as error:
+            outcomes[path.name] = (f"{type(error).__name__}: {error}"[:160], 0)
+        print(path.name, *outcomes[path.name], file=sys.stderr, flush=True)
+    return {"problems": len(outcomes), "reached": sum(how == "reached" for how, _ in outcomes.values()), "outcomes": outcomes}
+
+
+if __name__ == "__main__":
+    warnings.filterwarnings("ignore")
+    print(json.dumps({"check": check, "drive": drive_all}[sys.argv[1]](Path(sys.argv[2]))), flush=True)
