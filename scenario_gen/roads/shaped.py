@@ -30,7 +30,7 @@ from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
 from scenario_gen.roads.arms import RING_ROOM
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.sketch import Sketch
+from scenario_gen.roads.sketch import convex_hull, Sketch
 from scenario_gen.roads.ways import draw_ring_route, draw_route, extended
 from scenario_gen.template.frenet import FrenetTracks, main_line, MainLine
 from scenario_gen.template.manoeuvre import sharpness_of, turn_of
@@ -475,21 +475,4 @@ def _draw_arms(sketch: Sketch, arms: list[_ArmPlan], config: RoadConfig) -> None
             sketch.corner(corner, one, two, config.corner_radius)
             if abs(along) < _WIDE_JUNCTION:
                 middle.append(corner)
-    sketch.drivable.append(_hull(np.array(middle)))
-
-
-def _hull(points: Floats) -> Floats:
-    """The convex hull (H, 2) of points (M, 2), counter-clockwise (Andrew 1979)."""
-    order = points[np.lexsort((points[:, 1], points[:, 0]))]
-    halves = []
-    for row in (order, order[::-1]):
-        half: list[Floats] = []
-        for point in row:
-            while len(half) > 1:
-                u, v = half[-1] - half[-2], point - half[-1]
-                if u[0] * v[1] - u[1] * v[0] > 0.0:
-                    break
-                half.pop()
-            half.append(point)
-        halves += half[:-1]
-    return np.array(halves)
+    sketch.drivable.append(convex_hull(np.array(middle)))

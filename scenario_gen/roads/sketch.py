@@ -107,3 +107,20 @@ def _arc(centre: Floats, first: Floats, last: Floats, radius: float) -> Floats:
     turn = float(exact.arctan2(a[0] * b[1] - a[1] * b[0], float((a * b).sum())))
     angle = start + np.linspace(0.0, turn, 9)
     return np.asarray(centre + radius * np.column_stack((exact.cos(angle), exact.sin(angle))))
+
+
+def convex_hull(points: Floats) -> Floats:
+    """Return the convex hull (H, 2) of points (M, 2) [m], counter-clockwise (Andrew 1979)."""
+    order = points[np.lexsort((points[:, 1], points[:, 0]))]
+    halves = []
+    for row in (order, order[::-1]):
+        half: list[Floats] = []
+        for point in row:
+            while len(half) > 1:
+                u, v = half[-1] - half[-2], point - half[-1]
+                if u[0] * v[1] - u[1] * v[0] > 0.0:
+                    break
+                half.pop()
+            half.append(point)
+        halves += half[:-1]
+    return np.array(halves)

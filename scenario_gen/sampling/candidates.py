@@ -159,7 +159,8 @@ class CandidateModel:
             curve, arc = v.path.displaced(v.deviations(scale.lateral * z[:, a : a + across]))
             longer = arc[:, -1] - v.path.length
             cell = np.clip(np.round(v.speed.time / clock.grid[1]).astype(np.int64), 0, len(clock.grid) - 1)
-            speed, ok = v.speed.draw(scale.longitudinal * z[:, a + across : b], longer, pace[:, cell])
+            ends = np.clip(np.round(v.speed.spline.breaks[[0, -1]] / clock.grid[1]).astype(np.int64), 0, len(clock.grid) - 1)
+            speed, ok = v.speed.draw(scale.longitudinal * z[:, a + across : b], longer, pace[:, cell], pace[:, ends])
             feasible &= ok
             curves.append(curve)
             arcs.append(arc)

@@ -129,7 +129,7 @@ def drawn(count=4000, sigma=0.8, jerk=3.0):
     model = speed_model(basis, mean, plain(basis), bounds, TIME, speed, sigma, 4.0)
     z = np.random.default_rng(3).standard_normal((count, model.size))
     longer = np.linspace(-0.2, 0.2, count)
-    return model, ends, longer, model.draw(z, longer, np.ones((count, len(model.time))))
+    return model, ends, longer, model.draw(z, longer, np.ones((count, len(model.time))), np.ones((count, 2)))
 
 
 def test_draws_keep_ends_length_stands_and_bounds():
@@ -142,6 +142,14 @@ def test_draws_keep_ends_length_stands_and_bounds():
     assert c @ basis.length - model.mean @ basis.length == pytest.approx(longer, abs=1e-4)
     jerk = np.abs(c @ plain(basis).jerk.T)
     assert jerk.max() < max(1.06 * 3.0, 1.01 * np.abs(plain(basis).jerk @ model.mean).max())
+
+
+def test_a_speed_that_is_given_holds_on_any_clock():
+    model, ends, _, _ = drawn(1)
+    pace = np.array([[0.9, 1.2]])
+    c, _ = model.draw(np.zeros((1, model.size)), np.zeros(1), np.ones((1, len(model.time))), pace)
+    assert c[0, [0, -1]] / pace[0] == pytest.approx(ends)
+    assert model.spline.length @ (c[0] - model.mean) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_draws_have_the_stated_covariance_where_no_bound_is_near():

@@ -36,7 +36,9 @@ from scenario_gen.template.tracks import Track
 _ROOM = 1.0  # metres between a footprint and the end of the road
 _FORTH = 25.0  # metres of road before and after what is driven, where it has them
 _TRIED = 40  # roads, the straightest first
-_TURN = math.radians(60.0)  # a road may turn by this much more or less than the vehicles in the template
+_TURN = math.radians(
+    60.0
+)  # a road may bend by this much more than the template's; less it may, as the template is laid out straight
 _APART = 2.2  # metres between the middles of oncoming lanes, at least
 _ASIDE = 18.0  # metres between a road's outermost lanes
 _STRAIGHT = 0.02  # rad/m: how much of the cost is the road's bending: (rad/m)² are counted against this
@@ -149,7 +151,7 @@ def _laid(
         progress = np.zeros(len(along)) if track.still else (along - along[0]) * sign
         courses.append(Course(used, curve, float(begin[0]), np.maximum.accumulate(progress)))
         half = track.vehicle.length / 2.0 + _ROOM / 2.0
-        if courses[-1].start < half or courses[-1].end + half > curve.length or abs(turned_more(courses[-1], track)) > _TURN:
+        if courses[-1].start < half or courses[-1].end + half > curve.length or _bends_more(courses[-1], track):
             return None
     offsets = [
         [sides[int(k)].offset for k in frenet.lane[frenet.direction == sign].ravel()]
@@ -158,6 +160,13 @@ def _laid(
     if any(abs(a - b) < _APART for a in offsets[0] for b in offsets[1]):
         return None  # one lane for both directions
     return Match(tuple(courses), bend / _STRAIGHT + speeding(chains.network, courses, tracks), "")
+
+
+def _bends_more(course: Course, track: Track) -> bool:
+    """Whether a road turns a vehicle much more than the road of the template did."""
+    more = turned_more(course, track)
+    own = 0.0 if track.still else float(np.subtract(*track.curve.at(np.array([track.travelled, 0.0]))[:, 2]))
+    return abs(own + more) > abs(own) + _TURN
 
 
 def _sides(chains: Chains, axis: Curve, stretch: tuple[float, float], sign: int) -> list[_Side]:

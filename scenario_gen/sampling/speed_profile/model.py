@@ -51,6 +51,7 @@ class SpeedModel:
         spline: the basis.
         mean: (n,) coefficients [m/s] of the mean speed, which drives the route's own length.
         longer: (n,) what each further metre adds.
+        faster: (n, 2) what each further m/s at the start, and at the end, adds: no length.
         factor: (n, r) square root of the covariance.
         rows: (b, n) of what is bounded: coefficients, accelerations, jerks.
         low, high: (b,) their bounds.
@@ -61,6 +62,7 @@ class SpeedModel:
     spline: SpeedSpline
     mean: Floats
     longer: Floats
+    faster: Floats
     factor: Floats
     rows: Floats
     low: Floats
@@ -73,15 +75,17 @@ class SpeedModel:
         """Standard normal numbers needed per sample."""
         return int(self.factor.shape[1])
 
-    def draw(self, z: Floats, longer: Floats, pace: Floats) -> tuple[Floats, Bools]:
+    def draw(self, z: Floats, longer: Floats, pace: Floats, ends: Floats) -> tuple[Floats, Bools]:
         """Coefficients (S, n) [m/s] and whether they keep what must hold (S,).
 
         Args:
             z: (S, r) standard normal numbers.
             longer: (S,) metres by which the sample's path is longer than the route.
             pace: (S, b) rate of the sample's clock over the nominal one, at the times of the bounds.
+            ends: (S, 2) the same at the ends, where the speed of the vehicle, not that on the template's clock, is given.
         """
         base = self.mean + longer[:, None] * self.longer
+        base = base + exact.matmul((ends - 1.0) * self.mean[[0, -1]], self.faster.T)
         ok = np.ones(len(z), dtype=np.bool_)
         coefficients = base + exact.matmul(z, self.factor.T)
         if len(self.rows):
@@ -121,7 +125,7 @@ def speed_model(
         sigma: σ_s [m], standard deviation along the route.
         length: seconds over which that varies.
     """
-    longer = _spread_length(spline)
+    longer, faster = _spread_length(spline)
     factor = _conditioned(spline, _process(spline, mean, time, speed, sigma, length))
     unit, m = np.eye(spline.size), len(spline.stations)
     free = ~fixed_coefficients(spline, (0.0, 0.0))[0]
@@ -136,19 +140,29 @@ def speed_model(
     high = np.where(jerky, np.maximum(JERK_ROOM * high, driven), np.maximum(high, driven))
     spread = np.sqrt(np.square(exact.matmul(rows, factor)).sum(axis=1))
     near = (driven - low < _NEAR * spread) | (high - driven < _NEAR * spread)
-    return SpeedModel(spline, mean, longer, factor, rows[near], low[near], high[near], order[near], at[near])
+    return SpeedModel(spline, mean, longer, faster, factor, rows[near], low[near], high[near], order[near], at[near])
 
 
-def _spread_length(spline: SpeedSpline) -> Floats:
-    """(n,) the smoothest way to drive a metre more: ends and stands as they are; zero for a vehicle that stands throughout."""
+def _spread_length(spline: SpeedSpline) -> tuple[Floats, Floats]:
+    """The smoothest ways to drive a metre more (n,), and to be faster by 1 m/s at either end (n, 2) over the same length.
+
+    Stands, and what is not said to change, stay as they are; zero for a vehicle that stands throughout.
+    """
     given, _ = fixed_coefficients(spline, (0.0, 0.0))
     free = np.flatnonzero(~given)
-    out = np.zeros(spline.size)
-    if len(free):
-        stiff = spline.gram() + exact.power(LENGTH_SMOOTHING, 4) * spline.gram(2)
-        way = exact.solve_positive(stiff[np.ix_(free, free)], spline.length[free])
-        out[free] = way / float(exact.matmul(way, spline.length[free]))
-    return out
+    longer, faster = np.zeros(spline.size), np.zeros((spline.size, 2))
+    if len(free) == 0:
+        return longer, faster
+    stiff = spline.gram() + exact.power(LENGTH_SMOOTHING, 4) * spline.gram(2)
+    loose = stiff[np.ix_(free, free)]
+    way = exact.solve_positive(loose, spline.length[free])
+    longer[free] = way / float(exact.matmul(way, spline.length[free]))
+    for k, end in enumerate((0, spline.size - 1)):
+        if not spline.still[end]:
+            faster[end, k] = 1.0
+            faster[free, k] = -exact.solve_positive(loose, stiff[free, end])
+            faster[:, k] -= longer * float(exact.matmul(spline.length, faster[:, k]))
+    return longer, faster
 
 
 def kernel_root(time: Floats, amplitude: Floats, length: float) -> Floats:
