@@ -119,7 +119,7 @@ def test_a_scenario_is_held_against_what_was_asked_of_itself(run, tmp_path):
 def test_a_vehicle_may_be_left_out_and_the_order_of_the_others_is_free(run, tmp_path):
     def swapped(k, _data):
         scenario, order = run.generated.scenarios[k], [1, 0] if k else [1]
-        arrays = {name: getattr(scenario, name)[order] for name in ("position", "heading", "speed", "acceleration")}
+        arrays = {name: getattr(scenario, name)[order] for name in ("position", "heading", "speed", "acceleration", "present")}
         vehicles = tuple(np.array(scenario.vehicles, dtype=object)[order])
         return encode_scenario(replace(scenario, vehicles=vehicles, **arrays), run.encounter.start_ns)
 
