@@ -45,7 +45,7 @@ def run(monkeypatch, capsys, tmp_path):
 
 
 def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(run, tmp_path):
-    asked = ("--ego", "1", "--start", "2: 168 55.25 3.1416 9.5")
+    asked = ("--ego", "1", "--start", "2: 53 4.57 0 9.5")
     code, said = run("generate", LOG, *QUICK, "--count", 3, "--out", "one", *asked)
     assert code == 0, said
     messages = list(read_messages(tmp_path / "one" / "bag"))
@@ -54,7 +54,7 @@ def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(r
     assert len(scenarios) == 3
     for scenario in scenarios:
         assert [vehicle.id for vehicle in scenario.vehicles] == ["2"]
-        assert scenario.position[0, 0] == pytest.approx([168.0, 55.25], abs=0.01)
+        assert scenario.position[0, 0] == pytest.approx([53.0, 4.57], abs=0.01)
         assert scenario.speed[0, 0] == pytest.approx(9.5, abs=1e-6)
     page = (tmp_path / "one" / "report.html").read_text()
     assert "Vehicle 1 is left out for a planner under test" in page
@@ -68,7 +68,7 @@ def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(r
 
 
 def test_what_cannot_be_had_is_an_error_with_what_can(run):
-    code, said = run("generate", LOG, *QUICK, "--count", 2, "--goal", "1: 195.5 61.75 0 11")
+    code, said = run("generate", LOG, *QUICK, "--count", 2, "--goal", "1: 19 18.07 3.1413 11")
     assert code == 2
     nearest = re.search(r"--goal '([^']*)'", said)[1]
     assert "off the road" in said

@@ -30,12 +30,14 @@ from scenario_gen.evaluation import without_changepoints
 from scenario_gen.fitting import fit_template, FittingConfig
 from scenario_gen.reproduce.speed_profile import knots_on, SpeedBounds, SpeedProfile, SpeedProfileQP
 from scenario_gen.roads import build_road, RoadConfig
+from scenario_gen.roads.builtin import draw, layout_for
 from scenario_gen.routing import plan_routes, PlanningConfig
 from scenario_gen.routing.search.rrt_star_connect import PAPER
 from scenario_gen.sampling.config import SamplingConfig
 from scenario_gen.sampling.gp import Features, Observations, Posterior, Regression
 from scenario_gen.sampling.speed_profile.knots import speed_knots
 from scenario_gen.template.interaction import find_waits, Wait
+from scenario_gen.template.tracks import clean_tracks
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit
 from scenario_gen.types.road import Road
@@ -81,7 +83,8 @@ def place(encounter: Encounter, segmentation: Segmentation) -> tuple[Road, Float
     """Choose the road, and start and goal of every vehicle on it: (N, 3) x, y, yaw in cells.
 
     The metric fitting says which lanes the template takes and how far from the junction it begins and ends; the paper's
-    road has the same lanes, 100 cells wide.
+    road has the same lanes, 100 cells wide. So the metric road is the plain one, not shaped to the template: its arms are
+    those of the paper's, in the same order and straight.
 
     Raises:
         RefusedError: it fits none of the paper's roads; the message has the reason for each.
@@ -89,7 +92,7 @@ def place(encounter: Encounter, segmentation: Segmentation) -> tuple[Road, Float
     reasons = []
     for name in ROADS:
         try:
-            metric = build_road(name, encounter, RoadConfig())
+            metric = draw(name, layout_for(name, clean_tracks(encounter), RoadConfig()), RoadConfig())
             fit = fit_template(encounter, segmentation, metric)
         except RefusedError as error:
             reasons.append(f"{name}: {error}")

@@ -60,7 +60,7 @@ def slowed_clock(grid: Floats, needs: Sequence[Floats], most: float) -> Clock:
 
 
 def clock_of(grid: Floats, rate: Floats) -> Clock:
-    """The clock with these rates (G,) on its grid, cubic between."""
+    """Return the clock with these rates (G,) at template times (G,) [s], cubic between."""
     step = float(grid[1] - grid[0])
     time = np.concatenate([[0.0], np.cumsum(0.5 * step * (rate[1:] + rate[:-1]))])
     return Clock(grid, time, rate)

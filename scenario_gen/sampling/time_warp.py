@@ -51,7 +51,7 @@ class Clock:
     rate: Floats
 
     def at(self, tau: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Time, rate, and its first two derivatives at template times (q,) of a single clock."""
+        """Time [s], rate, and its first two derivatives [1/s, 1/s²] at template times (q,) [s] of a single clock."""
         cell = np.clip(np.searchsorted(self.grid, tau, side="right") - 1, 0, len(self.grid) - 2)
         h = self.grid[1] - self.grid[0]
         x = (tau - self.grid[cell]) / h

@@ -33,7 +33,7 @@ from scenario_gen.types.request import Request
 pytestmark = pytest.mark.dds
 LOG, ROAD, SEED = RESOURCES / "synthetic_b", "t_intersection", 7
 CHAIN = ("log_player", "segmenter", "planner", "gp_sampler", "road_server", "recorder")
-MOVED = {"starts": "2: 168 55.25 3.14159 9.5", "goals": "1: 195.5 51.75 0 11"}
+MOVED = {"starts": "2: 53 4.57 0 9.5", "goals": "1: 19 8.07 3.1413 11"}
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +115,7 @@ def test_the_same_bytes_as_in_process_with_states(suite, client):
 def test_what_is_impossible_is_refused_and_the_nearest_is_possible(suite, client):
     client.hear("/scenarios", "/scenarios/info")
     client.wait("/scenarios/info", 3, timeout=120.0)
-    result = ask(client, count=2, goals="1: 195.5 61.75 0 11")
+    result = ask(client, count=2, goals="1: 19 18.07 3.1413 11")
     assert not result.successful
     assert "off the road" in result.reason
     nearest = re.search(r"goals:='([^']*)'", result.reason.partition("Nearest possible: ")[2])[1]

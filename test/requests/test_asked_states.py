@@ -147,7 +147,7 @@ def test_a_start_too_fast_to_stop(chain, plain):
 def test_a_speed_above_the_limit(chain, plain):
     error = refused(chain, starts=state(plain, "start", 0, speed=60.0))
     assert "sampling.max_speed is 40" in str(error)
-    assert error.suggestions[0].request.states("starts")["1"][3] == pytest.approx(40.0)
+    assert 20.0 < error.suggestions[0].request.states("starts")["1"][3] <= 40.0
 
 
 def test_errors_of_the_caller_are_no_impossible_requests(chain):

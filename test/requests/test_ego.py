@@ -62,7 +62,7 @@ def test_the_track_is_drivable_in_shape_and_on_the_road(chain):
 def test_leaving_one_out_does_not_wait_for_its_limits(chain):
     """An ego that nobody could drive does not stand in the way of the others."""
     slow = replace(chain, encounter=chain.encounter, sampling=replace(chain.sampling, max_speed=11.0, max_stretch=0.0))
-    fast = Request(ego="1", goals="1: 199.0 51.75 0.0 40.0")
+    fast = Request(ego="1", goals="1: 16.0 8.07 3.14159 40.0")
     assert answer(replace(slow, sampling=replace(slow.sampling, max_speed=40.0)), fast, count=2).generated.scenarios
     assert len(answer(slow, Request(ego="1"), count=2).generated.scenarios) == 2
 

@@ -59,10 +59,12 @@ def test_two_to_eight_vehicles(count):
 
 @pytest.fixture(scope="module")
 def tight(data):
-    """A recorded left turn on a T-intersection: its arc leaves little below the lateral limits that are set here."""
+    """A recorded left turn on a T-intersection: its bends are driven just below the lateral limits set here."""
     (log,) = (data / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn_*.csv")
     encounter = read_log(log).encounters[0]
-    config = SamplingConfig(lateral_sigma=0.3, observation_sigma=0.3, longitudinal_sigma=0.5, time_sigma=1.0)
+    config = SamplingConfig(
+        lateral_sigma=0.3, observation_sigma=0.3, longitudinal_sigma=0.5, time_sigma=2.0, bend_acceleration=2.0
+    )
     return Given(encounter, segment(encounter), build_road("t_intersection", encounter), 0, sampling=config)
 
 
@@ -74,7 +76,7 @@ def limited(chain, lateral, **sampling):
 @pytest.mark.data
 def test_variance_adapts_where_validity_is_hard(tight):
     """Few candidates at full variance keep to the limit; with smaller deviations the set is had, and it is said."""
-    made = answer(limited(tight, 4.5), Request(), count=30).generated
+    made = answer(limited(tight, 2.0), Request(), count=30).generated
     assert len(made.scenarios) == 30
     (said,) = (line for line in made.adaptations if "few candidates were valid" in line)
     assert "standard deviations multiplied by 0" in said
@@ -84,11 +86,11 @@ def test_variance_adapts_where_validity_is_hard(tight):
 
 @pytest.mark.data
 def test_a_short_set_says_how_many_and_why(tight):
-    made = answer(limited(tight, 4.5, attempts=3), Request(), count=80).generated
+    made = answer(limited(tight, 1.95, attempts=3), Request(), count=80).generated
     assert 0 < len(made.scenarios) < made.requested == 80
     assert made.candidates == 240 == len(made.scenarios) + made.refused.total()
     assert set(made.refused) == {Cause.LATERAL_ACCELERATION}
-    impossible = answer(limited(tight, 2.0), Request(), count=10).generated
+    impossible = answer(limited(tight, 1.5), Request(), count=10).generated
     assert impossible.scenarios == ()
     assert impossible.refused.total() == impossible.candidates == 200
     assert "few candidates were valid, and smaller standard deviations did not help" in impossible.adaptations

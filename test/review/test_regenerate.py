@@ -36,7 +36,7 @@ from scenario_gen.storage.writer import atomic_bag
 from scenario_gen.types.request import Request
 
 LOG, ROAD, SEED = bundled("b"), "t_intersection", 7
-REQUESTS = {"plain": Request(), "ego": Request(ego="1"), "moved": Request(goals="1: 195.5 51.75 0 11", ego="2")}
+REQUESTS = {"plain": Request(), "ego": Request(ego="1"), "moved": Request(goals="1: 24.0 8.07 3.14159 11", ego="2")}
 
 
 @pytest.fixture(scope="module")

@@ -70,7 +70,7 @@ class Motion:
 
     @classmethod
     def of(cls, spline: SpeedSpline, rate: Floats, slope: Floats, bend: Floats) -> "Motion":
-        """Take r, r' and r'' (b,) at the spline's stations."""
+        """Take r, r' [1/s] and r'' [1/s²] (b,) at the spline's stations."""
         r, a, b = rate[:, None], slope[:, None], bend[:, None]
         u, du, ddu = (spline.design(spline.stations, k) for k in range(3))
         cubed = r * r * r

@@ -125,7 +125,7 @@ class SpeedSpline:
         return np.asarray((self.design(at.ravel()).reshape(*at.shape, self.size) * weight[..., None]).sum(axis=1))
 
     def gram(self, derivative: int = 0) -> Floats:
-        """(n, n) integrals of products of two basis functions' derivatives."""
+        """(n, n) integrals [s] of products of two basis functions, or of their derivatives."""
         at, weight = self._quadrature()
         basis = self.design(at.ravel(), derivative)
         return exact.matmul((basis * weight.ravel()[:, None]).T, basis)
