@@ -125,6 +125,16 @@ def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:
     }
 
 
+def write_verdicts(folder: Path, outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig) -> None:
+    """Write JSON and JUnit's XML to a folder that is there.
+
+    Raises:
+        OSError: the disk is full, or the folder may not be written.
+    """
+    write_text(folder / JSON, as_json(outcomes, planner, config))
+    write_text(folder / JUNIT, as_junit(outcomes, planner))
+
+
 def write_drives(
     out: Path,
     outcomes: Sequence[Outcome],
@@ -140,7 +150,6 @@ def write_drives(
         InputError: the folder may not be replaced, or not be written.
     """
     with replaced_folder(out, DRIVEN, inputs) as folder:
-        write_text(folder / JSON, as_json(outcomes, planner, config))
-        write_text(folder / JUNIT, as_junit(outcomes, planner))
+        write_verdicts(folder, outcomes, planner, config)
         write_text(folder / PAGE, as_page(outcomes, trials, planner, config, broken))
     return {name: out / name for name in (JSON, JUNIT, PAGE)}

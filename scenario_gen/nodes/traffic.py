@@ -35,7 +35,7 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from msg_conventions import driving
-from msg_conventions.diagnostics import encode_diagnostics, Level, Status
+from msg_conventions.diagnostics import Level
 from msg_conventions.ego import encode_state
 from msg_conventions.frames import encode_frames
 from msg_conventions.paths import encode_path
@@ -46,25 +46,23 @@ from scenario_gen.arrays import Floats
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.local_map import local_map
-from scenario_gen.closed_loop.results import as_json, as_junit
+from scenario_gen.closed_loop.results import write_verdicts
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
-from scenario_gen.closed_loop.tracking import of_twist, Track
 from scenario_gen.closed_loop.trials import Outcome, read_trials, Trial
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.errors import InputError, ScenarioGenError
-from scenario_gen.folders import write_text
 from scenario_gen.nodes.diagnostics import NodeDiagnostics
+from scenario_gen.nodes.ego_commands import FIRST_STAMP, Heard, INPUTS, stamp_of, understood, unusable
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.topics import create_publisher, create_subscription, publish
+from scenario_gen.nodes.traffic_messages import encode_odometries, encode_verdict
 from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.types.names import tokens
 from scenario_gen.types.road import Road
 
-INPUTS = ("ego/cmd_vel", "ego/cmd_vel_stamped", "ego/trajectory", "ego/path", "ego/odom")
 OUTPUTS = ("/clock", "/tf", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
 LOOK_AROUND = 10  # steps between two looks at who commands the ego
 GRID_EVERY = 0.2  # seconds of the drive between two local maps
-FIRST_STAMP = 1_000_000_000  # ns of a drive's clock at its start: a time of 0 means that none is known
 
 
 @dataclass(frozen=True)
@@ -82,17 +80,6 @@ class Config(Parameters):
     follow_on: bool = parameter(True, "go on with the next scenario when one is over")
     results: str = parameter("", "folder for drives.json and junit.xml, written anew after each drive; empty: none")
     drive: ClosedLoopConfig = field(default_factory=ClosedLoopConfig)
-
-
-@dataclass(frozen=True, eq=False)
-class Heard:
-    """A command: which step of the drive was the last when it came, its stamp [ns, 0: none], and what it gives at an instant."""
-
-    topic: str
-    step: int
-    stamp_ns: int
-    ask: Callable[[State], Command | Pose | None]
-    fault: str = ""
 
 
 class Traffic(Node):  # type: ignore[misc]
@@ -199,55 +186,22 @@ class Traffic(Node):  # type: ignore[misc]
         if self._loop is None:
             return
         try:
-            heard = self._understood(topic, data, self._loop)
-        except (InputError, ScenarioGenError) as error:
-            heard = Heard(topic, self._states[-1].step, 0, lambda _: None, str(error))
+            heard = understood(topic, data, self._loop, self._children[self._loop.ego], self._states[-1].step)
+        except ScenarioGenError as error:
+            heard = unusable(topic, self._states[-1].step, str(error))
         if heard.fault:
             self._say(Level.WARN, heard.fault, "ego")
         self._heard = heard
         if self._waiting is not None and not self._waiting.done():
             self._waiting.set_result(None)
 
-    def _understood(self, topic: str, data: bytes, loop: ClosedLoop) -> Heard:
-        """Return what a message asks.
-
-        Raises:
-            InputError: it is damaged, or in another frame.
-        """
-        step, period = self._states[-1].step, loop.config.step
-        frame, own = loop.scenario.frame_id, (self._children[loop.ego], "base_link", "")
-        if topic.startswith("ego/cmd_vel"):
-            stamp, said, speed, rate = driving.decode_twist(data, topic, stamped=topic.endswith("stamped"))
-            if said not in own and said != frame:
-                raise InputError(f"{topic}: frame {said!r} is not the ego's; {', '.join(map(repr, own[:2]))} are")
-            return Heard(topic, step, stamp, lambda state: of_twist(state.ego, speed, rate, period))
-        if topic == "ego/odom":
-            stamp, said, state = driving.decode_odometry(data, topic)
-            pose = Pose(*state[:4].tolist())
-            asked: Callable[[State], Command | Pose | None] = lambda _: pose  # noqa: E731
-        else:
-            decode = driving.decode_trajectory if topic == "ego/trajectory" else driving.decode_timed_path
-            way = decode(data, topic)
-            stamp, said = 0, way.frame_id  # its times say for when it is; it may be old
-            track = Track.of((way.time_ns - FIRST_STAMP) * 1e-9, way.poses)
-            asked = lambda state: track.command(state.ego, state.time, period)  # noqa: E731
-        if said != frame:
-            raise InputError(f"{topic}: frame {said!r} is not that of the scenario, {frame!r}")
-        return Heard(topic, step, stamp, asked)
-
     def _command(self, state: State) -> tuple[Command | Pose | None, str]:
         """Return what is asked of the ego now, and what is wrong with it."""
         heard = self._heard
         if heard is None:
             return None, ""
-        if heard.fault:
-            return None, heard.fault
-        old = (state.step - heard.step) * self.config.drive.step
-        if heard.stamp_ns:
-            old = max(old, self._stamp(state) * 1e-9 - heard.stamp_ns * 1e-9)
-        way = heard.topic in ("ego/trajectory", "ego/path")
-        if old > self.config.silence and not way:
-            return None, f"{heard.topic}: the last command is {old:.1f} s old"
+        if fault := heard.fault_at(state, self.config.drive.step, self.config.silence):
+            return None, fault
         if state.step % LOOK_AROUND == 0:
             self._sources = self._commanding()
         note = f"several egos: {', '.join(self._sources)}; what came last counts" if len(self._sources) > 1 else ""
@@ -281,18 +235,11 @@ class Traffic(Node):  # type: ignore[misc]
         verdict, trial = judge(loop, drive), self._trials[self._at]
         self._verdict = verdict.sentence()
         self._outcomes.append(Outcome(trial.name, verdict, drive))
-        level = Level.OK if verdict.passed else Level.ERROR
-        values = {key: json.dumps(value) for key, value in verdict.document().items()}
-        if drive.faults:
-            values["first_faults"] = json.dumps(drive.faults[:5])
-        status = Status(f"{self.get_name()}: scenario {trial.name}", level, self._verdict, values)
-        self._publish("verdicts", encode_diagnostics([status], self._stamp(self._states[-1])))
+        self._publish("verdicts", encode_verdict(self.get_name(), self._outcomes[-1], stamp_of(self._states[-1])))
         self.get_logger().info(f"scenario {trial.name}: {self._verdict}")
         if self.config.results:
-            folder, name = Path(self.config.results), f"{self.get_name()} over ROS 2"
-            folder.mkdir(parents=True, exist_ok=True)
-            write_text(folder / "drives.json", as_json(self._outcomes, name, self.config.drive))
-            write_text(folder / "junit.xml", as_junit(self._outcomes, name))
+            Path(self.config.results).mkdir(parents=True, exist_ok=True)
+            write_verdicts(Path(self.config.results), self._outcomes, f"{self.get_name()} over ROS 2", self.config.drive)
         if self.config.follow_on and not self.config.lock_step and self._at + 1 < len(self._trials):
             self._load(self._at + 1)
 
@@ -358,9 +305,6 @@ class Traffic(Node):  # type: ignore[misc]
 
     # --- what is published ------------------------------------------------------------------------------------
 
-    def _stamp(self, state: State) -> int:
-        return FIRST_STAMP + round(state.time * 1e9)
-
     def _publish(self, topic: str, data: bytes) -> None:
         publish(self, self._out[topic], data)
 
@@ -373,14 +317,11 @@ class Traffic(Node):  # type: ignore[misc]
         loop, state = self._loop, self._states[-1]
         if loop is None:
             return
-        stamp, frame = self._stamp(state), loop.scenario.frame_id
-        before = self._states[-2].vehicles if len(self._states) > 1 else state.vehicles
-        turned = (state.vehicles[:, 2] - before[:, 2]) / loop.config.step
+        stamp, frame = stamp_of(state), loop.scenario.frame_id
         self._publish("/clock", driving.encode_clock(stamp))
-        here = np.flatnonzero(state.here).tolist()
-        for i in here:
-            data = driving.encode_odometry(state.vehicles[i], float(turned[i]), self._children[i], frame, stamp)
+        for i, data in encode_odometries(self._states[-2:], self._children, loop.config.step, frame):
             publish(self, self._odometry[self._names[i]], data)
+        here = np.flatnonzero(state.here).tolist()
         poses: Floats = state.vehicles[here, :3]
         self._publish("/tf", encode_frames(poses, [self._children[i] for i in here], frame, stamp))
         vehicles = loop.scenario.vehicles
