@@ -47,7 +47,7 @@ class Arm:
 
 
 def reverse(pose: Floats) -> Floats:
-    """The same place (3,), heading the other way."""
+    """The same place (3,) [m, m, rad], heading the other way."""
     return np.asarray(pose + np.array([0.0, 0.0, np.pi]))
 
 

@@ -64,7 +64,7 @@ def always(present: Ints, samples: int) -> bool:
 
 
 def held(values: Floats, present: Ints) -> Floats:
-    """Return values (N, T, …) whose rows outside of the presence (N, 2) are the vehicle's first or last value inside of it."""
+    """Return values (N, T, …), of any unit; rows outside of the presence (N, 2) hold the first or last value inside of it."""
     samples = values.shape[1]
     if always(present, samples):
         return values

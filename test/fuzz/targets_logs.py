@@ -14,7 +14,7 @@
 
 """The readers of logs as targets: tables in text and Parquet, basic safety messages, bags in MCAP and SQLite."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 import contextlib
 from dataclasses import replace
 from functools import cache, partial
@@ -28,15 +28,19 @@ import numpy as np
 import pandas as pd
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
+from msg_conventions.autoware import AutowareEncoder
 from msg_conventions.ego import encode_state
 from msg_conventions.tracks import encode_tracks
 from msg_conventions.trajectory import TYPE as TRACKS
 from scenario_gen.errors import ScenarioGenError
 from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams
-from scenario_gen.logs.bag import read_streams, read_tracks, Topic, USED
+from scenario_gen.logs.bag import read_streams, read_tracked, read_tracks, Topic, USED
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.logs.tables import COLUMNS
-from scenario_gen.recordings.samples import FIX, ODOMETRY, STORES, TWIST
+from scenario_gen.recordings.samples import FIX, ODOMETRY, TWIST
+from scenario_gen.recordings.tracked import store, TRACKED
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.scenario import Scenario
 
 RECORD = "<BBqdd"  # vehicle, kind, stamp [ns], two values
 SHORT = LogConfig(min_duration=1.0, travel=1.0)
@@ -111,7 +115,7 @@ def safety_messages(_folder: Path) -> list[bytes]:
 
 
 def bags(storage: StoragePlugin, folder: Path) -> list[bytes]:
-    """Bags of one storage: streams of fixes and speeds, odometry of two vehicles, and a message of tracks; a few seconds each."""
+    """Bags of one storage: streams of fixes and speeds, odometry of two vehicles, a message of tracks, tracked objects."""
     (folder / "log.csv").write_bytes(texts(folder)[0])
     (encounter,) = read_log(folder / "log.csv", SHORT).encounters
     with Reader(bundled("b")) as reader:
@@ -123,14 +127,34 @@ def bags(storage: StoragePlugin, folder: Path) -> list[bytes]:
         for k, state in enumerate(np.column_stack(track)):
             stamp = encounter.start_ns + k * encounter.dt_ns
             odometry.append((f"/vehicle_{vehicle.id}/odom", ODOMETRY, stamp, encode_state(state, "car", "map", stamp)))
-    return [written(folder / name, storage, content) for name, content in (("s", streams), ("t", tracks), ("o", odometry))]
+    perceived = [("/objects", TRACKED, stamp, data) for stamp, data in objects(encounter)]
+    contents = {"s": streams, "t": tracks, "o": odometry, "p": perceived}
+    return [written(folder / name, storage, content) for name, content in contents.items()]
+
+
+def objects(encounter: Encounter) -> Iterator[tuple[int, bytes]]:
+    """Yield stamp [ns] and CDR bytes of what Autoware's perception says of an encounter."""
+    moved = Scenario(
+        vehicles=encounter.vehicles,
+        time=encounter.time,
+        position=encounter.position,
+        heading=encounter.heading,
+        speed=encounter.speed,
+        acceleration=np.zeros_like(encounter.speed),
+        seed=0,
+        index=0,
+    )
+    encoder = AutowareEncoder(moved)
+    for k, after in enumerate(encoder.time_ns):
+        stamp = encounter.start_ns + int(after)
+        yield stamp, encoder.tracked_objects(k, stamp)
 
 
 def written(bag: Path, storage: StoragePlugin, messages: Sequence[tuple[str, str, int, bytes]]) -> bytes:
     """Write messages (topic, type, stamp, CDR bytes) as a bag; return its one file."""
     with Writer(bag, version=9, storage_plugin=storage) as writer:
         kinds = {topic: kind for topic, kind, _, _ in messages}
-        connections = {topic: writer.add_connection(topic, kind, typestore=STORES) for topic, kind in kinds.items()}
+        connections = {topic: writer.add_connection(topic, kind, typestore=store()) for topic, kind in kinds.items()}
         for topic, _, stamp, data in messages:
             writer.write(connections[topic], stamp, data)
     (file,) = (file for file in bag.iterdir() if file.suffix in (".mcap", ".db3"))
@@ -169,13 +193,15 @@ def decode(data: bytes, _folder: Path) -> None:
     """Read a log of sound messages, among which some are the input."""
     kind = USED[data[0] % len(USED)] if data else USED[0]
     topics: dict[tuple[str, str], Topic] = {}
-    for used in (ODOMETRY,) if kind == ODOMETRY else (TRACKS,) if kind == TRACKS else (FIX, TWIST):
+    for used in (kind,) if kind in (ODOMETRY, TRACKS, TRACKED) else (FIX, TWIST):
         for number, (name, stamp, message) in enumerate(recorded()[used]):
             topic = topics.setdefault((used, name), Topic(name, used))
             topic.stamps.append(stamp)
             topic.data.append(data[1:] if used == kind and number % 7 == 0 else message)
     if kind == TRACKS:
         log = read_tracks(list(topics.values()), "log", "log.mcap", [])
+    elif kind == TRACKED:
+        log = read_tracked(list(topics.values()), "log", "log.mcap", [])
     else:
         log = read_streams(list(topics.values()), "log", "log.mcap", SHORT)
     encounters_of(log, SHORT)

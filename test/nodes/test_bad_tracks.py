@@ -27,6 +27,7 @@ from msg_conventions.streams import encode_fix, encode_speed
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.logs import read_log
 from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.presence import ALWAYS
 
 pytestmark = pytest.mark.dds
 NODES = {
@@ -54,6 +55,7 @@ def _repeated(encounter: Encounter, samples: int) -> bytes:
             position=np.repeat(encounter.position[:, :1], samples, axis=1),
             heading=np.repeat(encounter.heading[:, :1], samples, axis=1),
             speed=np.repeat(encounter.speed[:, :1], samples, axis=1),
+            present=ALWAYS,
         )
     )
 

@@ -83,9 +83,9 @@ def test_every_module_of_an_extra_is_one_that_is_looked_for():
 def write_csv(path):
     """Write the bundled case a as a table, which the core alone reads."""
     (encounter,) = read_log(bundled("a")).encounters
-    rows = ["vehicle,time_s,x_m,y_m,speed_mps"]
+    rows = ["vehicle,time_s,x_m,y_m,speed_mps,heading_rad"]  # a vehicle that only waits tells no heading by its places
     for n, vehicle in enumerate(encounter.vehicles):
-        for t, (x, y), speed in zip(encounter.time, encounter.position[n], encounter.speed[n], strict=True):
-            rows.append(f"{vehicle.id},{t:.1f},{x:.6f},{y:.6f},{speed:.6f}")
+        states = zip(encounter.time, encounter.position[n], encounter.speed[n], encounter.heading[n], strict=True)
+        rows += [f"{vehicle.id},{t:.1f},{x:.6f},{y:.6f},{speed:.6f},{heading:.6f}" for t, (x, y), speed, heading in states]
     path.write_text("\n".join(rows) + "\n")
     return path

@@ -116,7 +116,7 @@ def room_beside(
 ) -> tuple[float, float]:
     """What a footprint at a pose (in cells) surely has around it, and about what it has beside it; -FAR if it is blocked.
 
-    The first is proven by discs that cover the footprint: below 0 it tells nothing.
+    Clearances (H, W) are in cells. The first is proven by discs that cover the footprint: below 0 it tells nothing.
     """
     height, width = clearance.shape
     count = min(max(1, int(np.ceil(1.5 * half_length / half_width))), FEELERS)
