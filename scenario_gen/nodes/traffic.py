@@ -37,15 +37,12 @@ from std_srvs.srv import Trigger
 from msg_conventions import driving
 from msg_conventions.diagnostics import Level
 from msg_conventions.ego import encode_state
-from msg_conventions.frames import encode_frames
 from msg_conventions.paths import encode_path
 from msg_conventions.roads import decode_map
 from msg_conventions.scenarios import decode_scenario
 from msg_conventions.topics import vehicle_topic
-from scenario_gen.arrays import Floats
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
-from scenario_gen.closed_loop.local_map import local_map
 from scenario_gen.closed_loop.results import write_verdicts
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import Outcome, read_trials, Trial
@@ -55,7 +52,7 @@ from scenario_gen.nodes.diagnostics import NodeDiagnostics
 from scenario_gen.nodes.ego_commands import FIRST_STAMP, Heard, INPUTS, stamp_of, understood, unusable
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.topics import create_publisher, create_subscription, publish
-from scenario_gen.nodes.traffic_messages import encode_odometries, encode_verdict
+from scenario_gen.nodes.traffic_messages import encode_odometries, encode_poses, encode_surroundings, encode_verdict
 from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.types.names import tokens
 from scenario_gen.types.road import Road
@@ -321,17 +318,14 @@ class Traffic(Node):  # type: ignore[misc]
         self._publish("/clock", driving.encode_clock(stamp))
         for i, data in encode_odometries(self._states[-2:], self._children, loop.config.step, frame):
             publish(self, self._odometry[self._names[i]], data)
-        here = np.flatnonzero(state.here).tolist()
-        poses: Floats = state.vehicles[here, :3]
-        self._publish("/tf", encode_frames(poses, [self._children[i] for i in here], frame, stamp))
+        self._publish("/tf", encode_poses(state, self._children, frame))
         vehicles = loop.scenario.vehicles
         if self._is_heard("traffic/markers"):
             markers = driving.encode_traffic_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp)
             self._publish("traffic/markers", markers)
         every = max(round(GRID_EVERY / loop.config.step), 1)
         if state.step % every == 0 and loop.road is not None and self._is_heard("traffic/local_map"):
-            grid = local_map(loop, state)
-            self._publish("traffic/local_map", driving.encode_local_map(grid.blocked, grid.resolution, grid.origin, frame, stamp))
+            self._publish("traffic/local_map", encode_surroundings(loop, state))
 
     def _say(self, level: Level, message: str, subject: str) -> None:
         self.diagnostics.status(level, message, subject, {}, log=False)

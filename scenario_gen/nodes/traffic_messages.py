@@ -21,7 +21,10 @@ import numpy as np
 
 from msg_conventions import driving
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
-from scenario_gen.closed_loop.simulation import State
+from msg_conventions.frames import encode_frames
+from scenario_gen.arrays import Floats
+from scenario_gen.closed_loop.local_map import local_map
+from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.nodes.ego_commands import stamp_of
 
@@ -39,6 +42,19 @@ def encode_odometries(states: Sequence[State], children: Sequence[str], period: 
     turned = (state.vehicles[:, 2] - before.vehicles[:, 2]) / period
     for i in np.flatnonzero(state.here).tolist():
         yield i, driving.encode_odometry(state.vehicles[i], float(turned[i]), children[i], frame, stamp_of(state))
+
+
+def encode_poses(state: State, children: Sequence[str], frame: str) -> bytes:
+    """Return the CDR bytes of the frames of all vehicles that are there; `children` has everyone's."""
+    here = np.flatnonzero(state.here).tolist()
+    poses: Floats = state.vehicles[here, :3]
+    return encode_frames(poses, [children[i] for i in here], frame, stamp_of(state))
+
+
+def encode_surroundings(loop: ClosedLoop, state: State) -> bytes:
+    """Return the CDR bytes of the local map about the ego."""
+    grid, frame = local_map(loop, state), loop.scenario.frame_id
+    return driving.encode_local_map(grid.blocked, grid.resolution, grid.origin, frame, stamp_of(state))
 
 
 def encode_verdict(node: str, outcome: Outcome, stamp_ns: int) -> bytes:
