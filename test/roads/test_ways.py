@@ -45,7 +45,7 @@ def test_a_way_joins_two_lanes_with_the_asked_curvature_and_no_jump_of_it(turn, 
     bend = np.diff(way.points[:, 2]) / np.diff(way.station)
     if 1.5 * abs(turn) / sharpness < 60.0:  # there is room for it
         assert np.abs(bend).max() == pytest.approx(sharpness, rel=0.05)
-    assert np.abs(np.diff(bend)).max() < 0.35 * np.abs(bend).max()
+    assert np.abs(np.diff(bend)).max() < 0.5 * np.abs(bend).max()  # the shortest transition has three samples
 
 
 def test_a_line_between_two_poses_takes_the_bends_of_a_shape():
