@@ -223,9 +223,9 @@ def _way_strip(
     if outlines:
         station, offset = way.project(np.concatenate(outlines))
         on_way = (station > 0.0) & (station < way.length)
-        widened = [widest_near(way, station[on_way], sign * offset[on_way] + MARGIN) for sign in (1.0, -1.0)]
-        for base, needed in zip((left, right), widened, strict=True):
-            base[1:-1] = np.maximum(base[1:-1], np.minimum(needed[1:-1], base[1:-1] + MOST_WIDER))
+        needed = widest_near(way, station[on_way], np.abs(offset[on_way]) + MARGIN)[1:-1]
+        for base in (left, right):  # alike, so that the lane's middle, which planners follow, is as smooth as the way
+            base[1:-1] = np.maximum(base[1:-1], np.minimum(needed, base[1:-1] + MOST_WIDER))
     none = np.zeros((0, len(share)))
     name = f"way from arm {a + 1} to arm {b + 1}"
     if side == "right":

@@ -102,7 +102,7 @@ def test_who_leaves_the_true_lanes_gets_a_lane_and_that_is_said(side):
     y = float(road.entries[0, 1])
     scenario = moving([[10.0, y, 0.0, 8.0, 0.0, 0.0], [10.0, y - 3.0 if side == "right" else y + 3.0, 0.0, 8.0, 0.0, 0.0]])
     lane_map = true_lanes(road, "straight", None, config, [scenario], 5.0)
-    assert lane_map.added == 1 and "along the path of vehicle 2, which leaves them" in lane_map.origin
+    assert lane_map.added == 1 and "along the path of vehicle 2, which does not keep to them" in lane_map.origin
     area = area_of(lanes_of(lane_map))
     for n in range(2):
         assert all(area.covers(Polygon(corners)) for corners in footprints(scenario, n))
