@@ -134,7 +134,9 @@ def drive(path):
             return "late", step
         k = step % config.planning.replanning_frequency
         if planned is None or k == 0:
-            speed = max(planner.x_0.velocity, 0.01)  # at 0.0 it would take the initial speed for the desired one, and stand for ever
+            speed = max(
+                planner.x_0.velocity, 0.01
+            )  # at 0.0 it would take the initial speed for the desired one, and stand for ever
             planner.set_desired_velocity(desired_velocity=desired_speed(planner, cruise), current_speed=speed)
             planned, k = planner.plan(), 0
             if not planned:
