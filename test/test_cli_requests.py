@@ -49,7 +49,7 @@ def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(r
     code, said = run("generate", LOG, *QUICK, "--count", 3, "--out", "one", *asked)
     assert code == 0, said
     messages = list(read_messages(tmp_path / "one" / "bag"))
-    assert {"/ego/start", "/ego/goal", "/ego/track"} <= {message.topic for message in messages}
+    assert {"/ego/start", "/ego/goal", "/ego/witness"} <= {message.topic for message in messages}
     scenarios = [decode_scenario(message.data)[1] for message in messages if message.topic == "/scenarios"]
     assert len(scenarios) == 3
     for scenario in scenarios:

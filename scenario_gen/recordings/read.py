@@ -30,6 +30,7 @@ import numpy as np
 from msg_conventions import fits
 from msg_conventions.cdr import stamp_of
 from msg_conventions.changepoints import decode_changepoints, decode_posterior, segment_descriptions
+from msg_conventions.ego import WITNESS
 from msg_conventions.hashes import decode_hashes, hash_of
 from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import decode_info, encode_info, INFO, Info, MESSAGES, RequestSummary, ScenarioEntry
@@ -52,6 +53,7 @@ __all__ = [
     "INFO",
     "NO_ENTRY",
     "SCENARIOS",
+    "WITNESS",
     "Namespace",
     "Recording",
     "RequestSummary",
@@ -64,7 +66,7 @@ SCENARIOS = "scenarios"
 NO_ENTRY = f"{INFO} has no entry for them (lost with the end of a recording?)"
 READ = re.compile(
     r"(?:(?P<namespace>.*?)/)?(?P<topic>tracks|changepoints|posterior|map|road/entries|road/exits|fit|fit/info|vehicle_\w+/route"
-    r"|ego/(?:start|goal|track)|scenarios|scenarios/info|diagnostics)",
+    r"|ego/(?:start|goal|track|witness)|scenarios|scenarios/info|diagnostics)",
     re.DOTALL,
 )
 TEMPLATE_TOPIC = re.compile(
@@ -97,15 +99,16 @@ def read_recording(path: Path, config: BagConfig = BagConfig(), topics: Collecti
     Args:
         path: of the bag.
         config: what is read at most.
-        topics: names without namespace, if not all that the conventions know are needed.
+        topics: names without namespace, if not all that the conventions know are needed; with scenarios come their witnesses.
 
     Raises:
         InputError: the bag is missing or damaged, or larger than `config` allows.
     """
+    wanted = {*topics, *((WITNESS,) if SCENARIOS in topics else ())}
 
     def known(name: str) -> re.Match[str] | None:
         match = READ.fullmatch(name)
-        return match if match and (not topics or match["topic"] in topics) else None
+        return match if match and (not topics or match["topic"] in wanted) else None
 
     found: dict[str, dict[str, list[BagMessage]]] = {}
     for message in read_messages(path, lambda name: known(name) is not None, config):
@@ -213,15 +216,39 @@ class Namespace:
         return self._entry_by_hash.get(self.hashes[k])
 
     def scenario(self, k: int) -> tuple[int, Scenario]:
-        """Return stamp [ns] and scenario `k`, numbered as its entry says; without one, by its place.
+        """Return stamp [ns] and scenario `k`, numbered as its entry says; without one, by its place. With its ego's witness.
 
         Raises:
-            InputError: its message is damaged.
+            InputError: its message, or that of its witness, is damaged.
         """
-        entry = self.entry(k)
+        return self._decoded(self.messages[SCENARIOS][k].data, self.entry(k), k)
+
+    def _decoded(self, data: bytes, entry: ScenarioEntry | None, k: int) -> tuple[int, Scenario]:
         seed, index = (entry.seed, entry.index) if entry else (0, k)
-        what = f"{self.where(SCENARIOS)}, message {k}"
-        return decode_scenario(self.messages[SCENARIOS][k].data, seed=seed, index=index, what=what)
+        what, left_out = f"{self.where(SCENARIOS)}, message {k}", bool(entry and entry.ego)
+        stamp, scenario = decode_scenario(data, seed=seed, index=index, what=what, late=left_out)
+        witness = self.witness_messages.get(entry.witness) if entry else None
+        if witness is None:
+            return stamp, scenario
+        where = f"{self.where(WITNESS)}, of scenario {index}"
+        of, own = decode_scenario(witness.data, seed=seed, index=index, what=where, late=True)
+        if (of, own.frame_id) != (stamp, scenario.frame_id) or len(own.vehicles) != 1 or own.vehicles[0] in scenario.vehicles:
+            raise InputError(f"{where}: it is not one other vehicle with the scenario's stamp and frame")
+        return stamp, replace(scenario, witness=own)
+
+    @cached_property
+    def witness_messages(self) -> Mapping[str, BagMessage]:
+        """The messages of egos' witnesses by their SHA-256."""
+        return {digest(message.data): message for message in self.messages.get(WITNESS, ())}
+
+    def without_witness(self, entry: ScenarioEntry) -> bool:
+        """Whether the witness that an entry names is not in the bag."""
+        return bool(entry.witness) and entry.witness not in self.witness_messages
+
+    @cached_property
+    def altered_witnesses(self) -> bool:
+        """Whether there is a witness that no entry names, though entries are there."""
+        return bool(self.witness_messages.keys() - {entry.witness for entry in self.entries})
 
     @cached_property
     def unknown(self) -> dict[int, ScenarioEntry | None]:
@@ -270,9 +297,7 @@ class Namespace:
                 raise InputError(f"{self.path}: scenario {entry.index} of request {entry.request} is not on {what}")
         if len(own) != summary.published:
             raise InputError(f"{self.path}: {summary.published} scenarios were published, {len(own)} are on {what}")
-        return summary.result(
-            tuple(decode_scenario(by_hash[e.sha256], seed=e.seed, index=e.index, what=what)[1] for e in own.values())
-        )
+        return summary.result(tuple(self._decoded(by_hash[e.sha256], e, e.index)[1] for e in own.values()))
 
     # The template and the road that one scenario was made for.
 
@@ -361,7 +386,7 @@ class Namespace:
             summary: of its request.
 
         Raises:
-            InputError: a message is damaged, or the scenario itself is not in the bag.
+            InputError: a message is damaged, or the scenario itself or its witness is not in the bag.
         """
         stamp = stamp_of(info.data, info.topic)
         same = [m for m, sha256 in zip(self.messages.get(SCENARIOS, ()), self.hashes, strict=True) if sha256 == entry.sha256]
@@ -369,7 +394,10 @@ class Namespace:
             raise InputError(f"{self.path}: the scenario with SHA-256 {entry.sha256} is not on {self.where(SCENARIOS)}")
         closing = replace(info, data=encode_info(summary.of_one_scenario(), stamp))
         own = [replace(same[-1], data=data) for data in messages_of(same[-1].data)] if len(entry.messages) > 1 else same[-1:]
-        return (*self.template_messages(entry, stamp).values(), *own, info, closing)
+        if self.without_witness(entry):
+            raise InputError(f"{self.path}: the witness with SHA-256 {entry.witness} is not on {self.where(WITNESS)}")
+        witness = (self.witness_messages[entry.witness],) if entry.witness else ()
+        return (*self.template_messages(entry, stamp).values(), *witness, *own, info, closing)
 
     # To look at: the newest template and what the nodes said of it.
 
@@ -386,7 +414,7 @@ class Namespace:
 
     @cached_property
     def ego_track(self) -> Scenario | None:
-        """The newest track of an ego."""
+        """The newest track of an ego, of a bag of a version before 0.6."""
         tracks = self.data("ego/track")
         return decode_scenario(tracks[-1], what=self.where("ego/track"), late=True)[1] if tracks else None
 
