@@ -471,11 +471,16 @@ class Namespace:
                 fits.decode_fitted(poses, self.statuses, vehicle.id)
                 for poses, vehicle in zip(anchors, encounter.vehicles, strict=True)
             )
-            routes = tuple(route for _, _, route in decode_routes(messages, encounter, stamps))
+            routes = tuple(
+                fits.with_figures(route, self.statuses, vehicle.id)
+                for vehicle, (_, _, route) in zip(encounter.vehicles, decode_routes(messages, encounter, stamps), strict=True)
+            )
             lost = fits.decode_losses(self.statuses.get("fit", {}))
         except InputError:
             return None, ()
-        notes = tuple(text for key, text in self.statuses.get("fit", {}).items() if key.startswith("note."))
+        remarks = {said for vehicle, route in zip(encounter.vehicles, routes, strict=True) for said in route.remarks(vehicle.id)}
+        noted = tuple(text for key, text in self.statuses.get("fit", {}).items() if key.startswith("note."))
+        notes = tuple(text for text in noted if text not in remarks)  # which the routes say themselves
         return Fit(encounter.vehicles, fitted, anchor_index(encounter, changepoints), asked, notes, lost), routes
 
 
