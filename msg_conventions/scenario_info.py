@@ -116,10 +116,8 @@ class ScenarioEntry:
             return None
         start, end = (_states(values[key], where) for key, _ in keys)
         if witness:
-            start, end = (
-                np.concatenate([rows, _states(f"[{values[key]}]", where)])
-                for rows, (_, key) in zip((start, end), keys, strict=True)
-            )
+            own = (_states(f"[{values[key]}]", where) for _, key in keys)
+            start, end = (np.concatenate(rows) for rows in zip((start, end), own, strict=True))
         return BoundaryStates(start, end)
 
 

@@ -33,11 +33,12 @@ from msg_conventions.changepoints import decode_changepoints, decode_posterior, 
 from msg_conventions.ego import WITNESS
 from msg_conventions.hashes import decode_hashes, hash_of
 from msg_conventions.roads import decode_map
-from msg_conventions.scenario_info import decode_info, encode_info, INFO, Info, MESSAGES, RequestSummary, ScenarioEntry
+from msg_conventions.scenario_info import decode_info, encode_info, INFO, Info, RequestSummary, ScenarioEntry
 from msg_conventions.scenarios import decode_scenario, digest, messages_of
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
+from scenario_gen.recordings.of_scenarios import decode_with_witness, joined_messages
 from scenario_gen.recordings.requests import RequestTracker
 from scenario_gen.recordings.template import anchor_index, decode_routes, template_statuses
 from scenario_gen.storage.bag import BagMessage, read_messages, within
@@ -134,7 +135,7 @@ class Namespace:
         """The messages by topic; those of one scenario are joined, so that there is one for each scenario."""
         if not (SCENARIOS in self._recorded and INFO in self._recorded):
             return self._recorded
-        return {**self._recorded, SCENARIOS: _joined(self._recorded[SCENARIOS], self.entries)}
+        return {**self._recorded, SCENARIOS: joined_messages(self._recorded[SCENARIOS], self.entries)}
 
     def data(self, topic: str) -> list[bytes]:
         """Return the messages of a topic, in order."""
@@ -224,31 +225,23 @@ class Namespace:
         return self._decoded(self.messages[SCENARIOS][k].data, self.entry(k), k)
 
     def _decoded(self, data: bytes, entry: ScenarioEntry | None, k: int) -> tuple[int, Scenario]:
-        seed, index = (entry.seed, entry.index) if entry else (0, k)
-        what, left_out = f"{self.where(SCENARIOS)}, message {k}", bool(entry and entry.ego)
-        stamp, scenario = decode_scenario(data, seed=seed, index=index, what=what, late=left_out)
-        witness = self.witness_messages.get(entry.witness) if entry else None
-        if witness is None:
-            return stamp, scenario
-        where = f"{self.where(WITNESS)}, of scenario {index}"
-        of, own = decode_scenario(witness.data, seed=seed, index=index, what=where, late=True)
-        if (of, own.frame_id) != (stamp, scenario.frame_id) or len(own.vehicles) != 1 or own.vehicles[0] in scenario.vehicles:
-            raise InputError(f"{where}: it is not one other vehicle with the scenario's stamp and frame")
-        return stamp, replace(scenario, witness=own)
+        message = self.witnesses.get(entry.witness) if entry else None
+        witness = None if message is None else message.data
+        return decode_with_witness(data, entry, k, witness, f"{self.where(SCENARIOS)}, message {k}", self.where(WITNESS))
 
     @cached_property
-    def witness_messages(self) -> Mapping[str, BagMessage]:
+    def witnesses(self) -> Mapping[str, BagMessage]:
         """The messages of egos' witnesses by their SHA-256."""
         return {digest(message.data): message for message in self.messages.get(WITNESS, ())}
 
     def without_witness(self, entry: ScenarioEntry) -> bool:
         """Whether the witness that an entry names is not in the bag."""
-        return bool(entry.witness) and entry.witness not in self.witness_messages
+        return bool(entry.witness) and entry.witness not in self.witnesses
 
     @cached_property
-    def altered_witnesses(self) -> bool:
+    def strange_witnesses(self) -> bool:
         """Whether there is a witness that no entry names, though entries are there."""
-        return bool(self.witness_messages.keys() - {entry.witness for entry in self.entries})
+        return bool(self.witnesses.keys() - {entry.witness for entry in self.entries})
 
     @cached_property
     def unknown(self) -> dict[int, ScenarioEntry | None]:
@@ -396,7 +389,7 @@ class Namespace:
         own = [replace(same[-1], data=data) for data in messages_of(same[-1].data)] if len(entry.messages) > 1 else same[-1:]
         if self.without_witness(entry):
             raise InputError(f"{self.path}: the witness with SHA-256 {entry.witness} is not on {self.where(WITNESS)}")
-        witness = (self.witness_messages[entry.witness],) if entry.witness else ()
+        witness = (self.witnesses[entry.witness],) if entry.witness else ()
         return (*self.template_messages(entry, stamp).values(), *witness, *own, info, closing)
 
     # To look at: the newest template and what the nodes said of it.
@@ -495,33 +488,6 @@ def read_scenario_set(path: Path, namespace: str = "", config: BagConfig = BagCo
         raise InputError(f"{path}: no request was closed on {namespace}/{INFO}")
     with within(path):
         return found.scenario_set()
-
-
-def _joined(messages: Sequence[BagMessage], entries: Iterable[ScenarioEntry]) -> Sequence[BagMessage]:
-    """Return one message per scenario: who comes or goes is in messages of its own, which an entry names.
-
-    Where one of them is missing, what is there stays as it is: its entry then has no scenario, and that is found.
-    """
-    several = [entry for entry in entries if MESSAGES in entry.status.values]
-    if not several:
-        return messages
-    places: dict[str, list[int]] = {}
-    for k, message in enumerate(messages):
-        places.setdefault(digest(message.data), []).append(k)
-    joined = dict(enumerate(messages))
-    for entry in several:
-        try:
-            own = [places[sha256].pop(0) for sha256 in entry.messages if places.get(sha256)]
-            whole = len(own) == len(entry.messages)
-        except InputError:
-            continue
-        if not whole:
-            continue
-        data = b"".join(messages[k].data for k in own)
-        for k in own:
-            joined.pop(k)
-        joined[own[0]] = replace(messages[own[0]], data=data)
-    return [joined[k] for k in sorted(joined)]
 
 
 def _numbered(texts: Iterable[str]) -> Iterable[tuple[str, int]]:

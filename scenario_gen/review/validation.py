@@ -134,7 +134,7 @@ def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
         entry = namespace.entry(k) or entry
         silent = said
         if entry is not None and namespace.without_witness(entry):
-            if namespace.altered_witnesses:
+            if namespace.strange_witnesses:
                 wrong.append((ALTERED, f"the ego's witness is not what was published for index {entry.index}"))
             silent = (*said, NO_WITNESS)
         try:
