@@ -68,8 +68,8 @@ class Exported:
         if self.ego is not None and self.ego.present[0, 0] > 0:
             begin = float(self.ego.time[self.ego.present[0, 0]])
             raise RefusedError(
-                f"scenario {self.index}: the ego, vehicle {self.ego.vehicles[0].id}, arrives {begin:.1f} s late, and a planner under test "
-                "begins at 0; choose a vehicle with --ego that is there from the start"
+                f"scenario {self.index}: the ego, vehicle {self.ego.vehicles[0].id}, arrives {begin:.1f} s late, and a planner "
+                "under test begins at 0; choose a vehicle with --ego that is there from the start"
             )
 
 

@@ -59,9 +59,9 @@ def write_commonroad(case: Case, one: Exported, export: ExportConfig = ExportCon
     late = [v.id for v, (first, _) in zip(scenario.vehicles, scenario.present.tolist(), strict=True) if first > 0]
     if late and export.late == "refused":
         raise RefusedError(
-            f"scenario {one.index}: vehicle {', '.join(late)} arrives late, and the schema of CommonRoad 2020a has obstacles from "
-            "the first step on only; `--set late=written` writes the step at which it arrives, which commonroad-io reads; or "
-            "export it to openscenario or autoware"
+            f"scenario {one.index}: vehicle {', '.join(late)} arrives late, and CommonRoad's schema has obstacles "
+            "from the first step on only; `--set late=written` writes the step at which it arrives, which commonroad-io "
+            "reads; or export it to openscenario or autoware"
         )
     if late:
         notes += (f"vehicle {', '.join(late)} arrives late: its initial time step is not 0, which the schema does not allow",)

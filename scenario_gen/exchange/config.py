@@ -39,8 +39,8 @@ class ExportConfig(Parameters):
     )
     late: str = parameter(
         "refused",
-        "CommonRoad: a scenario in which a vehicle arrives late is refused, or written with the time step at which it arrives, which "
-        "its software reads and its schema does not allow",
+        "CommonRoad: a scenario in which a vehicle arrives late is refused, or written with the time step at which it arrives, "
+        "which CommonRoad's software reads and its schema does not allow",
         choices=("refused", "written"),
     )
     following: str = parameter(

@@ -32,6 +32,7 @@ APART = 0.5  # metres between points of a path that it is laid through
 MARGIN = 0.1  # metres between a footprint and its lane's edge
 AROUND = 0.5  # metres by which a lane goes on beyond its footprints at least
 ACROSS = 0.6  # rad by which a vehicle in a lane may be turned in it
+CUT = 5.0  # metres of a path that may lie across all lanes, as where a corner is cut
 SAME_LANE, SAME_WAY = 1.0, 0.35  # metres and rad within which a path lies in another one's lane
 NEAR = 3  # points of a lane on both sides over which it keeps its widest
 
@@ -79,7 +80,7 @@ def with_all_vehicles(lane_map: LaneMap, scenarios: Sequence[Scenario], road: Ro
         for n, vehicle in enumerate(scenario.vehicles):
             if vehicle.id not in missing:
                 path = driven_path(scenario, n)
-                if not covers(area, polygons(footprints(scenario, n))).all() or not _all_led(path, lanes):
+                if not covers(area, polygons(footprints(scenario, n))).all() or _unled(path, lanes) > CUT:
                     missing[vehicle.id] = path
     if not missing:
         return lane_map
@@ -90,8 +91,8 @@ def with_all_vehicles(lane_map: LaneMap, scenarios: Sequence[Scenario], road: Ro
     return replace(lane_map, strips=(*lane_map.strips, *strips), added=len(strips), origin=origin)
 
 
-def _all_led(path: Curve, lanes: Sequence[Lane]) -> bool:
-    """Say whether every point of a path lies in a lane of nearly its direction."""
+def _unled(path: Curve, lanes: Sequence[Lane]) -> float:
+    """Return the metres of a path on which no lane has nearly its direction."""
     led = np.zeros(len(path.points), dtype=np.bool_)
     for lane in lanes:
         inside = np.flatnonzero(~led & contains_xy(Polygon(np.concatenate([lane.left, lane.right[::-1]])), path.points[:, :2]))
@@ -99,7 +100,7 @@ def _all_led(path: Curve, lanes: Sequence[Lane]) -> bool:
             middle = Curve.through(lane.middle)
             yaw = middle.at(middle.project(path.points[inside, :2])[0])[:, 2]
             led[inside] |= exact.cos(path.points[inside, 2] - yaw) > exact.cos(ACROSS)
-    return bool(led.all())
+    return float(np.diff(path.station)[~led[1:]].sum())
 
 
 def footprints(scenario: Scenario, n: int) -> Floats:

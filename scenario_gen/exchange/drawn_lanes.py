@@ -180,8 +180,8 @@ def _arm_strip(name: str, arm: _Side, width: float, extra: float, side: str, run
     """Return an arm from its run-out to its mouth; its outermost edges lie `extra` outside."""
     reference = arm.line.cut(-run_out, arm.mouth, STEP).points
     along, against = (np.full((count, len(reference)), width) for count in (arm.inward, arm.outward))
-    for outermost in (along[-1:], against[-1:]):
-        outermost += extra
+    along[-1:] += extra
+    against[-1:] += extra
     right, left = (along, against) if side == "right" else (against, along)
     return Strip(name, reference, np.zeros(len(reference)), right, left)
 

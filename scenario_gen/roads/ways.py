@@ -135,7 +135,7 @@ def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float,
 
 
 def flare_begins(radius: float, aside: float) -> float:
-    """How far [m] from the centre of a roundabout of a `radius` [m] a lane, `aside` [m] from an arm's line, begins to bend to it."""
+    """How far [m] from a roundabout's centre a lane begins to bend to it, by the ring's radius and how far aside it lies [m]."""
     return float(np.sqrt(np.square(radius + _FLARE) - np.square(aside + _FLARE)))  # from the bend's centre to the ring's
 
 
