@@ -48,7 +48,7 @@ EXTRAS["ros"] = [*EXTRAS["all"], *chain.from_iterable(needed("requirements-ros.i
 
 setup(
     name=NAME,
-    version="0.5.0",
+    version="0.6.0",
     description="New multi-vehicle traffic encounters from recorded ones, as a library, as one command and as ROS 2 nodes",
     license="Apache-2.0",
     maintainer="The scenario_gen developers",
