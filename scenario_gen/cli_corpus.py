@@ -49,6 +49,16 @@ def lines(said: Sequence[str]) -> None:
         Terminal().print(line, soft_wrap=True)
 
 
+def conclude(failed: Sequence[str], out: Path) -> None:
+    """Say that not everything could be done.
+
+    Raises:
+        RefusedError: a task failed.
+    """
+    if failed:
+        raise RefusedError(f"{len(failed)} tasks failed, as said above; the rest is in {out}")
+
+
 @commands.command()
 def mine(
     archive: Annotated[list[Path], typer.Argument(help="folders of SPMD files, tables and bags, or single ones; repeatable")],
@@ -59,12 +69,7 @@ def mine(
         list[str] | None, typer.Option("--set", help="memory, range_size, interaction, log.proximity, …, as name=value")
     ] = None,
 ) -> None:
-    """Find the encounters in an archive of any size.
-
-    \f
-    Raises:
-        RefusedError: some of it could not be read.
-    """
+    """Find the encounters in an archive of any size."""
     from scenario_gen.corpus.config import CorpusConfig
     from scenario_gen.corpus.mine import mine as mined
     from scenario_gen.parameters import assigned
@@ -75,8 +80,7 @@ def mine(
     with telling() as told:
         result = mined(archive, out, config, workers=workers, scheduler=scheduler, told=told)
     lines(result.lines())
-    if result.failed:
-        raise RefusedError(f"{len(result.failed)} tasks failed, as said above; the rest is in {out}")
+    conclude(result.failed, out)
 
 
 @commands.command("synthetic-archive")

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Mining: planted encounters are found and no others, rows that are left out are counted, and the work can be cut off anywhere."""
+"""Mining: planted encounters are found and no others, rows left out are counted, the work can be cut off anywhere."""
 
 import json
 
