@@ -20,6 +20,7 @@ What the fitting decided travels on the diagnostics, a status for each vehicle. 
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 import json
 import math
 
@@ -128,6 +129,25 @@ def decode_losses(values: Mapping[str, str]) -> tuple[Loss, ...]:
                 kind, vehicles, said = json.loads(text)
                 found.append(Loss(str(kind), tuple(str(vehicle) for vehicle in vehicles), str(said)))
     return tuple(found)
+
+
+def with_figures(route: Route, statuses: Mapping[str, Mapping[str, str]], vehicle: str) -> Route:
+    """Return a decoded route with what the planner's status `fit of <vehicle>` says of how it was planned, where it says so.
+
+    Raises:
+        InputError: that is damaged.
+    """
+    values = statuses.get(f"fit of {vehicle}", {})
+    if "legs_joined" not in values:
+        return route
+    with guarded(f"fit of {vehicle}: damaged"):
+        joined, searched = (
+            None if (n := json.loads(values[f"legs_{key}"])) is None else int(n) for key in ("joined", "searched")
+        )
+        left_out = tuple(int(k) for k in json.loads(values["anchors_left_out"]))
+        far = json.loads(values["farthest_from_fit_m"])
+    farthest = math.nan if far is None else float(far)
+    return replace(route, joined=joined, searched=searched, left_out=left_out, farthest=farthest)
 
 
 def decode_fitted(anchors: Floats, statuses: Mapping[str, Mapping[str, str]], vehicle: str) -> FittedVehicle:

@@ -69,10 +69,11 @@ def write_results(
 
 
 def _figures(case: GenerationResult) -> dict[str, Any]:
-    """Return a case's evaluation and, by vehicle, how its route was planned."""
+    """Return a case's evaluation, what the fitting lost and decided, and, by vehicle, how its route was planned."""
     vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
     figures: dict[str, Any] = json.loads(case.evaluation.to_json())
-    return figures | {"routes": {vehicle.id: route.figures() for vehicle, route in vehicles}}
+    fit = {} if case.fit is None else case.fit.figures()
+    return figures | {"fit": fit, "routes": {vehicle.id: route.figures() for vehicle, route in vehicles}}
 
 
 def write_evaluation(folder: Path, cases: Sequence[GenerationResult], bag: Path, config: BagConfig) -> None:
@@ -81,9 +82,8 @@ def write_evaluation(folder: Path, cases: Sequence[GenerationResult], bag: Path,
     Raises:
         OSError: the disk is full, or fails.
     """
-    found = [case.evaluation for case in cases]
     write_text(folder / TABLE, as_table(cases) + "\n")
-    write_text(folder / FIGURES, json.dumps({"cases": [json.loads(one.to_json()) for one in found]}, indent=2) + "\n")
+    write_text(folder / FIGURES, json.dumps({"cases": [_figures(case) for case in cases]}, indent=2) + "\n")
     facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | read_recording(bag, config, (INFO,)).provenance
     write_report(folder / REPORT, ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts))
 

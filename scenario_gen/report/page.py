@@ -24,7 +24,7 @@ from scenario_gen.report.data import case_data
 from scenario_gen.report.html import render_page
 from scenario_gen.types.evaluation import Evaluation, Interval
 from scenario_gen.types.generation import GenerationResult, ORACLE, UNIFORM, WITH, WITHOUT
-from scenario_gen.types.route import legs_in_words, Route
+from scenario_gen.types.route import Route, routes_in_words
 from scenario_gen.types.scenario import ScenarioSet
 
 SIGNIFICANT = 0.03
@@ -94,7 +94,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "arms": [(name, made, _causes(made)) for name, made in arms if made is not None],
         "rows": [*evaluation.rows[1:], evaluation.rows[0]],
         "metrics": evaluation.metrics,
-        "ego": case.generated.ego.vehicles[0].id if case.generated.ego else "",
+        "ego": case.generated.ego.vehicle.id if case.generated.ego else "",
         "k": len(case.segmentation.changepoints),
         "remark": case.segmentation.remark(duration),
         "rate": len(case.segmentation.changepoints) / duration,
@@ -115,13 +115,15 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
                 "manoeuvre": f.manoeuvre,
                 "scale": f.scale,
                 "moved": float(f.moved.max()),
+                "turned": f.figures(),
                 "dwells": int(sum(f.stands)),
                 "route": r.figures() if r else {},
             }
             for v, f, r in vehicles
         ],
         "remarks": [said for v, r in zip(case.encounter.vehicles, case.routes, strict=False) for said in r.remarks(v.id)],
-        "legs": legs_in_words(case.routes),
+        "lost": [loss.said for loss in case.fit.lost] if case.fit else [],
+        "planned": routes_in_words(case.routes),
     }
 
 

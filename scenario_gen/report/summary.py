@@ -24,7 +24,7 @@ from rich.text import Text
 from scenario_gen.errors import printable
 from scenario_gen.types.evaluation import formatted, Interval
 from scenario_gen.types.generation import GenerationResult, WITH, WITHOUT
-from scenario_gen.types.route import legs_in_words
+from scenario_gen.types.route import routes_in_words
 from scenario_gen.types.scenario import Cause
 
 
@@ -62,15 +62,16 @@ def _case(case: GenerationResult) -> list[Text]:
     )
     kept = [] if found is None else _not_kept(found.values)
     remark = case.segmentation.remark(case.encounter.duration)
+    lost = [f"lost on this road: {loss.said}" for loss in case.fit.lost] if case.fit else []
     vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
     routes = [said for vehicle, route in vehicles for said in route.remarks(vehicle.id)]
-    legs = legs_in_words(case.routes)
-    if legs:
-        figures.append(f"  routes: {legs}")
+    planned = routes_in_words(case.routes)
+    if planned:
+        figures.append(f"  routes: {planned}")
     return [
         title,
         figures,
-        *(Text(f"  {printable(line)}", style="yellow") for line in (*kept, *routes, *([remark] if remark else []))),
+        *(Text(f"  {printable(line)}", style="yellow") for line in (*lost, *kept, *routes, *([remark] if remark else []))),
     ]
 
 

@@ -15,6 +15,7 @@
 """What the fitting answers: where every changepoint stands on the road, and what of the template's interaction is lost there."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -49,6 +50,17 @@ class FittedVehicle:
         object.__setattr__(self, "anchors", canonical_poses(self.anchors))
         object.__setattr__(self, "moved", frozen(self.moved))
         object.__setattr__(self, "path", frozen(self.path))
+
+    def figures(self) -> dict[str, Any]:
+        """Return what the fitting decided, ready for JSON: manoeuvre, scale, largest move [m], turns [deg, left positive]."""
+        turned = [round(float(turn), 1) for turn in np.degrees(self.turned)] if np.isfinite(self.turned).all() else [None, None]
+        return {
+            "manoeuvre": self.manoeuvre,
+            "scale": round(self.scale, 4),
+            "moved_m": round(float(self.moved.max()), 3),
+            "turned_in_template_deg": turned[0],
+            "turned_on_road_deg": turned[1],
+        }
 
 
 @dataclass(frozen=True)
@@ -85,3 +97,10 @@ class Fit:
     asked: BoundaryStates
     notes: tuple[str, ...]
     lost: tuple[Loss, ...] = ()
+
+    def figures(self) -> dict[str, Any]:
+        """Return what is lost, and by vehicle what was decided, ready for JSON."""
+        return {
+            "lost": [{"kind": loss.kind, "vehicles": list(loss.vehicles), "said": loss.said} for loss in self.lost],
+            "vehicles": {v.id: one.figures() for v, one in zip(self.vehicles, self.fitted, strict=False)},
+        }

@@ -74,10 +74,17 @@ class Route:
         return said
 
 
-def legs_in_words(routes: Sequence[Route]) -> str:
-    """Return how many legs of some routes were joined at once and how many searched for; nothing where it is not known."""
+def routes_in_words(routes: Sequence[Route]) -> str:
+    """Return how many legs of some routes were joined at once and searched for, and how far routes pass from fitted paths.
+
+    What is not known is left out, up to nothing.
+    """
+    said = []
     known = [(route.joined, route.searched) for route in routes if route.joined is not None and route.searched is not None]
-    if not known:
-        return ""
-    joined, searched = (sum(int(each[k]) for each in known) for k in (0, 1))
-    return f"{joined} legs joined at once, {searched} searched for"
+    if known:
+        joined, searched = (sum(int(each[k]) for each in known) for k in (0, 1))
+        said.append(f"{joined} legs joined at once, {searched} searched for")
+    far = [route.farthest for route in routes if not math.isnan(route.farthest)]
+    if far:
+        said.append(f"at most {max(far):.2f} m from the fitted paths")
+    return ", ".join(said)

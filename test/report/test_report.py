@@ -15,6 +15,7 @@
 """The report's page as text and data; how it behaves in a browser is in test_evaluation_browser.py."""
 
 from base64 import b64decode
+from dataclasses import replace
 import io
 import json
 import re
@@ -29,9 +30,12 @@ from rich.console import Console
 
 from scenario_gen.evaluation import feature_matrix
 from scenario_gen.evaluation.motion import at_count
+from scenario_gen.recordings.read import read_recording
 from scenario_gen.report.data import case_data, MATRIX_SIZE, pack, runs
 from scenario_gen.report.page import render, ReportInput, write_report
 from scenario_gen.report.summary import summary
+from scenario_gen.results import write_results
+from scenario_gen.types.fit import Loss
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +108,31 @@ def test_a_fine_road_is_made_coarse():
     assert max(drawn["size"]) <= 900 and drawn["cell"] * drawn["size"][0] == pytest.approx(140.0, abs=0.5)
     share = sum(drawn["runs"][1::2]) / sum(drawn["runs"])
     assert share == pytest.approx(road.drivable.mean(), abs=0.01)
+
+
+def test_what_the_fitting_lost_and_how_far_a_route_is_from_it_are_said(tmp_path):
+    case = report_case(3)
+    lost = Loss("conflict", ("west", "south"), "vehicles west and south have crossing paths in the template only")
+    fitted = tuple(replace(one, turned=(0.1, 0.35)) for one in case.fit.fitted)
+    routes = (
+        replace(case.routes[0], joined=3, searched=0, farthest=0.04),
+        replace(case.routes[1], joined=2, searched=1, farthest=2.25),
+    )
+    case = replace(case, fit=replace(case.fit, lost=(lost,), fitted=fitted), routes=routes)
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(summary([case]))
+    write_results(tmp_path, [case], seed=1, title="", quality=(), provenance={})
+    figures = json.loads((tmp_path / "evaluation.json").read_text())["cases"][0]
+    for text in (console.export_text(), (tmp_path / "report.html").read_text(encoding="utf-8")):
+        assert lost.said in text and "vehicle south: its route passes 2.2 m from its fitted path" in text
+        assert "5 legs joined at once, 1 searched for, at most 2.25 m from the fitted paths" in text
+    assert "6°, 20°" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert figures["fit"]["lost"] == [{"kind": "conflict", "vehicles": ["west", "south"], "said": lost.said}]
+    assert figures["fit"]["vehicles"]["west"]["turned_on_road_deg"] == 20.1
+    assert figures["routes"]["south"]["farthest_from_fit_m"] == 2.25
+    read = read_recording(tmp_path / "bag").namespaces[""]
+    assert read.fit[0].lost == (lost,) and read.fit[0].notes == case.fit.notes  # a remark about a route is not a note
+    assert [route.figures() for route in read.fit[1]] == [route.figures() for route in routes]
 
 
 def test_the_summary_fits_on_a_screen():

@@ -31,7 +31,7 @@ from scenario_gen.routing.search.pose_planner import PoseQuery, PoseRrtStarConne
 from scenario_gen.routing.search.sweep import sweep_is_free
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
-from scenario_gen.types.route import legs_in_words, Route
+from scenario_gen.types.route import Route, routes_in_words
 from scenario_gen.types.scenario import BoundaryStates
 
 CAR = (4.8, 1.9)
@@ -196,7 +196,9 @@ def test_what_is_far_from_the_fit_is_said():
     assert straight.remarks("7") == []
     assert round_it.farthest == pytest.approx(np.abs(round_it.points[:, 1] - 3.0).max(), abs=1e-6)
     assert round_it.remarks("7") == [f"vehicle 7: its route passes {round_it.farthest:.1f} m from its fitted path"]
-    assert legs_in_words([straight, round_it]) == "1 legs joined at once, 1 searched for"
+    assert routes_in_words([straight, round_it]) == (
+        f"1 legs joined at once, 1 searched for, at most {round_it.farthest:.2f} m from the fitted paths"
+    )
     assert np.isnan(farthest(straight.points, np.zeros((0, 3))))
     assert Route(straight.points, straight.anchor, straight.length).figures()["farthest_from_fit_m"] is None
 
