@@ -22,6 +22,7 @@ from typing import Annotated, Any, NoReturn, TYPE_CHECKING
 
 import typer
 
+from scenario_gen.cli_corpus import commands as corpus_commands
 from scenario_gen.errors import InputError, of_system, presentable, printable, RefusedError, ScenarioGenError
 
 if TYPE_CHECKING:
@@ -35,6 +36,8 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+app.add_typer(corpus_commands)
 
 LogArgument = Annotated[list[Path], typer.Argument(help="CSV, Parquet, SPMD files, or a rosbag2 bag (MCAP or SQLite)")]
 SetOption = Annotated[
@@ -337,7 +340,7 @@ def export_scenarios(
     ego: Annotated[str, typer.Option(help="id of a vehicle that becomes the ego: CommonRoad's planning problem, …")] = "",
     options: Annotated[
         list[str] | None,
-        typer.Option("--set", help="run_out, step, goal_length, goal_width, goal_late, following, bag.…, as name=value"),
+        typer.Option("--set", help="run_out, step, goal_length, goal_width, goal_late, late, following, bag.…, as name=value"),
     ] = None,
 ) -> None:
     """Write scenarios for other software: CommonRoad, OpenSCENARIO with OpenDRIVE, Autoware; same bag, same bytes."""
