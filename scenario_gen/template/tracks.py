@@ -55,6 +55,7 @@ class Track:
         still: True if it stands throughout.
         deviation: largest distance [m] from a recorded position to the cleaned one.
         present: (2,) first and last sample at which it is there; before and after, progress and speed are those at these.
+        recorded_turn: how far [rad, left positive] the recorded heading turns from start to end; NaN for one that stands.
     """
 
     vehicle: Vehicle
@@ -64,6 +65,7 @@ class Track:
     still: bool
     deviation: float
     present: Ints = field(default_factory=lambda: ALWAYS[:0, 0])
+    recorded_turn: float = math.nan
 
     def __post_init__(self) -> None:
         if len(self.present) != 2:
@@ -125,6 +127,7 @@ def _clean(encounter: Encounter, i: int) -> Track:
         progress=frozen(np.pad(track.progress, (before, after), mode="edge")),
         speed=encounter.speed[i],
         present=frozen_ints([first, last]),
+        recorded_turn=math.nan if track.still else float(encounter.heading[i, last] - encounter.heading[i, first]),
     )
 
 
