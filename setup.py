@@ -42,12 +42,13 @@ EXTRAS["segmentation"] = [
     wanted for wanted in CORE if wanted.startswith(("numpy", "scipy", "numba"))
 ]  # all that it needs of the core
 EXTRAS["cli"] += [*EXTRAS["bags"], *EXTRAS["parquet"], *EXTRAS["report"]]
-EXTRAS["all"] = [*EXTRAS["cli"], *EXTRAS["planners"], *EXTRAS["gym"]]
+EXTRAS["all"] = [*EXTRAS["cli"], *EXTRAS["planners"], *EXTRAS["gym"], *EXTRAS["corpus"]]
+EXTRAS["corpus"] += EXTRAS["cli"]  # whose commands it adds to
 EXTRAS["ros"] = [*EXTRAS["all"], *chain.from_iterable(needed("requirements-ros.in").values())]
 
 setup(
     name=NAME,
-    version="0.5.0",
+    version="0.6.0",
     description="New multi-vehicle traffic encounters from recorded ones, as a library, as one command and as ROS 2 nodes",
     license="Apache-2.0",
     maintainer="The scenario_gen developers",

@@ -59,8 +59,9 @@ def main() -> None:
         # 3. The same with a slot for a planner under test in place of the first vehicle.
         ego = encounter.vehicles[0].id
         slot = generate(encounter, road, config, count=1, seed=asked.seed, request=Request(ego=ego)).generated
-        left = [vehicle.id for vehicle in slot.scenarios[0].vehicles]
-        print(f"without vehicle {ego}: {', '.join(left)}; its own track is {'there' if slot.ego else 'missing'}")
+        others = slot.scenarios[0]
+        left = [vehicle.id for vehicle in others.vehicles]
+        print(f"without vehicle {ego}: {', '.join(left)}; its witness is {'there' if others.witness else 'missing'}")
 
 
 if __name__ == "__main__":

@@ -12,13 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The ego slot ⇄ `ego/start`, `ego/goal` (nav_msgs/Odometry) and `ego/track` (conventions: trajectory.py; one vehicle).
+"""The ego slot ⇄ `ego/start`, `ego/goal` (nav_msgs/Odometry) and `ego/witness` (conventions: trajectory.py; one vehicle).
 
-They belong to the request whose `scenarios/info` names the vehicle as its `ego`; being latched, they are those of the last such
-request. Frame: the road's. Stamp: the template's, also for the goal (when it is reached stands in `ego/track`).
+Start and goal belong to the request whose `scenarios/info` names the vehicle as its `ego`; being latched, they are those of the
+last such request. Frame: the road's. Stamp: the template's, also for the goal (when it is reached stands in the witness).
 Odometry: `child_frame_id` is `vehicle_<id>`, `pose.pose` the centre of the footprint, z = 0, yaw as a quaternion,
 `twist.twist.linear.x` the speed along the heading, m/s. Covariances and all else are 0. QoS: reliable, transient_local, depth 1.
-`ego/track` is the vehicle's template along its planned route, on the template's clock, not a scenario's.
+`ego/witness` is one message per scenario, before the scenario: a trajectory of the ego on the scenario's clock, with which the
+scenario was proven valid. `ego_witness` of its `scenarios/info` is the SHA-256 of the message. QoS as that of `scenarios`.
+Bags of versions before 0.6 have `ego/track` instead: one for the whole request, the vehicle's template, which may hit others.
 """
 
 from collections.abc import Iterator
@@ -28,12 +30,12 @@ import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.roads import pose_rows, poses_of
-from msg_conventions.scenarios import encode_scenario
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.types.names import token
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.types.scenario import EgoSlot
 
+WITNESS = "ego/witness"
 STATE_TYPE = "nav_msgs/msg/Odometry"
 _COVARIANCE = 36
 
@@ -67,23 +69,16 @@ def decode_state(data: bytes, what: str = "state") -> tuple[int, str, str, Float
     return stamp_ns, frame_id, child, np.append(poses_of(row[None, :7], what)[0], speed)
 
 
-def end_states(track: Scenario) -> tuple[Floats, Floats]:
-    """Return start and goal (4,) x, y, yaw, speed of an ego's track."""
-    first, last = (np.array([*track.position[0, k], track.heading[0, k], track.speed[0, k]]) for k in (0, -1))
-    return first, last
+def ego_messages(slot: EgoSlot, frame_id: str, stamp_ns: int) -> Iterator[tuple[str, bytes]]:
+    """Yield topic and CDR bytes of the ego's start and goal."""
+    child = f"vehicle_{token(slot.vehicle.id)}"
+    for topic, state in (("ego/start", slot.start), ("ego/goal", slot.goal)):
+        yield topic, encode_state(state, child, frame_id, stamp_ns)
 
 
-def ego_messages(track: Scenario, stamp_ns: int) -> Iterator[tuple[str, bytes]]:
-    """Yield topic and CDR bytes of the ego's start, goal and template track."""
-    child = f"vehicle_{token(track.vehicles[0].id)}"
-    for topic, state in zip(("ego/start", "ego/goal"), end_states(track), strict=True):
-        yield topic, encode_state(state, child, track.frame_id, stamp_ns)
-    yield "ego/track", encode_scenario(track, stamp_ns)
-
-
-def ego_values(track: Scenario | None) -> dict[str, str]:
+def ego_values(slot: EgoSlot | None) -> dict[str, str]:
     """Return what `scenarios/info` says of the ego: its id, start and goal; nothing if there is none."""
-    if track is None:
+    if slot is None:
         return {}
-    start, goal = (json.dumps([float(value) for value in state]) for state in end_states(track))
-    return {"ego": token(track.vehicles[0].id), "ego_start": start, "ego_goal": goal}
+    start, goal = (json.dumps([float(value) for value in state]) for state in (slot.start, slot.goal))
+    return {"ego": token(slot.vehicle.id), "ego_start": start, "ego_goal": goal}

@@ -26,18 +26,20 @@ import json
 
 import numpy as np
 
+from msg_conventions.cdr import stamp_of
 from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status
 from msg_conventions.ego import ego_values
 from msg_conventions.hashes import MAP_HASH, TEMPLATE_HASH
-from msg_conventions.scenarios import digest, messages_of
+from msg_conventions.scenarios import digest, encode_scenario, messages_of
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import guarded, InputError
 from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, ScenarioSet
+from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario, ScenarioSet
 
 INFO = "scenarios/info"
 REFUSED, ADAPTATION = "refused.", "adaptation."
 MESSAGES, PRESENT = "messages", "present"  # of a scenario in which not all are there throughout
+EGO_WITNESS = "ego_witness"  # of one with an ego slot
 Values = Mapping[str, str]
 
 
@@ -79,6 +81,16 @@ class ScenarioEntry:
         return tuple(found)
 
     @property
+    def ego(self) -> str:
+        """Token of the vehicle that was left out; "" if none was."""
+        return self.status.values.get("ego", "")
+
+    @property
+    def witness(self) -> str:
+        """SHA-256 of the message of its ego's witness; "" where it has none (no ego, or before version 0.6)."""
+        return self.status.values.get(EGO_WITNESS, "")
+
+    @property
     def template_hash(self) -> str | None:
         """Hash of the `tracks` that it was made from (hashes.py); None where it is not said (before version 0.2)."""
         return self.status.values.get(TEMPLATE_HASH)
@@ -88,15 +100,25 @@ class ScenarioEntry:
         """Hash of the `map` that it was made for, likewise."""
         return self.status.values.get(MAP_HASH)
 
-    def asked(self, what: str = INFO) -> BoundaryStates | None:
+    def asked(self, what: str = INFO, *, witness: bool = False) -> BoundaryStates | None:
         """Return the start and end states (N, 4) that were asked of it, None where they are not said.
+
+        Args:
+            what: names the topic in messages.
+            witness: add those of the ego in a last row.
 
         Raises:
             InputError: naming `what`, they are damaged.
         """
-        texts = [self.status.values.get(key) for key in ("asked_start", "asked_end")]
-        where = f"{what}: the asked states of {self.status.message}"
-        return None if None in texts else BoundaryStates(*(_states(text or "", where) for text in texts))
+        keys = (("asked_start", "ego_start"), ("asked_end", "ego_goal"))
+        values, where = self.status.values, f"{what}: the asked states of {self.status.message}"
+        if any(key not in values for pair in keys for key in pair[: 1 + witness]):
+            return None
+        start, end = (_states(values[key], where) for key, _ in keys)
+        if witness:
+            own = (_states(f"[{values[key]}]", where) for _, key in keys)
+            start, end = (np.concatenate(rows) for rows in zip((start, end), own, strict=True))
+        return BoundaryStates(start, end)
 
 
 @dataclass(frozen=True)
@@ -201,7 +223,7 @@ def scenario_entry(
     *,
     template: Sequence[Vehicle],
     asked: BoundaryStates,
-    ego: Scenario | None = None,
+    ego: EgoSlot | None = None,
     about: Values | None = None,
 ) -> ScenarioEntry:
     """Return the entry of a scenario.
@@ -213,7 +235,7 @@ def scenario_entry(
         node: full name of the publishing node.
         template: the template's vehicles, of which the scenario may have fewer.
         asked: their states.
-        ego: track of the vehicle that was left out.
+        ego: the vehicle that was left out.
         about: what else there is to say of all scenarios of the request (names of template and road, hashes).
     """
     ids = [vehicle.id for vehicle in template]
@@ -232,6 +254,7 @@ def scenario_entry(
         **({MESSAGES: json.dumps([digest(message) for message in several])} if len(several) > 1 else {}),
         **(about or {}),
         **ego_values(ego),
+        **({} if scenario.witness is None else {EGO_WITNESS: digest(encode_scenario(scenario.witness, stamp_of(data, INFO)))}),
         "asked_start": json.dumps(asked.start[rows].tolist()),
         "asked_end": json.dumps(asked.end[rows].tolist()),
     }

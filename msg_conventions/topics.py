@@ -47,7 +47,8 @@ TOPICS: dict[str, tuple[str, Quality]] = {
     "vehicle_*/speed": (TWIST_TYPE, STREAM),
     "ego/start": (ego.STATE_TYPE, LATCHED),
     "ego/goal": (ego.STATE_TYPE, LATCHED),
-    "ego/track": (trajectory.TYPE, LATCHED),
+    "ego/track": (trajectory.TYPE, LATCHED),  # of bags of versions before 0.6
+    ego.WITNESS: (trajectory.TYPE, MANY),
     "vehicle_*/odom": (driving.ODOMETRY_TYPE, LIVE),
     "traffic/markers": (pictures.MARKERS_TYPE, LIVE),
     "traffic/local_map": (roads.MAP_TYPE, Quality(depth=1, transient_local=False)),

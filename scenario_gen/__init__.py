@@ -52,7 +52,7 @@ if TYPE_CHECKING:  # what a type checker sees; _HOME says the same at run time
     from scenario_gen.types.segmentation import Segmentation
     from scenario_gen.validity import Checker, Limits
 
-__version__ = "0.5.0"
+__version__ = "0.6.0"
 
 _HOME = {
     "config": ("PipelineConfig",),

@@ -22,6 +22,7 @@ from typing import Annotated, Any, NoReturn, TYPE_CHECKING
 
 import typer
 
+from scenario_gen.cli_corpus import commands as corpus_commands
 from scenario_gen.errors import InputError, of_system, presentable, printable, RefusedError, ScenarioGenError
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+app.add_typer(corpus_commands)
 
 LogArgument = Annotated[list[Path], typer.Argument(help="CSV, Parquet, SPMD files, or a rosbag2 bag (MCAP or SQLite)")]
 SetOption = Annotated[

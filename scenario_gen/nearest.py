@@ -146,7 +146,7 @@ def attempt(
     waits = waits_to_keep(encounter, segmentation) if waits is None else waits
     fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
     routes = plan_routes(road, fit, config.planning, seed)
-    check = Checker.of_template(encounter, road, fit.asked, waits, config.limits, request.ego_of(encounter)).check
+    check = Checker.of_template(encounter, road, fit.asked, waits, config.limits).check
     generated = sample_scenarios(
         encounter, segmentation, road, routes, fit.asked, check, config.sampling,
         count=count, seed=seed, waits=waits, request=request, progress=progress, cancelled=cancelled, found=found,

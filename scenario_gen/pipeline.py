@@ -63,7 +63,7 @@ def generate(
             asks cannot be had; the message says why, and what nearby can.
     """
     refuse_too_large(encounter)
-    ego = request.ego_of(encounter)
+    request.ego_of(encounter)  # refused at once if there is no such vehicle
     if isinstance(road, str):
         road = build_road(road, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)
@@ -71,7 +71,7 @@ def generate(
         fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
         routes = plan_routes(road, fit, config.planning, seed)
         waits = waits_to_keep(encounter, segmentation)
-        check = Checker.of_template(encounter, road, fit.asked, waits, config.limits, ego).check
+        check = Checker.of_template(encounter, road, fit.asked, waits, config.limits).check
         generated = sample_scenarios(
             encounter, segmentation, road, routes, fit.asked, check, config.sampling,
             count=count, seed=seed, waits=waits, request=request, progress=progress,

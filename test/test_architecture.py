@@ -63,7 +63,8 @@ ORDER = (
     ("results", "reproduce"),
     ("closed_loop",),
     ("batch",),
-    ("nodes", "demo", "cli", "__main__"),
+    ("corpus",),
+    ("nodes", "demo", "cli", "cli_corpus", "__main__"),
 )
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])
@@ -167,7 +168,7 @@ def test_rclpy_is_imported_only_in_the_nodes():
 
 def test_the_command_line_loads_no_library_before_a_command_needs_it():
     """Else `scenario-gen --help` takes seconds."""
-    heavy = {"numpy", "scipy", "numba", "pandas", "shapely", "plotly", "jinja2", "rosbags", "yaml"}
+    heavy = {"numpy", "scipy", "numba", "pandas", "shapely", "plotly", "jinja2", "rosbags", "yaml", "duckdb", "distributed"}
     program = "import sys, scenario_gen.__main__, scenario_gen.cli; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     assert not heavy & set(loaded)

@@ -14,6 +14,7 @@
 
 """An ego slot, start and end states and one scenario again, on the command line."""
 
+import json
 import re
 import sys
 
@@ -49,7 +50,7 @@ def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(r
     code, said = run("generate", LOG, *QUICK, "--count", 3, "--out", "one", *asked)
     assert code == 0, said
     messages = list(read_messages(tmp_path / "one" / "bag"))
-    assert {"/ego/start", "/ego/goal", "/ego/track"} <= {message.topic for message in messages}
+    assert {"/ego/start", "/ego/goal", "/ego/witness"} <= {message.topic for message in messages}
     scenarios = [decode_scenario(message.data)[1] for message in messages if message.topic == "/scenarios"]
     assert len(scenarios) == 3
     for scenario in scenarios:
@@ -61,6 +62,13 @@ def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(r
     assert run("validate", "one/bag")[0] == 0
     assert run("evaluate", "one/bag", "--out", "page")[0] == 0
     assert "Vehicle 1 is left out" in (tmp_path / "page" / "report.html").read_text()
+    code, said = run(
+        "drive", "one/bag", "--planner", "scenario_gen.closed_loop.planners:IdmFollower", "--workers", 1, "--out", "driven"
+    )
+    driven = json.loads((tmp_path / "driven" / "drives.json").read_text())
+    assert len(driven["drives"]) == 3, said
+    assert run("drive", "one/bag", "--planner", "scenario_gen.closed_loop.planners:IdmFollower", "--ego", 2)[0] == 2
+    assert run("export", "one/bag", "--to", "commonroad", "--out", "exported")[0] == 0
     code, said = run("regenerate", "one/bag", 1, "--out", "again")
     assert code == 0 and "the same" in said
     again = [m.data for m in read_messages(tmp_path / "again") if m.topic == "/scenarios"]

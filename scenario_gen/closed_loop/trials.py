@@ -30,9 +30,10 @@ from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.evaluation.bootstrap import wilson
 from scenario_gen.parameters import parameter, Parameters
-from scenario_gen.recordings.read import INFO, read_recording, SCENARIOS
+from scenario_gen.recordings.read import INFO, read_recording, SCENARIOS, WITNESS
 from scenario_gen.storage.bag import within
 from scenario_gen.storage.config import BagConfig
+from scenario_gen.types.ego import together
 from scenario_gen.types.evaluation import Interval
 from scenario_gen.types.names import token
 from scenario_gen.types.road import Road
@@ -97,12 +98,12 @@ def read_trials(bag: Path, ego: str = "", count: int = 0, config: BagConfig = Ba
 
     Args:
         bag: of this suite.
-        ego: id of the vehicle in whose place the ego drives; the first of each scenario if "".
+        ego: id of the vehicle in whose place the ego drives. "": that of the scenario's ego slot, or the first if it has none.
         count: how many at most; all if 0.
         config: how much is read at most.
 
     Raises:
-        InputError: the bag is damaged, holds no scenario, or one has no vehicle `ego`; the message lists those it has.
+        InputError: the bag is damaged or holds no scenario, or one has no vehicle `ego`, or a slot for another.
     """
     trials: list[Trial] = []
     with within(bag):
@@ -111,17 +112,39 @@ def read_trials(bag: Path, ego: str = "", count: int = 0, config: BagConfig = Ba
                 if count and len(trials) >= count:
                     break
                 stamp, scenario = namespace.scenario(k)
-                ids = [vehicle.id for vehicle in scenario.vehicles]
-                wanted = ids[0] if not ego else next((one for one in ids if ego in (one, token(one))), "")
-                if not wanted:
-                    where = f"{namespace.where(SCENARIOS)}, scenario {scenario.index}"
-                    raise InputError(f"{where}: no vehicle {ego!r} to be the ego; it has {', '.join(ids)}")
-                road = namespace.road_of(namespace.entry(k), stamp)
+                entry = namespace.entry(k)
+                where = f"{namespace.where(SCENARIOS)}, scenario {scenario.index}"
+                wanted = _ego_of(scenario, entry.ego if entry else "", ego, where)
+                scenario = together(scenario)
+                road = namespace.road_of(entry, stamp)
                 name = f"{namespace.name or '/'} {scenario.index}" if namespace.name else str(scenario.index)
                 trials.append(Trial(name, scenario, wanted, road))
     if not trials:
         raise InputError(f"{bag}: no topic `scenarios` in any namespace; there is nothing to drive in")
     return trials
+
+
+def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
+    """Return the id of the vehicle in whose place the ego drives.
+
+    Raises:
+        InputError: naming `where`, there is no such vehicle, the scenario was made for another, or the witness is missing.
+    """
+    if scenario.witness is not None:
+        own = scenario.witness.vehicles[0].id
+        if asked not in ("", own, token(own)):
+            raise InputError(f"{where}: it was made for ego {own!r}; leave --ego out, or name that one")
+        return own
+    ids = [vehicle.id for vehicle in scenario.vehicles]
+    if slot and asked in ("", slot):
+        raise InputError(
+            f"{where}: it was made for ego {slot!r}, whose witness is not in the bag (it was recorded before 0.6, or without "
+            f"`{WITNESS}`): make it again, or name another vehicle with --ego; it has {', '.join(ids)}"
+        )
+    wanted = ids[0] if not asked else next((one for one in ids if asked in (one, token(one))), "")
+    if not wanted:
+        raise InputError(f"{where}: no vehicle {asked!r} to be the ego; it has {', '.join(ids)}")
+    return wanted
 
 
 def run_trials(

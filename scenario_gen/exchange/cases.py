@@ -15,18 +15,18 @@
 """What of a bag is exported: every scenario with its road's lanes and its ego, case by case."""
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 from scenario_gen.errors import InputError
 from scenario_gen.exchange.config import ExportConfig
 from scenario_gen.exchange.lanes import Lane, LaneMap, lanes_of
-from scenario_gen.exchange.motion import without
 from scenario_gen.exchange.road_lanes import lane_map_of
-from scenario_gen.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS
+from scenario_gen.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS, WITNESS
 from scenario_gen.storage.bag import within
 from scenario_gen.storage.config import BagConfig
+from scenario_gen.types.ego import split_off
 from scenario_gen.types.names import tokens
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import Scenario
@@ -156,23 +156,23 @@ def _with_ego(
     Raises:
         InputError: the ego asked for is none of the vehicles, or alone; another was left out; its track is not in the bag.
     """
-    slot = entry.status.values.get("ego", "") if entry else ""
+    slot = entry.ego if entry else ""
     ids = list(tokens(vehicle.id for vehicle in scenario.vehicles))
     where = f"{space.where(SCENARIOS)}, scenario {scenario.index}"
     if slot:
-        track = space.ego_track
         if asked not in ("", slot):
             raise InputError(f"{where} was made for ego {slot!r}; leave --ego out, or name that one")
+        track = scenario.witness or space.ego_track
         if track is None or tokens(vehicle.id for vehicle in track.vehicles) != (slot,):
-            raise InputError(f"{where} was made for ego {slot!r}, whose track is not on {space.where('ego/track')}")
-        return scenario, track, False
+            raise InputError(f"{where} was made for ego {slot!r}, whose track is not on {space.where(WITNESS)}")
+        return replace(scenario, witness=None), track, scenario.witness is not None
     if not asked:
         return scenario, None, False
     if asked not in ids:
         raise InputError(f"{where} has no vehicle {asked!r} to be the ego; there are: {', '.join(ids)}")
     if len(ids) == 1:
         raise InputError(f"{where} has no vehicle but {asked!r}: there would be nobody around the ego")
-    others, ego = without(scenario, ids.index(asked))
+    others, ego = split_off(scenario, ids.index(asked))
     return others, ego, True
 
 

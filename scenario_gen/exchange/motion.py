@@ -79,14 +79,3 @@ def _presence(scenario: Scenario, time: Floats) -> Ints:
     first = np.searchsorted(time, ends[:, 0] - EVEN)
     last = np.searchsorted(time, ends[:, 1] + EVEN, side="right") - 1
     return np.column_stack((first, last)).astype(np.int64)
-
-
-def without(scenario: Scenario, index: int) -> tuple[Scenario, Scenario]:
-    """Return a scenario of all vehicles but one, and one of that one, both on the same clock."""
-    rows = [n for n in range(len(scenario.vehicles)) if n != index]
-    return _of(scenario, rows), _of(scenario, [index])
-
-
-def _of(scenario: Scenario, rows: list[int]) -> Scenario:
-    arrays = {name: getattr(scenario, name)[rows] for name in ("position", "heading", "speed", "acceleration", "present")}
-    return replace(scenario, vehicles=tuple(scenario.vehicles[n] for n in rows), **arrays)

@@ -17,7 +17,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
-from msg_conventions.ego import ego_messages
+from msg_conventions.ego import ego_messages, WITNESS
 from msg_conventions.hashes import template_hashes
 from msg_conventions.pictures import encode_footprint, scenario_markers
 from msg_conventions.scenario_info import encode_info, INFO, request_summary, RequestSummary, scenario_entry
@@ -34,7 +34,7 @@ from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.names import tokens
 from scenario_gen.types.request import Request
-from scenario_gen.types.scenario import BoundaryStates, Scenario, ScenarioSet
+from scenario_gen.types.scenario import BoundaryStates, EgoSlot, Scenario, ScenarioSet
 from scenario_gen.validity import Checker, Limits
 
 Answer = tuple[GenerationResult, RequestSummary]  # what a request came to; its scenarios are published by then
@@ -67,12 +67,15 @@ class Config(Request):
 class _Messages:
     """Sends a request's messages in order, each scenario as it comes, so that a set need never be in memory."""
 
-    def __init__(self, encounter: Encounter, request: str, node: str, about: Mapping[str, str], send: Send) -> None:
-        """Take the template, the request's id, the node's full name, what every entry says, and what sends a message."""
-        self._encounter, self._request, self._node, self._about, self._send = encounter, request, node, about, send
+    def __init__(
+        self, encounter: Encounter, frame_id: str, request: str, node: str, about: Mapping[str, str], send: Send
+    ) -> None:
+        """Take the template, the road's frame, the request's id, the node's name, what every entry says, and what sends."""
+        self._encounter, self._frame_id, self._request, self._node = encounter, frame_id, request, node
+        self._about, self._send = about, send
         self._begun = False
 
-    def _begin(self, ego: Scenario | None) -> None:
+    def _begin(self, ego: EgoSlot | None) -> None:
         """Send what stands before the first scenario, once."""
         if self._begun:
             return
@@ -80,14 +83,16 @@ class _Messages:
         stamp, vehicles = self._encounter.start_ns, self._encounter.vehicles
         for vehicle, name in zip(vehicles, tokens(vehicle.id for vehicle in vehicles), strict=True):
             self._send(vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}"))
-        for topic, data in () if ego is None else ego_messages(ego, stamp):
+        for topic, data in () if ego is None else ego_messages(ego, self._frame_id, stamp):
             self._send(topic, data)
 
-    def scenario(self, scenario: Scenario, asked: BoundaryStates, ego: Scenario | None) -> None:
+    def scenario(self, scenario: Scenario, asked: BoundaryStates, ego: EgoSlot | None) -> None:
         """Send a scenario and its entry."""
         self._begin(ego)
         stamp = self._encounter.start_ns
         data = encode_scenario(scenario, stamp)
+        if scenario.witness is not None:
+            self._send(WITNESS, encode_scenario(scenario.witness, stamp))
         for message in (data,) if scenario.all_present else messages_of(data):
             self._send("scenarios", message)
         entry = scenario_entry(
@@ -135,7 +140,7 @@ def answer_request(
         progress(done, candidates, encounter.start_ns)
 
     hashes = template_hashes(messages)
-    out = _Messages(encounter, request, node, hashes, send)
+    out = _Messages(encounter, road.frame_id, request, node, hashes, send)
     if config.moves:
         from scenario_gen.config import PipelineConfig  # these load all stages, and few requests need them
         from scenario_gen.nearest import attempt, nearest_if_impossible
@@ -147,8 +152,8 @@ def answer_request(
                 *given, count=config.count, seed=config.seed, progress=advance, cancelled=cancelled, found=out.scenario
             )
     else:
-        waits, ego = waits_to_keep(encounter, segmentation), config.ego_of(encounter)
-        check = Checker.of_template(encounter, road, fit.asked, waits, config.limits, ego).check
+        waits = waits_to_keep(encounter, segmentation)
+        check = Checker.of_template(encounter, road, fit.asked, waits, config.limits).check
         generated = sample_scenarios(
             encounter, segmentation, road, template.routes, fit.asked, check, config.sampling, count=config.count,
             seed=config.seed, waits=waits, request=config, progress=advance, cancelled=cancelled, found=out.scenario,

@@ -30,13 +30,15 @@ import numpy as np
 from msg_conventions import fits
 from msg_conventions.cdr import stamp_of
 from msg_conventions.changepoints import decode_changepoints, decode_posterior, segment_descriptions
+from msg_conventions.ego import WITNESS
 from msg_conventions.hashes import decode_hashes, hash_of
 from msg_conventions.roads import decode_map
-from msg_conventions.scenario_info import decode_info, encode_info, INFO, Info, MESSAGES, RequestSummary, ScenarioEntry
+from msg_conventions.scenario_info import decode_info, encode_info, INFO, Info, RequestSummary, ScenarioEntry
 from msg_conventions.scenarios import decode_scenario, digest, messages_of
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
+from scenario_gen.recordings.of_scenarios import decode_with_witness, joined_messages
 from scenario_gen.recordings.requests import RequestTracker
 from scenario_gen.recordings.template import anchor_index, decode_routes, template_statuses
 from scenario_gen.storage.bag import BagMessage, read_messages, within
@@ -52,6 +54,7 @@ __all__ = [
     "INFO",
     "NO_ENTRY",
     "SCENARIOS",
+    "WITNESS",
     "Namespace",
     "Recording",
     "RequestSummary",
@@ -64,7 +67,7 @@ SCENARIOS = "scenarios"
 NO_ENTRY = f"{INFO} has no entry for them (lost with the end of a recording?)"
 READ = re.compile(
     r"(?:(?P<namespace>.*?)/)?(?P<topic>tracks|changepoints|posterior|map|road/entries|road/exits|fit|fit/info|vehicle_\w+/route"
-    r"|ego/(?:start|goal|track)|scenarios|scenarios/info|diagnostics)",
+    r"|ego/(?:start|goal|track|witness)|scenarios|scenarios/info|diagnostics)",
     re.DOTALL,
 )
 TEMPLATE_TOPIC = re.compile(
@@ -97,15 +100,16 @@ def read_recording(path: Path, config: BagConfig = BagConfig(), topics: Collecti
     Args:
         path: of the bag.
         config: what is read at most.
-        topics: names without namespace, if not all that the conventions know are needed.
+        topics: names without namespace, if not all that the conventions know are needed; with scenarios come their witnesses.
 
     Raises:
         InputError: the bag is missing or damaged, or larger than `config` allows.
     """
+    wanted = {*topics, *((WITNESS,) if SCENARIOS in topics else ())}
 
     def known(name: str) -> re.Match[str] | None:
         match = READ.fullmatch(name)
-        return match if match and (not topics or match["topic"] in topics) else None
+        return match if match and (not topics or match["topic"] in wanted) else None
 
     found: dict[str, dict[str, list[BagMessage]]] = {}
     for message in read_messages(path, lambda name: known(name) is not None, config):
@@ -131,7 +135,7 @@ class Namespace:
         """The messages by topic; those of one scenario are joined, so that there is one for each scenario."""
         if not (SCENARIOS in self._recorded and INFO in self._recorded):
             return self._recorded
-        return {**self._recorded, SCENARIOS: _joined(self._recorded[SCENARIOS], self.entries)}
+        return {**self._recorded, SCENARIOS: joined_messages(self._recorded[SCENARIOS], self.entries)}
 
     def data(self, topic: str) -> list[bytes]:
         """Return the messages of a topic, in order."""
@@ -213,15 +217,31 @@ class Namespace:
         return self._entry_by_hash.get(self.hashes[k])
 
     def scenario(self, k: int) -> tuple[int, Scenario]:
-        """Return stamp [ns] and scenario `k`, numbered as its entry says; without one, by its place.
+        """Return stamp [ns] and scenario `k`, numbered as its entry says; without one, by its place. With its ego's witness.
 
         Raises:
-            InputError: its message is damaged.
+            InputError: its message, or that of its witness, is damaged.
         """
-        entry = self.entry(k)
-        seed, index = (entry.seed, entry.index) if entry else (0, k)
-        what = f"{self.where(SCENARIOS)}, message {k}"
-        return decode_scenario(self.messages[SCENARIOS][k].data, seed=seed, index=index, what=what)
+        return self._decoded(self.messages[SCENARIOS][k].data, self.entry(k), k)
+
+    def _decoded(self, data: bytes, entry: ScenarioEntry | None, k: int) -> tuple[int, Scenario]:
+        message = self.witnesses.get(entry.witness) if entry else None
+        witness = None if message is None else message.data
+        return decode_with_witness(data, entry, k, witness, f"{self.where(SCENARIOS)}, message {k}", self.where(WITNESS))
+
+    @cached_property
+    def witnesses(self) -> Mapping[str, BagMessage]:
+        """The messages of egos' witnesses by their SHA-256."""
+        return {digest(message.data): message for message in self.messages.get(WITNESS, ())}
+
+    def without_witness(self, entry: ScenarioEntry) -> bool:
+        """Whether the witness that an entry names is not in the bag."""
+        return bool(entry.witness) and entry.witness not in self.witnesses
+
+    @cached_property
+    def strange_witnesses(self) -> bool:
+        """Whether there is a witness that no entry names, though entries are there."""
+        return bool(self.witnesses.keys() - {entry.witness for entry in self.entries})
 
     @cached_property
     def unknown(self) -> dict[int, ScenarioEntry | None]:
@@ -270,9 +290,7 @@ class Namespace:
                 raise InputError(f"{self.path}: scenario {entry.index} of request {entry.request} is not on {what}")
         if len(own) != summary.published:
             raise InputError(f"{self.path}: {summary.published} scenarios were published, {len(own)} are on {what}")
-        return summary.result(
-            tuple(decode_scenario(by_hash[e.sha256], seed=e.seed, index=e.index, what=what)[1] for e in own.values())
-        )
+        return summary.result(tuple(self._decoded(by_hash[e.sha256], e, e.index)[1] for e in own.values()))
 
     # The template and the road that one scenario was made for.
 
@@ -361,7 +379,7 @@ class Namespace:
             summary: of its request.
 
         Raises:
-            InputError: a message is damaged, or the scenario itself is not in the bag.
+            InputError: a message is damaged, or the scenario itself or its witness is not in the bag.
         """
         stamp = stamp_of(info.data, info.topic)
         same = [m for m, sha256 in zip(self.messages.get(SCENARIOS, ()), self.hashes, strict=True) if sha256 == entry.sha256]
@@ -369,7 +387,10 @@ class Namespace:
             raise InputError(f"{self.path}: the scenario with SHA-256 {entry.sha256} is not on {self.where(SCENARIOS)}")
         closing = replace(info, data=encode_info(summary.of_one_scenario(), stamp))
         own = [replace(same[-1], data=data) for data in messages_of(same[-1].data)] if len(entry.messages) > 1 else same[-1:]
-        return (*self.template_messages(entry, stamp).values(), *own, info, closing)
+        if self.without_witness(entry):
+            raise InputError(f"{self.path}: the witness with SHA-256 {entry.witness} is not on {self.where(WITNESS)}")
+        witness = (self.witnesses[entry.witness],) if entry.witness else ()
+        return (*self.template_messages(entry, stamp).values(), *witness, *own, info, closing)
 
     # To look at: the newest template and what the nodes said of it.
 
@@ -386,7 +407,7 @@ class Namespace:
 
     @cached_property
     def ego_track(self) -> Scenario | None:
-        """The newest track of an ego."""
+        """The newest track of an ego, of a bag of a version before 0.6."""
         tracks = self.data("ego/track")
         return decode_scenario(tracks[-1], what=self.where("ego/track"), late=True)[1] if tracks else None
 
@@ -467,33 +488,6 @@ def read_scenario_set(path: Path, namespace: str = "", config: BagConfig = BagCo
         raise InputError(f"{path}: no request was closed on {namespace}/{INFO}")
     with within(path):
         return found.scenario_set()
-
-
-def _joined(messages: Sequence[BagMessage], entries: Iterable[ScenarioEntry]) -> Sequence[BagMessage]:
-    """Return one message per scenario: who comes or goes is in messages of its own, which an entry names.
-
-    Where one of them is missing, what is there stays as it is: its entry then has no scenario, and that is found.
-    """
-    several = [entry for entry in entries if MESSAGES in entry.status.values]
-    if not several:
-        return messages
-    places: dict[str, list[int]] = {}
-    for k, message in enumerate(messages):
-        places.setdefault(digest(message.data), []).append(k)
-    joined = dict(enumerate(messages))
-    for entry in several:
-        try:
-            own = [places[sha256].pop(0) for sha256 in entry.messages if places.get(sha256)]
-            whole = len(own) == len(entry.messages)
-        except InputError:
-            continue
-        if not whole:
-            continue
-        data = b"".join(messages[k].data for k in own)
-        for k in own:
-            joined.pop(k)
-        joined[own[0]] = replace(messages[own[0]], data=data)
-    return [joined[k] for k in sorted(joined)]
 
 
 def _numbered(texts: Iterable[str]) -> Iterable[tuple[str, int]]:

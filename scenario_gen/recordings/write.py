@@ -19,7 +19,7 @@ from pathlib import Path
 
 from msg_conventions.changepoints import encode_changepoints, encode_posterior, segmentation_status
 from msg_conventions.diagnostics import encode_diagnostics
-from msg_conventions.ego import ego_messages
+from msg_conventions.ego import ego_messages, WITNESS
 from msg_conventions.fits import anchor_stamps, encode_fit, fit_statuses
 from msg_conventions.hashes import encode_hashes, template_hashes
 from msg_conventions.paths import encode_route
@@ -77,7 +77,7 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
     )
     yield "diagnostics", encode_diagnostics(statuses, stamp), stamp
     ego = result.generated.ego
-    for topic, data in () if ego is None else ego_messages(ego, stamp):
+    for topic, data in () if ego is None else ego_messages(ego, road.frame_id, stamp):
         yield topic, data, stamp
     about = {"template": encounter.name, "road": road.name, **hashes}
     logged = stamp
@@ -86,6 +86,8 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
         entry = scenario_entry(
             scenario, data, request, "/gp_sampler", template=encounter.vehicles, asked=fit.asked, ego=ego, about=about
         )
+        if scenario.witness is not None:
+            yield WITNESS, encode_scenario(scenario.witness, stamp), logged
         for message in (data,) if scenario.all_present else messages_of(data):
             yield SCENARIOS, message, logged
         yield INFO, encode_info(entry, stamp), logged

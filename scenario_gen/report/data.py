@@ -43,7 +43,6 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
     """Return all that one case draws, ready for JSON; at most `samples` scenarios of each arm."""
     sets = {"with": case.generated, "without": case.references.get(WITHOUT), "uniform": case.references.get(UNIFORM)}
     arms = {name: made.scenarios[:samples] for name, made in sets.items() if made is not None}
-    egos = {name: made.ego for name, made in sets.items() if made is not None}
     ids = [vehicle.id for vehicle in case.encounter.vehicles]
     if case.oracle is not None:
         arms["oracle"] = (case.oracle,)
@@ -56,7 +55,7 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
         "road": road_data(case.road) if case.road else None,
         "template": _template(case.encounter, case.segmentation, frames),
         "fit": _fit(case.fit, case.routes) if case.fit else [],
-        "arms": {name: _trajectories(group, frames, ids, egos.get(name)) for name, group in arms.items() if group},
+        "arms": {name: _trajectories(group, frames, ids) for name, group in arms.items() if group},
         "motion": _motion(case.encounter, case.generated.scenarios[:MAX_MOTION_SAMPLES]),
         "features": _features(case.encounter, arms, case.evaluation.vehicles),
     }
@@ -110,9 +109,9 @@ def states(source: Encounter | Scenario, frames: int) -> Floats:
     return np.concatenate([motion.position, motion.heading[..., None], motion.speed[..., None]], axis=-1)
 
 
-def _trajectories(scenarios: Sequence[Scenario], frames: int, ids: Sequence[str], ego: Scenario | None) -> dict[str, Any]:
+def _trajectories(scenarios: Sequence[Scenario], frames: int, ids: Sequence[str]) -> dict[str, Any]:
     return {
-        "states": pack(np.stack([_whole(scenario, frames, ids, ego) for scenario in scenarios])),
+        "states": pack(np.stack([_whole(scenario, frames, ids) for scenario in scenarios])),
         "there": [_there(scenario, ids) for scenario in scenarios],
         "durations": [_short(scenario.time[-1]) for scenario in scenarios],
         "index": [scenario.index for scenario in scenarios],
@@ -126,13 +125,13 @@ def _there(source: Encounter | Scenario, ids: Sequence[str]) -> list[list[float]
     return [[_short(v, 5) for v in shares[own.index(known)]] if known in own else [0.0, 1.0] for known in ids]
 
 
-def _whole(scenario: Scenario, frames: int, ids: Sequence[str], ego: Scenario | None) -> Floats:
-    """Return the states of all vehicles; in place of one that was left out stands the ego's template track.
+def _whole(scenario: Scenario, frames: int, ids: Sequence[str]) -> Floats:
+    """Return the states of all vehicles; in place of one that was left out stands the ego's witness.
 
-    Without such a track it is drawn where the first vehicle is, underneath it.
+    Without a witness it is drawn where the first vehicle is, underneath it.
     """
     own = {vehicle.id: state for vehicle, state in zip(scenario.vehicles, states(scenario, frames), strict=True)}
-    track = next(iter(own.values())) if ego is None else states(ego, frames)[0]
+    track = next(iter(own.values())) if scenario.witness is None else states(scenario.witness, frames)[0]
     return np.stack([own.get(known, track) for known in ids])
 
 

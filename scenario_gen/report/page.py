@@ -94,7 +94,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "arms": [(name, made, _causes(made)) for name, made in arms if made is not None],
         "rows": [*evaluation.rows[1:], evaluation.rows[0]],
         "metrics": evaluation.metrics,
-        "ego": case.generated.ego.vehicles[0].id if case.generated.ego else "",
+        "ego": case.generated.ego.vehicle.id if case.generated.ego else "",
         "k": len(case.segmentation.changepoints),
         "remark": case.segmentation.remark(duration),
         "rate": len(case.segmentation.changepoints) / duration,

@@ -18,6 +18,8 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.recordings.read import Namespace, NO_ENTRY, read_recording, SCENARIOS
@@ -25,9 +27,10 @@ from scenario_gen.review.validation import Reference
 from scenario_gen.storage.bag import within
 from scenario_gen.storage.config import BagConfig
 from scenario_gen.template.interaction import find_conflicts, find_waits
+from scenario_gen.types.ego import together
 from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.generation import GenerationResult, WITHOUT
-from scenario_gen.types.scenario import Scenario, ScenarioSet, Verdict
+from scenario_gen.types.scenario import EgoSlot, Scenario, ScenarioSet, Verdict
 from scenario_gen.validity import Checker, Limits
 
 
@@ -70,9 +73,13 @@ def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | Non
         notes.append(f"{lost} of {len(scenarios)} scenarios are unaccounted: {NO_ENTRY}")
     rows = [replace(row, notes=(*row.notes, *notes)) if row.name == SCENARIOS else row for row in evaluation.rows]
     evaluation = replace(evaluation, rows=tuple(rows))
-    ego = namespace.ego_track
-    if ego is not None and ego.vehicles[0].id in evaluation.vehicles:
-        ego = None  # of another request than these scenarios
+    ego, track = None, namespace.ego_track
+    if track is not None and track.vehicles[0].id not in evaluation.vehicles:  # else of another request than these scenarios
+        scenarios = tuple(one if one.witness else replace(one, witness=track) for one in scenarios)  # to be drawn
+    witness = next((one.witness for one in scenarios if one.witness is not None), None)
+    if witness is not None:
+        first, last = (np.array([*witness.position[0, k], witness.heading[0, k], witness.speed[0, k]]) for k in (0, -1))
+        ego = EgoSlot(witness.vehicles[0], first, last)
     generated = ScenarioSet(len(scenarios), scenarios, counts.candidates, Counter(counts.refused), _left_out(namespace), ego)
     return GenerationResult(
         encounter,
@@ -96,9 +103,10 @@ def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Lim
     names = tuple(vehicle.id for vehicle in encounter.vehicles)
     checkers: dict[tuple[str, ...], Checker] = {}
     verdicts: list[Verdict] = []
-    for k, scenario in enumerate(scenarios):
+    for k, one in enumerate(scenarios):
         entry = namespace.entry(k)
         map_hash = entry.map_hash if entry else None
+        scenario = together(one)
         key = (map_hash or "", *(vehicle.id for vehicle in scenario.vehicles))
         if key not in checkers:
             road = namespace.road

@@ -47,7 +47,7 @@ class Regenerated:
     """A scenario made again.
 
     Attributes:
-        scenario: the same as in the bag; data: its CDR bytes, whose SHA-256 is that in `scenarios/info`.
+        scenario: the same as in the bag, its witness too; data: its CDR bytes, whose SHA-256 is that in `scenarios/info`.
         messages: those of the bag that belong to it (template, road, routes, its own, its entry), for a bag of its own.
         sha256: of `data`.
     """
@@ -108,7 +108,9 @@ def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
         encounter, segmentation, road, routes, fit.asked, sampling, seed=seed, index=index, waits=waits, request=asked
     )
     data, sha256 = (b"", "") if scenario is None else scenario_bytes(scenario, encounter)
-    if scenario is None or sha256 != found.entry.sha256:
+    witness = None if scenario is None else scenario.witness
+    own = "" if witness is None else scenario_bytes(witness, encounter)[1]
+    if scenario is None or sha256 != found.entry.sha256 or own != found.entry.witness:
         now = versions()
         other = [f"{name} {values[name]} there, {now[name]} here" for name in now if values.get(name, now[name]) != now[name]]
         why = ", ".join(other) or "the versions agree, so the bag was changed"

@@ -17,8 +17,9 @@
 A scenario is checked against what bears its stamp in its own namespace: the states asked of it (its own in `scenarios/info`,
 else `fit`), the conflicts and waits of its template (`tracks`; waits if there are `changepoints`), and the road: the `map` that
 its entry on `scenarios/info` names by hash, else the newest one of the stamp, or of all. What is not there is not checked,
-and said. Vehicles are matched by id, so one may be left out for an ego. Where there are entries, a scenario is not to stand
-in the place of another that was published; one without any entry is counted, and checked as far as that goes.
+and said. Vehicles are matched by id, so one may be left out for an ego; with its witness, all are
+checked together. Where there are entries, a scenario is not to stand in the place of another that was published; one without any
+entry is counted, and checked as far as that goes.
 """
 
 from collections.abc import Collection, Sequence
@@ -29,16 +30,18 @@ import numpy as np
 
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
-from scenario_gen.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS
+from scenario_gen.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS, WITNESS
 from scenario_gen.storage.bag import within
 from scenario_gen.storage.config import BagConfig
 from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, Wait
+from scenario_gen.types.ego import together
 from scenario_gen.types.names import tokens
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Scenario
 from scenario_gen.validity import Checker, Limits
 
 UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
+NO_WITNESS = f"the ego: its witness is not on {WITNESS}"
 ALTERED = "altered_message"  # not the bytes that scenarios/info has an entry for
 
 
@@ -119,22 +122,30 @@ def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = B
 def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
     namespace.check_infos()
     result = Validation(namespace.name, missing=namespace.missing)
-    silent = () if namespace.entries else (f"sha256: there is no entry on {INFO}",)
+    said = () if namespace.entries else (f"sha256: there is no entry on {INFO}",)
     references: dict[tuple[object, ...], Reference] = {}
     checkers: dict[tuple[object, ...], Checker] = {}
-    asked = {entry.sha256: entry.asked(namespace.where(INFO)) for entry in namespace.entries}
     for k, sha256 in enumerate(namespace.hashes):
         wrong, entry = [], namespace.unknown.get(k)
         if entry is not None:
             wrong = [(ALTERED, _altered(k, sha256, entry))]
         elif k in namespace.unknown:
             result.unaccounted += 1
-        entry, states = namespace.entry(k) or entry, asked.get(sha256)
+        entry = namespace.entry(k) or entry
+        silent = said
+        if entry is not None and namespace.without_witness(entry):
+            if namespace.strange_witnesses:
+                wrong.append((ALTERED, f"the ego's witness is not what was published for index {entry.index}"))
+            silent = (*said, NO_WITNESS)
         try:
             stamp, scenario = namespace.scenario(k)
         except InputError as error:
             result.add(k, [*wrong, (UNUSABLE, str(error))], ())
             continue
+        states = None
+        if entry is not None and namespace.entry(k):
+            states = entry.asked(namespace.where(INFO), witness=scenario.witness is not None)
+        scenario = together(scenario)
         is_lost = k in namespace.unknown and entry is None
         place = (stamp, is_lost, entry and entry.template_hash, entry and entry.map_hash)
         if place not in references:

@@ -172,11 +172,8 @@ def prepare(
     asked: BoundaryStates,
     waits: Sequence[Wait],
     config: SamplingConfig,
-    ego: int | None = None,
 ) -> Prepared:
     """Build the model: on the template's clock, slowed ahead of bends, and stretched only where no speed exists otherwise.
-
-    Vehicle `ego` is left out of it, with its waits.
 
     Raises:
         InputError: routes, segmentation and encounter disagree in their numbers.
@@ -184,8 +181,8 @@ def prepare(
     times = encounter.time[np.concatenate([[0], segmentation.changepoints, [encounter.speed.shape[1] - 1]]).astype(np.int64)]
     if len(routes) != len(encounter.vehicles) or any(len(route.anchor) != len(times) for route in routes):
         raise InputError(f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each")
-    waits = [standing_part(encounter, wait) for wait in waits if wait.vehicle != ego]
-    drives = [_drive(n, encounter, times, routes[n], asked, waits, config) for n in range(len(encounter.vehicles)) if n != ego]
+    waits = [standing_part(encounter, wait) for wait in waits]
+    drives = [_drive(n, encounter, times, routes[n], asked, waits, config) for n in range(len(encounter.vehicles))]
     clock, sentences = _slowed(drives, template_grid(encounter), config)
     left = (1.0 + config.max_stretch) * float(times[-1]) / float(clock.time[-1])
     best: tuple[float, float, list[_Mean]] | None = None

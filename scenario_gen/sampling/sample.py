@@ -28,21 +28,21 @@ from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.sampling.candidates import Batch, CandidateModel, Scale
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.ego import ego_track
 from scenario_gen.sampling.lazy import LazyScenarios
 from scenario_gen.sampling.prepare import prepare
 from scenario_gen.template.interaction import Wait
+from scenario_gen.types.ego import with_witness
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, ScenarioSet, Verdict
+from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario, ScenarioSet, Verdict
 from scenario_gen.types.segmentation import Segmentation
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
 Progress = Callable[[int, int, int], None]  # of scenarios so far, scenarios wanted, candidates so far
 Cancelled = Callable[[], bool]
-OnValid = Callable[[Scenario, BoundaryStates, Scenario | None], None]  # a valid one, the states asked, the ego's track
+OnValid = Callable[[Scenario, BoundaryStates, EgoSlot | None], None]  # a valid one, the states asked, what the ego is asked
 
 LEVELS = (
     Scale(),
@@ -85,6 +85,7 @@ class Sampler:
     model: CandidateModel
     seed: int
     frame_id: str
+    ego: int | None = None  # of the vehicle that is left out of what is published, and is its witness
 
     def block(self, level: int, number: int) -> tuple[Batch, list[int]]:
         """Candidates number·BLOCK … of a level, and their indices."""
@@ -96,14 +97,19 @@ class Sampler:
         level, candidate = place_of(index)
         number, row = divmod(candidate, BLOCK)
         batch = self.model.draw(self._normal(level, number)[row : row + 1], LEVELS[level])
-        return batch.scenarios(self.seed, [index], self.frame_id)[0]
+        (whole,) = batch.scenarios(self.seed, [index], self.frame_id)
+        return None if whole is None else self.published(whole)
 
     def redraw(self, index: Sequence[int]) -> list[Scenario]:
         """The scenarios of indices that are of one block, bit for bit as in a whole set."""
         level, candidate = place_of(index[0])
         batch, own = self.block(level, candidate // BLOCK)
         drawn = batch.scenarios(self.seed, own, self.frame_id)
-        return [scenario for scenario in (drawn[one - own[0]] for one in index) if scenario is not None]
+        return [self.published(whole) for whole in (drawn[one - own[0]] for one in index) if whole is not None]
+
+    def published(self, whole: Scenario) -> Scenario:
+        """A candidate of all vehicles as it is published: the ego's motion apart, as witness."""
+        return whole if self.ego is None else with_witness(whole, self.ego)
 
     def _normal(self, level: int, number: int) -> Floats:
         """Standard normal numbers (BLOCK, size), every other row the mirror image of the one before.
@@ -143,12 +149,12 @@ def sample_scenarios(
         road: the target road, for the room it leaves.
         routes: one per vehicle, with an anchor at start, changepoints and end.
         asked: start and end states; their speeds are met exactly.
-        check: the validity checker; its verdicts decide.
+        check: the validity checker of all vehicles, the ego too; its verdicts decide.
         config: the standard deviations and limits.
         count: valid scenarios wanted.
         seed: of all randomness; with a scenario's index it gives that scenario again.
         waits: when a vehicle stands, on the template's clock.
-        request: which vehicle is left out of every scenario, its template track given instead; whether states were asked for.
+        request: which vehicle is left out of every scenario, its own motion given as witness; whether states were asked for.
         progress: called with (valid so far, count, candidates so far).
         cancelled: asked before each candidate; if True, the set so far is returned.
         found: called with each valid scenario as it is drawn, in the set's order.
@@ -162,16 +168,16 @@ def sample_scenarios(
         RefusedError: states were asked for, and not one candidate that meets them is valid.
     """
     ego = request.ego_of(encounter)
-    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config, ego)
-    track = None if ego is None else ego_track(encounter, segmentation, routes[ego], asked, ego, road.frame_id)
+    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config)
+    slot = None if ego is None else EgoSlot(encounter.vehicles[ego], asked.start[ego], asked.end[ego])
     if prepared.model is None:
-        made = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), track)
+        made = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot)
     else:
-        sampler = Sampler(prepared.model, seed, road.frame_id)
-        loop = _Loop(sampler, check, count, progress, cancelled, lambda scenario: found(scenario, asked, track))
+        sampler = Sampler(prepared.model, seed, road.frame_id, ego)
+        loop = _Loop(sampler, check, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
         loop.run(config.attempts * count)
         sentences = (*prepared.adaptations, *loop.adaptations)
-        made = ScenarioSet(count, loop.scenarios(), loop.candidates, loop.refused, sentences, track)
+        made = ScenarioSet(count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot)
     if request.moves and not made.scenarios and not cancelled():
         causes = ", ".join(f"{number} × {cause.value}" for cause, number in made.refused.most_common())
         more = f"; {'; '.join(made.adaptations)}" if made.adaptations else ""
@@ -193,8 +199,10 @@ def regenerate(
     request: Request = Request(),
 ) -> Scenario | None:
     """The scenario with this seed and index again, bit for bit, without the others; arguments as in `sample_scenarios`."""
-    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config, request.ego_of(encounter))
-    return None if prepared.model is None else Sampler(prepared.model, seed, road.frame_id).scenario(index)
+    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config)
+    if prepared.model is None:
+        return None
+    return Sampler(prepared.model, seed, road.frame_id, request.ego_of(encounter)).scenario(index)
 
 
 @dataclass
@@ -254,10 +262,11 @@ class _Loop:
                 verdict = None if scenario is None else next(verdicts)
                 if scenario is not None and verdict is not None and verdict.valid:
                     good += 1
+                    published = self.sampler.published(scenario)
                     self.index.append(number)
                     if len(self.kept) < KEPT:
-                        self.kept.append(scenario)
-                    self.found(scenario)
+                        self.kept.append(published)
+                    self.found(published)
                 else:
                     self.refused[verdict.violations[0].cause if verdict else Cause.SPEED_PROFILE] += 1
             self.progress(len(self.index), self.count, self.candidates + seen)

@@ -43,6 +43,8 @@ class Scenario:
         seed: the request's seed; index: the sample's number within the request.
         frame_id: the road's frame.
         present: (N, 2) first and last instant at which each vehicle is there, as in `Tracks`; default: everybody throughout.
+        witness: of a scenario with an ego slot: a trajectory of the vehicle that was left out, as a scenario of that vehicle
+            alone on the same clock. Both together were proven valid, so the slot can be driven.
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -55,6 +57,7 @@ class Scenario:
     index: int = 0
     frame_id: str = "map"
     present: Ints = field(default_factory=lambda: ALWAYS)
+    witness: "Scenario | None" = None
 
     def __post_init__(self) -> None:
         for name in ("position", "speed", "acceleration"):
@@ -139,12 +142,21 @@ class Verdict:
         return not self.violations
 
 
+@dataclass(frozen=True, eq=False)
+class EgoSlot:
+    """A vehicle that is left out for a planner, and the states (4,) x [m], y [m], yaw [rad], speed [m/s] that are asked of it."""
+
+    vehicle: Vehicle
+    start: Floats
+    goal: Floats
+
+
 @dataclass(frozen=True)
 class ScenarioSet:
     """What a request got: valid scenarios, and an account of every candidate.
 
     `refused` counts refused candidates by their first cause; `adaptations` names what was changed to get there. `ego` is the
-    template track of the vehicle that was left out for a planner under test, if one was: a scenario of that vehicle alone.
+    vehicle that was left out for a planner under test, if one was; each scenario then has its witness.
     The scenarios of a large set are not in memory but drawn again whenever they are looked at.
     """
 
@@ -153,7 +165,7 @@ class ScenarioSet:
     candidates: int
     refused: Counter[Cause] = field(default_factory=Counter)
     adaptations: Sequence[str] = ()
-    ego: Scenario | None = None
+    ego: EgoSlot | None = None
 
     @property
     def acceptance(self) -> float:

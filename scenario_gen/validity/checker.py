@@ -15,7 +15,6 @@
 """The checker: proves a scenario valid at every instant, or says what is wrong with it, when and by how much."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -78,9 +77,8 @@ class Checker:
         asked: BoundaryStates,
         waits: Sequence[Wait],
         limits: Limits | None = None,
-        ego: int | None = None,
     ) -> "Checker":
-        """Return the checker of scenarios of a template, one vehicle of which may be left out; that takes part in nothing.
+        """Return the checker of scenarios of a template, with all of its vehicles.
 
         Args:
             encounter: the template, whose conflicts are kept.
@@ -88,15 +86,9 @@ class Checker:
             asked: start and end states of all vehicles.
             waits: the template's waits that are kept.
             limits: the limits; the default ones if None.
-            ego: index of the vehicle that is left out.
         """
-        kept = [n for n in range(len(encounter.vehicles)) if n != ego]
-        vehicles = tuple(encounter.vehicles[n] for n in kept)
-        arrays = (encounter.position[kept], encounter.heading[kept], encounter.present[kept])
-        conflicts = find_conflicts(vehicles, encounter.time, *arrays)
-        own = [replace(wait, vehicle=kept.index(wait.vehicle)) for wait in waits if wait.vehicle != ego]
-        known = (limits or Limits()).for_template(encounter)
-        return cls(road, BoundaryStates(asked.start[kept], asked.end[kept]), conflicts, own, known)
+        conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
+        return cls(road, asked, conflicts, waits, (limits or Limits()).for_template(encounter))
 
     @property
     def not_applicable(self) -> tuple[str, ...]:

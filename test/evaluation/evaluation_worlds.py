@@ -20,13 +20,14 @@ from dataclasses import replace
 import numpy as np
 
 from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
+from scenario_gen.types.ego import with_witness
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.generation import GenerationResult, WITHOUT
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, ScenarioSet
+from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario, ScenarioSet
 from scenario_gen.types.segmentation import Segmentation
 
 CARS = (Vehicle("west", 4.0, 2.0), Vehicle("south", 4.0, 2.0))
@@ -123,15 +124,12 @@ def report_case(count=12, name="crossing", without=True):
 
 
 def ego_case(count=4):
-    """The case of the report without its first vehicle, whose template track is given instead."""
+    """The case of the report without its first vehicle, whose witness is given instead."""
     case = report_case(count, without=False)
 
-    def only(scenario, n):
-        fields = ("position", "heading", "speed", "acceleration", "present")
-        return replace(scenario, vehicles=(scenario.vehicles[n],), **{name: getattr(scenario, name)[[n]] for name in fields})
-
-    left = tuple(only(scenario, 1) for scenario in case.generated.scenarios)
-    made = replace(case.generated, scenarios=left, ego=only(case.oracle, 0))
+    left = tuple(with_witness(scenario, 0) for scenario in case.generated.scenarios)
+    slot = EgoSlot(case.encounter.vehicles[0], np.zeros(4), np.ones(4))
+    made = replace(case.generated, scenarios=left, ego=slot)
     rows = {"with changepoints": left, "oracle": [case.oracle]}
     evaluation = evaluate_scenarios(
         case.encounter, rows, changepoints=len(case.segmentation.changepoints), config=EvaluationConfig(resamples=50)

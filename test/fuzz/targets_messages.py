@@ -52,6 +52,8 @@ from msg_conventions.tracks import decode_tracks, encode_tracks
 from msg_conventions.trajectory import TYPE as TRAJECTORY_TYPE
 from scenario_gen.recordings.template import decode_template
 from scenario_gen.recordings.write import result_messages
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.scenario import EgoSlot
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 TEMPLATE = encounter(3)
@@ -71,7 +73,9 @@ def of_run(*topics: str) -> list[bytes]:
 
 def ego(topic: str) -> list[bytes]:
     """A message of the ego slot."""
-    return [data for name, data in ego_messages(scenario(5, n=1), 7_000_000_000) if name == topic]
+    return [
+        data for name, data in ego_messages(EgoSlot(Vehicle("5"), np.zeros(4), np.ones(4)), "map", 7_000_000_000) if name == topic
+    ]
 
 
 def diagnostics(data: bytes) -> None:
@@ -123,7 +127,7 @@ TARGETS = (
     decoder(
         "message_scenarios",
         TRAJECTORY_TYPE,
-        lambda: [encode_scenario(scenario(k), 5) for k in (1, 2)] + ego("ego/track"),
+        lambda: [encode_scenario(scenario(k), 5) for k in (1, 2)],
         decode_scenario,
     ),
     decoder("message_diagnostics", DIAGNOSTICS_TYPE, lambda: of_run("diagnostics", "scenarios/info"), diagnostics),

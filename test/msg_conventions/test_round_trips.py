@@ -40,12 +40,13 @@ from msg_conventions import (
 )
 from scenario_gen.arrays import canonical_angle
 from scenario_gen.errors import InputError
+from scenario_gen.types.ego import with_witness
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.names import token, tokens
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import BoundaryStates, Cause, ScenarioSet
+from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, ScenarioSet
 
 
 @given(seeds, st.integers(2, 5), st.integers(2, 60))
@@ -211,18 +212,29 @@ def test_states(seed):
 
 
 def test_ego_slot():
-    track = scenario(3, n=1)
-    sent = dict(ego.ego_messages(track, 17))
-    assert list(sent) == ["ego/start", "ego/goal", "ego/track"]
-    for topic, k in (("ego/start", 0), ("ego/goal", -1)):
+    slot = EgoSlot(Vehicle("v0"), np.array([1.0, 2.0, 0.5, 3.0]), np.array([4.0, 5.0, -0.5, 6.0]))
+    sent = dict(ego.ego_messages(slot, "map", 17))
+    assert list(sent) == ["ego/start", "ego/goal"]
+    for topic, asked in (("ego/start", slot.start), ("ego/goal", slot.goal)):
         stamp, frame, child, state = ego.decode_state(sent[topic])
-        assert (stamp, frame, child) == (17, track.frame_id, "vehicle_v0")
-        assert state[[0, 1, 3]].tolist() == [*track.position[0, k], track.speed[0, k]]
-    assert_same(scenarios.decode_scenario(sent["ego/track"])[1], track, "vehicles", "time", "position", "speed", "frame_id")
-    said = scenario_info.request_summary(ScenarioSet(1, (), 1, ego=track), "r", "/n", 7, {"count": "1", "ego": "v0"}).values
+        assert (stamp, frame, child) == (17, "map", "vehicle_v0")
+        assert state.tolist() == pytest.approx(asked.tolist(), abs=1e-12)
+    said = scenario_info.request_summary(ScenarioSet(1, (), 1, ego=slot), "r", "/n", 7, {"count": "1", "ego": "v0"}).values
     assert said["ego"] == "v0" and said["count"] == "1"
-    assert json.loads(said["ego_goal"])[3] == track.speed[0, -1]
+    assert json.loads(said["ego_goal"])[3] == 6.0
     assert ego.ego_values(None) == {}
+
+
+def test_a_scenario_with_a_witness_names_its_message():
+    one = with_witness(scenario(3, n=2), 1)
+    asked = BoundaryStates(np.zeros((2, 4)), np.ones((2, 4)))
+    slot = EgoSlot(one.witness.vehicles[0], np.full(4, 0.25), np.full(4, 0.5))
+    data = scenarios.encode_scenario(one, 17)
+    template = (*one.vehicles, *one.witness.vehicles)
+    made = scenario_info.scenario_entry(one, data, "r", "/n", template=template, asked=asked, ego=slot)
+    (entry,) = scenario_info.decode_info(scenario_info.encode_info(made, 17))
+    assert entry.witness == scenarios.digest(scenarios.encode_scenario(one.witness, 17))
+    assert entry.asked().start.tolist() == [[0.0] * 4] and entry.asked(witness=True).end.tolist() == [[1.0] * 4, [0.5] * 4]
 
 
 def test_asked_states_are_in_the_order_of_the_scenario():

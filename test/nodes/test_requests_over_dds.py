@@ -85,14 +85,17 @@ def published(client, result):
 
 
 def test_the_same_bytes_as_in_process_with_an_ego(suite, client):
-    client.hear("/scenarios", "/scenarios/info", "/ego/start", "/ego/goal", "/ego/track")
+    client.hear("/scenarios", "/scenarios/info", "/ego/start", "/ego/goal", "/ego/witness")
     client.wait("/scenarios/info", 3, timeout=120.0)
     result = ask(client, ego="1", count=3)
     assert result.successful, result.reason
     encounter, made = in_process(3, ego="1")
     digests, accounts = published(client, result)
     assert digests == [digest(encode_scenario(s, encounter.start_ns)) for s in made.scenarios]
-    for topic, data in ego_messages(made.ego, encounter.start_ns):
+    witnesses = [digest(encode_scenario(s.witness, encounter.start_ns)) for s in made.scenarios]
+    assert [values["ego_witness"] for values in accounts] == witnesses
+    client.until(lambda: set(witnesses) <= set(map(digest, client.heard["/ego/witness"])), "the witnesses")
+    for topic, data in ego_messages(made.ego, "map", encounter.start_ns):
         assert client.wait(f"/{topic}")[-1] == data, topic
     stamp, frame, child, state = decode_state(client.heard["/ego/start"][-1])
     assert (stamp, frame, child) == (encounter.start_ns, "map", "vehicle_1")

@@ -27,7 +27,10 @@ import scenario_gen
 from scenario_gen import bundled, MissingExtraError, read_log
 from scenario_gen.errors import needs
 
-EXTRA_MODULES = ("gymnasium", "jinja2", "lz4", "mcap", "ompl", "plotly", "pyarrow", "rich", "rosbags", "typer", "zstandard")
+EXTRA_MODULES = (
+    *("dask", "distributed", "duckdb", "gymnasium", "jinja2", "lz4", "mcap", "ompl", "plotly", "pyarrow", "rich", "rosbags"),
+    *("typer", "zstandard"),
+)
 MODULES = {"pillow": "PIL", "pyyaml": "yaml"}  # by distribution, where they differ
 
 

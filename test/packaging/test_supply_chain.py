@@ -57,7 +57,8 @@ def test_setup_py_asks_for_the_same(tmp_path):
             (names if len(asked) > 1 else asked["core"]).add(Requirement(line).name)
     listed = {name: {one.name for one in wanted} for name, wanted in extras().items()}
     everything = set().union(*listed.values()) - listed["core"]
-    assert asked["core"] == listed["core"] and asked["all"] == everything and asked["cli"] == everything - {"ompl", "gymnasium"}
+    assert asked["core"] == listed["core"] and asked["all"] == everything == asked["corpus"] | {"ompl", "gymnasium"}
+    assert asked["cli"] == everything - listed["corpus"] - {"ompl", "gymnasium"}
     assert asked["ros"] - everything == {"ros-jazzy-rclpy", "ros-jazzy-common-interfaces"}
 
 

@@ -165,7 +165,7 @@ def test_a_phone_shows_all_of_it(browser, report):
     tab.page.close()
 
 
-def test_an_ego_is_drawn_as_its_template_track(browser, tmp_path):
+def test_an_ego_is_drawn_as_its_witness(browser, tmp_path):
     """The vehicle that is left out has a dashed outline and line of its own; nothing else breaks, with one vehicle left."""
     path = tmp_path / "ego.html"
     write_report(path, ReportInput([ego_case(4)]))

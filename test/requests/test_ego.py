@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The ego slot: one vehicle is left out, the others are as valid as ever, and its template track is given."""
+"""The ego slot: one vehicle is left out, and its own motion, certified together with the others, is the witness."""
 
 from dataclasses import replace
 
@@ -20,13 +20,16 @@ from given import answer, Given
 import numpy as np
 import pytest
 
+from msg_conventions.scenarios import encode_scenario
+from scenario_gen.errors import RefusedError
 from scenario_gen.logs import read_log
 from scenario_gen.roads import build_road
-from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.segmentation import segment
 from scenario_gen.template.interaction import find_conflicts, waits_to_keep
+from scenario_gen.types.ego import together, with_witness
+from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.request import Request
-from scenario_gen.types.scenario import BoundaryStates
+from scenario_gen.types.scenario import BoundaryStates, Scenario
 from scenario_gen.validity import Checker
 
 
@@ -34,37 +37,49 @@ from scenario_gen.validity import Checker
 def test_of_two_vehicles_one_is_left(chain, plain, ego):
     made = answer(chain, Request(ego=ego), count=5).generated
     index = int(ego) - 1
+    whole = answer(chain, Request(), count=5).generated
+    for one, all_of_it in zip(made.scenarios, whole.scenarios, strict=True):
+        assert one.index == all_of_it.index, "the model of all vehicles is drawn and checked, then parted"
+        assert encode_scenario(together(one), 0) == encode_scenario(together(with_witness(all_of_it, index)), 0)
     assert [v.id for s in made.scenarios for v in s.vehicles] == ["2" if ego == "1" else "1"] * 5
     asked = plain.fit.asked
     for s in made.scenarios:
         assert s.position[0, 0] == pytest.approx(asked.start[1 - index, :2], abs=1e-5)
         assert s.position[0, -1] == pytest.approx(asked.end[1 - index, :2], abs=1e-5)
-    track = made.ego
-    assert [v.id for v in track.vehicles] == [ego]
-    for k, state in ((0, asked.start[index]), (-1, asked.end[index])):
-        assert track.position[0, k] == pytest.approx(state[:2], abs=1e-9)
-        assert np.cos(track.heading[0, k] - state[2]) == pytest.approx(1.0)
-        assert track.speed[0, k] == state[3]
-    assert np.array_equal(track.time, np.round(chain.encounter.time, 9)), "stamps are the template's"
+    slot = made.ego
+    assert (slot.vehicle.id, slot.start.tolist(), slot.goal.tolist()) == (
+        ego,
+        asked.start[index].tolist(),
+        asked.end[index].tolist(),
+    )
+    for track in (s.witness for s in made.scenarios):
+        assert [v.id for v in track.vehicles] == [ego]
+        for k, state in ((0, slot.start), (-1, slot.goal)):
+            assert track.position[0, k] == pytest.approx(state[:2], abs=1e-5)
+            assert np.cos(track.heading[0, k] - state[2]) == pytest.approx(1.0)
+            assert track.speed[0, k] == pytest.approx(state[3], abs=1e-9)
+    assert len({s.witness.position.tobytes() for s in made.scenarios}) == 5, "each has its own"
 
 
-def test_the_track_is_drivable_in_shape_and_on_the_road(chain):
-    track = answer(chain, Request(ego="2"), count=1).generated.ego
-    poses = np.column_stack([track.position[0], track.heading[0]])
-    vehicle = track.vehicles[0]
-    assert footprint_fits(chain.road, poses, vehicle.length, vehicle.width).all()
-    step = np.hypot(*np.diff(track.position[0], axis=0).T)
-    assert np.abs(step / 0.1 - 0.5 * (track.speed[0, 1:] + track.speed[0, :-1]))[1:-1].max() < 1.5
-    along = np.cos(np.arctan2(*np.diff(track.position[0], axis=0).T[::-1]) - track.heading[0, :-1])
-    assert along[step > 0.2].min() > 0.99
+def test_a_slot_that_cannot_be_driven_is_refused(chain):
+    """What is asked of the ego must exist, too: there is no scenario without a witness."""
+    with pytest.raises(RefusedError):
+        answer(chain, Request(ego="1", goals="1: 16.0 8.07 3.14159 40.0"), count=2)
 
 
-def test_leaving_one_out_does_not_wait_for_its_limits(chain):
-    """An ego that nobody could drive does not stand in the way of the others."""
-    slow = replace(chain, encounter=chain.encounter, sampling=replace(chain.sampling, max_speed=11.0, max_stretch=0.0))
-    fast = Request(ego="1", goals="1: 16.0 8.07 3.14159 40.0")
-    assert answer(replace(slow, sampling=replace(slow.sampling, max_speed=40.0)), fast, count=2).generated.scenarios
-    assert len(answer(slow, Request(ego="1"), count=2).generated.scenarios) == 2
+def test_parted_and_together_again():
+    """Of vehicles that come and go: whoever is alone at the end leaves the others' clock shorter, and it is whole again."""
+    time = np.arange(50) * 0.1
+    position = np.stack([np.stack([10.0 * n + time, 0.0 * time], axis=1) for n in range(3)])
+    rest = (np.zeros((3, 50)), np.ones((3, 50)), np.zeros((3, 50)))
+    whole = Scenario(tuple(map(Vehicle, "abc")), time, position, *rest, present=np.array([[0, 30], [5, 49], [2, 40]]))
+    parted = with_witness(whole, 1)
+    assert len(parted.time) == 41 and [v.id for v in parted.vehicles] == ["a", "c"]
+    back = together(parted)
+    assert [v.id for v in back.vehicles] == ["a", "c", "b"]
+    assert encode_scenario(together(with_witness(back, 1)), 0) == encode_scenario(together(with_witness(whole, 2)), 0)
+    assert np.array_equal(back.time, whole.time) and np.array_equal(back.present[[0, 2, 1]], whole.present)
+    assert np.array_equal(back.position[[0, 2, 1]], whole.position)
 
 
 @pytest.mark.data
@@ -83,4 +98,11 @@ def test_the_others_stay_valid_among_themselves(data, ego):
     asked = BoundaryStates(outcome.fit.asked.start[kept], outcome.fit.asked.end[kept])
     checker = Checker(chain.road, asked, conflicts, waits)
     assert all(verdict.valid for verdict in checker.check(outcome.generated.scenarios))
+    everybody = Checker.of_template(encounter, chain.road, outcome.fit.asked, kept_waits)
+    order = [*kept, ego]
+    place = np.argsort(order).tolist()
+    for scenario in map(together, outcome.generated.scenarios):
+        arrays = {name: getattr(scenario, name)[place] for name in ("position", "heading", "speed", "acceleration", "present")}
+        whole = replace(scenario, vehicles=tuple(scenario.vehicles[k] for k in place), **arrays)
+        assert everybody.check([whole])[0].valid, "the witness is certified together with the others"
     assert [v.id for v in outcome.generated.scenarios[0].vehicles] == [v.id for v in vehicles]

@@ -23,6 +23,7 @@ from typer.testing import CliRunner
 from msg_conventions.scenarios import digest, encode_scenario
 from msg_conventions.topics import topic_entry
 from scenario_gen.cli import app
+from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
@@ -30,7 +31,8 @@ from scenario_gen.nearest import attempt
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.recordings.write import result_messages, write_recording
 from scenario_gen.review.evaluation import bag_results
-from scenario_gen.review.validation import ALTERED, UNUSABLE, validate_bag
+from scenario_gen.review.regenerate import regenerate_scenario
+from scenario_gen.review.validation import ALTERED, NO_WITNESS, UNUSABLE, validate_bag
 from scenario_gen.roads import build_road
 from scenario_gen.segmentation import segment
 from scenario_gen.storage.bag import read_messages
@@ -216,3 +218,37 @@ def test_the_command_answers_with_its_exit_code(run, tmp_path):
         validate_bag(tmp_path / "none")
     with pytest.raises(InputError, match="nothing to check"):
         validate_bag(rewritten(bag, tmp_path / "empty", lambda _, data: data, ("scenarios",)))
+
+
+def test_an_ego_is_checked_with_its_witness(run, tmp_path):
+    """The witness is a part of what is proven: one that hits another is found, one that is lost or altered is said."""
+    slot = attempt(run.encounter, run.segmentation, run.road, PipelineConfig(), Request(ego="2"), count=3, seed=4)
+    whole = validate_bag(write_recording(tmp_path / "whole", slot))[0]
+    assert (whole.scenarios, whole.found, whole.left_out) == (3, {}, {})
+
+    def bag_with(name, change):
+        with atomic_bag(tmp_path / name) as bag:
+            for message in read_messages(tmp_path / "whole"):
+                data = change(message.data) if message.topic == "/ego/witness" else message.data
+                if data is not None:
+                    bag.add_topic(message.topic, message.type, qos_yaml(topic_entry(message.topic)[1]))
+                    bag.write(message.topic, data, message.stamp_ns)
+        return tmp_path / name
+
+    (lost,) = validate_bag(bag_with("lost", lambda _: None))
+    assert (lost.found, lost.left_out) == ({}, {NO_WITNESS: 3})
+    (altered,) = validate_bag(bag_with("altered", lambda data: data[:-8] + bytes(8)))
+    assert altered.found[ALTERED].count == 3
+    with pytest.raises(InputError, match="the witness with SHA-256"):
+        regenerate_scenario(tmp_path / "lost", slot.generated.scenarios[0].index)
+    with pytest.raises(InputError, match="whose witness is not in the bag"):
+        read_trials(tmp_path / "lost")
+    hitting = tuple(replace(one, witness=on_top_of(one)) for one in slot.generated.scenarios)
+    (hit,) = validate_bag(write_recording(tmp_path / "hit", replace(slot, generated=replace(slot.generated, scenarios=hitting))))
+    assert hit.found["overlap"].count == 3
+
+
+def on_top_of(scenario):
+    """The scenario's witness where its first vehicle is."""
+    arrays = {name: getattr(scenario, name)[:1] for name in ("position", "heading", "speed", "acceleration", "present")}
+    return replace(scenario.witness, time=scenario.time, **arrays)

@@ -87,7 +87,7 @@ def test_a_bag_of_its_own(bag, name, tmp_path):
     assert (found.scenarios, found.invalid, found.left_out) == (1, 0, {})
     topics = {message.topic for message in read_messages(folder)}
     assert {f"/{name}/tracks", f"/{name}/map", f"/{name}/fit", f"/{name}/vehicle_1/route"} <= topics
-    assert (f"/{name}/ego/track" in topics) == (name != "plain")
+    assert (f"/{name}/ego/witness" in topics) == (name != "plain")
     assert regenerate_scenario(folder, 2).data == published(bag, f"/{name}")[2], "again from there"
 
 

@@ -176,7 +176,7 @@ class View {
     context.restore();
   }
 
-  /** Where an ego would be by its template: a dashed outline, for it is not part of the scenario. */
+  /** Where an ego's witness is: a dashed outline, for it is not part of the scenario. */
   outline(state, vehicle, colour) {
     const context = this.context;
     context.save();

@@ -1,0 +1,41 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parameters of mining, and where a corpus keeps what."""
+
+from dataclasses import dataclass
+
+from scenario_gen.logs.config import LogConfig
+from scenario_gen.parameters import parameter, Parameters
+
+
+@dataclass(frozen=True)
+class CorpusConfig(Parameters):
+    """How an archive is mined, and how the work is spread."""
+
+    range_size: int = parameter(256, "bytes of text that one task parses", unit="MiB", low=1, high=4096)
+    task_rows: int = parameter(10_000_000, "rows whose hours one task searches, so that none is shorter than its start", low=1000)
+    task_encounters: int = parameter(100, "encounters that one task cleans", low=1, high=100_000)
+    memory: int = parameter(600, "memory that the database of one task takes before it spills to disk", unit="MiB", low=100)
+    slack: float = parameter(
+        10.0, "metres beyond the proximity within which a coarse position still makes a candidate", unit="m", low=0.0, high=100.0
+    )
+    interaction: float = parameter(
+        6.0,
+        "space-time gap below which two vehicles have to do with each other: a second counts 2 m",
+        unit="m",
+        low=0.1,
+        high=200.0,
+    )
+    log: LogConfig = LogConfig()

@@ -1,0 +1,209 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Encounters kept by the thousand: tables in which each is a row, with its tracks as the bytes that a bag would hold.
+
+The messages of those who meet are cleaned and smoothed by `logs`, as a log's are; a log of another format is read whole.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenario_gen.corpus.config import CorpusConfig
+from scenario_gen.corpus.grouping import Found, label
+from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
+from scenario_gen.corpus.tasks import arriving
+from scenario_gen.errors import InputError, needs
+from scenario_gen.logs import read_log
+from scenario_gen.logs.raw import Observations, RawLog, Segment
+from scenario_gen.logs.read import encounters_of
+from scenario_gen.logs.tables import EPOCH_NS
+from scenario_gen.recordings.tracks import tracks_bytes, tracks_of
+from scenario_gen.types.encounter import Encounter
+
+MARGIN = 2_000_000  # µs of messages before and after an encounter, for smoothing
+
+
+@dataclass(frozen=True)
+class CleanTask:
+    """Encounters to clean, the tables of messages in which they are, and the table to write."""
+
+    name: str
+    found: tuple[Found, ...]
+    rows: tuple[Path, ...]
+    target: Path
+    config: CorpusConfig
+
+
+@dataclass(frozen=True)
+class LogTask:
+    """A log to read, of any format that `read_log` knows, and the table to write."""
+
+    name: str
+    paths: tuple[Path, ...]
+    target: Path
+    config: CorpusConfig
+
+
+def clean_found(task: CleanTask) -> None:
+    """Write the table of a task: a row for each encounter that is whole after cleaning, and why others are not."""
+    if task.target.exists():
+        return
+    from pyarrow import parquet
+
+    first, last = min(one.start for one in task.found) - MARGIN, max(one.end for one in task.found) + MARGIN
+    wanted = sorted({device for one in task.found for device in one.devices})
+    filters = [("t", ">=", first), ("t", "<=", last), ("device", "in", wanted)]
+    tables = [parquet.read_table(path, filters=filters).to_pandas() for path in task.rows if path.exists()]
+    import pandas as pd
+
+    messages = pd.concat(tables).drop_duplicates().sort_values(["device", "t", "lat", "lon"], kind="stable")
+    by_device = dict(tuple(messages.groupby("device")))
+    rows, refused = [], []
+    for found in task.found:
+        try:
+            encounters = encounters_of(_raw(found, by_device), task.config.log).encounters
+        except InputError as error:
+            refused.append({"name": found.name, "why": str(error)})
+            continue
+        rows += [row_of(encounter, "messages", task.config) for encounter in encounters]
+    write_encounters(task.target, rows, {"refused": refused, "quality": []})
+
+
+def _raw(found: Found, by_device: Mapping[int, Any]) -> RawLog:
+    """The messages of an encounter as a log."""
+    vehicles, begin = [], 0
+    for device in found.devices:
+        own = by_device[device]
+        own = own[(own["t"] >= found.start - MARGIN) & (own["t"] <= found.end + MARGIN)]
+        stamps = own["t"].to_numpy(np.int64) * 1000 + EPOCH_NS
+        numbers = np.arange(begin, begin + len(own))
+        speed = own["speed"].to_numpy(np.float64)
+        heading = np.pi / 2.0 - own["heading"].to_numpy(np.float64) * (np.pi / 180.0)
+        vehicles.append(
+            Observations(
+                label(device), stamps, own[["lat", "lon"]].to_numpy(np.float64), numbers, heading, stamps, speed, numbers
+            )
+        )
+        begin += len(own)
+    return RawLog(found.name, True, tuple(vehicles), begin, (Segment(0, found.name, "message", 1),))
+
+
+def read_one_log(task: LogTask) -> None:
+    """Write the table of a log's encounters; it is bounded as every log is (`LogConfig`).
+
+    Raises:
+        InputError: the log cannot be used; the message names file and row.
+    """
+    if task.target.exists():
+        return
+    made = read_log(list(task.paths), task.config.log)
+    source = ", ".join(path.name for path in task.paths)
+    rows = [row_of(encounter, source, task.config) for encounter in made.encounters]
+    write_encounters(task.target, rows, {"refused": [], "quality": list(made.quality.lines())})
+
+
+def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str, Any]:
+    """Return an encounter's row: its kind is that of the two vehicles that have most to do with each other."""
+    pairs = []
+    for i, j in combinations(range(len(encounter.vehicles)), 2):
+        both = np.flatnonzero(encounter.there[i] & encounter.there[j])
+        if len(both) < 2:
+            continue
+        apart = np.sqrt(np.square(encounter.position[i, both] - encounter.position[j, both]).sum(axis=1))
+        both = both[apart < config.log.proximity] if (apart < config.log.proximity).sum() > 1 else both
+        a, b = (Motion(encounter.position[n, both], encounter.heading[n, both], encounter.speed[n, both]) for n in (i, j))
+        gap, _, _ = space_time_gap(a, b, encounter.dt)
+        pairs.append((gap, i, j, kind_of(a, b, encounter.dt), float(apart.min())))
+    pairs.sort()
+    latitude, longitude = encounter.origin or (None, None)
+    return {
+        "name": encounter.name,
+        "source": source,
+        "kind": pairs[0][3],
+        "kinds": json.dumps({f"{encounter.vehicles[i].id} {encounter.vehicles[j].id}": kind for _, i, j, kind, _ in pairs}),
+        "vehicles": [vehicle.id for vehicle in encounter.vehicles],
+        "count": len(encounter.vehicles),
+        "start_ns": encounter.start_ns,
+        "seconds": encounter.duration,
+        "gap": pairs[0][0],
+        "distance": min(pair[4] for pair in pairs),
+        "travel": float((encounter.speed * encounter.there).sum(axis=1).max() * encounter.dt),
+        "lat": latitude,
+        "lon": longitude,
+        "tracks": tracks_bytes(encounter),
+    }
+
+
+def write_encounters(target: Path, rows: Sequence[Mapping[str, Any]], account: Mapping[str, Any]) -> None:
+    """Write a table of encounters, whole or not at all; the account stands in its metadata."""
+    needs("corpus", "pyarrow")
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    text, number = pa.string(), pa.float64()
+    kinds = {
+        **dict.fromkeys(("name", "source", "kind", "kinds"), text),
+        "vehicles": pa.list_(text),
+        **dict.fromkeys(("count", "start_ns"), pa.int64()),
+        **dict.fromkeys(("seconds", "gap", "distance", "travel", "lat", "lon"), number),
+        "tracks": pa.binary(),
+    }
+    table = pa.Table.from_pylist(list(rows), schema=pa.schema(list(kinds.items())))
+    with arriving(target) as part:
+        parquet.write_table(table.replace_schema_metadata({"account": json.dumps(account)}), part, compression="zstd")
+
+
+def tables_of(corpus: Path) -> list[Path]:
+    """Return the tables of a corpus that `mine` wrote, sorted.
+
+    Raises:
+        InputError: there is none.
+    """
+    found = sorted((corpus / "encounters").glob("*.parquet"))
+    if not found:
+        raise InputError(f"{corpus} holds no encounters/*.parquet; write it with `scenario-gen mine ARCHIVE --out {corpus}`")
+    return found
+
+
+def account_of(table: Path) -> dict[str, Any]:
+    """Return what a table says of the encounters that are not in it, and of its log's quality."""
+    from pyarrow import parquet
+
+    account: dict[str, Any] = json.loads((parquet.read_schema(table).metadata or {}).get(b"account", b"{}"))
+    return account
+
+
+def rows_of(tables: Sequence[Path], columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
+    """Yield the rows of tables, in their order."""
+    from pyarrow import parquet
+
+    for path in tables:
+        yield from parquet.read_table(path, columns=list(columns) if columns else None).to_pylist()
+
+
+def encounter_of(row: Mapping[str, Any]) -> Encounter:
+    """Return a row's encounter.
+
+    Raises:
+        InputError: its bytes are damaged.
+    """
+    origin = None if row["lat"] is None else (row["lat"], row["lon"])
+    return replace(tracks_of(row["tracks"], row["name"], origin), name=row["name"])

@@ -1,0 +1,158 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What two vehicles have to do with each other: following, merging, turning, crossing, opposing.
+
+All from two tracks (T, 2) on one clock while both are near each other. The first definition that holds gives the kind:
+
+- *following*: for at least 70 % of the first and of the last quarter of the time one drives on the other's path: within 2.5 m of
+  it, headings within 30°. A path goes on straight at both ends.
+- *merging*: so in the last quarter, and for less than 30 % of the first.
+- *turning*: one of them turns by 45° or more.
+- *crossing*: neither turns and their paths intersect at 30° to 150°.
+- *opposing*: where they are nearest to each other their headings differ by 150° or more.
+- *other*: none of these, e.g. side by side in two lanes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Bools, Floats, wrap_angle
+from scenario_gen.logs.groups import LAG
+
+KINDS = ("following", "merging", "turning", "crossing", "opposing", "other")
+BESIDE, ALIKE = 2.5, np.radians(30.0)  # m, rad: on the same path
+MOSTLY, HARDLY = 0.7, 0.3
+TURNS, AGAINST = np.radians(45.0), np.radians(150.0)
+BEYOND = 150.0  # m by which a path goes on at both ends
+STEP = 2.0  # m between the points of a path
+MOVES = 0.5  # m/s below which a heading tells nothing new
+EVERY = 0.3  # s between the samples that are compared with all others
+FINE = 15  # parts of that in which the nearest are compared once more: at 38 m/s two such samples are 11 m apart
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A vehicle's position (T, 2) [m], heading (T,) [rad] and speed (T,) [m/s]."""
+
+    position: Floats
+    heading: Floats
+    speed: Floats
+
+    def every(self, step: int) -> "Motion":
+        """Return each `step`-th sample."""
+        return Motion(self.position[::step], self.heading[::step], self.speed[::step])
+
+
+def space_time_gap(a: Motion, b: Motion, dt: float) -> tuple[float, int, int]:
+    """Return min over t, t' of |a(t) - b(t')| + 2 m/s |t - t'| [m], and the samples t and t' at which it is taken.
+
+    Args:
+        a: (T,) samples.
+        b: (T,) samples at the same times.
+        dt: s between two samples.
+    """
+    step = max(round(EVERY / dt), 1)
+    one, other = a.position[::step], b.position[::step]
+    time = np.arange(len(one)) * (step * dt)
+    apart = exact.hypot(one[:, None, 0] - other[None, :, 0], one[:, None, 1] - other[None, :, 1])
+    cost = apart + LAG * np.abs(time[:, None] - time[None, :])
+    i, j = divmod(int(cost.argmin()), len(other))
+    fine = np.arange(-FINE, FINE + 1) / FINE * (step * dt)
+    when = [np.clip(time[k] + fine, 0.0, time[-1]) for k in (i, j)]
+    near = [
+        np.stack([np.interp(at, time, places[:, 0]), np.interp(at, time, places[:, 1])], axis=1)
+        for at, places in zip(when, (one, other), strict=True)
+    ]
+    apart = exact.hypot(near[0][:, None, 0] - near[1][None, :, 0], near[0][:, None, 1] - near[1][None, :, 1])
+    return float((apart + LAG * np.abs(when[0][:, None] - when[1][None, :])).min()), i * step, j * step
+
+
+def kind_of(a: Motion, b: Motion, dt: float) -> str:
+    """Return the kind of what two vehicles do, by the definitions above; the same for (b, a).
+
+    Args:
+        a: (T,) samples while the two are near each other.
+        b: (T,) samples at the same times.
+        dt: s between two samples.
+    """
+    one, other = (motion.every(max(round(EVERY / dt), 1)) for motion in (a, b))
+    path, others = path_of(one), path_of(other)
+    on = np.stack([_on_path(one, others), _on_path(other, path)])
+    quarter = max(len(one.speed) // 4, 1)
+    early, late = float(on[:, :quarter].mean(axis=1).max()), float(on[:, -quarter:].mean(axis=1).max())
+    if late >= MOSTLY and early >= MOSTLY:
+        return "following"
+    if late >= MOSTLY and early < HARDLY:
+        return "merging"
+    if max(abs(turned(one)), abs(turned(other))) >= TURNS:
+        return "turning"
+    if _intersect(one, other):
+        return "crossing"
+    apart = exact.hypot(*(one.position - other.position).T)
+    nearest = int(apart.argmin())
+    if abs(float(wrap_angle(one.heading[nearest : nearest + 1] - other.heading[nearest : nearest + 1])[0])) >= AGAINST:
+        return "opposing"
+    return "other"
+
+
+def turned(motion: Motion) -> float:
+    """Return how far a vehicle's heading turns in all [rad], left positive, while it moves."""
+    heading = np.unwrap(motion.heading[motion.speed > MOVES])
+    return float(heading[-1] - heading[0]) if len(heading) else 0.0
+
+
+def path_of(motion: Motion) -> tuple[Floats, Floats]:
+    """Return points (P, 2) [m] of a path, 2 m apart, with a straight at both ends, and its heading (P,) [rad] there."""
+    moved = np.concatenate([[True], exact.hypot(*np.diff(motion.position, axis=0).T) > 0.0])
+    places = motion.position[moved]
+    driven = np.concatenate([[0.0], np.cumsum(exact.hypot(*np.diff(places, axis=0).T))])
+    at = np.arange(0.0, float(driven[-1]) + STEP, STEP)
+    heading = np.unwrap(motion.heading[moved])
+    middle = np.stack([np.interp(at, driven, places[:, 0]), np.interp(at, driven, places[:, 1])], axis=1)
+    facing = np.interp(at, driven, heading)
+    out = np.arange(STEP, BEYOND, STEP)[:, None]
+    before = middle[0] - out[::-1] * np.array([exact.cos(float(facing[0])), exact.sin(float(facing[0]))])
+    after = middle[-1] + out * np.array([exact.cos(float(facing[-1])), exact.sin(float(facing[-1]))])
+    ends = np.full(len(out), facing[0]), np.full(len(out), facing[-1])
+    return np.vstack([before, middle, after]), np.concatenate([ends[0], facing, ends[1]])
+
+
+def _on_path(motion: Motion, path: tuple[Floats, Floats]) -> Bools:
+    """(T,) whether a vehicle is beside no path but on this one, and drives along it."""
+    points, facing = path
+    apart = motion.position[:, None, :] - points[None, :, :]
+    nearest = np.square(apart).sum(axis=2).argmin(axis=1)
+    rest, along = apart[np.arange(len(nearest)), nearest], facing[nearest]
+    beside = np.abs(rest[:, 1] * exact.cos(along) - rest[:, 0] * exact.sin(along))
+    alike = np.abs(wrap_angle(motion.heading - along)) < ALIKE
+    near = np.square(rest).sum(axis=1) < np.square(STEP + BESIDE)
+    found: Bools = (beside < BESIDE) & alike & near
+    return found
+
+
+def _intersect(a: Motion, b: Motion) -> bool:
+    """Whether the ways driven cross each other at 30° to 150°."""
+    p, q = a.position[:-1], b.position[:-1]
+    r, s = np.diff(a.position, axis=0), np.diff(b.position, axis=0)
+    between = q[None, :, :] - p[:, None, :]
+    denominator = r[:, None, 0] * s[None, :, 1] - r[:, None, 1] * s[None, :, 0]
+    safe = np.where(denominator == 0.0, 1.0, denominator)
+    t = (between[..., 0] * s[None, :, 1] - between[..., 1] * s[None, :, 0]) / safe
+    u = (between[..., 0] * r[:, None, 1] - between[..., 1] * r[:, None, 0]) / safe
+    angle = np.abs(wrap_angle(a.heading[:-1][:, None] - b.heading[:-1][None, :]))
+    hit = (denominator != 0.0) & (t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0) & (angle > ALIKE) & (angle < AGAINST)
+    return bool(hit.any())

@@ -1,0 +1,288 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`mine`: an archive -> a corpus of encounters. Four stages of tasks, each writing files that the next one reads.
+
+    messages/range-*.parquet    what text said, by hour (`messages.py`)
+    hours/hour-*.parquet        which two vehicles meet (`meetings.py`), and beside it their messages
+    found.parquet               who is joined to whom (`grouping.py`)
+    encounters/*.parquet        cleaned encounters (`encounters.py`); of logs in other formats, these at once
+
+A file that is there is done, so a run that was killed goes on where it was.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
+import json
+from pathlib import Path
+from typing import Any
+
+from scenario_gen.corpus.config import CorpusConfig
+from scenario_gen.corpus.encounters import account_of, clean_found, CleanTask, LogTask, read_one_log, rows_of, tables_of
+from scenario_gen.corpus.grouping import Found, group, Meeting
+from scenario_gen.corpus.meetings import HourTask, overlap, search_hours
+from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
+from scenario_gen.corpus.tasks import arriving, spread, sweep, Told
+from scenario_gen.errors import InputError, needs
+from scenario_gen.folders import write_text
+from scenario_gen.folders.claim import alone
+from scenario_gen.logs.adapters.commonroad import is_commonroad
+from scenario_gen.logs.read import is_bag, is_spmd, is_table
+from scenario_gen.parameters import flatten
+
+ARCHIVE = "archive.json"
+MOST_SHOWN = 20  # failures and files that are named; the corpus holds all
+
+
+@dataclass(frozen=True)
+class Mined:
+    """What mining came to.
+
+    Attributes:
+        encounters: in the corpus.
+        kinds: how many of each kind.
+        account: rows left out, by cause.
+        files: the same by file, those with anything to say.
+        refused: encounters that cleaning did not leave whole: name and reason.
+        failed: a sentence for each task that failed.
+        notes: what else a person should know.
+    """
+
+    encounters: int
+    kinds: dict[str, int]
+    account: dict[str, int]
+    files: dict[str, dict[str, int]]
+    refused: list[dict[str, str]]
+    failed: list[str]
+    notes: list[str]
+
+    def lines(self) -> list[str]:
+        """Return the summary for people."""
+        kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(self.kinds.items()))
+        said = [f"{self.encounters} encounters: {kinds or 'none'}"]
+        said += [f"{count} × {cause}" for cause, count in sorted(self.account.items())]
+        for file, causes in list(self.files.items())[:MOST_SHOWN]:
+            said.append(f"{file}: " + ", ".join(f"{n} × {cause}" for cause, n in causes.items()))
+        said += [f"encounter {one['name']} is left out: {one['why']}" for one in self.refused[:MOST_SHOWN]]
+        for what, ones in (("files", self.files), ("encounters left out", self.refused)):
+            if len(ones) > MOST_SHOWN:
+                said.append(f"… and {len(ones) - MOST_SHOWN} more {what}")
+        return [*said, *self.notes, *self.failed]
+
+
+def mine(
+    archives: Sequence[Path],
+    out: Path,
+    config: CorpusConfig = CorpusConfig(),
+    *,
+    workers: int = 1,
+    scheduler: str = "",
+    told: Told = lambda *_: None,
+) -> Mined:
+    """Find the encounters of an archive.
+
+    Args:
+        archives: folders, whose SPMD files at any depth are one archive on one clock, and whose tables and bags are a log each;
+            or files and bags. A folder of tables that holds no SPMD file and no other folder is one log, as for `read_log`.
+        out: the corpus; an unfinished one of the same archive and parameters is gone on with.
+        config: how.
+        workers: processes; 0 takes one for each core.
+        scheduler: address of a Dask scheduler, instead.
+        told: how far each stage is.
+
+    Raises:
+        InputError: there is nothing to read, or `out` is of another archive or other parameters.
+    """
+    needs("corpus", "duckdb", "pyarrow")
+    messages, logs = inventory(archives)
+    out.mkdir(parents=True, exist_ok=True)
+    with alone(out), spread(workers, scheduler, told) as go:
+        _agree(out, messages, logs, config)
+        sweep(out)
+        log_tasks = [
+            LogTask(paths[0].stem, tuple(paths), out / "encounters" / f"log-{k:05}.parquet", config)
+            for k, paths in enumerate(logs)
+        ]
+        failed = go(read_one_log, [task for task in log_tasks if not task.target.exists()])
+        if messages:
+            ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
+            failed += go(parse_range, [task for task in ranged if not task.target.exists()])
+            failed += go(search_hours, hour_tasks(ranged, out, config))
+            if not failed:
+                failed += go(clean_found, clean_tasks(out, config))
+        return summary(out, failed)
+
+
+def inventory(archives: Sequence[Path]) -> tuple[list[Path], list[list[Path]]]:
+    """Return the SPMD files, and the other logs, each with its files.
+
+    Raises:
+        InputError: a path does not exist, or nothing in it can be read.
+    """
+    messages: list[Path] = []
+    logs: list[list[Path]] = []
+    for archive in archives:
+        if not archive.exists():
+            raise InputError(f"{archive} does not exist")
+        before = len(messages) + len(logs)
+        if archive.is_file() or is_bag(archive):
+            (messages.append(archive) if is_spmd(archive) else logs.append([archive]))
+            continue
+        files = sorted(path for path in archive.rglob("*") if path.is_file() and not path.name.startswith("."))
+        spmd = [path for path in files if is_spmd(path)]
+        messages += spmd
+        rest = [path for path in files if path not in set(spmd)]
+        bags = sorted({path.parent for path in rest if path.name == "metadata.yaml" and is_bag(path.parent)})
+        tables = [path for path in rest if is_table(path) or is_commonroad(path)]
+        loose = [path for path in rest if path.suffix in (".mcap", ".db3") and path.parent not in bags]
+        if not spmd and not bags and not loose and tables and all(path.parent == archive and is_table(path) for path in tables):
+            logs.append(tables)
+        else:
+            logs += [[path] for path in (*tables, *bags, *loose)]
+        if len(messages) + len(logs) == before:
+            raise InputError(f"{archive} holds no log that can be read: no SPMD file, table, bag or CommonRoad scenario")
+    return messages, logs
+
+
+def _agree(out: Path, messages: Sequence[Path], logs: Sequence[Sequence[Path]], config: CorpusConfig) -> None:
+    """Write down what the corpus is of; or see that it is of the same.
+
+    Raises:
+        InputError: it is of something else.
+    """
+    files = [*messages, *chain.from_iterable(logs)]
+    document = {
+        "format": 1,
+        "files": [[str(path.resolve()), path.stat().st_size if path.is_file() else 0] for path in files],
+        "parameters": {name: value for name, (_, value) in flatten(config).items() if name not in ("memory", "task_rows")},
+    }
+    place = out / ARCHIVE
+    if place.exists():
+        before = json.loads(place.read_text(encoding="utf-8"))
+        for key, what in (("files", "archive, whose files were other ones"), ("parameters", "set of parameters")):
+            if before.get(key) != document[key]:
+                raise InputError(f"{out} is a corpus of another {what}; name another folder, or remove this one")
+        return
+    if any(path.name != ARCHIVE and not path.name.startswith(".") for path in out.iterdir()):
+        raise InputError(f"{out} is not empty and no corpus; name another folder")
+    with arriving(place) as part:
+        write_text(part, json.dumps(document, indent=1) + "\n")
+
+
+def hour_tasks(ranged: Sequence[RangeTask], out: Path, config: CorpusConfig) -> list[HourTask]:
+    """Put the hours that are not searched into tasks of about `task_rows` rows."""
+    rows: Counter[int] = Counter()
+    files: dict[int, list[Path]] = {}
+    for task in ranged:
+        if task.target.exists():
+            for hour, count in json.loads(task.target.with_suffix(".json").read_text(encoding="utf-8"))["hours"].items():
+                rows[int(hour)] += count
+                files.setdefault(int(hour), []).append(task.target)
+    tasks: list[list[tuple[int, tuple[Path, ...]]]] = []
+    room = 0
+    sides = -(-overlap(config) // HOUR)
+    for hour in sorted(rows):
+        if (out / "hours" / f"hour-{hour}.parquet").exists():
+            continue
+        if not tasks or rows[hour] > room:
+            tasks.append([])
+            room = config.task_rows
+        near = sorted({path for near in range(hour - sides, hour + sides + 1) for path in files.get(near, ())})
+        tasks[-1].append((hour, tuple(near)))
+        room -= rows[hour]
+    return [HourTask(f"hours {own[0][0]} to {own[-1][0]}", tuple(own), out / "hours", config) for own in tasks]
+
+
+def clean_tasks(out: Path, config: CorpusConfig) -> list[CleanTask]:
+    """Group all meetings, and put those encounters that are not cleaned into tasks."""
+    found = grouped(out, config)
+    tasks = []
+    for k in range(0, len(found), config.task_encounters):
+        own = tuple(found[k : k + config.task_encounters])
+        target = out / "encounters" / f"found-{k // config.task_encounters:06}.parquet"
+        first, last = min(one.meetings[0].start for one in own), max(one.end for one in own)
+        first = min(meeting.start for one in own for meeting in one.meetings)
+        rows = tuple(
+            path
+            for hour in range(first // HOUR - 1, last // HOUR + 1)
+            if (path := out / "hours" / f"hour-{hour}.rows.parquet").exists()
+        )
+        if not target.exists():
+            tasks.append(CleanTask(f"encounters from {k}", own, rows, target, config))
+    return tasks
+
+
+def grouped(out: Path, config: CorpusConfig) -> list[Found]:
+    """Return the encounters of all meetings, and write their table."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    names = ("gap", "start", "a", "b", "end", "kind", "distance", "lat", "lon")
+    tables = sorted((out / "hours").glob("hour-*[0-9].parquet"))
+    rows = (row for path in tables for row in parquet.read_table(path, columns=list(names)).to_pylist())
+    meetings = [Meeting(*(row[name] for name in names)) for row in rows]
+    found = group(meetings, config.log)
+    listed = [
+        {
+            "name": one.name, "devices": list(one.devices), "start": one.start, "end": one.end, "kind": one.meetings[0].kind,
+            "gap": one.meetings[0].gap, "distance": min(meeting.distance for meeting in one.meetings),
+            "lat": one.meetings[0].lat, "lon": one.meetings[0].lon,
+        }
+        for one in found
+    ]  # fmt: skip
+    kinds: dict[str, Any] = {"name": pa.string(), "devices": pa.list_(pa.int64()), "start": pa.int64(), "end": pa.int64()}
+    kinds |= {"kind": pa.string(), **dict.fromkeys(("gap", "distance", "lat", "lon"), pa.float64())}
+    with arriving(out / "found.parquet") as part:
+        parquet.write_table(pa.Table.from_pylist(listed, schema=pa.schema(list(kinds.items()))), part, compression="zstd")
+    return found
+
+
+def summary(out: Path, failed: list[str]) -> Mined:
+    """Return what is in a corpus, by listing it."""
+    from pyarrow import parquet
+
+    files: dict[str, Counter[str]] = {}
+    notes: list[str] = []
+    for path in sorted((out / "messages").glob("*.json")):
+        account = json.loads(path.read_text(encoding="utf-8"))
+        notes += account["notes"]
+        for file, causes in account["files"].items():
+            files.setdefault(file, Counter()).update(causes)
+    shared: Counter[str] = Counter()
+    for path in sorted((out / "hours").glob("hour-*[0-9].parquet")):
+        shared.update(json.loads((parquet.read_schema(path).metadata or {}).get(b"shared", b"{}")).keys())
+    if shared:
+        first = ", ".join(sorted(shared)[:10])
+        notes.append(f"{len(shared)} ids are borne by several vehicles at once, and told apart by place: {first} …")
+    tables = sorted((out / "encounters").glob("*.parquet"))
+    accounts = [account_of(path) for path in tables]
+    kinds = Counter(row["kind"] for row in rows_of(tables, ["kind"]))
+    total: Counter[str] = Counter()
+    for causes in files.values():
+        total.update(causes)
+    told = {file: {cause: n for cause, n in causes.items() if n and cause != "rows"} for file, causes in files.items()}
+    return Mined(
+        encounters=sum(int(count) for count in kinds.values()),
+        kinds=dict(kinds),
+        account={cause: count for cause, count in total.items() if count},
+        files={file: causes for file, causes in told.items() if causes},
+        refused=[one for account in accounts for one in account.get("refused", ())],
+        failed=failed,
+        notes=notes + [line for account in accounts for line in account.get("quality", ())],
+    )
+
+
+__all__ = ["ARCHIVE", "Mined", "inventory", "mine", "tables_of"]

@@ -1,0 +1,438 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Synthetic archives in the format of the Safety Pilot, of any size, whose encounters are known: for tests and benchmarks.
+
+Nothing in them was recorded. Vehicles drive along straights and arcs in closed form, so that a whole archive is a few operations
+on arrays. Each encounter has a tile of its own; half of those that are planted lie just inside of one threshold of the miner, and
+others just outside. The rest of the rows are vehicles that meet nobody: some drive on streets 60 m apart, where the proximity
+alone would find them. Clocks are asynchronous, rows are lost, repeated, stamped wrongly and damaged, ids repeat.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from datetime import date
+import json
+from pathlib import Path
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.errors import InputError, needs
+from scenario_gen.folders import Kind, replaced_folder, write_text
+from scenario_gen.parameters import parameter, Parameters
+
+TRUTH = "synthetic.json"
+SYNTHETIC = Kind("synthetic archive")
+KINDS = ("crossing", "opposing", "following", "merging", "turning")
+THRESHOLDS = ("proximity", "duration", "presence", "travel", "beside", "late")
+"""Of the miner, at each of which encounters are planted inside and outside: the distance, how long the pass takes, how long both
+are recorded, how far one drives, how far beside each other they pass, how long after each other."""
+FIRST_DAY = 3000  # days after 2004-01-01: April 2012
+DAY0 = date(1899, 12, 30)  # from which the names of the files count
+PLACE = (42.28, -83.74)  # degrees, around which all lies
+TILE, STREET, BLOCK, COLUMN = 2000.0, 300.0, 60.0, 30_000.0  # m: an encounter's own ground; between lone drives, wide and narrow
+ROWS_PER_FILE = 1_000_000
+NEVER = 9e9
+
+
+@dataclass(frozen=True)
+class ArchiveConfig(Parameters):
+    """What a synthetic archive holds."""
+
+    rows: int = parameter(100_000, "rows, about", low=5000)
+    hours: float = parameter(1.0, "time over which the encounters are spread", unit="h", low=0.1, high=10_000.0)
+    encounters: int = parameter(30, "encounters planted that are to be found", low=1)
+    outside: int = parameter(12, "encounters planted just outside of a threshold", low=0)
+    loss: float = parameter(0.03, "share of messages lost", low=0.0, high=0.5)
+    duplicates: float = parameter(0.18, "share of messages that a second vehicle heard", low=0.0, high=1.0)
+    wrong_times: float = parameter(0.001, "share of rows with a wrong stamp", low=0.0, high=0.1)
+    damaged: float = parameter(0.0001, "share of rows that are no rows", low=0.0, high=0.1)
+    repeated_ids: float = parameter(
+        0.02, "share of the encounters of which a vehicle's id is also somebody else's", low=0.0, high=1.0
+    )
+    noise: float = parameter(0.3, "standard deviation of a drive's position error", unit="m", low=0.0, high=3.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Drives:
+    """Drives in closed form; each array is (V,).
+
+    A vehicle is at (x, y) at time `at` [s], where its arc of radius `radius` [m] over `turn` [rad] begins; before, it drives
+    straight with `heading` [rad]. It drives at `speed` [m/s], but for a dip by the share `dip` about the time `dip_at`,
+    `dip_width` [s] wide. It is recorded from `begin` for `lasts` [s]. All times count from the archive's begin, places from
+    (`east`, `north`) [m].
+    """
+
+    device: Ints
+    x: Floats
+    y: Floats
+    heading: Floats
+    radius: Floats
+    turn: Floats
+    speed: Floats
+    at: Floats
+    begin: Floats
+    lasts: Floats
+    dip: Floats
+    dip_at: Floats
+    dip_width: Floats
+    east: Floats
+    north: Floats
+
+
+@dataclass(frozen=True)
+class Planted:
+    """An encounter in the archive: `threshold` "" or the one that it is close to, `inside` whether it is to be found."""
+
+    kind: str
+    devices: tuple[int, ...]
+    at: float
+    threshold: str = ""
+    inside: bool = True
+
+
+@dataclass
+class _Plan:
+    """Drives while they are collected."""
+
+    random: np.random.Generator
+    rows: list[dict[str, float]] = field(default_factory=list)
+    planted: list[Planted] = field(default_factory=list)
+    device: int = 100
+
+    def between(self, low: float, high: float) -> float:
+        return low + (high - low) * float(self.random.random())
+
+    def add(self, place: tuple[float, float, float, float], drives: list[dict[str, float]]) -> list[int]:
+        """Put drives, given about an encounter's own middle, to a place (east, north, turned by, time); return their devices."""
+        east, north, turned, when = place
+        cos, sin = exact.cos(turned), exact.sin(turned)
+        found = []
+        for drive in drives:
+            one = {"radius": 1.0, "turn": 0.0, "dip": 0.0, "dip_at": 0.0, "dip_width": 4.0, "x": 0.0, "y": 0.0, "at": 0.0} | drive
+            x, y = one["x"], one["y"]
+            one |= {
+                "x": cos * x - sin * y,
+                "y": sin * x + cos * y,
+                "heading": one["heading"] + turned,
+                "east": east,
+                "north": north,
+            }
+            one |= {name: one[name] + when for name in ("at", "begin", "dip_at")}
+            self.device += 1
+            found.append(int(one.setdefault("device", self.device)))
+            self.rows.append(one)
+        return found
+
+
+def write_archive(folder: Path, config: ArchiveConfig = ArchiveConfig(), seed: int = 0) -> Path:
+    """Write a synthetic archive: SPMD files of about a million rows, and what is planted in them; same seed, same bytes.
+
+    Args:
+        folder: of the files; an earlier synthetic archive there is replaced.
+        config: what it holds.
+        seed: of all randomness.
+
+    Returns:
+        `folder`, with `synthetic.json` beside the files.
+
+    Raises:
+        InputError: the folder may not be replaced, or the rows cannot hold that many encounters.
+    """
+    needs("corpus", "pyarrow")
+    drives, planted = plan(config, seed)
+    with replaced_folder(folder, SYNTHETIC) as place:
+        counts = _write(place, drives, config, np.random.default_rng([seed, 1]))
+        document = {
+            "synthetic": True,
+            "seed": seed,
+            **counts,
+            "planted": [vars(one) for one in planted],
+        }
+        write_text(place / TRUTH, json.dumps(document, indent=1) + "\n")
+    return folder
+
+
+def read_planted(folder: Path) -> list[Planted]:
+    """Return what is planted in an archive that `write_archive` wrote."""
+    found = json.loads((folder / TRUTH).read_text(encoding="utf-8"))["planted"]
+    return [Planted(**one | {"devices": tuple(one["devices"])}) for one in found]
+
+
+def plan(config: ArchiveConfig, seed: int) -> tuple[Drives, list[Planted]]:
+    """Return all drives of an archive, and what is planted among them.
+
+    Raises:
+        InputError: the encounters alone take more than the rows.
+    """
+    made = _Plan(np.random.default_rng([seed, 0]))
+    wide = int(np.ceil(np.sqrt(config.encounters + config.outside)))
+    for k in range(config.encounters + config.outside):
+        inside = k < config.encounters
+        nth = k // 2 if inside else k - config.encounters
+        threshold = THRESHOLDS[nth % len(THRESHOLDS)] if k % 2 or not inside else ""
+        when = made.between(60.0, 3600.0 * config.hours - 60.0)
+        if k % 7 == 0 and config.hours >= 2.0:  # across the full hour, where tasks meet
+            when = 3600.0 * (1 + k % int(config.hours - 1)) + made.between(-3.0, 3.0)
+        place = ((k % wide) * TILE, (k // wide + 1) * TILE, made.between(-3.1, 3.1), when)
+        kind = KINDS[k % len(KINDS)]
+        if threshold:
+            kind, drives = _at_threshold(made, threshold, inside=inside)
+        else:
+            drives = _OF_KIND[kind](made)
+        devices = made.add(place, drives)
+        made.planted.append(Planted(kind, tuple(devices), when, threshold, inside))
+    used = sum(int(10.0 * row["lasts"]) for row in made.rows)
+    shared = [row for row in made.rows if made.random.random() < config.repeated_ids]
+    _lone(made, config, config.rows / (1.0 - config.loss) / (1.0 + config.duplicates) - used, shared)
+    names = Drives.__dataclass_fields__
+    columns = {name: np.array([row[name] for row in made.rows], dtype=np.float64) for name in names}
+    return Drives(columns.pop("device").astype(np.int64), **columns), made.planted
+
+
+def _lone(made: _Plan, config: ArchiveConfig, rows: float, shared: list[dict[str, float]]) -> None:
+    """Add vehicles that meet nobody: for ten minutes each, a fifth of them side by side, and somebody for each shared id.
+
+    Raises:
+        InputError: there is no room for any.
+    """
+    if rows < 0.0:
+        raise InputError(f"parameter rows: the encounters alone take {-rows:.0f} rows more than {config.rows}")
+    lasts = min(600.0, 3600.0 * config.hours)
+    count = int(np.ceil(rows / (10.0 * lasts)))
+    north = begin = 0.0
+    for k in range(count):
+        block = k % 20 < 4  # side by side, at the same time
+        north -= BLOCK if block and k % 20 else STREET
+        if not block or k % 20 == 0:
+            begin = made.between(0.0, 3600.0 * config.hours - lasts)
+        column = k // 2000
+        if column and k % 2000 == 0:
+            north = -STREET
+        drive = {
+            "heading": np.pi if k % 3 == 0 else 0.0,
+            "speed": made.between(8.0, 15.0),
+            "begin": begin,
+            "lasts": lasts,
+            "at": begin + 300.0,
+        }
+        if k < len(shared):
+            drive |= {"device": shared[k]["device"], "begin": max(shared[k]["begin"] - 300.0, 0.0), "at": shared[k]["begin"]}
+        made.add(
+            (column * COLUMN, north, 0.0, 0.0),
+            [drive | {"dip": 0.9 * made.random.random(), "dip_at": begin + 200.0, "dip_width": 20.0}],
+        )
+
+
+def _recorded(made: _Plan, low: float = 18.0, high: float = 25.0) -> dict[str, float]:
+    begin = -made.between(low, high)
+    return {"begin": begin, "lasts": made.between(low, high) - begin}
+
+
+def _crossing(made: _Plan, late: tuple[float, float] = (1.0, 2.4)) -> list[dict[str, float]]:
+    angle = made.between(1.1, 2.0) * (1.0 if made.random.random() < 0.5 else -1.0)
+    dip = {"dip": made.between(0.0, 0.5), "dip_at": made.between(-7.0, -4.0), "dip_width": 2.0}
+    return [
+        {"heading": 0.0, "speed": made.between(7.0, 14.0), **_recorded(made)},
+        {"heading": angle, "speed": made.between(7.0, 14.0), "at": made.between(*late), **_recorded(made), **dip},
+    ]
+
+
+def _opposing(made: _Plan, beside: tuple[float, float] = (3.2, 4.5)) -> list[dict[str, float]]:
+    return [
+        {"heading": 0.0, "speed": made.between(6.0, 14.0), **_recorded(made)},
+        {"heading": np.pi, "speed": made.between(6.0, 14.0), "y": made.between(*beside), **_recorded(made)},
+    ]
+
+
+def _following(made: _Plan) -> list[dict[str, float]]:
+    speed, headway, dip = made.between(7.0, 15.0), made.between(1.1, 2.4), made.between(0.0, 0.8)
+    same = {"heading": 0.0, "speed": speed, "dip": dip, **_recorded(made)}
+    count = 3 if made.random.random() < 0.2 else 2
+    return [same | {"at": k * headway, "dip_at": k * headway} for k in range(count)]
+
+
+def _merging(made: _Plan) -> list[dict[str, float]]:
+    angle, radius, speed, times = made.between(0.8, 1.55), made.between(9.0, 14.0), made.between(6.0, 8.0), _recorded(made)
+    side = 1.0 if made.random.random() < 0.5 else -1.0
+    x, y = -radius * exact.sin(angle), side * radius * (1.0 - exact.cos(angle))  # where the arc begins that ends at (0, 0)
+    at = made.between(1.2, 2.4) - radius * angle / speed
+    return [
+        {"heading": 0.0, "speed": speed, **times},
+        {"heading": -side * angle, "turn": side * angle, "radius": radius, "x": x, "y": y, "at": at, "speed": speed, **times},
+    ]
+
+
+def _turning(made: _Plan) -> list[dict[str, float]]:
+    radius, lane, speed, other = made.between(8.0, 11.0), 3.5, made.between(5.0, 8.0), made.between(8.0, 14.0)
+    beta = exact.arctan2(float(np.sqrt(2.0 * radius * lane - lane * lane)), radius - lane)  # where it crosses the other's lane
+    passes = -radius * exact.sin(beta) / other
+    at = passes + made.between(1.3, 2.4) - radius * beta / speed
+    return [
+        {"heading": 0.0, "speed": other, **_recorded(made)},
+        {"heading": np.pi, "y": lane, "radius": radius, "turn": np.pi / 2.0, "speed": speed, "at": at, **_recorded(made)},
+    ]
+
+
+_OF_KIND: dict[str, Callable[[_Plan], list[dict[str, float]]]] = {
+    "crossing": _crossing,
+    "opposing": _opposing,
+    "following": _following,
+    "merging": _merging,
+    "turning": _turning,
+}
+
+
+def _at_threshold(made: _Plan, threshold: str, *, inside: bool) -> tuple[str, list[dict[str, float]]]:
+    """Return the kind and the drives of an encounter just inside or just outside of a threshold (the miner's defaults)."""
+
+    def margin(limit: float, by: float) -> float:  # `by` on the side on which it is found
+        return limit + (by if inside else -by) * made.between(1.0, 1.5)
+
+    if threshold == "proximity":  # behind each other, almost 100 m apart
+        apart, times = margin(100.0, -4.0), {"begin": -6.0, "lasts": 12.0}
+        return "following", [{"heading": 0.0, "speed": 38.0, "at": k * apart / 38.0, **times} for k in range(2)]
+    if threshold == "duration":  # nearer than 100 m for almost 5 s
+        closing = 200.0 / margin(5.0, 0.6)
+        return "opposing", [
+            {"heading": k * np.pi, "speed": closing / 2.0, "y": k * 3.6, "begin": -9.0, "lasts": 18.0} for k in range(2)
+        ]
+    if threshold == "presence":  # the second is recorded for almost 5 s
+        lasts = margin(5.0, 0.6)
+        one, other = _opposing(made)
+        return "opposing", [one | {"speed": 7.0}, other | {"speed": 7.0, "begin": -lasts / 2.0, "lasts": lasts}]
+    if threshold == "travel":  # one stands, the other creeps
+        speed, times = margin(5.0, 1.2) / 30.0, {"begin": -15.0, "lasts": 30.0}
+        return "following", [
+            {"heading": 0.0, "speed": speed, **times},
+            {"heading": 0.0, "speed": 0.0, "x": 4.8 + 15.0 * speed, **times},
+        ]
+    if threshold == "beside":  # on two roads side by side
+        beside = margin(6.0, -1.3)
+        return "opposing", _opposing(made, (beside, beside))
+    late = margin(3.0, -0.5)
+    return "crossing", _crossing(made, (late, late))
+
+
+def _write(folder: Path, drives: Drives, config: ArchiveConfig, random: np.random.Generator) -> dict[str, int]:
+    """Write the files; return how many rows of what there are."""
+    import pyarrow as pa
+    from pyarrow import csv
+
+    counts = {"rows": 0, "wrong_times": 0, "damaged": 0, "duplicates": 0}
+    number = 0
+    days = (drives.begin // 86400.0).astype(np.int64)
+    order = np.lexsort([drives.begin, days])
+    for day in np.unique(days):
+        own = order[days[order] == day]
+        for part in _parts(own, np.maximum(drives.lasts[own] * 10.0, 1.0)):
+            number += 1
+            label = (date(2004, 1, 1) - DAY0).days + FIRST_DAY + int(day)
+            columns = _rows(drives, part, number, config, random, counts)
+            path = folder / f"TripStart_bsmrx_{label}_p{number:03}.csv"
+            csv.write_csv(pa.table(columns), path, csv.WriteOptions(include_header=False))
+            broken = round(config.damaged * len(columns["TxDevice"]))
+            if broken:
+                with path.open("a", encoding="utf-8") as file:  # torn rows, a row of text, and an end that is cut off
+                    file.writelines("17,3,\n" if k % 2 else "x,".join(["17"] * 19) + "\n" for k in range(broken - 1))
+                    file.write("17,3,55,261")
+            counts["damaged"] += broken
+            counts["rows"] += len(columns["TxDevice"]) + broken
+    return counts
+
+
+def _parts(own: Ints, rows: Floats) -> Iterator[Ints]:
+    """Cut drives into files of about a million rows."""
+    file = (np.cumsum(rows) // ROWS_PER_FILE).astype(np.int64)
+    for k in np.unique(file):
+        yield own[file == k]
+
+
+def states(drives: Drives, who: Ints, time: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return positions (R, 2) [m] from the archive's origin, headings (R,) [rad] and speeds (R,) [m/s].
+
+    Args:
+        drives: of V vehicles.
+        who: (R,) index of a drive.
+        time: (R,) s.
+    """
+    base, width = drives.speed[who], drives.dip_width[who]
+    since, since_at = (time - drives.dip_at[who]) / width, ((drives.at - drives.dip_at) / drives.dip_width)[who]
+    dip = drives.dip[who]
+    speed = base * (1.0 - dip / (1.0 + np.square(since)))
+    driven = base * ((time - drives.at[who]) - dip * width * (exact.arctan2(since, 1.0) - exact.arctan2(since_at, 1.0)))
+    radius, turn, heading = drives.radius[who], drives.turn[who], drives.heading[who]
+    bent = np.clip(driven / radius, 0.0, np.abs(turn))
+    side = np.sign(turn)
+    now = heading + side * bent
+    rest = driven - bent * radius
+    cos, sin, cos0, sin0 = exact.cos(now), exact.sin(now), exact.cos(heading), exact.sin(heading)
+    x = drives.x[who] + side * radius * (sin - sin0) + rest * cos
+    y = drives.y[who] - side * radius * (cos - cos0) + rest * sin
+    return np.stack([x + drives.east[who], y + drives.north[who]], axis=1), now, speed
+
+
+def _rows(
+    drives: Drives, part: Ints, number: int, config: ArchiveConfig, random: np.random.Generator, counts: dict[str, int]
+) -> dict[str, Ints | Floats]:
+    """Return the columns of one file."""
+    amount = np.maximum((drives.lasts[part] * 10.0).astype(np.int64), 1)
+    who = np.repeat(part, amount)
+    tick = np.arange(len(who)) - np.repeat(np.cumsum(amount) - amount, amount)
+    phase = np.repeat(0.1 * random.random(len(part)), amount)
+    time = drives.begin[who] + 0.1 * tick + phase + 0.03 * (random.random(len(who)) - 0.5)
+    position, heading, speed = states(drives, who, time)
+    off = config.noise * exact.random.standard_normal(random, (len(drives.x), 2))
+    position = position + off[who] + 0.05 * (random.random((len(who), 2)) - 0.5)
+    # metres of a degree on the ellipsoid; about each encounter's own origin, so that its shape is right to 1e-4
+    north0 = PLACE[0] + drives.north[who] / 111_000.0
+    r0 = north0 * (np.pi / 180.0)
+    metres_north = 111_132.954 - 559.822 * exact.cos(2.0 * r0) + 1.175 * exact.cos(4.0 * r0)
+    metres_east = 111_412.84 * exact.cos(r0) - 93.5 * exact.cos(3.0 * r0)
+    latitude = north0 + (position[:, 1] - drives.north[who]) / metres_north
+    east0 = PLACE[1] + drives.east[who] / 80_000.0
+    longitude = east0 + (position[:, 0] - drives.east[who]) / metres_east
+    stamp = (np.round(time * 1e6) + FIRST_DAY * 86400e6).astype(np.int64)
+    second = stamp // 1000 % 60_000
+    kept = random.random(len(who)) >= config.loss
+    copies = np.where(kept, 1 + (random.random(len(who)) < config.duplicates), 0)
+    at = np.repeat(np.arange(len(who)), copies)
+    again = np.concatenate([[False], np.diff(at) == 0])
+    counts["duplicates"] += int(again.sum())
+    stamp = stamp[at]
+    wrong = random.random(len(at)) < config.wrong_times
+    shift = (random.random(int(wrong.sum())) * 2e12 - 1e12).astype(np.int64)
+    stamp[wrong] = np.where(shift % 7 == 0, 0, stamp[wrong] + shift)
+    counts["wrong_times"] += int(wrong.sum())
+    device = drives.device[who][at]
+    zeros = np.zeros(len(at), dtype=np.int64)
+    north_clockwise = np.degrees(np.pi / 2.0 - heading[at]) % 360.0
+    return {
+        "RxDevice": np.where(again, device + 1, device + 2),
+        "FileId": np.full(len(at), number),
+        "TxDevice": device,
+        "Gentime": stamp,
+        "TxRandom": zeros,
+        "MsgCount": tick[at] % 128,
+        "DSecond": second[at],
+        "Latitude": np.round(latitude[at], 7),
+        "Longitude": np.round(longitude[at], 7),
+        "Elevation": np.full(len(at), 250.0),
+        "Speed": np.round(speed[at] * 1.005, 2),
+        "Heading": np.round(north_clockwise, 4),
+        **dict.fromkeys(("Ax", "Ay", "Az", "Yawrate", "PathCount", "RadiusOfCurve"), zeros),
+        "Confidence": np.full(len(at), 100),
+    }

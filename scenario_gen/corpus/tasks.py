@@ -1,0 +1,158 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Tasks: pure functions that each write one file, mapped over processes; what is done is what is there.
+
+A task writes to a temporary name, syncs and renames, so a file that is there is whole, whoever was killed. Dask does the
+distribution, nothing else: it holds no state that a killed run would lose.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, ExitStack
+import os
+from pathlib import Path
+import shutil
+import time
+from typing import Any, TypeVar
+
+from scenario_gen.errors import needs
+from scenario_gen.folders.disk import discard, naming, sync
+
+Task = TypeVar("Task")
+Told = Callable[[int, int, str], None]
+"""Told how many tasks are done, of how many, and how much time is left, in words."""
+TEMPORARY = ".partial"
+
+
+@contextmanager
+def arriving(target: Path) -> Iterator[Path]:
+    """Give a temporary path beside `target`; at the end what was written there, file or folder, takes its name, synced.
+
+    Raises:
+        OSError: the disk is full, or fails; it names the file.
+    """
+    target.parent.mkdir(parents=True, exist_ok=True)
+    temporary = target.with_name(f"{target.name}{TEMPORARY}-{os.getpid()}-{time.monotonic_ns()}")
+    try:
+        yield temporary
+        if temporary.is_dir():
+            for path in sorted(temporary.rglob("*"), reverse=True):
+                sync(path)
+        sync(temporary)
+        with naming(target):
+            if target.is_dir():  # of a task that was killed before its last file
+                shutil.rmtree(target)
+            temporary.replace(target)
+        sync(target.parent)
+    except BaseException:
+        discard(temporary)
+        raise
+
+
+def sweep(folder: Path) -> None:
+    """Remove what killed tasks left behind; nobody may be writing there."""
+    for path in sorted(folder.rglob(f"*{TEMPORARY}-*")) if folder.exists() else ():
+        discard(path)
+
+
+class Spread:
+    """Runs a function on each of many tasks: in this process, in processes of this machine, or on a cluster.
+
+    A cluster of this machine is started when the first task needs it, and serves until the end.
+    """
+
+    def __init__(self, workers: int, scheduler: str, told: Told, stack: ExitStack) -> None:
+        self._workers = workers or os.cpu_count() or 1
+        self._scheduler, self._told, self._stack = scheduler, told, stack
+        self._client: Any = None
+
+    def __call__(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> list[str]:
+        """Run tasks, none of which depends on another.
+
+        Args:
+            function: of a module, pure: it writes its task's file.
+            tasks: each has a name.
+
+        Returns:
+            A sentence for each task that failed; the others are done.
+        """
+        begun, failed = time.monotonic(), []
+        for done, said in enumerate(self._outcomes(function, tasks), start=1):
+            failed += [said] if said else []
+            left = (time.monotonic() - begun) / done * (len(tasks) - done)
+            self._told(done, len(tasks), f"{left:.0f} s left" if left < 600.0 else f"{left / 60.0:.0f} min left")
+        return sorted(failed)
+
+    def _outcomes(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> Iterator[str]:
+        """Yield for each task, as it ends, why it failed, "" if it did not."""
+        if not tasks or (self._workers == 1 and not self._scheduler):
+            yield from (_guarded(function, task) for task in tasks)
+            return
+        if self._client is None:
+            needs("corpus", "dask", "distributed")
+            self._client = self._stack.enter_context(_client(self._workers, self._scheduler))
+        from distributed import as_completed
+
+        futures = self._client.map(_guarded, [function] * len(tasks), tasks, pure=False)
+        names = {future.key: getattr(task, "name", "a task") for future, task in zip(futures, tasks, strict=True)}
+        for future in as_completed(futures):
+            lost = future.status != "finished"  # every worker that tried it died
+            yield f"{names[future.key]}: {future.exception()}" if lost else future.result()
+
+
+@contextmanager
+def spread(workers: int = 1, scheduler: str = "", told: Told = lambda *_: None) -> Iterator[Spread]:
+    """Give what runs tasks.
+
+    Args:
+        workers: processes; 1 runs in this one, 0 takes one for each core.
+        scheduler: address of a Dask scheduler, instead of `workers`.
+        told: how far it is.
+    """
+    with ExitStack() as stack:
+        yield Spread(workers, scheduler, told, stack)
+
+
+def _guarded(function: Callable[[Any], Any], task: Any) -> str:
+    """Run one task; an error of its own input is a sentence, and does not end the others."""
+    from scenario_gen.errors import said, ScenarioGenError
+
+    try:
+        function(task)
+    except (ScenarioGenError, OSError, MemoryError) as error:
+        return f"{getattr(task, 'name', task)}: {said(error)}"
+    return ""
+
+
+@contextmanager
+def _client(workers: int, scheduler: str) -> Iterator[Any]:
+    """A client of a cluster on this machine, or of one that runs."""
+    import dask
+    from distributed import Client, LocalCluster
+
+    if scheduler:
+        with Client(scheduler) as client:
+            yield client
+        return
+    settings = {
+        "distributed.scheduler.allowed-failures": 10,
+        "distributed.worker.daemon": True,
+        "logging.distributed": "critical",
+    }
+    with (
+        dask.config.set(settings),
+        LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, memory_limit=0) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client

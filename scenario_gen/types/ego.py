@@ -1,0 +1,65 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One vehicle apart from the others: the slot of an ego, and both together again."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from scenario_gen.arrays import Floats, Ints
+from scenario_gen.types.scenario import Scenario
+
+_ROWS = ("position", "heading", "speed", "acceleration")
+
+
+def split_off(scenario: Scenario, index: int) -> tuple[Scenario, Scenario]:
+    """Return a scenario of all vehicles but one, and one of that one, both on the same clock."""
+    rows = [n for n in range(len(scenario.vehicles)) if n != index]
+    return _of(scenario, rows), _of(scenario, [index])
+
+
+def with_witness(scenario: Scenario, index: int) -> Scenario:
+    """Return the scenario without one vehicle, whose motion becomes the witness; it ends when the last of the others does."""
+    others, witness = split_off(scenario, index)
+    last = int(others.present[:, 1].max()) + 1
+    arrays = {name: getattr(others, name)[:, :last] for name in _ROWS}
+    return replace(others, time=others.time[:last], **arrays, witness=witness)
+
+
+def together(scenario: Scenario) -> Scenario:
+    """Return a scenario and its witness as one of all vehicles, the witness last; the same where there is no witness."""
+    witness = scenario.witness
+    if witness is None:
+        return scenario
+    parts = (replace(scenario, witness=None), witness)
+    time = np.unique(np.concatenate([part.time for part in parts]))  # whole nanoseconds, so equal instants are equal
+    vehicles = (*scenario.vehicles, *witness.vehicles)
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name)[:, _held(part, time)] for part in parts]) for name in _ROWS
+    }
+    present = np.concatenate([np.searchsorted(time, part.time[part.present]) for part in parts])
+    return replace(parts[0], vehicles=vehicles, time=time, **arrays, present=present)
+
+
+def _held(part: Scenario, time: Floats) -> Ints:
+    """Return for each instant (T,) [s] the part's sample there; where it has none nobody of it is there, and any will do."""
+    return np.minimum(np.searchsorted(part.time, time), len(part.time) - 1)
+
+
+def _of(scenario: Scenario, rows: Sequence[int]) -> Scenario:
+    arrays = {name: getattr(scenario, name)[list(rows)] for name in (*_ROWS, "present")}
+    return replace(scenario, vehicles=tuple(scenario.vehicles[n] for n in rows), **arrays)

@@ -1,0 +1,178 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Mining: planted encounters are found and no others, rows left out are counted, the work can be cut off anywhere."""
+
+import json
+
+from hypothesis import given, strategies
+import numpy as np
+import pytest
+
+from scenario_gen.corpus.config import CorpusConfig
+from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.grouping import group, label, Meeting
+from scenario_gen.corpus.kinds import kind_of, Motion
+from scenario_gen.corpus.messages import parse_range, ranges
+from scenario_gen.corpus.mine import mine
+from scenario_gen.corpus.synthetic import ArchiveConfig, read_planted, write_archive
+from scenario_gen.corpus.tasks import arriving
+from scenario_gen.errors import InputError
+from scenario_gen.folders import sha256_of
+from scenario_gen.logs.config import LogConfig
+
+pytestmark = pytest.mark.xdist_group("corpus")  # one archive for all
+SMALL = ArchiveConfig(rows=60_000, hours=2.0, encounters=14, outside=6, repeated_ids=0.1, damaged=0.001)
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    return write_archive(tmp_path_factory.mktemp("archive") / "spmd", SMALL, seed=3)
+
+
+@pytest.fixture(scope="module")
+def corpus(archive, tmp_path_factory):
+    out = tmp_path_factory.mktemp("mined") / "corpus"
+    return out, mine([archive], out)
+
+
+def found_in(out):
+    rows = rows_of(tables_of(out), ["vehicles", "kind"])
+    return {frozenset(int(name.partition("x")[0]) for name in row["vehicles"]): row["kind"] for row in rows}
+
+
+def test_planted_encounters_are_found_with_their_kinds_and_those_just_outside_are_not(archive, corpus):
+    planted = {frozenset(one.devices): one.kind for one in read_planted(archive) if one.inside}
+    found = found_in(corpus[0])
+    assert found.keys() == planted.keys()
+    assert np.mean([found[who] == kind for who, kind in planted.items()]) >= 0.95
+
+
+def test_every_row_that_is_left_out_is_counted_by_file(archive, corpus):
+    mined = corpus[1]
+    truth = json.loads((archive / "synthetic.json").read_text())
+    assert mined.account["rows"] == truth["rows"]
+    assert mined.account["left out: no row of 19 fields with numbers"] == truth["damaged"]
+    wrong = sum(mined.account[cause] for cause in mined.account if "clocks" in cause or "2004" in cause)
+    assert 0.9 * truth["wrong_times"] <= wrong <= truth["wrong_times"]  # a few agree with the other clock by chance
+    assert any("borne by several vehicles" in note for note in mined.notes)
+    assert mined.files and not mined.failed
+
+
+def test_an_encounter_of_the_corpus_is_an_encounter(corpus):
+    for row in rows_of(tables_of(corpus[0])):
+        encounter = encounter_of(row)
+        assert encounter.name == row["name"] and encounter.duration == row["seconds"] and len(encounter.vehicles) == row["count"]
+        assert encounter.origin == (row["lat"], row["lon"])
+
+
+def test_ranges_and_whole_files_give_the_same_rows(archive, tmp_path):
+    from pyarrow import parquet
+
+    files = sorted(archive.glob("*.csv"))
+    seen = []
+    for name, size in (("whole", 1 << 30), ("cut", 700_001)):
+        for task in ranges(files, tmp_path / name / "messages", size, 200):
+            parse_range(task)
+        tables = sorted((tmp_path / name / "messages").glob("*.parquet"))
+        rows = np.concatenate(
+            [np.stack([parquet.read_table(t)[c].to_numpy() for c in ("device", "t", "lat")]) for t in tables], 1
+        )
+        counts = [json.loads(t.with_suffix(".json").read_text())["files"] for t in tables]
+        seen.append((rows[:, np.lexsort(rows)], sum(causes["rows"] for one in counts for causes in one.values())))
+    assert len(tables) > 5
+    assert (seen[0][0] == seen[1][0]).all() and seen[0][1] == seen[1][1]
+
+
+def test_what_is_missing_is_made_again_and_the_same(archive, corpus, tmp_path):
+    """As after a kill: of each stage a file is gone, and a torn one lies there."""
+    out, _ = corpus
+    before = {path.relative_to(out): sha256_of(path) for path in out.rglob("*.parquet")}
+    for stage in ("messages", "hours", "encounters"):
+        sorted((out / stage).glob("*[0-9].parquet"))[0].unlink()
+        (out / stage / "x.partial-1-2").write_text("torn")
+    mine([archive], out)
+    assert {path.relative_to(out): sha256_of(path) for path in out.rglob("*.parquet")} == before
+    assert not list(out.rglob("*.partial*"))
+    with pytest.raises(InputError, match="another set of parameters"):
+        mine([archive], out, CorpusConfig(interaction=5.0))
+    with pytest.raises(InputError, match="is not empty and no corpus"):
+        mine([archive], archive)
+
+
+def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive, tmp_path):
+    (tmp_path / "in").mkdir()
+    row = "1,1,7,259200000000000,0,0,0,42.3,-83.7,250,0,0,0,0,0,0,0,0,100\n"
+    (tmp_path / "in" / "a.csv").write_text(row + "0,0\n" + row.replace(",7,", ",,").replace("42.3", "95.0") + row[:40])
+    (tmp_path / "in" / "one.csv").write_text("t,x,y\n0,0,0\n1,1,0\n")
+    mined = mine([tmp_path / "in"], tmp_path / "out")
+    assert mined.encounters == 0 and len(mined.failed) == 1 and "one.csv" in mined.failed[0]
+    assert mined.account == {"rows": 4, "left out: no row of 19 fields with numbers": 2, "left out: no vehicle": 1}
+
+
+def test_nothing_to_read_is_an_error(tmp_path):
+    with pytest.raises(InputError, match="does not exist"):
+        mine([tmp_path / "nowhere"], tmp_path / "out")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="holds no log that can be read"):
+        mine([tmp_path / "empty"], tmp_path / "out")
+
+
+def test_a_task_that_fails_leaves_nothing(tmp_path):
+    with pytest.raises(ZeroDivisionError), arriving(tmp_path / "a") as part:
+        part.write_text("half")
+        raise ZeroDivisionError
+    assert not list(tmp_path.iterdir())
+
+
+def straight(x, y, heading, speed, seconds=12.0):
+    time = np.arange(0.0, seconds, 0.1)
+    way = speed * (time - seconds / 2.0)
+    place = np.stack([x + way * np.cos(heading), y + way * np.sin(heading)], axis=1)
+    return Motion(place, np.full(len(time), heading), np.full(len(time), speed))
+
+
+@given(
+    turned=strategies.floats(-3.0, 3.0),
+    case=strategies.sampled_from(
+        [
+            ("following", (0.0, 0.0, 0.0), (-15.0, 0.5, 0.0)),
+            ("opposing", (0.0, 0.0, 0.0), (0.0, 3.5, np.pi)),
+            ("crossing", (0.0, 0.0, 0.0), (0.0, 5.0, np.pi / 2.0)),
+            ("other", (0.0, 0.0, 0.0), (0.0, 3.5, 0.0)),
+        ]
+    ),
+)
+def test_the_kind_depends_neither_on_the_direction_nor_on_the_order(turned, case):
+    kind, *both = case
+    cos, sin = np.cos(turned), np.sin(turned)
+    a, b = (straight(cos * x - sin * y, sin * x + cos * y, heading + turned, 10.0) for x, y, heading in both)
+    assert kind_of(a, b, 0.1) == kind == kind_of(b, a, 0.1)
+
+
+def meeting(a, b, start, end, gap):
+    return Meeting(gap, int(start * 1e6), a, b, int(end * 1e6), "following", gap, 42.0, -83.0)
+
+
+def test_who_is_joined_to_whom():
+    config = LogConfig()
+    platoon = [meeting(k, k + 1, 0, 20, 1.0 + k) for k in range(3)]
+    assert [one.devices for one in group(platoon, config)] == [(0, 1, 2), (2, 3)]  # 3 meets one of three: too few
+    apart = [meeting(1, 2, 0, 20, 1.0), meeting(2, 3, 30, 50, 1.0)]
+    assert [one.devices for one in group(apart, config)] == [(1, 2), (2, 3)]
+    crowd = [meeting(a, b, 0, 20, 1.0 + a) for b in range(15) for a in range(b)]
+    assert max(len(one.devices) for one in group(crowd, config)) == config.max_vehicles
+    brief = [meeting(1, 2, 0, 4, 1.0)]
+    assert group(brief, config) == []
+    assert label(17 + (2 << 40)) == "17x2"
