@@ -22,8 +22,10 @@ from shapely.geometry import box, MultiPoint
 from shapely.ops import unary_union
 
 from benchmarks._planning_maps import road_of
+from benchmarks._planning_obstructed import obstructed
+from scenario_gen.errors import RefusedError
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
-from scenario_gen.routing import plan_routes, PlanningConfig
+from scenario_gen.routing import plan, plan_routes, PlanningConfig
 from scenario_gen.routing.plan import farthest
 from scenario_gen.routing.search.dubins import shortest_into
 from scenario_gen.routing.search.planner import BlockedError, Budget, BudgetSpentError, NoWayError
@@ -187,6 +189,16 @@ def test_a_slalom_is_driven():
     assert np.abs(np.diff(bend)).max() < 0.08  # per half a metre: no jump of curvature
     shape = unary_union([footprint(at) for at in route.points])
     assert shape.intersection(blocked_area(road)).area < 1e-6
+
+
+def test_where_smoothing_fails_a_gentler_way_is_searched_for(monkeypatch):
+    case = obstructed(113)
+    ends = (case.query.start, case.query.goal)
+    route = route_on(case.road, *ends)
+    assert np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max() <= PlanningConfig().max_curvature
+    monkeypatch.setattr(plan, "TIGHTEST", plan.TIGHTEST[:1])
+    with pytest.raises(RefusedError, match="its curvature reaches"):
+        route_on(case.road, *ends)
 
 
 def test_what_is_far_from_the_fit_is_said():
