@@ -15,6 +15,7 @@
 """Bridges: exported scenarios before other people's programs, and back again. The judges are installed by `make judges`."""
 
 from collections.abc import Iterator, Sequence
+from itertools import islice
 import json
 import os
 from pathlib import Path
@@ -42,8 +43,8 @@ from scenario_gen.types.scenario import Scenario
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", ROOT.parent / "shared" / "data"))
-PER_DEMO, PER_CASE, CASES, PROBLEMS = sized(50, 2), sized(5, 1), sized(20, 1), sized(40, 1)
-ON = ("t_intersection", "corridor", "four_way", "straight")
+PER_DEMO, PER_CASE, CASES, CUTS, PROBLEMS = sized(50, 2), sized(5, 1), sized(20, 1), sized(10, 1), sized(40, 1)
+ON = ("t_intersection", "corridor", "four_way", "straight", "roundabout", "merge", "curve")
 DRIVES = 15.0  # metres that a vehicle must drive to make an ego
 
 
@@ -64,20 +65,25 @@ def run() -> list[Row]:
 
 
 def _bags(folder: Path) -> Iterator[Path]:
-    """Yield a bag of each case: the demo's, and recorded ones as long as there are fewer than `CASES`."""
+    """Yield a bag of each case: the demo's, recorded ones on `CASES` roads, and `CUTS` encounters cut out of whole recordings."""
     for case, road in ROADS.items():
-        yield from _bag(folder, read_log(bundled(case)).encounters, (road,), PER_DEMO)
-    recorded = 0
-    for path in sorted((DATA / "trajectories").glob("*/encounter_*.csv")) if DATA.is_dir() else ():
-        for road in ON:
-            if recorded < CASES:
-                for bag in _bag(folder, read_log(path).encounters[:1], (road,), PER_CASE):
-                    recorded += 1
-                    yield bag
+        yield from _bag(folder, read_log(bundled(case)).encounters, road, PER_DEMO)
+    logs = sorted((DATA / "trajectories").glob("*/*.csv"))
+    recorded = [read_log(path).encounters[0] for path in logs if path.name.startswith("encounter_")]
+    yield from islice(_turns(folder, recorded, PER_CASE), CASES)
+    found = [one for path in logs if path.name.endswith("_all_vehicles.csv") for one in read_log(path).encounters]
+    yield from islice(_turns(folder, [found[k] for k in np.random.default_rng(7).permutation(len(found))], 1), CUTS)
 
 
-def _bag(folder: Path, encounters: Sequence[Encounter], roads: Sequence[str], count: int) -> Iterator[Path]:
-    pairs = [(encounter, road) for encounter in encounters for road in roads]
+def _turns(folder: Path, encounters: Sequence[Encounter], count: int) -> Iterator[Path]:
+    """Yield bags of every encounter on one road, then of every one on another, and so on."""
+    for turn in range(len(ON)):
+        for k, encounter in enumerate(encounters):
+            yield from _bag(folder, [encounter], ON[(k + turn) % len(ON)], count)
+
+
+def _bag(folder: Path, encounters: Sequence[Encounter], road: str, count: int) -> Iterator[Path]:
+    pairs = [(encounter, road) for encounter in encounters]
     made, _ = generate_all(pairs, PipelineConfig(), count=count, seed=7)
     for case in made:
         if case.generated.scenarios:

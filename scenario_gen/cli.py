@@ -315,7 +315,7 @@ def export_scenarios(
     ego: Annotated[str, typer.Option(help="id of a vehicle that becomes the ego: CommonRoad's planning problem, …")] = "",
     options: Annotated[
         list[str] | None,
-        typer.Option("--set", help="run_out, step, goal_length, goal_width, goal_late, following, bag.…, as name=value"),
+        typer.Option("--set", help="run_out, step, goal_length, goal_width, goal_late, late, following, bag.…, as name=value"),
     ] = None,
 ) -> None:
     """Write scenarios for other software: CommonRoad, OpenSCENARIO with OpenDRIVE, Autoware; same bag, same bytes."""

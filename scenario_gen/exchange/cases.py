@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from scenario_gen.errors import InputError
+from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.exchange.config import ExportConfig
 from scenario_gen.exchange.lanes import Lane, LaneMap, lanes_of
 from scenario_gen.exchange.road_lanes import lane_map_of
@@ -58,6 +58,19 @@ class Exported:
     def duration(self) -> float:
         """Seconds until the last vehicle, or the ego, is at its end."""
         return max(float(s.time[-1]) for s in (self.others, self.ego) if s is not None)
+
+    def refuse_late_ego(self) -> None:
+        """Refuse an ego that arrives late: a controller under test is there from the first instant on.
+
+        Raises:
+            RefusedError: it arrives late.
+        """
+        if self.ego is not None and self.ego.present[0, 0] > 0:
+            begin = float(self.ego.time[self.ego.present[0, 0]])
+            raise RefusedError(
+                f"scenario {self.index}: the ego, vehicle {self.ego.vehicles[0].id}, arrives {begin:.1f} s late, and a planner "
+                "under test begins at 0; choose a vehicle with --ego that is there from the start"
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,15 +52,19 @@ def write_commonroad(case: Case, one: Exported, export: ExportConfig = ExportCon
     """Return a scenario as the bytes of a CommonRoad file, and sentences on what was changed for it.
 
     Raises:
-        RefusedError: a vehicle arrives late, for which the format has no form.
+        RefusedError: a vehicle arrives late, for which the schema has no form, or the ego does.
     """
+    one.refuse_late_ego()
     scenario, notes = _even(one.others, export)
     late = [v.id for v, (first, _) in zip(scenario.vehicles, scenario.present.tolist(), strict=True) if first > 0]
-    if late:
+    if late and export.late == "refused":
         raise RefusedError(
-            f"scenario {one.index}: vehicle {', '.join(late)} arrives late, and CommonRoad 2020a has obstacles from the first "
-            "step on only; export it to openscenario or autoware"
+            f"scenario {one.index}: vehicle {', '.join(late)} arrives late, and CommonRoad's schema has obstacles "
+            "from the first step on only; `--set late=written` writes the step at which it arrives, which commonroad-io "
+            "reads; or export it to openscenario or autoware"
         )
+    if late:
+        notes += (f"vehicle {', '.join(late)} arrives late: its initial time step is not 0, which the schema does not allow",)
     step = even_step(scenario) or export.step
     root = Element(
         "commonRoad",
@@ -180,9 +184,10 @@ def _obstacle(root: Element, scenario: Scenario, n: int) -> None:
     rectangle = add(add(obstacle, "shape"), "rectangle")
     add(rectangle, "length", vehicle.length)
     add(rectangle, "width", vehicle.width)
-    _state(obstacle, "initialState", scenario, n, 0)
+    first, last = scenario.present[n].tolist()
+    _state(obstacle, "initialState", scenario, n, first)
     trajectory = add(obstacle, "trajectory")
-    for k in range(1, int(scenario.present[n, 1]) + 1):
+    for k in range(first + 1, last + 1):
         _state(trajectory, "state", scenario, n, k)
 
 
@@ -193,8 +198,9 @@ def _problem(root: Element, ego: Scenario, step: float, export: ExportConfig) ->
     rate = (ego.heading[0, 1] - ego.heading[0, 0]) / (ego.time[1] - ego.time[0])
     _exact(start, "yawRate", float(rate))
     _exact(start, "slipAngle", 0.0)
-    (x, y), yaw = ego.position[0, -1].tolist(), float(ego.heading[0, -1])
-    last = int(np.ceil(export.goal_late * ego.time[-1] / step))
+    end = int(ego.present[0, 1])
+    (x, y), yaw = ego.position[0, end].tolist(), float(ego.heading[0, end])
+    last = int(np.ceil(export.goal_late * ego.time[end] / step))
     _goal(problem, (x, y, yaw), (export.goal_length, export.goal_width), last)
 
 

@@ -37,6 +37,12 @@ class ExportConfig(Parameters):
     goal_late: float = parameter(
         2.0, "until when an ego may reach its goal, in durations of its track; from the first step on it may", low=1.0, high=10.0
     )
+    late: str = parameter(
+        "refused",
+        "CommonRoad: a scenario in which a vehicle arrives late is refused, or written with the time step at which it arrives, "
+        "which CommonRoad's software reads and its schema does not allow",
+        choices=("refused", "written"),
+    )
     following: str = parameter(
         "position",
         "OpenSCENARIO's followingMode: the simulator puts vehicles on the trajectory, or its controllers follow it",

@@ -18,18 +18,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from shapely import covers, make_valid, Polygon, polygons, prepare, union_all
+from shapely import contains_xy, covers, make_valid, Polygon, polygons, prepare, union_all
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.curve import Curve
-from scenario_gen.exchange.lanes import LaneMap, lanes_of, Strip
+from scenario_gen.exchange.lanes import Lane, LaneMap, lanes_of, Strip
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import Scenario
 
 STEP = 1.0  # metres between points of a lane
 APART = 0.5  # metres between points of a path that it is laid through
 MARGIN = 0.1  # metres between a footprint and its lane's edge
+AROUND = 0.5  # metres by which a lane goes on beyond its footprints at least
+ACROSS = 0.6  # rad by which a vehicle in a lane may be turned in it
+CUT = 5.0  # metres of a path that may lie across all lanes, as where a corner is cut
 SAME_LANE, SAME_WAY = 1.0, 0.35  # metres and rad within which a path lies in another one's lane
 NEAR = 3  # points of a lane on both sides over which it keeps its widest
 
@@ -63,23 +66,41 @@ def derived_lanes(scenarios: Sequence[Scenario], road: Road | None, lane_width: 
     return LaneMap(tuple(strips), (), "right", origin, derived=True)
 
 
-def with_all_footprints(lane_map: LaneMap, scenarios: Sequence[Scenario], road: Road, lane_width: float) -> LaneMap:
-    """Return a map with a derived lane added along the path of every vehicle that leaves its lanes somewhere in a scenario."""
-    rings = [np.concatenate([lane.left, lane.right[::-1]]) for lane in lanes_of(lane_map)]
-    area = union_all(make_valid([Polygon(ring) for ring in rings]))
+def with_all_vehicles(lane_map: LaneMap, scenarios: Sequence[Scenario], road: Road, lane_width: float) -> LaneMap:
+    """Return a map with a derived lane added along the path of every vehicle that the lanes do not suffice for.
+
+    They do not where a footprint leaves them in some scenario, or where no lane has the vehicle's direction, as of one that turns
+    off the road across the others' lanes.
+    """
+    lanes = lanes_of(lane_map)
+    area = union_all(make_valid([Polygon(np.concatenate([lane.left, lane.right[::-1]])) for lane in lanes]))
     prepare(area)
-    outside: dict[str, Curve] = {}
+    missing: dict[str, Curve] = {}
     for scenario in scenarios:
         for n, vehicle in enumerate(scenario.vehicles):
-            if vehicle.id not in outside and not covers(area, polygons(footprints(scenario, n))).all():
-                outside[vehicle.id] = driven_path(scenario, n)
-    if not outside:
+            if vehicle.id not in missing:
+                path = driven_path(scenario, n)
+                if not covers(area, polygons(footprints(scenario, n))).all() or _unled(path, lanes) > CUT:
+                    missing[vehicle.id] = path
+    if not missing:
         return lane_map
-    strips = [_lane(f"along vehicle {name}", path, {name}, scenarios, road, lane_width, 0.0) for name, path in outside.items()]
+    strips = [_lane(f"along vehicle {name}", path, {name}, scenarios, road, lane_width, 0.0) for name, path in missing.items()]
     if lane_map.side == "left":
         strips = [replace(s, offset=s.offset - s.right[0], left=s.right, right=s.left) for s in strips]
-    origin = f"{lane_map.origin}, and a derived one along the path of vehicle {', '.join(outside)}, which leaves them"
+    origin = f"{lane_map.origin}, and a derived one along the path of vehicle {', '.join(missing)}, which does not keep to them"
     return replace(lane_map, strips=(*lane_map.strips, *strips), added=len(strips), origin=origin)
+
+
+def _unled(path: Curve, lanes: Sequence[Lane]) -> float:
+    """Return the metres of a path on which no lane has nearly its direction."""
+    led = np.zeros(len(path.points), dtype=np.bool_)
+    for lane in lanes:
+        inside = np.flatnonzero(~led & contains_xy(Polygon(np.concatenate([lane.left, lane.right[::-1]])), path.points[:, :2]))
+        if len(inside):
+            middle = Curve.through(lane.middle)
+            yaw = middle.at(middle.project(path.points[inside, :2])[0])[:, 2]
+            led[inside] |= exact.cos(path.points[inside, 2] - yaw) > exact.cos(ACROSS)
+    return float(np.diff(path.station)[~led[1:]].sum())
 
 
 def footprints(scenario: Scenario, n: int) -> Floats:
@@ -112,17 +133,17 @@ def _runs_in(path: Curve, lane: Curve) -> bool:
 def _lane(
     name: str, path: Curve, members: set[str], scenarios: Sequence[Scenario], road: Road | None, lane_width: float, run_out: float
 ) -> Strip:
-    """Return the strip of one lane, which holds every footprint of its members."""
+    """Return the strip of one lane, which holds every footprint of its members.
+
+    Its edges lie as far from the path on both sides, so that the lane's middle, which planners follow, is as smooth as the path.
+    """
     corners = np.concatenate([outline(scenario, n) for scenario in scenarios for n in _rows(scenario, members)])
     station, offset = path.project(corners)
-    reference = path.cut(float(station.min()) - run_out, float(station.max()) + run_out, STEP)
-    sides = []
-    for sign in (1.0, -1.0):
-        wide = _room(reference, sign, road, lane_width / 2.0, run_out)
-        needed = widest_near(reference, station - station.min() + run_out, np.maximum(sign * offset, 0.0) + MARGIN)
-        sides.append(np.maximum(wide, needed))
-    left, right = sides
-    return Strip(name, reference.points, left, (left + right)[None], np.zeros((0, len(left))))
+    more = max(run_out, AROUND)
+    reference = path.cut(float(station.min()) - more, float(station.max()) + more, STEP)
+    room = np.minimum(*(_room(reference, sign, road, lane_width / 2.0, more) for sign in (1.0, -1.0)))
+    half = np.maximum(room, widest_near(reference, station - station.min() + more, np.abs(offset) + MARGIN))
+    return Strip(name, reference.points, half, 2.0 * half[None], np.zeros((0, len(half))))
 
 
 def widest_near(line: Curve, station: Floats, wide: Floats) -> Floats:

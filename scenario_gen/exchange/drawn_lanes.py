@@ -30,17 +30,19 @@ from scenario_gen.arrays import Floats, wrap_angle
 from scenario_gen.curve import Curve
 from scenario_gen.exchange.derived_lanes import outline, widest_near
 from scenario_gen.exchange.lanes import Joint, LaneMap, Strip
-from scenario_gen.roads.arms import Arm, arms_of
-from scenario_gen.roads.ways import draw_route
+from scenario_gen.roads.arms import Arm, arms_of, reverse, ring_of
+from scenario_gen.roads.ways import draw_ring_route, draw_route, flare_begins
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import Scenario
 
 STEP = 1.0  # metres between points of a line
 HALF_DIAGONAL = 0.7072  # of a cell, in sides
 BEFORE = 1.0  # metres that a mouth lies before the place where the road is wider
+STEADY = 5  # cells along an arm for which the road is wider
 SHORTEST = 0.5  # metres of an arm
 EVEN = 1e-3  # metres by which lanes may lie elsewhere than side by side
 STRAIGHT_ON = 0.52  # rad, 30°: a way that turns by less goes straight on
+TURN_BACK = 2.6  # rad, 150°: a way that turns by more is none but for who drives it
 MOST_WIDER = 1.2  # metres by which an edge of a way is moved out at most
 STRAIGHT_LINE = 1e-6  # by which the cosine of an arm's direction to a straight road may differ from 1
 MARGIN = 0.05  # metres between a footprint and its way's edge
@@ -70,11 +72,13 @@ def drawn_lanes(road: Road, axis: Curve | None, side: str, scenarios: Sequence[S
         None if its lanes do not lie side by side in arms, or from one of them no way leads on.
     """
     arms = arms_of(road)
-    widths = [np.abs(offsets) for arm in arms for offsets in (arm.inward, arm.outward)]
-    lanes = len(np.concatenate(widths)) if arms else 0
-    if len(arms) < 2 or lanes != len(road.entries) + len(road.exits) or not all(map(len, widths)):
+    if len(arms) < 2:
         return None
+    widths = [np.abs(offsets) for arm in arms for offsets in (arm.inward, arm.outward)]
     width = 2.0 * min(float(offsets.min()) for offsets in widths)
+    ramps = _ramps(road, arms, width, side)
+    if len(np.concatenate(widths)) + len(ramps) != len(road.entries) + len(road.exits):
+        return None
     if any(np.abs(np.sort(offsets) - (np.arange(len(offsets)) + 0.5) * width).max() > EVEN for offsets in widths):
         return None
     if axis is not None:
@@ -83,7 +87,7 @@ def drawn_lanes(road: Road, axis: Curve | None, side: str, scenarios: Sequence[S
         if float(exact.hypot(*(axis.points[-1, :2] - arms[1].pose[:2]))) > EVEN:
             return None
     extra = HALF_DIAGONAL * road.resolution
-    if len(arms) == 2:
+    if len(arms) == 2 and not ramps:
         line = axis or _between(arms)
         if line is None:
             return None
@@ -91,28 +95,47 @@ def drawn_lanes(road: Road, axis: Curve | None, side: str, scenarios: Sequence[S
             "main road", _Side(line, line.length + run_out, len(arms[0].inward), len(arms[1].inward)), width, extra, side, run_out
         )
         return LaneMap((strip,), (), side, "", derived=False)
+    ring = ring_of(road)
     sides = []
-    for k, arm in enumerate(arms):
-        found = _mouth(road, arm, _line(arm, k, axis, road), width)
+    for k, arm in enumerate((*arms, *ramps)):
+        found = _mouth(road, arm, _line(arm, k, axis, road), width, ring)
         if found is None:
             return None
         sides.append(found)
     strips = [_arm_strip(f"arm {k + 1}", one, width, extra, side, run_out) for k, one in enumerate(sides)]
-    drawn = ((places, _way(sides, places, width, side)) for places in _places(sides))
+    drawn = ((places, _way(sides, places, width, side, ring)) for places in _places(sides))
     ways = {places: way for places, way in drawn if way is not None and road.drivable_at(way.points[:, :2]).all()}
-    if {places[0] for places in ways} != set(range(len(sides))):  # ways lead otherwise, as about an island
+    if {places[0] for places in ways} != set(range(len(sides))):
         return None
     used = _used(ways, sides, width, scenarios)
     joints = []
     for places, way in ways.items():
         a, i, b, j = places
-        if i != j and places not in used:
-            continue
+        ahead = i if sides[a].outward else i + sides[b].outward - sides[a].inward  # a ramp joins the outermost lane
         turn = float(wrap_angle(np.asarray(way.points[-1, 2] - way.points[0, 2])))
+        if (j != ahead or abs(turn) > TURN_BACK) and places not in used:
+            continue
         name = "straight" if abs(turn) < STRAIGHT_ON else "left" if turn > 0.0 else "right"
         joints.append(Joint(len(strips), a, b, name, i, j))
         strips.append(_way_strip(way, sides, places, width, extra, side, used.get(places, [])))
     return LaneMap(tuple(strips), tuple(joints), side, "", derived=False)
+
+
+def _ramps(road: Road, arms: Sequence[Arm], width: float, side: str) -> list[Arm]:
+    """Return an arm of one lane, by which nobody leaves, for each entry that is in no arm."""
+    known = [arm.pose[:2] + offset * _left(arm.pose) for arm in arms for offset in arm.inward]
+    offset = width / 2.0 if side == "right" else -width / 2.0  # lanes in lie to the left of who looks out, on the right side
+    found = []
+    for entry in road.entries:
+        if all(float(exact.hypot(*(entry[:2] - place))) > EVEN for place in known):
+            out = reverse(entry)
+            pose = np.array([*(out[:2] - offset * _left(out)), out[2]])
+            found.append(Arm(pose, np.array([offset]), np.zeros(0)))
+    return found
+
+
+def _left(pose: Floats) -> Floats:
+    return np.array([-exact.sin(pose[2]), exact.cos(pose[2])])
 
 
 def _between(arms: Sequence[Arm]) -> Curve | None:
@@ -135,17 +158,21 @@ def _line(arm: Arm, k: int, axis: Curve | None, road: Road) -> Curve:
     return Curve(np.array([[x, y, yaw + np.pi], end]))
 
 
-def _mouth(road: Road, arm: Arm, line: Curve, width: float) -> _Side | None:
-    """Return an arm as far as the road is no wider than its lanes; None if it never is."""
+def _mouth(road: Road, arm: Arm, line: Curve, width: float, ring: tuple[Floats, float] | None) -> _Side | None:
+    """Return an arm as far as the road is no wider than its lanes, and a way about the ring can begin; None if it never is."""
     along = np.arange(0.0, line.length, road.resolution)
     is_right = bool(arm.inward[0] > 0.0)  # lanes in lie to the left of who looks out
     left, right = (len(arm.outward), len(arm.inward)) if is_right else (len(arm.inward), len(arm.outward))
     wider = np.zeros(len(along), dtype=np.bool_)
     for edge in (left * width + 1.5 * road.resolution, -right * width - 1.5 * road.resolution):
         wider |= road.drivable_at(line.beside(along, np.full(len(along), edge))[:, :2])
+    wider = np.array([wider[k : k + STEADY].all() for k in range(len(wider) - STEADY)])  # not a slanted kerb's single cells
     if not wider.any():
         return None
-    mouth = max(float(along[int(np.argmax(wider))]) - BEFORE, SHORTEST)
+    mouth = float(along[int(np.argmax(wider))]) - BEFORE
+    if ring is not None:
+        mouth = min(mouth, float(exact.hypot(*(arm.pose[:2] - ring[0]))) - flare_begins(ring[1], width / 2.0) - BEFORE)
+    mouth = max(mouth, SHORTEST)
     return _Side(line, mouth, len(arm.inward), len(arm.outward))
 
 
@@ -153,8 +180,8 @@ def _arm_strip(name: str, arm: _Side, width: float, extra: float, side: str, run
     """Return an arm from its run-out to its mouth; its outermost edges lie `extra` outside."""
     reference = arm.line.cut(-run_out, arm.mouth, STEP).points
     along, against = (np.full((count, len(reference)), width) for count in (arm.inward, arm.outward))
-    along[-1] += extra
-    against[-1] += extra
+    along[-1:] += extra
+    against[-1:] += extra
     right, left = (along, against) if side == "right" else (against, along)
     return Strip(name, reference, np.zeros(len(reference)), right, left)
 
@@ -168,18 +195,18 @@ def _places(sides: Sequence[_Side]) -> Iterator[Way]:
             yield from ((a, i, b, j) for i in range(sides[a].inward) for j in range(sides[b].outward))
 
 
-def _way(sides: Sequence[_Side], places: Way, width: float, side: str) -> Curve | None:
+def _way(sides: Sequence[_Side], places: Way, width: float, side: str, ring: tuple[Floats, float] | None) -> Curve | None:
     """Return the way from the middle of one lane at its mouth to another's; None if no car could drive it."""
     a, i, b, j = places
     keep = 1.0 if side == "right" else -1.0
     start = sides[a].line.beside(np.array([sides[a].mouth]), np.array([-keep * (i + 0.5) * width]))[0]
     goal = sides[b].line.beside(np.array([sides[b].mouth]), np.array([keep * (j + 0.5) * width]))[0] + np.array([0.0, 0.0, np.pi])
-    way = draw_route(start, goal, lambda _: True)
+    way = draw_route(start, goal, lambda _: True) if ring is None else draw_ring_route(start, goal, *ring, lambda _: True)
     if way is None:
         return None
     points = way.cut(0.0, way.length, STEP).points.copy()
-    turn = float(wrap_angle(np.asarray(goal[2] - start[2])))
-    points[0], points[-1] = start, [*goal[:2], start[2] + turn]
+    rest = float(wrap_angle(np.asarray(goal[2] - points[-1, 2])))
+    points[0], points[-1] = start, [*goal[:2], points[-1, 2] + rest]
     return Curve(points)
 
 
@@ -223,9 +250,9 @@ def _way_strip(
     if outlines:
         station, offset = way.project(np.concatenate(outlines))
         on_way = (station > 0.0) & (station < way.length)
-        widened = [widest_near(way, station[on_way], sign * offset[on_way] + MARGIN) for sign in (1.0, -1.0)]
-        for base, needed in zip((left, right), widened, strict=True):
-            base[1:-1] = np.maximum(base[1:-1], np.minimum(needed[1:-1], base[1:-1] + MOST_WIDER))
+        needed = widest_near(way, station[on_way], np.abs(offset[on_way]) + MARGIN)[1:-1]
+        for base in (left, right):  # alike, so that the lane's middle, which planners follow, is as smooth as the way
+            base[1:-1] = np.maximum(base[1:-1], np.minimum(needed, base[1:-1] + MOST_WIDER))
     none = np.zeros((0, len(share)))
     name = f"way from arm {a + 1} to arm {b + 1}"
     if side == "right":

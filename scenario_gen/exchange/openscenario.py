@@ -39,7 +39,12 @@ STEERING = 0.7  # rad
 
 
 def write_openscenario(case: Case, one: Exported, road_file: str, export: ExportConfig = ExportConfig()) -> bytes:
-    """Return a scenario as the bytes of an OpenSCENARIO file; `road_file` names its OpenDRIVE file, beside it."""
+    """Return a scenario as the bytes of an OpenSCENARIO file; `road_file` names its OpenDRIVE file, beside it.
+
+    Raises:
+        RefusedError: the ego arrives late.
+    """
+    one.refuse_late_ego()
     root = Element("OpenSCENARIO")
     add(
         root,

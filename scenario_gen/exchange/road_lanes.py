@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.exchange.derived_lanes import derived_lanes, with_all_footprints
+from scenario_gen.exchange.derived_lanes import derived_lanes, with_all_vehicles
 from scenario_gen.exchange.drawn_lanes import drawn_lanes
 from scenario_gen.exchange.lanes import LaneMap
 from scenario_gen.recordings.provenance import read_parameters
@@ -78,4 +78,4 @@ def true_lanes(
     made = drawn_lanes(drawn, axis, config.traffic_side, scenarios, run_out)
     if made is None:
         return None
-    return with_all_footprints(replace(made, origin=f"the true lanes of {name}"), scenarios, road, config.lane_width)
+    return with_all_vehicles(replace(made, origin=f"the true lanes of {name}"), scenarios, road, config.lane_width)

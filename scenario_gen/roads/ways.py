@@ -109,7 +109,7 @@ def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float,
         return None
     bends = []
     for distance, aside in ((ahead, abs(left)), (-behind, abs(right))):
-        along = float(np.sqrt(np.square(radius + _FLARE) - np.square(aside + _FLARE)))  # from the bend's centre to the ring's
+        along = flare_begins(radius, aside)
         if distance - along < 0.5:
             return None
         bends.append((distance - along, float(exact.arctan2(along, aside + _FLARE))))
@@ -132,6 +132,11 @@ def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float,
         return None
     xy += np.linspace(0.0, 1.0, len(xy))[:, None] * (end - xy[-1])  # what rounding leaves
     return _accepted(Curve(np.column_stack((_placed(entry, xy), entry[2] + turned))), fits)
+
+
+def flare_begins(radius: float, aside: float) -> float:
+    """How far [m] from a roundabout's centre a lane begins to bend to it, by the ring's radius and how far aside it lies [m]."""
+    return float(np.sqrt(np.square(radius + _FLARE) - np.square(aside + _FLARE)))  # from the bend's centre to the ring's
 
 
 def relative(pose: Floats, xy: Floats) -> tuple[float, float]:

@@ -14,6 +14,7 @@
 
 """CommonRoad files: the schema's rules, the motion to the nanometre, the ego's problem; and back again as a log."""
 
+from dataclasses import replace
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -114,6 +115,29 @@ def test_uneven_steps_are_resampled_and_that_is_said(tmp_path):
 def test_who_arrives_late_is_refused_by_name(tmp_path):
     with pytest.raises(RefusedError, match=r"vehicle 2 arrives late.*openscenario"):
         written(tmp_path, crossing(present=[[0, 60], [8, 60]]))
+
+
+def test_who_arrives_late_is_written_where_that_is_asked_for(tmp_path):
+    scenario = crossing(present=[[0, 60], [8, 51]])
+    path, _, notes = written(tmp_path, scenario, export=ExportConfig(late="written"))
+    assert "vehicle 2 arrives late" in notes[0]
+    track = read_scenario_file(path).tracks[1]
+    assert np.allclose(track.rows[:, 0], scenario.time[8:52], atol=1e-9)
+    assert np.abs(track.rows[:, 1:3] - scenario.position[1, 8:52]).max() < 1e-6
+
+
+@pytest.mark.parametrize("late", ["refused", "written"])
+def test_an_ego_that_arrives_late_is_refused(tmp_path, late):
+    ego = replace(one_vehicle(), present=np.array([[5, 61]]))
+    with pytest.raises(RefusedError, match=r"the ego, vehicle ego, arrives 0.5 s late"):
+        written(tmp_path, crossing(), ego, export=ExportConfig(late=late))
+
+
+def test_the_goal_of_an_ego_that_leaves_early_is_where_it_leaves(tmp_path):
+    ego = replace(one_vehicle(), present=np.array([[0, 40]]))
+    _, root, _ = written(tmp_path, crossing(), ego)
+    goal = root.find("planningProblem/goalState/position/rectangle")
+    assert np.allclose([number(goal, f"center/{axis}") for axis in "xy"], ego.position[0, 40], atol=1e-9)
 
 
 def test_trucks_are_trucks(tmp_path):

@@ -81,16 +81,17 @@ def check(folder):
     schema = etree.XMLSchema(etree.parse(str(SCHEMA)))
     found = {"files": 0, "invalid": [], "read_error": 0.0, "collisions": [], "off_road": [], "not_found": []}
     for path in sorted(folder.rglob("*.xml")):
+        name = str(path.relative_to(folder))
         found["files"] += 1
         if not schema.validate(etree.parse(str(path))):
-            found["invalid"].append(path.name)
+            found["invalid"].append(name)
         scenario, _ = CommonRoadFileReader(str(path)).open()
         found["read_error"] = max(found["read_error"], read_error(path, scenario))
         _, boundary = create_road_boundary_obstacle(scenario, method="aligned_triangulation")
         pairs, off = violations(scenario, boundary)
-        found["collisions"] += [path.name] * bool(pairs)
-        found["off_road"] += [path.name] * bool(off)
-        found["not_found"] += [path.name] * (False in planted(path, boundary))
+        found["collisions"] += [name] * bool(pairs)
+        found["off_road"] += [name] * bool(off)
+        found["not_found"] += [name] * (False in planted(path, boundary))
     return found
 
 
@@ -133,7 +134,10 @@ def drive(path):
             return "late", step
         k = step % config.planning.replanning_frequency
         if planned is None or k == 0:
-            planner.set_desired_velocity(desired_velocity=desired_speed(planner, cruise), current_speed=planner.x_0.velocity)
+            speed = max(
+                planner.x_0.velocity, 0.01
+            )  # at 0.0 it would take the initial speed for the desired one, and stand for ever
+            planner.set_desired_velocity(desired_velocity=desired_speed(planner, cruise), current_speed=speed)
             planned, k = planner.plan(), 0
             if not planned:
                 return "no trajectory", step
