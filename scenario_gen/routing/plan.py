@@ -28,6 +28,7 @@ from scenario_gen.roads.clearance import clearance_field, footprint_fits, neares
 from scenario_gen.roads.vector.ground import own_ground
 from scenario_gen.routing.config import PlanningConfig
 from scenario_gen.routing.connections import candidates, direct
+from scenario_gen.routing.distance import farthest
 from scenario_gen.routing.search.planner import (  # fmt: skip
     BlockedError,
     Budget,
@@ -132,26 +133,6 @@ def _on_own_lanes(task: _Task) -> Route:
 def deviations(route: Route, fitted: FittedVehicle) -> Floats:
     """How far [m] the route passes from each anchor: (K + 2,)."""
     return np.asarray(exact.hypot(*(route.points[route.anchor, :2] - fitted.anchors[:, :2]).T))
-
-
-def farthest(points: Floats, path: Floats) -> float:
-    """Largest distance [m] between two polylines (M, 2 or more), from a point of either to the other; NaN: there is no path."""
-    if not len(path):
-        return float("nan")
-    one, other = points[:, :2], path[:, :2]
-    return max(float(_from_line(one, other).max()), float(_from_line(other, one).max()))
-
-
-def _from_line(points: Floats, line: Floats) -> Floats:
-    """Distance (M,) of points (M, 2) to a polyline (P, 2)."""
-    if len(line) == 1:
-        return np.asarray(exact.hypot(*(points - line[0]).T))
-    edge = np.diff(line, axis=0)
-    square = np.maximum(np.square(edge).sum(axis=1), 1e-12)
-    rel = points[:, None] - line[None, :-1]
-    along = np.clip((rel * edge).sum(axis=-1) / square, 0.0, 1.0)
-    off = rel - along[..., None] * edge
-    return np.asarray(np.sqrt(np.square(off).sum(axis=-1)).min(axis=1))
 
 
 def make_planner(config: PlanningConfig) -> Planner:
