@@ -27,7 +27,7 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints
 from scenario_gen.sampling.deviations import soft_clipped
-from scenario_gen.sampling.freedom import Freedom
+from scenario_gen.sampling.freedom import Freedom, onward, seconds_onward
 from scenario_gen.sampling.path import BasePath, states
 from scenario_gen.sampling.speed_profile.model import SpeedModel
 from scenario_gen.sampling.time_warp import Clock, DT, template_times, TimeWarp
@@ -111,6 +111,29 @@ class _Drawn:
     speed: Floats
     ok: Bools
 
+    def states(self, model: VehicleModel, at: Floats, counts: Ints, read: "_Read | None" = None) -> tuple[Floats, "_Read"]:
+        """States (S, T, 5) at times (S, T) [s] on the clock, the first `counts` (S,) of them; and what was read of the clock."""
+        if read is None or read.clock is not self.clock:  # a shared one is read once
+            tau, pace, slope = np.zeros(at.shape), np.ones(at.shape), np.zeros(at.shape)
+            template_times(self.clock.grid, self.clock.time, self.clock.rate, at, counts, tau, pace, slope)
+            read = _Read(self.clock, tau, pace, slope)
+        out, spline = np.empty((*at.shape, 5)), model.speed.spline
+        states(
+            self.curve, self.arc, model.path.spacing, spline.breaks, spline.first, spline.pieces, self.speed,
+            read.tau, read.pace, read.slope, counts, out,
+        )  # fmt: skip
+        return out, read
+
+
+@dataclass(frozen=True, eq=False)
+class _Read:
+    """A clock read at some times: (S, T) template times [s], rates and their slopes [1/s]."""
+
+    clock: Clock
+    tau: Floats
+    pace: Floats
+    slope: Floats
+
 
 @dataclass(frozen=True, eq=False)
 class Batch:
@@ -118,32 +141,29 @@ class Batch:
 
     Attributes:
         models: the models of the vehicles.
-        vehicles: (N, S) the vehicles themselves.
-        clock: per vehicle, (S, G) clocks; the same one where they share it.
+        drawn: what is drawn of each.
+        ends: (S, N, 2) when each comes to the start and to the end of its route [s], on its clock.
+        at_ends: (N, S, 2, 5) its states there, see `states`.
         begin: (S,) when a scenario begins [s], on the clocks.
         count: (S,) instants of the published grid.
         present: (S, N, 2) first and last of them at which each vehicle is there.
-        curve, arc: per vehicle, the paths: (S, G, 4) x, y, dx/du, dy/du at the nodes of a cubic spline, (S, G) arc lengths [m].
-        speed: per vehicle, (S, n) coefficients [m/s].
         feasible: (S,) False where no speed keeps what must hold.
     """
 
     models: tuple[VehicleModel, ...]
-    vehicles: tuple[list[Vehicle], ...]
-    clock: tuple[Clock, ...]
+    drawn: tuple[_Drawn, ...]
+    ends: Floats
+    at_ends: Floats | None
     begin: Floats
     count: Ints
     present: Ints
-    curve: tuple[Floats, ...]
-    arc: tuple[Floats, ...]
-    speed: tuple[Floats, ...]
     feasible: Bools
 
     @classmethod
     def of(cls, models: tuple[VehicleModel, ...], drawn: Sequence[_Drawn]) -> "Batch":
         """Join what is drawn: a scenario is the stretch in which all are there who are there throughout the template.
 
-        Who stands at an end of the template goes on standing.
+        Who stands at an end of the template goes on standing; who is free there and drives goes straight on, while there is road.
         """
         ends = np.stack([
             one.clock.time[:, nearest_cell(one.clock, model.speed.spline.breaks[[0, -1]])]
@@ -151,23 +171,29 @@ class Batch:
         ], axis=1)  # fmt: skip
         grid = drawn[0].clock.grid
         times = np.stack([model.speed.spline.breaks[[0, -1]] for model in models])
-        still = np.stack([model.speed.spline.still[[0, -1]] for model in models])
         there = np.column_stack([times[:, 0] <= grid[0] + 1e-9, times[:, 1] >= grid[-1] - 1e-9])
-        first, last = (there & ~still).T
-        begin = ends[:, first, 0].max(axis=1) if first.any() else ends[:, there[:, 0], 0].min(axis=1, initial=0.0)
-        end = ends[:, last, 1].min(axis=1) if last.any() else ends[:, :, 1].max(axis=1)
-        ends[:, there[:, 0] & still[:, 0], 0] = begin[:, None]
-        ends[:, there[:, 1] & still[:, 1], 1] = end[:, None]
+        reach, at_ends = ends.copy(), None
+        if any(model.freedom is not None for model in models):
+            two = np.full(len(ends), 2)
+            numbered = enumerate(zip(models, drawn, strict=True))
+            at_ends = np.stack([one.states(m, np.ascontiguousarray(ends[:, n]), two)[0] for n, (m, one) in numbered])
+            for n, model in enumerate(models):
+                for end, sign in ((0, -1.0), (1, 1.0)):
+                    if there[n, end] and model.speed.spline.still[-end]:
+                        reach[:, n, end] = sign * np.inf
+                    elif there[n, end] and model.freedom is not None:
+                        reach[:, n, end] += sign * seconds_onward(at_ends[n, :, end], float(model.freedom.ahead[end]), sign)
+        begin = np.maximum(reach[:, there[:, 0], 0].max(axis=1, initial=-np.inf), ends[..., 0].min(axis=1))
+        end = np.minimum(reach[:, there[:, 1], 1].min(axis=1, initial=np.inf), ends[..., 1].max(axis=1))
+        ends_shown = ends.copy()
+        ends_shown[:, there[:, 0], 0], ends_shown[:, there[:, 1], 1] = begin[:, None], end[:, None]
         count = np.floor((end - begin) / DT + 1e-6).astype(np.int64) + 1
-        at = (ends - begin[:, None, None]) / DT
+        at = (ends_shown - begin[:, None, None]) / DT
         present = np.stack([np.ceil(at[..., 0] - 1e-6), np.floor(at[..., 1] + 1e-6)], axis=-1).astype(np.int64)
         present = np.clip(present, 0, np.maximum(count - 1, 0)[:, None, None])
         feasible = np.logical_and.reduce([one.ok for one in drawn])
         feasible &= (count >= 2) & (present[..., 1] > present[..., 0]).all(axis=1)
-        return cls(
-            models, tuple(one.vehicles for one in drawn), tuple(one.clock for one in drawn), begin, count, present,
-            tuple(one.curve for one in drawn), tuple(one.arc for one in drawn), tuple(one.speed for one in drawn), feasible,
-        )  # fmt: skip
+        return cls(models, tuple(drawn), ends, at_ends, begin, count, present, feasible)
 
     def states(self, time: Floats, count: Sequence[int] | None = None) -> Floats:
         """States (N, S, T, 5) x, y [m], yaw [rad, not unwrapped], speed [m/s], acceleration [m/s²] at ascending times (T,) [s].
@@ -178,17 +204,15 @@ class Batch:
         counts = np.full(samples, len(time)) if count is None else np.asarray(count, dtype=np.int64)
         at = time + self.begin[:, None]
         out = np.empty((len(self.models), samples, len(time), 5))
-        before: Clock | None = None
-        for n, (v, clock) in enumerate(zip(self.models, self.clock, strict=True)):
-            if clock is not before:  # a shared one is read once
-                tau, pace, slope = np.zeros_like(at), np.ones_like(at), np.zeros_like(at)
-                template_times(clock.grid, clock.time, clock.rate, at, counts, tau, pace, slope)
-                before = clock
-            spline = v.speed.spline
-            states(
-                self.curve[n], self.arc[n], v.path.spacing, spline.breaks, spline.first, spline.pieces, self.speed[n],
-                tau, pace, slope, counts, out[n],
-            )  # fmt: skip
+        read: _Read | None = None
+        for n, (model, one) in enumerate(zip(self.models, self.drawn, strict=True)):
+            out[n], read = one.states(model, at, counts, read)
+            if self.at_ends is None:
+                continue
+            for end, sign in ((0, -1.0), (1, 1.0)):
+                since = np.maximum(sign * (at - self.ends[:, n, end : end + 1]), 0.0)
+                if since.any() and not model.speed.spline.still[-end]:
+                    out[n] = np.where((since > 0.0)[..., None], onward(self.at_ends[n][:, end], since, sign), out[n])
         return out
 
     def scenarios(self, seed: int, index: Sequence[int], frame_id: str) -> list[Scenario | None]:
@@ -201,7 +225,7 @@ class Batch:
                 made.append(None)
                 continue
             t, (x, y, yaw, speed, acceleration) = time[:count], np.moveaxis(out[:, s, :count], -1, 0)
-            position, vehicles = np.stack([x, y], axis=-1), tuple(own[s] for own in self.vehicles)
+            position, vehicles = np.stack([x, y], axis=-1), tuple(one.vehicles[s] for one in self.drawn)
             made.append(Scenario(vehicles, t, position, yaw, speed, acceleration, seed, index[s], frame_id, self.present[s]))
         return made
 

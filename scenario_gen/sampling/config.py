@@ -32,7 +32,7 @@ class SamplingConfig(Parameters):
         choices=("narrow", "wide"),
     )
     arrival_sigma: float = parameter(
-        1.0, "wide: standard deviation of each vehicle's own shift in time against the others", unit="s", low=0.0, high=10.0
+        1.5, "wide: standard deviation of each vehicle's own shift in time against the others", unit="s", low=0.0, high=10.0
     )
     pace_sigma: float = parameter(0.04, "wide: standard deviation of each vehicle's own pace, as a share", low=0.0, high=0.2)
     wait_sigma: float = parameter(1.0, "wide: standard deviation of the length of each wait", unit="s", low=0.0, high=10.0)

@@ -41,7 +41,9 @@ _RAMP, _RAMP_SHARE = (
     1.0 / 3.0,
 )  # s, and share of the duration: over which an own clock leaves the shared one where states are asked
 _TAPER = 30.0  # m, over which a vehicle goes to its place in the lane
-_LEAST_STAND, _LEAST_SHARE = 1.5, 0.5  # s and share of a wait that is left of it
+_LEAST_STAND, _LEAST_SHARE = 1.5, 0.5  # s and share of a wait that is left of it; of a speed, while acceleration dies away
+FADES = 0.7  # s, in which it does
+MOST_ONWARD = 4.0  # s, for which a vehicle drives straight on before or behind its route
 _FASTEST = 0.5  # m/s by which a speed may leave what the template has near its ends, besides its stated bounds
 
 
@@ -173,6 +175,7 @@ class Freedom:
         place_sigma: m; end_speed: (2,) m/s, standard deviations.
         bound: standard deviations at which all are cut.
         sizes: (C, 2) length and width [m] to choose from; empty to keep its own.
+        ahead: (2,) metres of free road straight on before its route and behind it; 0 where its state is asked.
     """
 
     clock: OwnClock
@@ -181,6 +184,7 @@ class Freedom:
     end_speed: Floats
     bound: float
     sizes: Floats
+    ahead: Floats
 
     @property
     def size(self) -> int:
@@ -203,6 +207,31 @@ class Freedom:
         return [replace(own, length=float(length), width=float(width)) for length, width in self.sizes[chosen].tolist()]
 
 
+def onward(state: Floats, since: Floats, sign: float) -> Floats:
+    """States (S, T, 5) of vehicles that drive straight on from theirs (S, 5): the acceleration dies away, speed and yaw stay.
+
+    Args:
+        state: x, y [m], yaw [rad], speed [m/s], acceleration [m/s²].
+        since: (S, T) seconds after it, or before it.
+        sign: 1 after it, -1 before it.
+    """
+    x, y, yaw, speed, acceleration = (column[:, None] for column in state.T)
+    gains = sign * acceleration
+    fades = np.where(gains < 0.0, np.minimum(FADES, _LEAST_SHARE * speed / np.maximum(-gains, 1e-9)), FADES)
+    left = exact.exp(-since / np.maximum(fades, 1e-6))
+    driven = sign * (speed * since + gains * fades * (since - fades * (1.0 - left)))
+    out = np.empty((*since.shape, 5))
+    out[..., 0], out[..., 1] = x + driven * exact.cos(yaw), y + driven * exact.sin(yaw)
+    out[..., 2], out[..., 3], out[..., 4] = yaw, speed + gains * fades * (1.0 - left), acceleration * left
+    return out
+
+
+def seconds_onward(state: Floats, ahead: float, sign: float) -> Floats:
+    """Return for how long (S,) [s] vehicles in states (S, 5) drive no more than `ahead` metres straight on."""
+    fastest = state[:, 3] + np.maximum(sign * state[:, 4], 0.0) * FADES
+    return np.asarray(np.minimum(ahead / np.maximum(fastest, 1e-3), MOST_ONWARD))
+
+
 def freedom_of(
     vehicle: Vehicle,
     arc: Floats,
@@ -210,6 +239,7 @@ def freedom_of(
     rests: Sequence[tuple[float, float]],
     freed: Floats,
     asked: Bools,
+    ahead: Floats,
     config: SamplingConfig,
 ) -> Freedom:
     """Return what is free of a vehicle.
@@ -221,6 +251,7 @@ def freedom_of(
         rests: when it stands [s], on the template's clock.
         freed: (2, 2) metres and m/s by which its start and end may differ from what is given.
         asked: (2,) whether start and end states are asked of any vehicle.
+        ahead: (2,) metres of free road straight on before its route and behind it.
         config: the standard deviations.
     """
     place = np.ones(len(arc))
@@ -236,6 +267,7 @@ def freedom_of(
         np.where(freed[:, 1] > 0.0, config.end_speed_sigma, 0.0),
         config.freedom,
         np.array(CATALOGUE) if other_size else np.zeros((0, 2)),
+        np.where(asked, 0.0, ahead),
     )
 
 

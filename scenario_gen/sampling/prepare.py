@@ -19,12 +19,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats
+from scenario_gen.arrays import Bools, Floats
 from scenario_gen.errors import InputError
 from scenario_gen.sampling.candidates import CandidateModel, VehicleModel
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.deviations import lateral_covariance_root, lateral_room, MAX_ROOM_SIGMAS, ROOM_SIGMAS, Steering
-from scenario_gen.sampling.freedom import freedom_of
+from scenario_gen.sampling.deviations import (
+    lateral_covariance_root,
+    lateral_room,
+    MAX_ROOM_SIGMAS,
+    road_ahead,
+    ROOM_SIGMAS,
+    Steering,
+)
+from scenario_gen.sampling.freedom import FADES, Freedom, freedom_of, MOST_ONWARD
 from scenario_gen.sampling.pace import clock_of, slowed_clock, template_grid
 from scenario_gen.sampling.path import BasePath
 from scenario_gen.sampling.speed_profile.knots import speed_knots, SpeedKnots, STAND
@@ -215,10 +222,19 @@ def prepare(
     if config.variety == "wide":
         tied = (asked.freed[..., 0] == 0.0).any(axis=0)
         vehicles = [
-            replace(v, freedom=freedom_of(v.vehicle, v.path.arc, warp.nominal, drive.rests, asked.freed[n], tied, config))
+            replace(v, freedom=_freedom(drive, v, warp.nominal, asked.freed[n], tied, road, config))
             for n, (v, drive) in enumerate(zip(vehicles, drives, strict=True))
         ]
     return Prepared(CandidateModel(tuple(vehicles), warp), tuple(sentences))
+
+
+def _freedom(
+    drive: _Drive, model: VehicleModel, nominal: Clock, freed: Floats, tied: Bools, road: Road, config: SamplingConfig
+) -> Freedom:
+    """What preset `wide` frees of a vehicle."""
+    fastest = drive.speed[[0, -1]] + config.freedom * config.end_speed_sigma + config.max_acceleration * FADES
+    ahead = road_ahead(drive.path, drive.vehicle, road, MOST_ONWARD * fastest)
+    return freedom_of(drive.vehicle, drive.path.arc, nominal, drive.rests, freed, tied, ahead, config)
 
 
 def _slowed(drives: Sequence[_Drive], grid: Floats, config: SamplingConfig) -> tuple[Clock, list[str]]:

@@ -56,7 +56,7 @@ LEVEL_SLOTS = 8  # levels that an index has room for; after them come the next L
 KEPT = 1000  # scenarios up to which a set stays in memory
 BLOCK = 32  # candidates whose random numbers are drawn together
 PILOT = 2 * BLOCK  # candidates by which a level is judged
-ENOUGH = 0.3  # share of valid candidates below which the next level is tried
+ENOUGH = {"narrow": 0.3, "wide": 0.1}  # share of valid candidates below which the next level is tried
 
 
 def index_of(level: int, candidate: int) -> int:
@@ -181,6 +181,7 @@ def sample_scenarios(
     else:
         sampler = Sampler(prepared.model, seed, road.frame_id, ego)
         loop = _Loop(sampler, check, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
+        loop.enough = ENOUGH[config.variety]
         loop.run(config.attempts * count)
         sentences = (*prepared.adaptations, *loop.adaptations)
         made = ScenarioSet(count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot)
@@ -226,6 +227,7 @@ class _Loop:
     refused: Counter[Cause] = field(default_factory=Counter)
     candidates: int = 0
     adaptations: list[str] = field(default_factory=list)
+    enough: float = ENOUGH["narrow"]
     absent: int = 0  # conflicts of the template that the road or the clock of all leaves out; no candidate may lose more
 
     def run(self, budget: int) -> None:
@@ -238,7 +240,7 @@ class _Loop:
         for level in range(len(LEVELS)):
             seen, good = self._spend(blocks[level], min(PILOT, budget - self.candidates))
             share.append(good / seen if seen else 0.0)
-            if self._done(budget) or share[-1] >= ENOUGH:
+            if self._done(budget) or share[-1] >= self.enough:
                 break
         best = int(np.argmax(share))
         while not self._done(budget) and self._spend(blocks[best], budget - self.candidates)[0]:
