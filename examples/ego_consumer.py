@@ -85,26 +85,26 @@ class EgoConsumer(Node):
         self.speed = self.declare_parameter("speed", 8.0).value
         self.lock_step = self.declare_parameter("lock_step", False).value
         self.route: np.ndarray | None = None
-        self.fresh = False  # whether odometry has come since the route did
         self.grid: tuple[np.ndarray, np.ndarray, float] | None = None
-        self._odometry = None
+        self._vehicle, self._odometry = "", None
         self._command = self.create_publisher(Twist, "ego/cmd_vel", 10)
         self._step = self.create_client(Trigger, "traffic/step")
         self.create_subscription(Odometry, "ego/goal", self._hear_goal, LATCHED)
         self.create_subscription(Path, "ego/route", self._hear_route, LATCHED)
         self.create_subscription(OccupancyGrid, "traffic/local_map", self._hear_map, 1)
         self.create_subscription(DiagnosticArray, "verdicts", self._hear_verdict, QoSProfile(depth=100))
-        self.create_timer(1.0, self._begin)
 
     def _hear_goal(self, message: Odometry) -> None:
-        if self._odometry is not None:
+        topic = f"{message.child_frame_id}/odom"
+        if self._odometry is not None and self._vehicle != topic:
             self.destroy_subscription(self._odometry)
-        self._odometry = self.create_subscription(Odometry, f"{message.child_frame_id}/odom", self._drive, 10)
+            self._odometry = None
+        if self._odometry is None:
+            self._vehicle, self._odometry = topic, self.create_subscription(Odometry, topic, self._drive, 10)
 
     def _hear_route(self, message: Path) -> None:
         poses = [stamped.pose for stamped in message.poses]
         self.route = np.array([(pose.position.x, pose.position.y, heading(pose.orientation)) for pose in poses])
-        self.fresh = False
 
     def _hear_map(self, message: OccupancyGrid) -> None:
         info = message.info
@@ -115,15 +115,9 @@ class EgoConsumer(Node):
         for status in message.status:
             self.get_logger().info(f"{status.name}: {status.message}")
 
-    def _begin(self) -> None:
-        """Move off from a stand, where no odometry has come yet: the drive begins with the first command."""
-        if self.route is not None and not self.fresh:
-            self._say(0.0, 0.0)
-
     def _drive(self, message: Odometry) -> None:
         if self.route is None or not len(self.route):
             return
-        self.fresh = True
         place = message.pose.pose
         pose = np.array((place.position.x, place.position.y, heading(place.orientation)))
         self._say(*decide(pose, message.twist.twist.linear.x, self.route, self.grid, self.speed))

@@ -22,6 +22,7 @@ frame `base_link`, the middle of the rear axle on the ground. Covariances are 0:
 depth 1.
 """
 
+from collections.abc import Sequence
 import hashlib
 
 import numpy as np
@@ -72,9 +73,8 @@ class AutowareEncoder:
         writer = CdrWriter().header(stamp_ns, self.scenario.frame_id).pack("I", len(here))
         for n in here:
             self._object(writer, n, k)
-            path = self.poses[n, self._ahead(n, k)]
-            writer.pack("I", 1).pack("I", len(path)).align(8).raw(path.tobytes()).stamp(STEP_NS).pack("f", 1.0)
-            self._shape(writer, n)
+            _path(writer, self.poses[n, self._ahead(n, k)])
+            _shape(writer, self.scenario.vehicles[n])
         return writer.finish()
 
     def tracked_objects(self, k: int, stamp_ns: int) -> bytes:
@@ -84,16 +84,14 @@ class AutowareEncoder:
         for n in here:
             self._object(writer, n, k)
             writer.pack("B", ORIENTATION_KNOWN, int(self.scenario.speed[n, k] == 0.0))
-            self._shape(writer, n)
+            _shape(writer, self.scenario.vehicles[n])
         return writer.finish()
 
     def odometry(self, k: int, stamp_ns: int, n: int = 0) -> bytes:
         """Return vehicle `n` at instant `k` as the ego's Odometry."""
         scenario = self.scenario
-        axle = shifted(scenario.position[n, k], scenario.heading[n, k], -rear_axle(scenario.vehicles[n]))
-        writer = CdrWriter().header(stamp_ns, scenario.frame_id).string(BASE_LINK)
-        writer.pack("d", *pose_rows(np.array([[*axle, scenario.heading[n, k]]]))[0]).raw(_NO_COVARIANCE)
-        return self._twist(writer, n, k).finish()
+        pose = (*scenario.position[n, k], scenario.heading[n, k], *self._rates(n, k))
+        return encode_kinematic_state(scenario.vehicles[n], np.array(pose), scenario.frame_id, stamp_ns)
 
     def _ahead(self, n: int, k: int) -> list[int]:
         """Return the instants of the predicted path from `k` on: those at whole steps, while the vehicle is there."""
@@ -104,23 +102,69 @@ class AutowareEncoder:
 
     def _object(self, writer: CdrWriter, n: int, k: int) -> None:
         """Append id, existence, class and kinematics."""
-        vehicle = self.scenario.vehicles[n]
-        writer.raw(uuid_of(vehicle)).pack("f", 1.0).pack("I", 1).pack("B", TRUCK if is_truck(vehicle) else CAR).pack("f", 1.0)
-        writer.pack("d", *self.poses[n, k]).raw(_NO_COVARIANCE)
-        self._twist(writer, n, k)
-        writer.pack("d", float(self.scenario.acceleration[n, k]), *[0.0] * 5).raw(_NO_COVARIANCE)
+        _kinematics(writer, self.scenario.vehicles[n], self.poses[n, k], *self._rates(n, k))
 
-    def _twist(self, writer: CdrWriter, n: int, k: int) -> CdrWriter:
-        speed, rate = float(self.scenario.speed[n, k]), float(self.yaw_rate[n, k])
-        return writer.pack("d", speed, 0.0, 0.0, 0.0, 0.0, rate).raw(_NO_COVARIANCE)
+    def _rates(self, n: int, k: int) -> tuple[float, float, float]:
+        """Return speed [m/s], acceleration [m/s²] and yaw rate [rad/s]."""
+        return float(self.scenario.speed[n, k]), float(self.scenario.acceleration[n, k]), float(self.yaw_rate[n, k])
 
-    def _shape(self, writer: CdrWriter, n: int) -> None:
-        vehicle = self.scenario.vehicles[n]
-        writer.pack("B", BOUNDING_BOX).pack("I", 0).pack("d", vehicle.length, vehicle.width, height(vehicle))
+
+def encode_predicted_objects(
+    vehicles: Sequence[Vehicle], states: Floats, paths: Sequence[Floats], frame_id: str, stamp_ns: int
+) -> bytes:
+    """Return vehicles as PredictedObjects.
+
+    Args:
+        vehicles: N of them.
+        states: (N, 6) x, y [m], yaw [rad], speed [m/s], acceleration [m/s²], yaw rate [rad/s].
+        paths: of each the poses (K, 3) x, y [m], yaw [rad] every `STEP_NS` from now on.
+        frame_id: of the road.
+        stamp_ns: now.
+    """
+    writer = CdrWriter().header(stamp_ns, frame_id).pack("I", len(vehicles))
+    for vehicle, state, path in zip(vehicles, states, paths, strict=True):
+        _kinematics(writer, vehicle, _shape_poses(vehicle, state[None, :3])[0], *state[3:].tolist())
+        _path(writer, _shape_poses(vehicle, path))
+        _shape(writer, vehicle)
+    return writer.finish()
+
+
+def encode_kinematic_state(vehicle: Vehicle, state: Floats, frame_id: str, stamp_ns: int) -> bytes:
+    """Return the ego as Odometry; `state` (6,) x, y [m], yaw [rad], speed [m/s], acceleration [m/s²], yaw rate [rad/s]."""
+    axle = shifted(state[:2], state[2], -rear_axle(vehicle))
+    writer = CdrWriter().header(stamp_ns, frame_id).string(BASE_LINK)
+    writer.pack("d", *pose_rows(np.array([[*axle, state[2]]]))[0]).raw(_NO_COVARIANCE)
+    return _twist(writer, float(state[3]), float(state[5])).finish()
+
+
+def _kinematics(writer: CdrWriter, vehicle: Vehicle, pose: Floats, speed: float, acceleration: float, rate: float) -> None:
+    """Append id, existence, class, pose (7,), twist and acceleration."""
+    writer.raw(uuid_of(vehicle)).pack("f", 1.0).pack("I", 1).pack("B", TRUCK if is_truck(vehicle) else CAR).pack("f", 1.0)
+    writer.pack("d", *pose).raw(_NO_COVARIANCE)
+    _twist(writer, speed, rate)
+    writer.pack("d", acceleration, *[0.0] * 5).raw(_NO_COVARIANCE)
+
+
+def _twist(writer: CdrWriter, speed: float, rate: float) -> CdrWriter:
+    return writer.pack("d", speed, 0.0, 0.0, 0.0, 0.0, rate).raw(_NO_COVARIANCE)
+
+
+def _path(writer: CdrWriter, poses: Floats) -> None:
+    """Append the one predicted path, of poses (K, 7)."""
+    writer.pack("I", 1).pack("I", len(poses)).align(8).raw(poses.tobytes()).stamp(STEP_NS).pack("f", 1.0)
+
+
+def _shape(writer: CdrWriter, vehicle: Vehicle) -> None:
+    writer.pack("B", BOUNDING_BOX).pack("I", 0).pack("d", vehicle.length, vehicle.width, height(vehicle))
 
 
 def _poses(scenario: Scenario, n: int) -> Floats:
     """Return (T, 7) poses of a vehicle's shape, as on the wire."""
-    rows = pose_rows(np.column_stack([scenario.position[n], scenario.heading[n]]))
-    rows[:, 2] = height(scenario.vehicles[n]) / 2.0
+    return _shape_poses(scenario.vehicles[n], np.column_stack([scenario.position[n], scenario.heading[n]]))
+
+
+def _shape_poses(vehicle: Vehicle, poses: Floats) -> Floats:
+    """Return (K, 7) poses of a vehicle's shape, as on the wire, of poses (K, 3) x, y [m], yaw [rad]."""
+    rows = pose_rows(poses)
+    rows[:, 2] = height(vehicle) / 2.0
     return np.ascontiguousarray(rows)

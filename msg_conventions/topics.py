@@ -16,7 +16,7 @@
 
 import re
 
-from msg_conventions import changepoints, diagnostics, driving, ego, frames, lanes, paths, pictures, roads, trajectory
+from msg_conventions import autoware, changepoints, diagnostics, driving, ego, frames, lanes, paths, pictures, roads, trajectory
 from scenario_gen.types.qos import Quality
 
 FIX_TYPE = "sensor_msgs/msg/NavSatFix"
@@ -60,6 +60,8 @@ TOPICS: dict[str, tuple[str, Quality]] = {
     "ego/path": (paths.TYPE, LIVE),
     "ego/odom": (driving.ODOMETRY_TYPE, LIVE),
     "verdicts": (diagnostics.TYPE, MANY),
+    autoware.OBJECTS: ("autoware_perception_msgs/msg/PredictedObjects", autoware.QUALITY),
+    autoware.EGO: (ego.STATE_TYPE, autoware.QUALITY),
     "clock": (driving.CLOCK_TYPE, Quality(depth=10, transient_local=False)),
     "scenarios": (trajectory.TYPE, MANY),
     "scenarios/info": (diagnostics.TYPE, MANY),

@@ -26,6 +26,7 @@ from scenario_gen.cli_corpus import commands as corpus_commands
 from scenario_gen.errors import InputError, of_system, presentable, printable, RefusedError, ScenarioGenError
 
 if TYPE_CHECKING:
+    from scenario_gen.closed_loop.command import OverDds
     from scenario_gen.pipeline import PipelineConfig
     from scenario_gen.types.generation import GenerationResult
 
@@ -262,8 +263,18 @@ def validate(
 @app.command()
 def drive(
     bag: Annotated[Path, typer.Argument(help="a bag of this suite with scenarios")],
-    planner: Annotated[str, typer.Option(help="MODULE:CLASS of the planner, e.g. scenario_gen.closed_loop.planners:IdmFollower")],
-    ego: Annotated[str, typer.Option(help="id of the vehicle in whose place it drives; the first if not given")] = "",
+    planner: Annotated[
+        str,
+        typer.Option(
+            help="MODULE:CLASS of the planner, e.g. scenario_gen.closed_loop.planners:IdmFollower; with --ros its command"
+        ),
+    ],
+    ego: Annotated[
+        str, typer.Option(help="id of the vehicle in whose place it drives; if not given, that of the ego slot, or the first")
+    ] = "",
+    ros: Annotated[
+        bool, typer.Option("--ros", help="drive over DDS in lock-step: the planner is a node that answers each odometry")
+    ] = False,
     count: Annotated[int, typer.Option(min=0, help="scenarios at most; 0: all")] = 0,
     workers: Annotated[int, typer.Option(min=0, help="processes; 0: one for each core")] = 0,
     out: Annotated[Path, typer.Option(help="folder of drives.json, junit.xml and drives.html")] = Path("out/drives"),
@@ -289,6 +300,7 @@ def drive(
             out=out,
             assignments=assignments or [],
             progress=lambda done, total: advance(planner, done, total),
+            over_dds=_over_dds() if ros else None,
         )
     table = Table("drives", planner)
     for name, rate in result.found.items():
@@ -301,6 +313,19 @@ def drive(
     if result.broken:
         say("bars not kept: " + "; ".join(result.broken))
         raise typer.Exit(1)
+
+
+def _over_dds() -> "OverDds":
+    """Return what drives over DDS.
+
+    Raises:
+        InputError: ROS 2 is not in this environment.
+    """
+    try:
+        from scenario_gen.nodes.drive_over_dds import drive_over_dds
+    except ImportError as error:
+        raise InputError(f"ROS 2 is not in this environment ({error}); source it, or leave --ros out") from error
+    return drive_over_dds
 
 
 @app.command("export")

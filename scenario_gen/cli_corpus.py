@@ -101,3 +101,72 @@ def synthetic_archive(
     planted = read_planted(write_archive(out, config, seed))
     inside = sum(int(one.inside) for one in planted)
     lines([f"{out}: synthetic, {inside} encounters to be found, {len(planted) - inside} just outside of a threshold"])
+
+
+@commands.command()
+def batch(
+    corpus: Annotated[Path, typer.Argument(help="a corpus that `mine` wrote")],
+    roads: Annotated[list[str], typer.Option(help="as for `generate`; several separated by commas, or repeated")],
+    out: Annotated[Path, typer.Option(help="folder of tables and bags; an unfinished batch is gone on with")],
+    count: Annotated[int, typer.Option(min=1, help="scenarios per template and road")] = 50,
+    seed: Annotated[int, typer.Option(min=0, help="same seed, same scenarios")] = 0,
+    templates: Annotated[int, typer.Option(min=0, help="the first so many of the corpus; 0: all")] = 0,
+    workers: WorkersOption = 0,
+    scheduler: SchedulerOption = "",
+    assignments: Annotated[
+        list[str] | None, typer.Option("--set", help="a parameter of the pipeline, as name=value; repeatable")
+    ] = None,
+) -> None:
+    """Generate scenarios of all templates of a corpus on all roads."""
+    from scenario_gen.config import PipelineConfig
+    from scenario_gen.corpus.batch import run_batch
+    from scenario_gen.parameters import assigned
+
+    config = PipelineConfig()
+    for assignment in assignments or []:
+        config = assigned(config, assignment)
+    names = [name for text in roads for name in text.split(",") if name]
+    with telling() as told:
+        result = run_batch(
+            corpus, names, out, config,
+            count=count, seed=seed, templates=templates, workers=workers, scheduler=scheduler, told=told,
+        )  # fmt: skip
+    lines(result.lines())
+    conclude(result.failed, out)
+
+
+@commands.command()
+def find(
+    batch: Annotated[Path, typer.Argument(help="a batch, finished or not")],
+    condition: Annotated[str, typer.Argument(help="SQL, e.g. \"kind = 'crossing' and pet < 1\"")] = "true",
+    limit: Annotated[int, typer.Option(min=0, help="at most so many; 0: all")] = 20,
+    bag: Annotated[Path | None, typer.Option(help="write the hits to this bag, with their templates and roads")] = None,
+    report: Annotated[Path | None, typer.Option(help="folder of the report on the hits; needs --bag")] = None,
+    again: Annotated[bool, typer.Option("--again", help="make each hit again, alone, and compare it bit for bit")] = False,
+) -> None:
+    """Find scenarios of a batch by what they are: kind, road, PET, time to collision, …."""
+    from rich.table import Table
+
+    from scenario_gen.corpus import find as finding
+    from scenario_gen.terminal import Terminal
+
+    found = finding.find(batch, condition, limit)
+    table = Table(*finding.COLUMNS)
+    for row in found.rows:
+        table.add_row(
+            *(
+                "" if row[name] is None else f"{row[name]:.2f}" if isinstance(row[name], float) else str(row[name])
+                for name in finding.COLUMNS
+            )
+        )
+    Terminal().print(table)
+    lines(finding.coverage_lines(found, batch))
+    if again:
+        for row in found.rows:
+            finding.make_again(batch, row)
+        lines([f"{len(found.rows)} scenarios made again: the same bytes"])
+    if bag is not None:
+        lines([f"bag: {finding.export_hits(batch, found.rows, bag)}"])
+        if report is not None:
+            finding.write_page(bag, report)
+            lines([f"report: {report}"])

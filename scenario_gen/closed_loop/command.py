@@ -21,9 +21,10 @@ from pathlib import Path
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.results import write_drives
-from scenario_gen.closed_loop.trials import Bars, broken_bars, Outcome, Rate, rates, read_trials, run_trials
+from scenario_gen.closed_loop.trials import Bars, broken_bars, Outcome, Rate, rates, read_trials, run_trials, Trial
 from scenario_gen.parameters import assigned
 
+OverDds = Callable[[Sequence[Trial], str, ClosedLoopConfig, Callable[[int, int], None]], list[Outcome]]
 WORST = 5  # drives that the terminal names
 
 
@@ -55,18 +56,20 @@ def drive_bag(
     out: Path,
     assignments: Sequence[str] = (),
     progress: Callable[[int, int], None] = lambda *_: None,
+    over_dds: OverDds | None = None,
 ) -> DriveResult:
     """Drive a planner through the scenarios of a bag and write what it came to.
 
     Args:
         bag: of this suite.
-        planner: MODULE:CLASS.
+        planner: MODULE:CLASS; with `over_dds` the command that starts its node.
         ego: id of the vehicle in whose place it drives.
         count: scenarios at most; 0: all.
         workers: processes; 0: one for each core.
         out: folder of the results.
         assignments: parameters as name=value; those of a drive without prefix, those of the bars as bars.name.
         progress: told how many are done of how many.
+        over_dds: drives them over DDS, one after the other, instead of in this process.
 
     Raises:
         InputError: bag, planner or a parameter is wrong; the message names it.
@@ -75,7 +78,10 @@ def drive_bag(
     for assignment in assignments:
         config = assigned(config, assignment if assignment.startswith(("bars.", "drive.")) else f"drive.{assignment}")
     trials = read_trials(bag, ego, count)
-    outcomes = run_trials(trials, planner, config.drive, workers or os.cpu_count() or 1, progress)
+    if over_dds is not None:
+        outcomes = over_dds(trials, planner, config.drive, progress)
+    else:
+        outcomes = run_trials(trials, planner, config.drive, workers or os.cpu_count() or 1, progress)
     found = rates(outcomes)
     broken = broken_bars(found, config.bars)
     failed = [outcome for outcome in outcomes if not outcome.verdict.passed]

@@ -30,7 +30,7 @@ from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.evaluation.bootstrap import wilson
 from scenario_gen.parameters import parameter, Parameters
-from scenario_gen.recordings.read import INFO, read_recording, SCENARIOS, WITNESS
+from scenario_gen.recordings.read import INFO, read_recording, ScenarioEntry, SCENARIOS, WITNESS
 from scenario_gen.storage.bag import within
 from scenario_gen.storage.config import BagConfig
 from scenario_gen.types.ego import together
@@ -114,14 +114,28 @@ def read_trials(bag: Path, ego: str = "", count: int = 0, config: BagConfig = Ba
                 stamp, scenario = namespace.scenario(k)
                 entry = namespace.entry(k)
                 where = f"{namespace.where(SCENARIOS)}, scenario {scenario.index}"
-                wanted = _ego_of(scenario, entry.ego if entry else "", ego, where)
-                scenario = together(scenario)
-                road = namespace.road_of(entry, stamp)
-                name = f"{namespace.name or '/'} {scenario.index}" if namespace.name else str(scenario.index)
-                trials.append(Trial(name, scenario, wanted, road))
+                name = f"{namespace.name} {scenario.index}" if namespace.name else str(scenario.index)
+                trials.append(trial_of(name, scenario, entry, namespace.road_of(entry, stamp), ego, where))
     if not trials:
         raise InputError(f"{bag}: no topic `scenarios` in any namespace; there is nothing to drive in")
     return trials
+
+
+def trial_of(name: str, scenario: Scenario, entry: ScenarioEntry | None, road: Road | None, ego: str, where: str) -> Trial:
+    """Return the trial of a scenario, with its witness among the vehicles where it has one.
+
+    Args:
+        name: for people.
+        scenario: as it was recorded or heard.
+        entry: its own on `scenarios/info`, if there is one.
+        road: its road, if it is known.
+        ego: id of the vehicle in whose place the ego drives; "": that of the ego slot, or the first.
+        where: names it in messages.
+
+    Raises:
+        InputError: naming `where`, there is no such vehicle, the scenario was made for another, or the witness is missing.
+    """
+    return Trial(name, together(scenario), _ego_of(scenario, entry.ego if entry else "", ego, where), road)
 
 
 def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:

@@ -40,6 +40,7 @@ TURNS, AGAINST = np.radians(45.0), np.radians(150.0)
 BEYOND = 150.0  # m by which a path goes on at both ends
 STEP = 2.0  # m between the points of a path
 MOVES = 0.5  # m/s below which a heading tells nothing new
+MEETS = 1e-6  # of a step: ways that cross in the end of one cross, whatever is rounded
 EVERY = 0.3  # s between the samples that are compared with all others
 FINE = 15  # parts of that in which the nearest are compared once more: at 38 m/s two such samples are 11 m apart
 
@@ -154,5 +155,6 @@ def _intersect(a: Motion, b: Motion) -> bool:
     t = (between[..., 0] * s[None, :, 1] - between[..., 1] * s[None, :, 0]) / safe
     u = (between[..., 0] * r[:, None, 1] - between[..., 1] * r[:, None, 0]) / safe
     angle = np.abs(wrap_angle(a.heading[:-1][:, None] - b.heading[:-1][None, :]))
-    hit = (denominator != 0.0) & (t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0) & (angle > ALIKE) & (angle < AGAINST)
+    inside = (np.minimum(t, u) >= -MEETS) & (np.maximum(t, u) <= 1.0 + MEETS)
+    hit = (denominator != 0.0) & inside & (angle > ALIKE) & (angle < AGAINST)
     return bool(hit.any())

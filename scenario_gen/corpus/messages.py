@@ -39,6 +39,7 @@ CLOCK = 1500  # ms by which the two clocks of a message may differ
 MOST_WRONG = 0.5  # of a file's rows whose clocks differ: beyond, the second clock is something else and is not asked
 UNKNOWN_SECOND = 65_535  # DSecond of a sender that does not know
 LAST_STAMP = 40 * 365 * 24 * HOUR  # from 2004 on
+SMALLER = "see the parameters memory, task_rows and range_size"
 NAMED_DAY = re.compile(r"_(4\d{4})(?:_|\.)")
 DAY_OF_2004 = 37_987  # 2004-01-01 as the names of the files count days
 TYPES = {
@@ -84,11 +85,11 @@ def ranges(files: Sequence[Path], folder: Path, size: int, memory: int) -> list[
 
 
 @contextmanager
-def database(folder: Path, memory: int, what: str) -> Iterator[Any]:
+def database(folder: Path, memory: int, what: str, remedy: str = SMALLER) -> Iterator[Any]:
     """Give a DuckDB connection of one thread, within `memory` MiB, that spills to a folder of its own in `folder`.
 
     Raises:
-        InputError: the database fails; `what` it was doing begins the message.
+        InputError: the database fails; `what` it was doing begins the message, `remedy` ends it.
     """
     needs("corpus", "duckdb", "pyarrow")
     import duckdb
@@ -99,7 +100,7 @@ def database(folder: Path, memory: int, what: str) -> Iterator[Any]:
         connection.execute(f"SET memory_limit = '{memory}MiB'")
         connection.execute("SET temp_directory = ?", [spill])
         connection.execute("SET enable_progress_bar = false")
-        with guarded(what, duckdb.Error, remedy="see the parameters memory, task_rows and range_size"):
+        with guarded(what, duckdb.Error, remedy=remedy):
             yield connection
 
 

@@ -43,8 +43,10 @@ def arriving(target: Path) -> Iterator[Path]:
         OSError: the disk is full, or fails; it names the file.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
-    temporary = target.with_name(f"{target.name}{TEMPORARY}-{os.getpid()}-{time.monotonic_ns()}")
+    place = target.with_name(f"{target.name}{TEMPORARY}-{os.getpid()}-{time.monotonic_ns()}")
+    temporary = place / target.name  # for a bag's files are called as its folder is
     try:
+        place.mkdir()
         yield temporary
         if temporary.is_dir():
             for path in sorted(temporary.rglob("*"), reverse=True):
@@ -54,9 +56,10 @@ def arriving(target: Path) -> Iterator[Path]:
             if target.is_dir():  # of a task that was killed before its last file
                 shutil.rmtree(target)
             temporary.replace(target)
+        place.rmdir()
         sync(target.parent)
     except BaseException:
-        discard(temporary)
+        discard(place)
         raise
 
 

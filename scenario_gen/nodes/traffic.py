@@ -14,10 +14,11 @@
 
 """traffic: drives the vehicles of a scenario around a planner's ego, in real time or in lock-step, and judges the planner.
 
-Scenarios come from a bag, or, without one, live from `scenarios` and `map`. The ego takes the place of one vehicle and is steered
-by `ego/cmd_vel`, `ego/cmd_vel_stamped`, `ego/trajectory`, `ego/path` or `ego/odom`; what came last counts. The drive begins with
-the first of them. `~/next`, `~/reset`, `~/pause`, `~/resume`, and `~/step` in lock-step: one step for each call, which waits
-for a command that came after the step before, so that a client that answers each step with one command gets the same drive again.
+Scenarios come from a bag, or, without one, live from `scenarios`, `scenarios/info`, `ego/witness` and `map`. The ego takes the
+place of one vehicle and is steered by `ego/cmd_vel`, `ego/cmd_vel_stamped`, `ego/trajectory`, `ego/path` or `ego/odom`; what
+came last counts. The drive begins with the first of them. `~/next`, `~/reset`, `~/pause`, `~/resume`, and `~/step` in
+lock-step: one step for each call, which waits for a command that came after the step before, so that a client that answers each
+step with one command gets the same drive again.
 Topics, frames and units: msg_conventions/driving.py. What is wrong with the ego stands on /diagnostics and in the verdict.
 """
 
@@ -35,25 +36,34 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from msg_conventions import driving
+from msg_conventions.autoware import EGO, OBJECTS
 from msg_conventions.diagnostics import Level
 from msg_conventions.ego import encode_state
+from msg_conventions.hashes import hash_of
 from msg_conventions.paths import encode_path
 from msg_conventions.roads import decode_map
-from msg_conventions.scenarios import decode_scenario
 from msg_conventions.topics import vehicle_topic
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.results import write_verdicts
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
-from scenario_gen.closed_loop.trials import Outcome, read_trials, Trial
+from scenario_gen.closed_loop.trials import Outcome, read_trials, Trial, trial_of
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.nodes.diagnostics import NodeDiagnostics
 from scenario_gen.nodes.ego_commands import FIRST_STAMP, Heard, INPUTS, stamp_of, understood, unusable
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.topics import create_publisher, create_subscription, publish
-from scenario_gen.nodes.traffic_messages import encode_odometries, encode_poses, encode_surroundings, encode_verdict
+from scenario_gen.nodes.traffic_messages import (
+    encode_ego,
+    encode_odometries,
+    encode_poses,
+    encode_predictions,
+    encode_surroundings,
+    encode_verdict,
+)
 from scenario_gen.parameters import parameter, Parameters
+from scenario_gen.recordings.arriving import ArrivingScenarios, TOPICS
 from scenario_gen.types.names import tokens
 from scenario_gen.types.road import Road
 
@@ -66,8 +76,8 @@ GRID_EVERY = 0.2  # seconds of the drive between two local maps
 class Config(Parameters):
     """The node's parameters; those of a drive are called drive.step, drive.policy and so on."""
 
-    bag: str = parameter("", "bag with scenarios; empty: they come live from `scenarios` and `map`")
-    ego: str = parameter("", "id of the vehicle in whose place the ego drives; empty: the first of each scenario")
+    bag: str = parameter("", "bag with scenarios; empty: they come live from `scenarios`, its `info` and `map`")
+    ego: str = parameter("", "id of the vehicle in whose place the ego drives; empty: the scenario's own ego slot, or its first")
     index: int = parameter(0, "number of the first scenario, from 0, in the order of the bag", low=0)
     rate: float = parameter(1.0, "how many times as fast as real time", low=0.01, high=1000.0)
     lock_step: bool = parameter(False, "go one step for each call of ~/step, and not by a clock")
@@ -75,6 +85,9 @@ class Config(Parameters):
     silence: float = parameter(0.5, "a command older than this is no command, and the ego brakes", unit="s", low=0.01)
     patience: float = parameter(5.0, "in lock-step, wait so long for a command, in real time", unit="s", low=0.01)
     follow_on: bool = parameter(True, "go on with the next scenario when one is over")
+    autoware: bool = parameter(
+        False, f"publish {OBJECTS} and {EGO}, too, as Autoware's planners take them; needs autoware_perception_msgs"
+    )
     results: str = parameter("", "folder for drives.json and junit.xml, written anew after each drive; empty: none")
     drive: ClosedLoopConfig = field(default_factory=ClosedLoopConfig)
 
@@ -82,10 +95,10 @@ class Config(Parameters):
 class Traffic(Node):  # type: ignore[misc]
     """Drives one scenario after the other."""
 
-    def __init__(self, namespace: str | None = None) -> None:
+    def __init__(self, namespace: str | None = None, config: Config = Config()) -> None:
         self._together = ReentrantCallbackGroup()  # a call of ~/step waits for a command, which another callback takes
         super().__init__("traffic", namespace=namespace)
-        self.parameters = ConfigParameters(self, Config())
+        self.parameters = ConfigParameters(self, config)
         self.diagnostics = NodeDiagnostics(self, self._report)
         self._trials: list[Trial] = []
         self._at = self.config.index
@@ -96,10 +109,12 @@ class Traffic(Node):  # type: ignore[misc]
         self._paused = False
         self._sources: list[str] = []
         self._outcomes: list[Outcome] = []
-        self._road: Road | None = None
+        self._roads: dict[str, Road] = {}  # by the hash of their map
+        self._arriving = ArrivingScenarios()
         self._verdict = ""
         self._out = {topic: create_publisher(self, topic) for topic in OUTPUTS}
         self._odometry: dict[str, Any] = {}
+        self._autoware: dict[str, Any] = {}
         for topic in INPUTS:
             create_subscription(self, topic, lambda data, topic=topic: self._hear(topic, data))
         for name, action in (("next", self._next), ("reset", self._reset), ("pause", self._pause), ("resume", self._resume)):
@@ -120,9 +135,11 @@ class Traffic(Node):  # type: ignore[misc]
         """Read the bag, or listen for scenarios, and begin.
 
         Raises:
-            InputError: the bag cannot be read, or has no such vehicle or scenario.
+            InputError: the bag cannot be read, or has no such vehicle or scenario; autoware_perception_msgs is not there.
         """
         config = self.config
+        if config.autoware:
+            self._autoware = {topic: create_publisher(self, topic) for topic in (OBJECTS, EGO)}
         if config.bag:
             self._trials = read_trials(Path(config.bag), config.ego)
             if config.index >= len(self._trials):
@@ -130,7 +147,8 @@ class Traffic(Node):  # type: ignore[misc]
             self._load(config.index)
         else:
             create_subscription(self, "map", self._take_map)
-            create_subscription(self, "scenarios", self._take_scenario)
+            for topic in TOPICS:
+                create_subscription(self, topic, lambda data, topic=topic: self._take(topic, data))
         if not config.lock_step:
             period = config.drive.step / config.rate
             self.create_timer(period, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -139,20 +157,26 @@ class Traffic(Node):  # type: ignore[misc]
 
     def _take_map(self, data: bytes) -> None:
         try:
-            self._road = decode_map(data)[1]
+            self._roads[hash_of("map", data)] = decode_map(data)[1]
         except InputError as error:
             self._say(Level.ERROR, str(error), "map")
 
-    def _take_scenario(self, data: bytes) -> None:
+    def _take(self, topic: str, data: bytes) -> None:
+        """Take a message of a live scenario; what is whole waits for its turn, on the road that its entry names."""
         try:
-            _, scenario = decode_scenario(data, index=len(self._trials))
-            ego = self.config.ego or scenario.vehicles[0].id
-            road = self._road if self._road is not None and self._road.frame_id == scenario.frame_id else None
-            self._trials.append(Trial(str(len(self._trials)), scenario, ego, road))
-            if self._loop is None and len(self._trials) > self._at:
+            for entry, _, scenario in self._arriving.take(topic, data):
+                road = self._roads.get(entry.map_hash or "")
+                name = f"{entry.request} {entry.index}"
+                self._trials.append(trial_of(name, scenario, entry, road, self.config.ego, f"scenario {name}"))
+            if self._idle and len(self._trials) > self._at:
                 self._load(self._at)
-        except InputError as error:
-            self._say(Level.ERROR, str(error), "scenarios")
+        except ScenarioGenError as error:
+            self._say(Level.ERROR, str(error), topic)
+
+    @property
+    def _idle(self) -> bool:
+        """Whether nothing is driven."""
+        return self._loop is None
 
     def _load(self, number: int) -> None:
         """Begin a scenario.
@@ -246,22 +270,30 @@ class Traffic(Node):  # type: ignore[misc]
         if loop is None or self._verdict or not self.config.lock_step:
             response.message = self._why_no_step()
             return response
-        state = self._states[-1]
-        if self._heard is None or self._heard.step < state.step:
-            self._waiting = Future(executor=self.executor)
-            waiting = self._waiting
-            timer = self.create_timer(
-                self.config.patience,
-                lambda: None if waiting.done() else waiting.set_result(None),
-                clock=Clock(clock_type=ClockType.STEADY_TIME),
-            )
-            await waiting
-            self.destroy_timer(timer)
-        if self._loop is loop and self._states[-1] is state:
-            self._advance(loop)
+        await self._step_once(loop)
         response.success = True
         response.message = json.dumps({"time": self._states[-1].time, "over": bool(self._verdict), "verdict": self._verdict})
         return response
+
+    async def _step_once(self, loop: ClosedLoop) -> None:
+        """Go one step of a drive when a command that answers its last one is there, or patience is at its end."""
+        state = self._states[-1]
+        await self._answered(state, self.config.patience)
+        if self._loop is loop and self._states[-1] is state:
+            self._advance(loop)
+
+    async def _answered(self, state: State, patience: float) -> None:
+        """Return when a command has come since this state was told, or after `patience` [s] of real time."""
+        if self._heard is not None and self._heard.step >= state.step:
+            return
+        waiting = self._waiting = Future(executor=self.executor)
+        timer = self.create_timer(
+            patience,
+            lambda: None if waiting.done() else waiting.set_result(None),
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+        )
+        await waiting
+        self.destroy_timer(timer)
 
     def _why_no_step(self) -> str:
         if not self.config.lock_step:
@@ -310,13 +342,15 @@ class Traffic(Node):  # type: ignore[misc]
         return int(self._out[topic].get_subscription_count()) > 0
 
     def _tell(self) -> None:
-        """Publish where everyone is now."""
+        """Publish where everyone is now; the ego's odometry last, so that who answers it has heard of all else."""
         loop, state = self._loop, self._states[-1]
         if loop is None:
             return
         stamp, frame = stamp_of(state), loop.scenario.frame_id
         self._publish("/clock", driving.encode_clock(stamp))
-        for i, data in encode_odometries(self._states[-2:], self._children, loop.config.step, frame):
+        odometries = dict(encode_odometries(self._states[-2:], self._children, loop.config.step, frame))
+        own = odometries.pop(loop.ego)
+        for i, data in odometries.items():
             publish(self, self._odometry[self._names[i]], data)
         self._publish("/tf", encode_poses(state, self._children, frame))
         vehicles = loop.scenario.vehicles
@@ -326,6 +360,10 @@ class Traffic(Node):  # type: ignore[misc]
         every = max(round(GRID_EVERY / loop.config.step), 1)
         if state.step % every == 0 and loop.road is not None and self._is_heard("traffic/local_map"):
             self._publish("traffic/local_map", encode_surroundings(loop, state))
+        for topic, publisher in self._autoware.items():
+            encode = encode_predictions if topic == OBJECTS else encode_ego
+            publish(self, publisher, encode(loop, self._states[-2:]))
+        publish(self, self._odometry[self._names[loop.ego]], own)
 
     def _say(self, level: Level, message: str, subject: str) -> None:
         self.diagnostics.status(level, message, subject, {}, log=False)
@@ -333,10 +371,13 @@ class Traffic(Node):  # type: ignore[misc]
     def _report(self) -> None:
         """Say each second what is driven; a fault of the ego that is over clears."""
         if self._loop is None:
-            self._say(Level.WARN, "there is no scenario yet", "driving")
+            waiting = f": {self._arriving.unmatched} messages wait for scenarios/info" if self._arriving.unmatched else ""
+            self._say(Level.WARN, f"there is no scenario yet{waiting}", "driving")
             return
         state, trial = self._states[-1], self._trials[self._at]
         doing = self._verdict or ("paused" if self._paused else "waiting for the ego" if self._heard is None else "driving")
         self._say(Level.OK, f"scenario {trial.name}, {state.time:.1f} s: {doing}", "driving")
+        if self._heard is None and not self._verdict:
+            self._tell()  # who came late has not heard where everyone is
         if not state.fault and not (self._heard and self._heard.fault):
             self.diagnostics.resolve("ego")

@@ -20,6 +20,7 @@ import json
 import numpy as np
 
 from msg_conventions import driving
+from msg_conventions.autoware import encode_kinematic_state, encode_predicted_objects, HORIZON_NS, STEP_NS
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.frames import encode_frames
 from scenario_gen.arrays import Floats
@@ -55,6 +56,39 @@ def encode_surroundings(loop: ClosedLoop, state: State) -> bytes:
     """Return the CDR bytes of the local map about the ego."""
     grid, frame = local_map(loop, state), loop.scenario.frame_id
     return driving.encode_local_map(grid.blocked, grid.resolution, grid.origin, frame, stamp_of(state))
+
+
+def encode_predictions(loop: ClosedLoop, states: Sequence[State]) -> bytes:
+    """Return the others that are there as the CDR bytes of PredictedObjects.
+
+    Each one's predicted path is what it does if nothing changes: on its certified path, its clock at its present rate.
+
+    Args:
+        loop: the drive.
+        states: its last two, or its first alone.
+    """
+    state, known = states[-1], loop.certified
+    others = [i for i in np.flatnonzero(state.here).tolist() if i != loop.ego]
+    ahead = np.arange(0.0, HORIZON_NS + 1.0, STEP_NS) * 1e-9
+    time = known.scenario.time
+    paths = []
+    for i in others:
+        at = np.minimum(state.clock[i] + state.rate[i] * ahead, known.spans[i, 1])
+        paths.append(np.column_stack([np.interp(at, time, known.motion[i, :, c]) for c in range(3)]))
+    objects = [known.scenario.vehicles[i] for i in others]
+    return encode_predicted_objects(objects, _rates(loop, states)[others], paths, known.scenario.frame_id, stamp_of(state))
+
+
+def encode_ego(loop: ClosedLoop, states: Sequence[State]) -> bytes:
+    """Return the CDR bytes of the ego's Odometry as Autoware takes it, at its rear axle; arguments as above."""
+    vehicle = loop.scenario.vehicles[loop.ego]
+    return encode_kinematic_state(vehicle, _rates(loop, states)[loop.ego], loop.scenario.frame_id, stamp_of(states[-1]))
+
+
+def _rates(loop: ClosedLoop, states: Sequence[State]) -> Floats:
+    """Return (N, 6) x, y [m], yaw [rad], speed [m/s], acceleration [m/s²], yaw rate [rad/s] of all."""
+    before, now = states[0].vehicles, states[-1].vehicles
+    return np.column_stack([now, (now[:, 3] - before[:, 3]) / loop.config.step, (now[:, 2] - before[:, 2]) / loop.config.step])
 
 
 def encode_verdict(node: str, outcome: Outcome, stamp_ns: int) -> bytes:

@@ -33,8 +33,9 @@ class SamplingConfig(Parameters):
     observation_sigma: float = parameter(
         1.0, "σ_ω: standard deviation across the route at an interior anchor", unit="m", low=1e-3, high=10.0
     )
+    steering: float = parameter(1.0, "how much a driver corrects to the side, over what the template's does", low=0.0, high=10.0)
     longitudinal_sigma: float = parameter(
-        0.8, "σ_s: standard deviation along the route, at the same template time", unit="m", low=0.0, high=10.0
+        1.2, "σ_s: standard deviation along the route, at the same template time", unit="m", low=0.0, high=10.0
     )
     longitudinal_time: float = parameter(
         4.0, "time over which displacements along the route vary", unit="s", low=0.1, high=1000.0

@@ -14,6 +14,8 @@
 
 """How far samples lie to the side of the route: the square root of the covariance."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from scenario_gen import exact
@@ -33,9 +35,78 @@ BEND_FROM_SHARE = 0.6  # share of the room from which on a deviation is bent bac
 _FLANK_STEP = 0.5  # m
 _ROOM_STEP = 0.1  # m
 _SMOOTHING = 4.0  # m along the route, each of two passes
+_COURSE = 1.5  # s, of each of two passes: what is slower is a driver's course, not a correction
+_SLOW = 3.0  # m/s, below which corrections are made over a distance rather than a time
+_MOVES = 0.5  # m/s, from which on a heading tells of them
+_CORRECTIONS = 0.5, 2.0  # s, least and greatest length scale
+_MOST_LENGTHS = 200  # of those in a drive, so that long ones cost no more than their length
+_MOST_CORRECTION = 0.1  # m, standard deviation at most
+_GAUSSIAN_MEDIAN = 1.4826  # standard deviation of a Gaussian over the median of its absolute values
 
 
-def lateral_covariance_root(path: BasePath, room: Floats, config: SamplingConfig) -> Floats:
+@dataclass(frozen=True)
+class Steering:
+    """The small corrections of a driver: a squared-exponential process of the time that a stretch of road takes.
+
+    Attributes:
+        sigma: its standard deviation [m].
+        length: its length scale [s].
+        driven: (T,) metres from the start.
+        passed: (T,) seconds there; slow stretches count as if they were driven at 3 m/s, for cars steer in
+            distance there.
+    """
+
+    sigma: float
+    length: float
+    driven: Floats
+    passed: Floats
+
+    @classmethod
+    def of(cls, time: Floats, yaw: Floats, speed: Floats, length: float) -> "Steering":
+        """Those of a recorded drive: its heading less what it is over some seconds.
+
+        Of a process with standard deviation a and length scale l the sideways speed varies by a / l, the sideways
+        acceleration by sqrt(3) a / l². Both are taken of medians, for where a drive turns it differs from its course by more
+        than by corrections.
+
+        Args:
+            time: (T,) seconds, evenly spaced.
+            yaw: (T,) rad, unwrapped.
+            speed: (T,) m/s.
+            length: metres of the route; the drive is scaled to it.
+        """
+        from scipy.ndimage import uniform_filter1d  # slow to import
+
+        dt = float(time[1] - time[0])
+        at_least = np.sqrt(np.square(speed) + np.square(_SLOW))
+        driven = np.concatenate([[0.0], np.cumsum(0.5 * dt * (speed[1:] + speed[:-1]))])
+        share = 0.5 * dt * (speed[1:] / at_least[1:] + speed[:-1] / at_least[:-1])
+        passed = np.concatenate([[0.0], np.cumsum(share)])
+        width = 2 * round(0.5 * _COURSE / dt) + 1
+        course = yaw
+        for _ in range(2):
+            course = uniform_filter1d(course, width, mode="nearest")
+        inside = np.flatnonzero(speed[width : len(yaw) - width] > _MOVES) + width
+        if len(inside) < width:
+            return cls(0.0, 1.0, driven, passed)
+        rest = yaw - course
+        sideways = rest * at_least, np.gradient(rest, dt) * np.square(at_least) / np.maximum(speed, _MOVES)
+        quick, curved = (_GAUSSIAN_MEDIAN * float(np.median(np.abs(values[inside]))) for values in sideways)
+        low, high = max(_CORRECTIONS[0], float(passed[-1]) / _MOST_LENGTHS), _CORRECTIONS[1]
+        scale = max(min(float(np.sqrt(3.0)) * quick / max(curved, 1e-9), high), low)
+        return cls(min(scale * quick, _MOST_CORRECTION), scale, driven * (length / max(driven[-1], 1e-9)), passed)
+
+    def root(self, arc: Floats) -> Floats:
+        """Square root (G, r) of the covariance at arc lengths (G,) [m], with value and slope 0 at both ends."""
+        if self.sigma < 1e-4:
+            return np.zeros((len(arc), 0))
+        ends = self.passed[[0, -1, 0, -1]]
+        tied = Observations(ends, np.zeros(4), np.zeros(4), (0, 0, 1, 1))
+        features = Features(float(ends[0]), float(ends[1]), self.sigma, self.length)
+        return Regression(features, tied).predict(np.interp(arc, self.driven, self.passed)).factor
+
+
+def lateral_covariance_root(path: BasePath, room: Floats, config: SamplingConfig, steering: Steering) -> Floats:
     """Square root (G, r) of the covariance of the deviation [m] at the route's nodes.
 
     Source: eqs 12 to 15, of the deviation as a function of arc length.
@@ -47,6 +118,7 @@ def lateral_covariance_root(path: BasePath, room: Floats, config: SamplingConfig
         path: the route.
         room: (G,) metres to either side, see `lateral_room`.
         config: σ_f, l, σ_ω.
+        steering: what is added to it, of the template's driver.
     """
     nodes, sigma = len(path.node), config.lateral_sigma
     if sigma == 0.0 or path.length < SHORTEST_ROUTE:
@@ -59,6 +131,7 @@ def lateral_covariance_root(path: BasePath, room: Floats, config: SamplingConfig
     noise = np.concatenate([np.zeros(4), np.full(len(inside), config.observation_sigma)])
     seen = Observations(x, np.zeros(len(x)), noise, (0, 0, 1, 1, *(0 for _ in inside)))
     factor = Regression(Features(0.0, path.length, sigma, length), seen).predict(path.arc).factor
+    factor = np.hstack([factor, config.steering * steering.root(path.arc)])
     return np.minimum(room / (ROOM_SIGMAS * sigma), 1.0)[:, None] * exact.compact(factor, 1e-6 * sigma)
 
 

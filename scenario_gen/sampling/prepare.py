@@ -23,11 +23,11 @@ from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.sampling.candidates import CandidateModel, VehicleModel
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.deviations import lateral_covariance_root, lateral_room, MAX_ROOM_SIGMAS, ROOM_SIGMAS
+from scenario_gen.sampling.deviations import lateral_covariance_root, lateral_room, MAX_ROOM_SIGMAS, ROOM_SIGMAS, Steering
 from scenario_gen.sampling.pace import clock_of, slowed_clock, template_grid
 from scenario_gen.sampling.path import BasePath
 from scenario_gen.sampling.speed_profile.knots import speed_knots, SpeedKnots, STAND
-from scenario_gen.sampling.speed_profile.mean import Bounds, mean_speed, Motion, rounded_lines, SMOOTHING, Target
+from scenario_gen.sampling.speed_profile.mean import Bounds, mean_speed, Motion, rounded_lines, Target
 from scenario_gen.sampling.speed_profile.model import speed_model
 from scenario_gen.sampling.speed_profile.spline import SpeedSpline
 from scenario_gen.sampling.speed_profile.stops import least_shares, lengthened, SHORTEST_WAIT, standing_part
@@ -51,6 +51,7 @@ _JERK_SHARE, _LEAST_JERK = 1.2, 1.0  # of the template's largest jerk; m/s³
 _BEND_SHARE, _LEAST_BEND = 1.2, 2.0  # of the template's largest lateral acceleration; m/s²
 _SMOOTH = 0.5  # s, over which that is taken
 _TIME_SHARE = 1.0 / 3.0  # of the duration, at most: what varies more slowly between given ends hardly varies
+_EARLY = 0.3  # s, by which a vehicle leaves a stand before its lines do, for they are rounded
 _LEAST_REST = SHORTEST_WAIT - 0.2  # s: behind it a vehicle is still too slow to be seen moving for a while
 _FREE_SLIDE = 1.5  # m, by which changepoints may be passed from their place before the clock is stretched
 _SAID_PACE, _SAID_SLIDE, _SAID_JERK = 0.02, 0.3, 0.2  # slowing, m and m/s³ from which on they are said
@@ -89,6 +90,7 @@ class _Drive:
         speed: (T,) its speeds [m/s] there, scaled to the route.
         ends: asked speeds [m/s] at start and end.
         jerk: m/s³ that it keeps to; bend: m/s² sideways above which the pace is lowered.
+        steering: the small corrections of its driver.
     """
 
     vehicle: Vehicle
@@ -102,6 +104,7 @@ class _Drive:
     ends: tuple[float, float]
     jerk: float
     bend: float
+    steering: Steering
 
     def target(self, clock: Clock) -> Target:
         """What its mean speed should be near to, on this clock."""
@@ -274,6 +277,7 @@ def _drive(
         min(
             config.bend_acceleration or max(_BEND_SHARE * sideways, _LEAST_BEND), _CURVE_MARGIN * config.max_lateral_acceleration
         ),
+        Steering.of(time, clean_tracks(encounter)[n].poses[here, 2], encounter.speed[n, here], path.length),
     )
 
 
@@ -282,7 +286,7 @@ def _at_rest(knots: SpeedKnots, times: Floats) -> list[tuple[float, float]]:
     rest = []
     for a, b in knots.stretches(knots.still):
         moves = (a > times[0], b < times[-1])
-        room = max(min(SMOOTHING, (b - a - _LEAST_REST) / max(int(moves[0]) + int(moves[1]), 1)), 0.0)
+        room = max(min(_EARLY, (b - a - _LEAST_REST) / max(int(moves[0]) + int(moves[1]), 1)), 0.0)
         rest.append((a + room if moves[0] else a, b - room if moves[1] else b))
     return rest
 
@@ -329,4 +333,4 @@ def _model(
         sentences.append(f"{name} varies less across {100.0 * narrow.mean():.0f} % of its route, where the road is narrow")
     length = min(config.longitudinal_time, _TIME_SHARE * float(drive.times[-1] - drive.times[0]))
     speed = speed_model(spline, mean, motion, bounds, drive.time, drive.speed, config.longitudinal_sigma, length)
-    return VehicleModel(drive.vehicle, path, lateral_covariance_root(path, room, config), room, speed)
+    return VehicleModel(drive.vehicle, path, lateral_covariance_root(path, room, config, drive.steering), room, speed)

@@ -26,25 +26,13 @@ from scenario_gen.corpus.grouping import group, label, Meeting
 from scenario_gen.corpus.kinds import kind_of, Motion
 from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.mine import mine
-from scenario_gen.corpus.synthetic import ArchiveConfig, read_planted, write_archive
+from scenario_gen.corpus.synthetic import read_planted
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.errors import InputError
 from scenario_gen.folders import sha256_of
 from scenario_gen.logs.config import LogConfig
 
 pytestmark = pytest.mark.xdist_group("corpus")  # one archive for all
-SMALL = ArchiveConfig(rows=60_000, hours=2.0, encounters=14, outside=6, repeated_ids=0.1, damaged=0.001)
-
-
-@pytest.fixture(scope="module")
-def archive(tmp_path_factory):
-    return write_archive(tmp_path_factory.mktemp("archive") / "spmd", SMALL, seed=3)
-
-
-@pytest.fixture(scope="module")
-def corpus(archive, tmp_path_factory):
-    out = tmp_path_factory.mktemp("mined") / "corpus"
-    return out, mine([archive], out)
 
 
 def found_in(out):

@@ -36,8 +36,8 @@ SUITE = ("road_server", "segmenter", "planner", "gp_sampler", "evaluator", "log_
 LOG = str(RESOURCES / "synthetic_c")
 
 
-def launched(**arguments: str) -> list[SimpleNamespace]:
-    """What the launch file would start; the launch package is not among the wheels, so stand-ins take its place."""
+def launched(file: str = "suite.launch.py", **arguments: str) -> list[SimpleNamespace]:
+    """What a launch file would start; the launch package is not among the wheels, so stand-ins take its place."""
     started, declared, functions = [], {}, []
 
     def node(**keywords):
@@ -62,10 +62,10 @@ def launched(**arguments: str) -> list[SimpleNamespace]:
         "launch_ros.actions": mock.MagicMock(Node=node),
         "ament_index_python.packages": mock.MagicMock(get_package_share_directory=lambda _: str(ROOT)),
     }
-    source = (ROOT / "launch" / "suite.launch.py").read_text()
+    source = (ROOT / "launch" / file).read_text()
     with mock.patch.dict(sys.modules, stand_ins):
         scope: dict[str, object] = {}
-        exec(compile(source, "suite.launch.py", "exec"), scope)
+        exec(compile(source, file, "exec"), scope)
         scope["generate_launch_description"]()
         assert set(arguments) <= set(declared)
         try:
@@ -189,3 +189,26 @@ def test_what_is_written_for_a_launch_is_removed_at_its_end(tmp_path):
     answer = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"TMPDIR": str(tmp_path)}, check=True)
     assert Path(answer.stdout.strip()).parent == tmp_path
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_drive_is_launched_with_its_parameters(domain, client, tmp_path):
+    """The values that launch_ros would write for `traffic`: each is one of its parameters, and takes effect."""
+    from rcl_interfaces.srv import GetParameters
+
+    from scenario_gen.nodes.traffic import Config
+
+    (only, *pictures) = launched("drive.launch.py", ego="2", policy="replay", lock_step="true", namespace="/a", rviz="true")
+    assert (only.executable, only.namespace, [one.executable for one in pictures]) == ("traffic", "/a", ["rviz2"])
+    (values,) = only.parameters
+    assert set(values) <= set(flatten(Config()))
+    file = tmp_path / "values.yaml"
+    file.write_text(yaml.safe_dump({"/**": {"ros__parameters": values | {"ego": 2}}}))  # launch_ros guesses a number
+    process = start_nodes(
+        "start", "traffic", "--ros-args", "-r", "__ns:=/a", "--params-file", str(file), ROS_DOMAIN_ID=str(domain)
+    )
+    try:
+        request = GetParameters.Request(names=["ego", "drive.policy", "lock_step"])
+        ego, policy, lock_step = client.call(GetParameters, "/a/traffic/get_parameters", request).values
+        assert (ego.string_value, policy.string_value, lock_step.bool_value) == ("2", "replay", True)
+    finally:
+        process.kill()

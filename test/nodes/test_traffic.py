@@ -14,7 +14,9 @@
 
 """The node `traffic`: a planner over DDS in lock-step, whatever is wrong with its commands, and the verdict."""
 
+from dataclasses import replace
 import json
+import sys
 
 from bag_examples import hand_made_run
 import numpy as np
@@ -22,6 +24,7 @@ import pytest
 
 from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.driving import decode_odometry, encode_odometry, encode_twist
+from msg_conventions.ego import decode_state
 from msg_conventions.frames import decode_frames
 from msg_conventions.paths import encode_path
 from msg_conventions.roads import decode_map
@@ -29,7 +32,10 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.tracking import of_twist
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.recordings.write import write_recording
+from scenario_gen.recordings.write import result_messages, write_recording
+from scenario_gen.types.ego import with_witness
+from scenario_gen.types.names import token
+from scenario_gen.types.scenario import EgoSlot
 
 pytestmark = pytest.mark.dds
 
@@ -139,3 +145,85 @@ def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, clie
     assert int(values["faults"]) >= 5
     faults = str(values["first_faults"])
     assert "not finite" in faults and "jumped" in faults and "is not that of the scenario" in faults
+
+
+def test_live_scenarios_are_driven_on_the_road_that_they_name(start, client):
+    """What gp_sampler publishes: a map, witnesses, scenarios, entries, of which another may come before what it belongs to."""
+    from std_srvs.srv import Trigger
+
+    run = hand_made_run()
+    slot = EgoSlot(run.encounter.vehicles[1], np.zeros(4), np.ones(4))
+    parted = tuple(with_witness(one, 1) for one in run.generated.scenarios)
+    live = replace(run, generated=replace(run.generated, scenarios=parted, ego=slot))
+    messages = [(topic, data) for topic, data, _ in result_messages(live)]
+    start("traffic", lock_step=True)
+    topics = ("map", "scenarios/info", "scenarios", "ego/witness")
+    for topic in topics:
+        client.announce(topic)
+        client.until(lambda topic=topic: client.node.count_subscribers(topic) >= 1, topic)
+    client.hear("ego/goal", "traffic/local_map", "verdicts")
+    for wanted in topics:  # entries before scenarios, witnesses last
+        for topic, data in messages:
+            if topic == wanted:
+                client.say(topic, data)
+    _, _, child, goal = decode_state(client.wait("ego/goal")[0])
+    witness = parted[0].witness
+    assert child == f"vehicle_{token(slot.vehicle.id)}"
+    assert goal[:2] == pytest.approx(witness.position[0, -1])
+    client.announce("ego/cmd_vel")
+    client.until(lambda: client.node.count_subscribers("ego/cmd_vel") >= 1, "ego/cmd_vel")
+    said = {"over": False}
+    while not said["over"]:
+        client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
+        said = step(client)
+    client.wait("traffic/local_map")
+    assert client.call(Trigger, "/traffic/next", Trigger.Request()).success
+
+
+PLANNER = """
+import sys
+
+import rclpy
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+
+rclpy.init()
+node = rclpy.create_node("three")
+command = node.create_publisher(Twist, "ego/cmd_vel", 10)
+
+
+def act(_):
+    twist = Twist()
+    twist.linear.x = 3.0
+    command.publish(twist)
+
+
+node.create_subscription(Odometry, sys.argv[1], act, 10)
+rclpy.spin(node)
+"""
+
+
+def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(bag, tmp_path):
+    """`scenario-gen drive --ros`: any node that answers its odometry with a command; what it is not is said."""
+    from typer.testing import CliRunner
+
+    from scenario_gen.cli import app
+
+    program = tmp_path / "three.py"
+    program.write_text(PLANNER)
+    words = ["drive", str(bag), "--count", "2", "--set", "bars.goals=0.0"]
+    words += [word for bar in ("collisions", "at_fault", "off_road") for word in ("--set", f"bars.{bar}=1.0")]
+    for out, more in (
+        ("over_dds", ["--ros", "--planner", f"{sys.executable} {program} vehicle_1/odom"]),
+        ("in_process", ["--planner", "test_traffic:Slow", "--workers", "1"]),
+    ):
+        told = CliRunner().invoke(app, [*words, "--out", str(tmp_path / out), *more])
+        assert told.exit_code == 0, told.output
+    over_dds, in_process = (json.loads((tmp_path / out / "drives.json").read_text()) for out in ("over_dds", "in_process"))
+    assert over_dds["drives"] == in_process["drives"] and len(in_process["drives"]) == 2
+    for command, said in (
+        (f"{sys.executable} -c 'print(7)'", "it ended with code 0; it said: 7"),
+        ("no_such_program", "No such"),
+    ):
+        refused = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "none"), "--ros", "--planner", command])
+        assert said in str(refused.exception), refused.output

@@ -32,7 +32,7 @@ from scenario_gen.arrays import Bools, Floats
 from scenario_gen.sampling.speed_profile.knots import SpeedKnots
 from scenario_gen.sampling.speed_profile.spline import SpeedSpline
 
-SMOOTHING = 0.3  # s, ℓ: kinks of the lines are rounded over about this time
+SMOOTHING = 0.5  # s, ℓ: kinks of the lines are rounded over about this time
 ANCHOR_WEIGHT = 10.0  # 1/s, w: a changepoint passed 0.5 m from its place weighs as 1.6 m/s too fast for a second
 JERK_PRICE = 20.0  # m s, of each 1 m/s³ above the bound for a second
 

@@ -31,9 +31,10 @@ from scenario_gen.arrays import Bools, Floats, runs
 from scenario_gen.sampling.speed_profile.mean import Bounds, fixed_coefficients, Motion
 from scenario_gen.sampling.speed_profile.spline import SpeedSpline
 
-SHARE = 0.7  # of the template's own deviation from the mean is drawn
-WINDOW = 1.5  # s, over which the strength of that deviation is taken
-QUICKEST, SLOWEST = 0.5, 2.0  # s, bounds of its length scale
+SHARE = 0.85  # of the template's own deviation from the mean is drawn
+PASSES = 2  # of that window: a strength that changes at once is a jerk of high frequency
+WINDOW = 1.5  # s, of each pass over which the strength of that deviation is taken
+QUICKEST, SLOWEST = 0.8, 2.0  # s, bounds of its length scale
 QUICKNESS = 3.87  # ℓ² = 3.87 sd(r) / sd(r''), of the kernel smoothed by what a spline can follow
 LENGTH_SMOOTHING = 1.5  # s, over which a change of the whole length is spread
 JERK_ROOM = 1.05  # of a sample's jerk over the mean's bound
@@ -185,7 +186,10 @@ def _process(spline: SpeedSpline, mean: Floats, time: Floats, speed: Floats, sig
     if sigma > 0.0 and strong > 1e-3:
         scale = min(max(float(np.sqrt(QUICKNESS * strong / max(quick, 1e-9))), QUICKEST), SLOWEST)
         width = 2 * round(0.5 * WINDOW / dt) + 1
-        local = np.sqrt(np.maximum(uniform_filter1d(np.square(rest), width, mode="nearest"), 0.0))
+        local = np.square(rest)
+        for _ in range(PASSES):
+            local = np.maximum(uniform_filter1d(local, width, mode="nearest"), 0.0)
+        local = np.sqrt(local)
         parts.append(kernel_root(at, SHARE * np.interp(at, time[inside], local), scale))
     if not parts:
         return np.zeros((len(at), 0))

@@ -1,0 +1,316 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`batch`: templates × roads × samples. A task makes all scenarios of a few templates on one road, and writes three things.
+
+    bags/road=NAME/part-00000/              a bag as `generate` writes it, a namespace for each template
+    scenarios/road=NAME/part-00000.parquet  a row for each scenario: where it is, and how critical
+    cases/road=NAME/part-00000.parquet      a row for each template: how many there are, and why not more
+
+The table of cases comes last: where it is, the part is done. So the manifest is what is there.
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+import json
+from pathlib import Path
+from typing import Any
+
+from scenario_gen.config import PipelineConfig
+from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.tasks import arriving, spread, sweep, Told
+from scenario_gen.errors import InputError, needs, RefusedError
+from scenario_gen.evaluation.criticality import criticality
+from scenario_gen.evaluation.motion import at_period
+from scenario_gen.folders import sha256_of, write_text
+from scenario_gen.folders.claim import alone
+from scenario_gen.nearest import attempt
+from scenario_gen.recordings.provenance import parameter_texts, versions
+from scenario_gen.recordings.write import add_results, scenario_bytes
+from scenario_gen.roads import build_road
+from scenario_gen.segmentation import segment
+from scenario_gen.storage.writer import BagWriter
+from scenario_gen.template.size import refuse_too_large
+from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types.request import Request
+
+BATCH = "batch.json"
+TEMPLATES = 10  # of one task
+
+
+@dataclass(frozen=True)
+class PartTask:
+    """Templates (table, row) to place on a road, and where the three files go: `out`/…/road=`token`/part-`number`."""
+
+    name: str
+    templates: tuple[tuple[Path, int], ...]
+    road: str
+    token: str
+    number: int
+    out: Path
+    count: int
+    seed: int
+    config: PipelineConfig
+
+    def place(self, what: str, ending: str = ".parquet") -> Path:
+        """Return the path of one of the three."""
+        return self.out / what / f"road={self.token}" / f"part-{self.number:05}{ending}"
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What a batch came to: cases (template and road), scenarios, those refused by cause, and what went wrong."""
+
+    cases: int
+    scenarios: int
+    wanted: int
+    failures: dict[str, int]
+    refused: dict[str, int]
+    failed: list[str]
+
+    def lines(self) -> list[str]:
+        """Return the summary for people."""
+        said = [f"{self.scenarios} of {self.wanted} scenarios of {self.cases} cases (template and road)"]
+        said += [f"{count} cases without any: {why}" for why, count in sorted(self.failures.items(), key=lambda one: -one[1])]
+        said += [f"{count} candidates refused: {cause}" for cause, count in sorted(self.refused.items(), key=lambda one: -one[1])]
+        return said + self.failed
+
+
+def run_batch(
+    corpus: Path,
+    roads: Sequence[str],
+    out: Path,
+    config: PipelineConfig = PipelineConfig(),
+    *,
+    count: int = 50,
+    seed: int = 0,
+    templates: int = 0,
+    workers: int = 1,
+    scheduler: str = "",
+    told: Told = lambda *_: None,
+) -> Batch:
+    """Generate scenarios of all templates of a corpus on all roads.
+
+    Args:
+        corpus: that `mine` wrote.
+        roads: names or paths, as `build_road` takes them.
+        out: of the tables and bags; an unfinished batch of the same corpus, roads and parameters is gone on with.
+        config: of the pipeline.
+        count: scenarios of each template on each road.
+        seed: of all; each case has its own seed, which follows from this one, its template's name and its road.
+        templates: the first so many of the corpus; 0 takes all.
+        workers: processes; 0 takes one for each core.
+        scheduler: address of a Dask scheduler, instead.
+        told: how far it is.
+
+    Raises:
+        InputError: the corpus has no encounters, or `out` is of something else.
+    """
+    needs("corpus", "duckdb", "pyarrow")
+    tables = tables_of(corpus)
+    rows = [(table, k) for table in tables for k, _ in enumerate(rows_of([table], ["name"]))]
+    rows = rows[: templates or None]
+    document = {
+        "format": 1,
+        "corpus": [sha256_of(table) for table in tables],
+        "roads": list(roads),
+        "count": count,
+        "seed": seed,
+        "templates": len(rows),
+        "parameters": parameter_texts(config),
+    }
+    out.mkdir(parents=True, exist_ok=True)
+    with alone(out), spread(workers, scheduler, told) as go:
+        _agree(out, document)
+        sweep(out)
+        return summary(
+            out, go(make_part, [t for t in parts(rows, roads, out, config, count, seed) if not t.place("cases").exists()])
+        )
+
+
+def parts(
+    rows: Sequence[tuple[Path, int]], roads: Sequence[str], out: Path, config: PipelineConfig, count: int, seed: int
+) -> list[PartTask]:
+    """Return the tasks: ten templates on one road each, the same whoever does them."""
+    tokens = tokens_of(roads)
+    return [
+        PartTask(
+            f"part {k // TEMPLATES} on {token}",
+            tuple(rows[k : k + TEMPLATES]),
+            road,
+            token,
+            k // TEMPLATES,
+            out,
+            count,
+            seed,
+            config,
+        )
+        for k in range(0, len(rows), TEMPLATES)
+        for road, token in zip(roads, tokens, strict=True)
+    ]
+
+
+def tokens_of(roads: Sequence[str]) -> list[str]:
+    """Return a name for each road that a folder can bear, no two the same."""
+    stems = ["".join(c if c.isalnum() else "_" for c in Path(road).stem) for road in roads]
+    return [stem if stems.count(stem) == 1 else f"{stem}_{k}" for k, stem in enumerate(stems)]
+
+
+def seed_of(seed: int, template: str, road: str) -> int:
+    """Return a case's own seed, below 2^32: of all randomness of one template on one road."""
+    return int.from_bytes(sha256(f"{seed}\n{template}\n{road}".encode()).digest()[:4], "big")
+
+
+def _agree(out: Path, document: Mapping[str, Any]) -> None:
+    """Write down what the batch is of; or see that it is of the same.
+
+    Raises:
+        InputError: it is of something else.
+    """
+    place = out / BATCH
+    if place.exists():
+        before = json.loads(place.read_text(encoding="utf-8"))
+        other = [key for key in document if before.get(key) != document[key]]
+        if other:
+            raise InputError(f"{out} is a batch of other {', '.join(other)}; name another folder, or remove this one")
+        return
+    if any(not path.name.startswith(".") for path in out.iterdir()):
+        raise InputError(f"{out} is not empty and no batch; name another folder")
+    with arriving(place) as part:
+        write_text(part, json.dumps(document, indent=1) + "\n")
+
+
+def make_part(task: PartTask) -> None:
+    """Generate a part's scenarios and write its bag and its two tables; done if the table of cases is there.
+
+    Raises:
+        OSError: the disk is full, or fails.
+    """
+    if task.place("cases").exists():
+        return
+    cases, made = [], dict[str, GenerationResult]()
+    for k, (table, row) in enumerate(task.templates):
+        case, result = _case(_row(table, row), f"/case_{k}", task)
+        cases.append(case)
+        if result is not None and len(result.generated.scenarios):
+            made[f"/case_{k}"] = result
+    scenarios = [row for name, result in made.items() for row in _scenario_rows(name, result, cases, task)]
+    if made:
+        with arriving(task.place("bags", "")) as part, BagWriter(part) as bag:
+            add_results(bag, made)
+    _write(task.place("scenarios"), scenarios, SCENARIO_COLUMNS)
+    _write(task.place("cases"), cases, CASE_COLUMNS)
+
+
+def _row(table: Path, row: int) -> dict[str, Any]:
+    """One row of a table of encounters."""
+    from pyarrow import parquet
+
+    found: dict[str, Any] = parquet.read_table(table).slice(row, 1).to_pylist()[0]
+    return found
+
+
+def _case(row: Mapping[str, Any], namespace: str, task: PartTask) -> tuple[dict[str, Any], GenerationResult | None]:
+    """Generate one template's scenarios; a refusal is a case without any, with the reason."""
+    seed = seed_of(task.seed, row["name"], task.road)
+    case = {
+        "template": row["name"], "kind": row["kind"], "vehicles": row["count"], "namespace": namespace, "seed": seed,
+        "wanted": task.count, "published": 0, "candidates": 0, "refused": "{}", "cause": "", "why": "", "part": task.number,
+        "changepoints": 0,
+    }  # fmt: skip
+    try:
+        encounter = encounter_of(row)
+        refuse_too_large(encounter)
+        road = build_road(task.road, encounter, task.config.road)
+        segmentation = segment(encounter, task.config.segmentation, seed)
+        made = attempt(encounter, segmentation, road, task.config, Request(), count=task.count, seed=seed)
+    except (RefusedError, InputError) as error:
+        cause = str(error).partition(":")[0] if isinstance(error, RefusedError) else "input"
+        return case | {"cause": _cause(cause), "why": str(error)}, None
+    generated = made.generated
+    facts = {"template": row["name"], "roads": task.road, "seed": str(seed), "count": str(task.count)}
+    provenance = facts | versions() | parameter_texts(task.config)
+    found = case | {
+        "published": len(generated.scenarios),
+        "candidates": generated.candidates,
+        "refused": json.dumps({str(cause): number for cause, number in sorted(generated.refused.items()) if number}),
+        "changepoints": len(segmentation.changepoints),
+        "cause": "" if len(generated.scenarios) else "no valid candidate",
+    }
+    return found, GenerationResult(encounter, segmentation, road, made.fit, made.routes, generated, seed, provenance=provenance)
+
+
+def _cause(text: str) -> str:
+    """A reason without the numbers and names that make each its own."""
+    return " ".join(word for word in text.split() if not any(c.isdigit() for c in word))[:80]
+
+
+def _scenario_rows(
+    namespace: str, made: GenerationResult, cases: Sequence[Mapping[str, Any]], task: PartTask
+) -> list[dict[str, Any]]:
+    """A row for each scenario of a case."""
+    case = next(one for one in cases if one["namespace"] == namespace)
+    rows = []
+    for scenario in made.generated.scenarios:
+        motion = at_period(scenario, task.config.evaluation.period)
+        found = criticality(motion, task.config.evaluation.ttc_horizon)
+        rows.append({
+            "template": case["template"], "kind": case["kind"], "vehicles": case["vehicles"], "namespace": namespace,
+            "part": task.number, "index": scenario.index, "seed": scenario.seed,
+            "sha256": scenario_bytes(scenario, made.encounter)[1], "seconds": float(scenario.time[-1]),
+            "distance": found.min_distance, "ttc": found.min_ttc, "pet": found.pet,
+            "speed": float(scenario.speed.max()), "braking": float(-scenario.acceleration.min()),
+        })  # fmt: skip
+    return rows
+
+
+SCENARIO_COLUMNS = {
+    **dict.fromkeys(("template", "kind", "namespace", "sha256"), "string"),
+    **dict.fromkeys(("vehicles", "part", "index", "seed"), "int64"),
+    **dict.fromkeys(("seconds", "distance", "ttc", "pet", "speed", "braking"), "double"),
+}
+CASE_COLUMNS = {
+    **dict.fromkeys(("template", "kind", "namespace", "refused", "cause", "why"), "string"),
+    **dict.fromkeys(("vehicles", "seed", "wanted", "published", "candidates", "part", "changepoints"), "int64"),
+}
+
+
+def _write(target: Path, rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> None:
+    """Write a table, whole or not at all; NaN becomes null."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    kinds = {"string": pa.string(), "int64": pa.int64(), "double": pa.float64()}
+    schema = pa.schema([(name, kinds[kind]) for name, kind in columns.items()])
+    clean = [{name: None if row[name] != row[name] else row[name] for name in columns} for row in rows]
+    with arriving(target) as part:
+        parquet.write_table(pa.Table.from_pylist(clean, schema=schema), part, compression="zstd")
+
+
+def summary(out: Path, failed: list[str]) -> Batch:
+    """Return what is there, by listing it."""
+    cases = list(rows_of(sorted((out / "cases").rglob("*.parquet"))))
+    refused: Counter[str] = Counter()
+    for case in cases:
+        refused.update(json.loads(case["refused"]))
+    return Batch(
+        cases=len(cases),
+        scenarios=sum(int(case["published"]) for case in cases),
+        wanted=sum(int(case["wanted"]) for case in cases),
+        failures=dict(Counter(case["cause"] for case in cases if not case["published"])),
+        refused=dict(refused),
+        failed=failed,
+    )

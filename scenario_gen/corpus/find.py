@@ -1,0 +1,138 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`find`: the scenarios of a batch as a database: a condition in SQL; what it finds as a bag, as a page, or made again."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from scenario_gen.corpus.messages import database
+from scenario_gen.errors import InputError, ScenarioGenError
+from scenario_gen.folders import replaced_folder
+from scenario_gen.recordings.write import add_message
+from scenario_gen.results import EVALUATED, write_evaluation
+from scenario_gen.review.evaluation import bag_results
+from scenario_gen.review.regenerate import regenerate_scenario, Regenerated
+from scenario_gen.storage.config import BagConfig
+from scenario_gen.storage.writer import atomic_bag
+
+MEMORY = 500  # MiB
+COLUMNS = ("template", "kind", "road", "vehicles", "index", "seconds", "distance", "ttc", "pet", "speed", "braking")
+PET = (0.0, 1.0, 2.0, 4.0)  # s: bounds of the classes of the table of coverage
+CLASSES = "CASE WHEN pet IS NULL THEN 'none' " + " ".join(f"WHEN pet < {b:g} THEN '< {b:g} s'" for b in PET) + " ELSE 'more' END"
+
+
+@dataclass(frozen=True)
+class Hits:
+    """The rows found, and the coverage of the whole batch: kind, road and class of PET -> scenarios."""
+
+    rows: list[dict[str, Any]]
+    coverage: list[tuple[str, str, str, int]]
+
+
+def find(batch: Path, condition: str = "true", limit: int = 0) -> Hits:
+    """Return the scenarios of a batch for which a condition holds, the most critical first.
+
+    Args:
+        batch: that `run_batch` wrote, finished or not.
+        condition: SQL over the columns template, kind, road, vehicles, index, seed, seconds [s], distance [m], ttc [s],
+            pet [s], speed [m/s], braking [m/s²], sha256.
+        limit: at most so many; 0: all.
+
+    Raises:
+        InputError: there is no batch, or the condition is none.
+    """
+    tables = [str(path) for path in sorted((batch / "scenarios").rglob("*.parquet")) if _done(batch, path)]
+    if not tables:
+        raise InputError(f"{batch} holds no scenarios; write them with `scenario-gen batch DIR --roads … --out {batch}`")
+    columns = f"the columns are {', '.join(COLUMNS)}, seed, sha256"
+    with database(batch, MEMORY, f"condition {condition!r}", columns) as base:
+        base.execute(
+            f"CREATE TABLE scenarios AS SELECT * FROM read_parquet({tables!r}, hive_partitioning=true, hive_types_autocast=false)"
+        )
+        base.execute("SET enable_external_access = false")  # a condition reads no files
+        order = "ORDER BY pet NULLS LAST, ttc, template, road, index" + (f" LIMIT {limit}" if limit else "")
+        found = base.execute(f"SELECT * FROM scenarios WHERE ({condition}) {order}")
+        names = [column[0] for column in found.description]
+        rows = [dict(zip(names, row, strict=True)) for row in found.fetchall()]
+        coverage = base.execute(
+            f"SELECT kind, road, {CLASSES} AS pet, count(*) FROM scenarios GROUP BY ALL ORDER BY ALL"
+        ).fetchall()
+    return Hits(rows, coverage)
+
+
+def _done(batch: Path, table: Path) -> bool:
+    """Whether the part of a table of scenarios is done: its table of cases is there."""
+    return (batch / "cases" / table.relative_to(batch / "scenarios")).exists()
+
+
+def coverage_lines(hits: Hits, batch: Path) -> list[str]:
+    """Return the coverage for people: of each kind on each road the scenarios by class of PET, and what is empty."""
+    classes = [*(f"< {bound:g} s" for bound in PET), "more", "none"]
+    kinds, roads = (
+        sorted({one[0] for one in hits.coverage}),
+        sorted({path.name.partition("=")[2] for path in (batch / "cases").iterdir()}),
+    )
+    cells = {(kind, road, pet): count for kind, road, pet, count in hits.coverage}
+    said = [f"coverage: {len(cells)} of {len(kinds) * len(roads) * len(classes)} cells of kind × road × PET hold a scenario"]
+    for kind in kinds:
+        for road in roads:
+            counts = ", ".join(f"{pet}: {cells.get((kind, road, pet), 0)}" for pet in classes)
+            said.append(f"  {kind} on {road}: PET {counts}")
+    return said
+
+
+def bag_of(batch: Path, row: Mapping[str, Any]) -> Path:
+    """Return the bag in which a row's scenario is."""
+    return batch / "bags" / f"road={row['road']}" / f"part-{row['part']:05}"
+
+
+def make_again(batch: Path, row: Mapping[str, Any]) -> Regenerated:
+    """Make a scenario again, alone, from its template, road, parameters and seed; it has the SHA-256 of the table.
+
+    Raises:
+        ScenarioGenError: it comes out differently; the message names what differs.
+    """
+    made = regenerate_scenario(bag_of(batch, row), row["index"], namespace=row["namespace"])
+    if made.sha256 != row["sha256"]:
+        raise ScenarioGenError(f"{bag_of(batch, row)}: scenario {row['index']} of {row['namespace']} is not that of the table")
+    return made
+
+
+def export_hits(batch: Path, rows: Sequence[Mapping[str, Any]], folder: Path) -> Path:
+    """Write the scenarios of rows to a bag, each made again, with its template and road, in a namespace; return its folder.
+
+    Raises:
+        InputError: there is no row, a bag is missing or damaged, or `folder` is something else.
+    """
+    if not rows:
+        raise InputError("there is no scenario to export; ask for less with the condition")
+    with atomic_bag(folder) as bag:
+        for k, row in enumerate(rows):
+            for message in make_again(batch, row).messages:
+                own = message.topic.removeprefix(row["namespace"])
+                add_message(bag, f"/hit_{k + 1}{own}", message.data, message.stamp_ns)
+    return folder
+
+
+def write_page(bag: Path, folder: Path) -> None:
+    """Write the report of a bag of hits.
+
+    Raises:
+        InputError: the bag is damaged, or the folder may not be replaced.
+    """
+    with replaced_folder(folder, EVALUATED, [bag]) as place:
+        write_evaluation(place, bag_results(bag), bag, BagConfig())

@@ -1,0 +1,158 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A planner that is a ROS 2 node of its own, driven through many scenarios over DDS in lock-step: `scenario-gen drive --ros`.
+
+The node `traffic` runs in this process, and steps when the planner has answered: any node does that answers each odometry with
+one command. The planner is started as a command, in a ROS domain in which nobody else is.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+import os
+import shlex
+import subprocess
+import tempfile
+import time
+from typing import Any
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.trials import Outcome, Trial
+from scenario_gen.errors import InputError
+from scenario_gen.nodes.domain import free_domain, this_host_only
+from scenario_gen.nodes.traffic import Config, Traffic
+
+Progress = Callable[[int, int], None]
+START = 60.0  # seconds that a planner's node may take until it publishes commands
+SETTLE = 1.0  # seconds from its first publisher until it has found the topics that it hears
+LAST = 1.0  # seconds in which an answer to a drive's last state is waited for, that it is not taken for the next drive's first
+LINES = 8  # of what the planner wrote last, that an error shows
+
+
+class TrafficOfTrials(Traffic):
+    """Drives trials one after the other, each step when the planner has answered the one before."""
+
+    def __init__(self, trials: Sequence[Trial], config: ClosedLoopConfig, progress: Progress) -> None:
+        super().__init__(config=Config(lock_step=True, follow_on=False, drive=config))
+        self._trials, self._progress = list(trials), progress
+
+    @property
+    def outcomes(self) -> list[Outcome]:
+        """What the trials came to, so far."""
+        return self._outcomes
+
+    def steered(self) -> bool:
+        """Whether somebody publishes commands."""
+        return bool(self._commanding())
+
+    async def drive_all(self) -> None:
+        """Drive all trials."""
+        for number in range(len(self._trials)):
+            self._load(number)
+            loop = self._loop
+            while loop is not None and not self._verdict:
+                await self._step_once(loop)
+            self._progress(number + 1, len(self._trials))
+            await self._answered(self._states[-1], LAST)
+
+
+def drive_over_dds(trials: Sequence[Trial], command: str, config: ClosedLoopConfig, progress: Progress) -> list[Outcome]:
+    """Drive the node that a command starts through every trial; results are in the order of the trials.
+
+    Args:
+        trials: what is driven.
+        command: starts the planner's node, e.g. `ros2 run my_package my_planner`; words are parted as by a shell.
+        config: the parameters of a drive.
+        progress: told how many are done, and how many there are.
+
+    Raises:
+        InputError: the command cannot be run, its node publishes no command, or ends before the drives do.
+        RefusedError: no ROS domain is free.
+    """
+    words = shlex.split(command)
+    if not words:
+        raise InputError("--planner is empty; with --ros it is a command that starts the planner's node")
+    with free_domain() as domain, _environment(domain), tempfile.TemporaryFile() as said:
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            process = subprocess.Popen(words, stdout=said, stderr=subprocess.STDOUT, start_new_session=True)
+        except OSError as error:
+            rclpy.try_shutdown()
+            raise InputError(f"--planner {command}: {error}") from error
+        try:
+            return _driven(trials, command, config, progress, process, said)
+        finally:
+            process.terminate()
+            try:
+                process.wait(10.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+            rclpy.try_shutdown()
+
+
+@contextmanager
+def _environment(domain: int) -> Iterator[None]:
+    """Set what puts this process and its children in a ROS domain on this host."""
+    own = {**this_host_only(), "ROS_DOMAIN_ID": str(domain)}
+    before = {name: os.environ.get(name) for name in own}
+    os.environ.update(own)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _driven(
+    trials: Sequence[Trial], command: str, config: ClosedLoopConfig, progress: Progress, process: Any, said: Any
+) -> list[Outcome]:
+    def check() -> None:
+        if process.poll() is not None:
+            said.seek(0)
+            lines = said.read().decode(errors="replace").splitlines()[-LINES:]
+            raise InputError(f"--planner {command}: it ended with code {process.returncode}; it said: {' | '.join(lines)}")
+
+    node, executor = TrafficOfTrials(trials, config, progress), SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        until = time.monotonic() + START
+        while not node.steered():
+            check()
+            if time.monotonic() > until:
+                raise InputError(
+                    f"--planner {command}: no command from it in {START:.0f} s; it must publish one of ego/cmd_vel, "
+                    "ego/cmd_vel_stamped, ego/trajectory, ego/path, ego/odom (docs/closed_loop.md)"
+                )
+            executor.spin_once(timeout_sec=0.05)
+        until = time.monotonic() + SETTLE
+        while time.monotonic() < until:
+            executor.spin_once(timeout_sec=0.05)
+        task = executor.create_task(node.drive_all)
+        while not task.done():
+            executor.spin_until_future_complete(task, timeout_sec=1.0)
+            if not task.done():
+                check()
+        task.result()
+        return node.outcomes
+    finally:
+        node.destroy_node()
+        executor.shutdown(timeout_sec=1.0)

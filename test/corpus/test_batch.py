@@ -1,0 +1,112 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Batches: the same bytes by whomever, found again by what they are, made again alone; a killed run loses and doubles nothing."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from refusing import refuse
+
+from scenario_gen.corpus.batch import run_batch, seed_of, tokens_of
+from scenario_gen.corpus.encounters import rows_of
+from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
+from scenario_gen.corpus.tasks import spread
+from scenario_gen.errors import InputError, ScenarioGenError
+from scenario_gen.folders import sha256_of
+from scenario_gen.recordings.read import read_recording
+
+pytestmark = pytest.mark.xdist_group("corpus")
+ROADS = ("corridor", "straight")
+
+
+def digests(out):
+    return {path.relative_to(out): sha256_of(path) for path in out.rglob("*") if path.suffix in (".parquet", ".mcap", ".yaml")}
+
+
+@pytest.fixture(scope="module")
+def batch(corpus, tmp_path_factory):
+    out = tmp_path_factory.mktemp("batch") / "out"
+    return out, run_batch(corpus[0], ROADS, out, count=3, seed=5, templates=4)
+
+
+def test_every_case_is_accounted_for(batch):
+    out, made = batch
+    cases = list(rows_of(sorted((out / "cases").rglob("*.parquet"))))
+    assert made.cases == len(cases) == 8 and made.wanted == 24 and not made.failed
+    assert sum(case["published"] for case in cases) == made.scenarios == len(find(out).rows) > 10
+    assert all(case["cause"] and (case["why"] or case["candidates"]) for case in cases if not case["published"])
+    assert len({case["seed"] for case in cases}) == 8
+
+
+def test_scenarios_are_found_by_what_they_are_and_made_again_alone(batch, tmp_path):
+    out, made = batch
+    found = find(out, "road = 'corridor' and speed > 1", 2)
+    assert len(found.rows) == 2 and found.rows[0]["road"] == "corridor"
+    for row in found.rows:
+        assert make_again(out, row).sha256 == row["sha256"]
+    namespaces = read_recording(export_hits(out, found.rows, tmp_path / "hits")).namespaces
+    assert [one.hashes for one in namespaces.values()] == [(row["sha256"],) for row in found.rows]
+    assert sum(count for *_, count in found.coverage) == made.scenarios and "coverage" in coverage_lines(found, out)[0]
+    with pytest.raises(ScenarioGenError, match="is not that of the table"):
+        make_again(out, found.rows[0] | {"sha256": "0"})
+    with pytest.raises(InputError, match="the columns are"):
+        find(out, "colour = 'red'")
+    with pytest.raises(InputError, match="no scenario to export"):
+        export_hits(out, [], tmp_path / "none")
+    with pytest.raises(InputError, match="disabled by configuration"):
+        find(out, "sha256 in (select content from read_text('/etc/hostname'))")
+
+
+def test_a_batch_is_gone_on_with_but_not_as_another_one(batch, corpus):
+    out, _ = batch
+    before = digests(out)
+    (out / "cases" / "road=straight" / "part-00000.parquet").unlink()  # as if killed before its last file
+    assert not find(out, "road = 'straight'").rows
+    run_batch(corpus[0], ROADS, out, count=3, seed=5, templates=4)
+    assert digests(out) == before
+    with pytest.raises(InputError, match="other count"):
+        run_batch(corpus[0], ROADS, out, count=4, seed=5, templates=4)
+
+
+@pytest.mark.long
+def test_a_killed_run_with_two_processes_ends_with_the_same_bytes(batch, corpus, tmp_path):
+    """The run is killed with its workers as soon as its first file is there, and then done by Dask to the end."""
+    out = tmp_path / "again"
+    words = [sys.executable, "-m", "scenario_gen", "batch", str(corpus[0]), "--out", str(out), "--count", "3", "--seed", "5"]
+    words += ["--templates", "4", "--roads", ",".join(ROADS), "--workers", "2"]
+    with subprocess.Popen(words, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
+        while run.poll() is None and not list(out.rglob("*.mcap")):
+            time.sleep(0.01)
+        assert run.poll() is None, "it ended before it could be killed"
+        os.killpg(run.pid, signal.SIGKILL)
+    made = run_batch(corpus[0], ROADS, out, count=3, seed=5, templates=4, workers=2)
+    assert digests(out) == digests(batch[0]) and made.lines() == batch[1].lines()
+
+
+def test_names_and_seeds():
+    assert tokens_of(["a/map.osm", "b/map.osm", "straight"]) == ["map_0", "map_1", "straight"]
+    assert seed_of(1, "a", "b") != seed_of(1, "a", "c") != seed_of(2, "a", "c")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_task_that_is_refused_does_not_end_the_others(workers):
+    told = []
+    with spread(workers, "", lambda *how: told.append(how)) as go:
+        assert go(refuse, ["a", "b", "c"]) == ["b: b is none"]
+    assert [done for done, *_ in told] == [1, 2, 3]
