@@ -114,7 +114,7 @@ def _round_trip(folder: Path, bags: Sequence[Path], target: str) -> list[Row]:
     ]
 
 
-def _judged(environment: str, program: str, *arguments: str) -> Any:
+def judged(environment: str, program: str, *arguments: str) -> Any:
     """Return what a judge says; None if its environment is not here."""
     python = ROOT / f".venv-judges-{environment}" / "bin" / "python"
     if not python.is_file():
@@ -127,7 +127,7 @@ def _judged(environment: str, program: str, *arguments: str) -> Any:
 
 
 def _commonroad(folder: Path) -> list[Row]:
-    found = _judged("commonroad", "commonroad_files.py", "check", str(folder))
+    found = judged("commonroad", "commonroad_files.py", "check", str(folder))
     if found is None:
         return []
     peer = f"commonroad-io 2024.3, drivability checker 2025.4.0: {found['files']} files"
@@ -141,7 +141,7 @@ def _commonroad(folder: Path) -> list[Row]:
 
 
 def _asam(folder: Path) -> list[Row]:
-    found = _judged("asam", "asam_files.py", str(folder))
+    found = judged("asam", "asam_files.py", str(folder))
     if found is None:
         return []
     rows = []
@@ -176,7 +176,7 @@ def _drives(one: Exported) -> bool:
 
 
 def _driven(folder: Path, problems: int) -> list[Row]:
-    found = _judged("commonroad", "commonroad_files.py", "drive", str(folder)) if problems else None
+    found = judged("commonroad", "commonroad_files.py", "drive", str(folder)) if problems else None
     if found is None:
         return []
     peer = f"commonroad-reactive-planner 2025.1: {found['reached']} of {found['problems']} problems"
