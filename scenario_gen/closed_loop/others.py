@@ -38,6 +38,7 @@ SLOW = 0.2  # m/s, certified speed below which a clock runs or stands, for there
 STAND = 0.02  # m/s, certified speed of a stand, which passes whatever there is
 NEARER = 0.1  # metres by which a gap must be smaller than the certified one to be minded
 LATE = 0.05  # seconds by which the ego's clock is uncertain
+HARDER = 1.0  # m/s² by which an ego on its witness' path must brake harder than that one to be foreseen to go on so
 ENTRY = 3.0  # metres ahead of and behind its place that the ego must leave free for one who comes onto the scene
 PARTS = 4  # of a step, in each of which the order is proven
 
@@ -220,21 +221,30 @@ def react(  # noqa: PLR0912, PLR0915 - one loop after the other
 def _foresee_ego(h: float, time: Floats, motion: Floats, half: Floats, body: Floats, witness: Floats, out: Floats) -> None:
     """Fill `out` (M, 7) with the ego's boxes at the end of this step and of the following ones.
 
-    On its witness' path it goes on as the witness did, at its own rate; else straight on, and braking if it brakes.
+    On its witness' path it goes on as the witness did, at its own rate; else straight on. If it brakes, on that path harder than
+    the witness, it goes on braking.
     """
     pose = np.empty(5)
     c, s = np.empty(7), body[3]
     fill_box(body[0], body[1], body[2], half[0], half[1], c)
-    way = 0.0
-    for m in range(out.shape[0]):
-        if m == 0:
-            out[m] = c
-        elif witness[2] > 0.0:
-            pose_at(time, motion, witness[0] + witness[1] * m * h, pose)
+    usual = 0.0  # the witness' own braking there, in the step that is over and after it
+    for back in range(3):
+        pose_at(time, motion, witness[0] - (1.0 - 0.5 * back) * h * witness[1], pose)
+        usual = min(usual, pose[4])
+    on_path = witness[2] > 0.0
+    keeps = on_path and body[5] > witness[1] * witness[1] * usual - HARDER
+    braking, way, clock = max(-body[5], 0.0), 0.0, witness[0]
+    out[0] = c
+    for m in range(1, out.shape[0]):
+        after = max(s - braking * h, 0.0)
+        moved = 0.5 * (s + after) * h if after > 0.0 or braking == 0.0 else 0.5 * s * s / braking
+        s = after
+        if on_path:
+            clock += witness[1] * h if keeps else min(moved / max(pose[3], SLOW), h)
+            pose_at(time, motion, clock, pose)
             fill_box(pose[0], pose[1], pose[2], half[0], half[1], out[m])
         else:
-            way += s * h
-            s = max(s + min(body[5], 0.0) * h, 0.0)
+            way += moved
             out[m] = c
             out[m, 0], out[m, 1] = body[0] + way * c[2], body[1] + way * c[3]
 

@@ -25,7 +25,7 @@ from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.placement import Placement
 from scenario_gen.roads.arms import arms_of, unused_arms
 from scenario_gen.template.interaction import Conflict, find_conflicts
-from scenario_gen.template.manoeuvre import in_words, keeps, turn_of
+from scenario_gen.template.manoeuvre import in_words, keeps, turn_of, turns_to_keep
 from scenario_gen.template.tracks import Track
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Loss
@@ -45,11 +45,12 @@ def refuse_lost_turns(tracks: tuple[Track, ...], placed: tuple[Track, ...], road
         RefusedError: one turns more than 25° differently, or otherwise; with both figures.
     """
     for track, other in zip(tracks, placed, strict=True):
-        template, there = turn_of(track), turn_of(other)
-        if not keeps(template, there):
-            raise RefusedError(
-                f"vehicle {track.vehicle.id} {in_words(template)} in the template, and would on road {road} {_otherwise(there)}"
-            )
+        there, name = turn_of(other), track.vehicle.id
+        for turn in turns_to_keep(track):
+            if not keeps(turn, there):
+                raise RefusedError(
+                    f"vehicle {name} {in_words(turn)} in the template, and would on road {road} {_otherwise(there)}"
+                )
 
 
 def _otherwise(turn: float) -> str:
@@ -96,11 +97,16 @@ def find_losses(encounter: Encounter, tracks: tuple[Track, ...], placement: Plac
     poses = np.stack([track.poses for track in placement.tracks])
     turns = [
         Loss("turn", (track.vehicle.id,), f"vehicle {track.vehicle.id} {in_words(a)} in the template, {in_words(b)} on this road")
-        for track, a, b in ((t, turn_of(t), turn_of(p)) for t, p in zip(tracks, placement.tracks, strict=True))
+        for track, a, b in ((t, _recorded(t), turn_of(p)) for t, p in zip(tracks, placement.tracks, strict=True))
         if not keeps(a, b)
     ]
     own = np.concatenate((encounter.position, encounter.heading[..., None]), axis=-1)
     return (*turns, *_lost_conflicts(encounter, poses), *_lost_neighbours(encounter, own, poses))
+
+
+def _recorded(track: Track) -> float:
+    """How far [rad] a vehicle was recorded to turn, by its heading; by its path where that is not known."""
+    return turn_of(track) if np.isnan(track.recorded_turn) else track.recorded_turn
 
 
 def _lost_conflicts(encounter: Encounter, poses: Floats) -> list[Loss]:

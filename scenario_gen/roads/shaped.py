@@ -208,7 +208,7 @@ class _End:
         at: (2,) where the steady part of the path begins, seen from the junction.
         away: metres from the centre to the path's end, along `yaw`; negative if it is not reached.
         steady: metres near the end on which the path hardly turns.
-        turning: how it goes on turning, seen along `yaw`: the sign of what an arm may differ.
+        turning: how it goes on turning, seen along `yaw`: the sign of what an arm may differ; 0 for one that goes straight on.
     """
 
     vehicle: int
@@ -332,6 +332,7 @@ def _ends(i: int, track: Track, centre: Floats) -> list[_End]:
     poses = track.curve.at(s)
     found = []
     turn = turn_of(track)
+    goes_on = 0.0 if abs(turn) < _THROUGH else float(np.sign(turn))
     for inward in (True, False):
         along = poses if inward else poses[::-1]
         steady = np.flatnonzero(np.abs(along[:, 2] - along[0, 2]) > _STEADY)
@@ -342,7 +343,7 @@ def _ends(i: int, track: Track, centre: Floats) -> list[_End]:
         out = np.array([exact.cos(yaw), exact.sin(yaw)])
         away = float(((along[0, :2] - centre) * out).sum())
         at = along[nearest if abs(turn) < _THROUGH else last, :2]
-        found.append(_End(i, inward, yaw, at, away, last * 0.5, float(np.sign(turn)) * (-1.0 if inward else 1.0)))
+        found.append(_End(i, inward, yaw, at, away, last * 0.5, goes_on * (-1.0 if inward else 1.0)))
     if track.still:
         return [max(found, key=lambda end: end.away)]  # it stands on the arm on which it is
     return found

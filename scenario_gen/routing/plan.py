@@ -28,6 +28,7 @@ from scenario_gen.roads.clearance import clearance_field, footprint_fits, neares
 from scenario_gen.roads.vector.ground import own_ground
 from scenario_gen.routing.config import PlanningConfig
 from scenario_gen.routing.connections import candidates, direct
+from scenario_gen.routing.distance import farthest
 from scenario_gen.routing.search.planner import (  # fmt: skip
     BlockedError,
     Budget,
@@ -57,7 +58,8 @@ AGAINST = 3.0  # times as dear as the other way it is to leave a leg's direct li
 HALF_LANE = 1.75  # [m] that far towards it is one's own side
 LACK = 1.0  # price of a metre without the room wished for, beside the metre itself
 ROOMY = 0.05  # [m] more on every side than a footprint needs
-TIGHTEST = 0.97  # share of the largest curvature that a search may use: smoothing needs some
+TIGHTEST = (0.97, 0.9, 0.8)  # shares of the largest curvature that a search may use, one after another: smoothing needs some
+OWN_SHARE = 0.1  # of the iterations, in which a way is looked for that stays on its own side: there is one at once, or none
 EASE, FARTHEST = 0.15, 1.0  # [m] room around a waypoint that is eased, and how far it may be moved
 PATIENCE = 20  # times the iterations in which a search goes on for a first path
 SLACK = 1.5  # how much more curvature than allowed a waypoint may ask for before it is softened
@@ -73,6 +75,7 @@ class _Task:
     config: PlanningConfig
     planner: Planner
     seed: int
+    tightest: float = TIGHTEST[0]
 
     @property
     def anchors(self) -> Floats:
@@ -132,26 +135,6 @@ def deviations(route: Route, fitted: FittedVehicle) -> Floats:
     return np.asarray(exact.hypot(*(route.points[route.anchor, :2] - fitted.anchors[:, :2]).T))
 
 
-def farthest(points: Floats, path: Floats) -> float:
-    """Largest distance [m] between two polylines (M, 2 or more), from a point of either to the other; NaN: there is no path."""
-    if not len(path):
-        return float("nan")
-    one, other = points[:, :2], path[:, :2]
-    return max(float(_from_line(one, other).max()), float(_from_line(other, one).max()))
-
-
-def _from_line(points: Floats, line: Floats) -> Floats:
-    """Distance (M,) of points (M, 2) to a polyline (P, 2)."""
-    if len(line) == 1:
-        return np.asarray(exact.hypot(*(points - line[0]).T))
-    edge = np.diff(line, axis=0)
-    square = np.maximum(np.square(edge).sum(axis=1), 1e-12)
-    rel = points[:, None] - line[None, :-1]
-    along = np.clip((rel * edge).sum(axis=-1) / square, 0.0, 1.0)
-    off = rel - along[..., None] * edge
-    return np.asarray(np.sqrt(np.square(off).sum(axis=-1)).min(axis=1))
-
-
 def make_planner(config: PlanningConfig) -> Planner:
     """The geometric planner that `config` names."""
     if config.planner == "rrt_star_connect":
@@ -174,6 +157,32 @@ def _route(task: _Task) -> Route:
     waypoints = _waypoints(anchors, task.fitted.stands, task.config.max_curvature)
     if not task.config.drivable:
         return _polyline(task, waypoints)
+    failed: RefusedError | None = None
+    for share in TIGHTEST:
+        try:
+            found = _smoothed(replace(task, tightest=share), waypoints)
+        except RefusedError as error:  # none is found as gentle as that
+            raise failed or error from None
+        if isinstance(found, Route):
+            return found
+        failed = failed or found.reason
+        if not found.searched:
+            break
+    assert failed is not None
+    raise failed
+
+
+@dataclass(frozen=True, eq=False)
+class _Rough:
+    """A way was found, and no drivable curve along it: why, and whether it was searched for (another search may find another)."""
+
+    reason: RefusedError
+    searched: bool
+
+
+def _smoothed(task: _Task, waypoints: list[int]) -> Route | _Rough:
+    """The route through waypoints (indices of anchors), or what stands against it."""
+    anchors = task.anchors
     legs, waypoints, left_out = _legs(task, waypoints)
     weights = _weights(anchors, waypoints)
     targets = Targets(anchors[weights > 0.0, :2], weights[weights > 0.0])
@@ -188,7 +197,7 @@ def _route(task: _Task) -> Route:
             far = farthest(route.points, task.fitted.path)
             return replace(route, joined=len(legs) - searched, searched=searched, left_out=left_out, farthest=far)
     assert curve is not None
-    raise RefusedError(_reason(task, curve))
+    return _Rough(RefusedError(_reason(task, curve)), searched > 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,16 +315,19 @@ def _searched_poses(task: _Task, a: int, b: int, start: Floats, end: Floats, pat
     free = Wishes(config.margin, LACK, guide, *_sides(config, config.keep_side * AGAINST, config.keep_side))
     most_left, most_right = _sides(config, HALF_LANE, np.inf)
     own = replace(free, about=_own_side(guide, config), most_left=most_left, most_right=most_right)
-    attempts = [(own, ROOMY), (free, ROOMY), (free, 0.0)] if config.keep_side > 0.0 else [(free, ROOMY), (free, 0.0)]
+    few = max(int(OWN_SHARE * config.iterations), 1)
+    attempts = [(free, ROOMY, config.iterations), (free, 0.0, config.iterations)]
+    if config.keep_side > 0.0:
+        attempts.insert(0, (own, ROOMY, few))
     planner = PoseRrtStarConnect(config.pose)
     where = f"between {task.name(a)} and {task.name(b)}"
-    limit = TIGHTEST * config.max_curvature
+    limit = task.tightest * config.max_curvature
     error: RefusedError | None = None
-    for wishes, extra in attempts:
+    for wishes, extra, iterations in attempts:
         query = PoseQuery(start, end, vehicle.length + 2.0 * extra, vehicle.width + 2.0 * extra, limit)
         try:
             try:
-                return planner.plan(task.road, query, Budget(config.iterations), task.seed + a, wishes).poses
+                return planner.plan(task.road, query, Budget(iterations), task.seed + a, wishes).poses
             except BudgetSpentError:
                 if extra or patience == 1:
                     raise

@@ -51,6 +51,15 @@ def keeps(template: float, road: float) -> bool:
     return change <= _DOUBT or (change <= MOST_CHANGE and manoeuvre_of(template) == manoeuvre_of(road))
 
 
+def turns_to_keep(track: Track) -> list[float]:
+    """How far [rad] a template's track turns: by its path, and by its recorded heading unless that contradicts the path.
+
+    A path is smoothed, and turns less at its ends than the vehicle did.
+    """
+    own, recorded = turn_of(track), track.recorded_turn
+    return [own, recorded] if keeps(recorded, own) else [own]
+
+
 def sharpness_of(track: Track) -> float:
     """The curvature [1/m] of a track's sharpest bend, over 8 m of path; within what cars drive."""
     bend = abs(track.turning(_WINDOW)) / min(_WINDOW, max(track.curve.length, 1.0))

@@ -16,8 +16,9 @@
 
 Positions carry noise (GPS staircases of a metre, kinks of a video tracker), speeds far less of it. So the position is
 smoothed as a function of the distance u = ∫ v dt that the speed claims: a penalised spline f(u) that minimises
-∫ |f(u) − p|² du + λ ∫ |f''|² du (Eilers & Marx 1996). The least λ is taken at which the path can be driven, or the one
-that weighs a path hard to drive least badly against one far from the record. Standing
+∫ |f(u) − p|² du + λ ∫ |f''|² du (Eilers & Marx 1996). The least λ is taken at which the lateral acceleration can be
+driven, or the one that weighs that least badly against a path far from the record; bends that are too sharp are then eased,
+and turn as far as before. Standing
 phases collapse to a point, time enters only through u(t), and no sample turns back.
 """
 
@@ -34,10 +35,9 @@ from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
 from scenario_gen.types.presence import ALWAYS
 
 _WAVELENGTHS = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)  # metres at which the filter halves an oscillation
-_MAX_CURVATURE = 0.17  # 1/m
+_MAX_CURVATURE = 0.2  # 1/m, a car's tightest turn but for a little
 _MAX_LATERAL = 4.0  # m/s²
 _MAX_DEVIATION = 0.6  # metres from the record
-_WEIGHT = (10.0, 1.0, 1.0)  # how bad it is to exceed each; what no vehicle can steer is worst
 _TURN = math.radians(45.0)
 _U_TURN = math.radians(140.0)
 _STILL = 0.5  # metres: less path than this in a whole log is no path
@@ -55,6 +55,7 @@ class Track:
         still: True if it stands throughout.
         deviation: largest distance [m] from a recorded position to the cleaned one.
         present: (2,) first and last sample at which it is there; before and after, progress and speed are those at these.
+        recorded_turn: how far [rad, left positive] the recorded heading turns from start to end; NaN for one that stands.
     """
 
     vehicle: Vehicle
@@ -64,6 +65,7 @@ class Track:
     still: bool
     deviation: float
     present: Ints = field(default_factory=lambda: ALWAYS[:0, 0])
+    recorded_turn: float = math.nan
 
     def __post_init__(self) -> None:
         if len(self.present) != 2:
@@ -125,6 +127,7 @@ def _clean(encounter: Encounter, i: int) -> Track:
         progress=frozen(np.pad(track.progress, (before, after), mode="edge")),
         speed=encounter.speed[i],
         present=frozen_ints([first, last]),
+        recorded_turn=math.nan if track.still else float(encounter.heading[i, last] - encounter.heading[i, first]),
     )
 
 
@@ -146,8 +149,8 @@ def _cleaned(encounter: Encounter, i: int, position: Floats, heading: Floats, sp
         deviation = float(exact.hypot(*(curve.at(progress)[:, :2] - position).T).max())
         curvature = np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)
         lateral = curvature * np.square(np.interp((grid[1:] + grid[:-1]) / 2.0, *_increasing(claimed, speed)))
-        excess = (curvature.max() / _MAX_CURVATURE, lateral.max() / _MAX_LATERAL, deviation / _MAX_DEVIATION)
-        badness = math.fsum(w * max(float(e) - 1.0, 0.0) for w, e in zip(_WEIGHT, excess, strict=True))
+        excess = (float(lateral.max()) / _MAX_LATERAL, deviation / _MAX_DEVIATION)  # what is too sharp is eased below
+        badness = math.fsum(max(e - 1.0, 0.0) for e in excess)
         if best is None or badness < best[0]:
             best = (badness, curve, progress, deviation)
         if badness == 0.0:

@@ -103,7 +103,31 @@ def test_every_recorded_encounter_fits_two_roads_and_refusals_say_why(recorded):
                 assert footprint_fits(road, f.anchors, vehicle.length, vehicle.width).all()
                 assert 0.8 <= f.scale <= 1.25
                 assert f.moved.max() <= 3.0
+            assert turned_otherwise(encounter, fit) <= {loss.vehicles[0] for loss in fit.lost if loss.kind == "turn"}
         assert fitted >= 2, name
+
+
+def turned_otherwise(encounter, fit):
+    """Ids of the vehicles whose fitted path turns more than 25° differently than their recorded headings do."""
+    found = set()
+    for i, (vehicle, f) in enumerate(zip(fit.vehicles, fit.fitted, strict=True)):
+        first, last = encounter.present[i]
+        recorded = encounter.heading[i, last] - encounter.heading[i, first]
+        driven = f.path[-1, 2] - f.path[0, 2]
+        if not f.stands.all() and abs(np.degrees(recorded - driven)) > 25.0:
+            found.add(vehicle.id)
+    return found
+
+
+@pytest.mark.data
+def test_who_goes_straight_on_has_an_arm_ahead_even_where_its_record_ends_before(data):
+    files = sorted((data / "trajectories").glob("*/encounter_*.csv"))
+    for name in ("a_cross", "b_left"):  # one vehicle's record begins, or ends, in the middle of the junction
+        encounter = read_log([next(file for file in files if name in file.stem)]).encounters[0]
+        for road_name in ("t_intersection", "four_way"):
+            fit = fit_template(encounter, every(encounter), build_road(road_name, encounter))
+            assert not turned_otherwise(encounter, fit), (name, road_name)
+            assert not any(loss.kind in ("turn", "conflict") for loss in fit.lost)
 
 
 def test_oncoming_vehicles_stay_as_far_apart_where_there_are_lanes():

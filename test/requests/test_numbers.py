@@ -76,7 +76,7 @@ def limited(chain, lateral, **sampling):
 @pytest.mark.data
 def test_variance_adapts_where_validity_is_hard(tight):
     """Few candidates at full variance keep to the limit; with smaller deviations the set is had, and it is said."""
-    made = answer(limited(tight, 2.0), Request(), count=30).generated
+    made = answer(limited(tight, 1.65), Request(), count=30).generated
     assert len(made.scenarios) == 30
     (said,) = (line for line in made.adaptations if "few candidates were valid" in line)
     assert "standard deviations multiplied by 0" in said
@@ -86,11 +86,11 @@ def test_variance_adapts_where_validity_is_hard(tight):
 
 @pytest.mark.data
 def test_a_short_set_says_how_many_and_why(tight):
-    made = answer(limited(tight, 1.95, attempts=3), Request(), count=80).generated
+    made = answer(limited(tight, 1.6, attempts=3), Request(), count=80).generated
     assert 0 < len(made.scenarios) < made.requested == 80
     assert made.candidates == 240 == len(made.scenarios) + made.refused.total()
     assert set(made.refused) == {Cause.LATERAL_ACCELERATION}
-    impossible = answer(limited(tight, 1.5), Request(), count=10).generated
+    impossible = answer(limited(tight, 1.0), Request(), count=10).generated
     assert impossible.scenarios == ()
     assert impossible.refused.total() == impossible.candidates == 200
     assert "few candidates were valid, and smaller standard deviations did not help" in impossible.adaptations

@@ -18,13 +18,15 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 from shapely import affinity
-from shapely.geometry import box, MultiPoint
+from shapely.geometry import box, LineString, MultiPoint, Point
 from shapely.ops import unary_union
 
 from benchmarks._planning_maps import road_of
+from benchmarks._planning_obstructed import obstructed
+from scenario_gen.errors import RefusedError
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
-from scenario_gen.routing import plan_routes, PlanningConfig
-from scenario_gen.routing.plan import farthest
+from scenario_gen.routing import plan, plan_routes, PlanningConfig
+from scenario_gen.routing.distance import distances_to_line, farthest
 from scenario_gen.routing.search.dubins import shortest_into
 from scenario_gen.routing.search.planner import BlockedError, Budget, BudgetSpentError, NoWayError
 from scenario_gen.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect, PoseSearchConfig, Wishes
@@ -36,6 +38,7 @@ from scenario_gen.types.scenario import BoundaryStates
 
 CAR = (4.8, 1.9)
 LIMIT = 0.225
+point = st.tuples(st.floats(-50, 50), st.floats(-50, 50))
 pose = st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-7, 7))
 
 
@@ -187,6 +190,23 @@ def test_a_slalom_is_driven():
     assert np.abs(np.diff(bend)).max() < 0.08  # per half a metre: no jump of curvature
     shape = unary_union([footprint(at) for at in route.points])
     assert shape.intersection(blocked_area(road)).area < 1e-6
+
+
+def test_where_smoothing_fails_a_gentler_way_is_searched_for(monkeypatch):
+    case = obstructed(113)
+    ends = (case.query.start, case.query.goal)
+    route = route_on(case.road, *ends)
+    assert np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max() <= PlanningConfig().max_curvature
+    monkeypatch.setattr(plan, "TIGHTEST", plan.TIGHTEST[:1])
+    with pytest.raises(RefusedError, match="its curvature reaches"):
+        route_on(case.road, *ends)
+
+
+@settings(deadline=None)
+@given(st.lists(point, min_size=1, max_size=6), st.lists(point, min_size=2, max_size=6))
+def test_distances_to_a_line_are_those_of_shapely(points, line):
+    found = distances_to_line(np.array(points), np.array(line))
+    assert found == pytest.approx([LineString(line).distance(Point(each)) for each in points], abs=1e-6)
 
 
 def test_what_is_far_from_the_fit_is_said():

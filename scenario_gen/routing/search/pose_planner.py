@@ -55,9 +55,9 @@ class PoseSearchConfig(Parameters):
     about: float = parameter(0.7, "share of samples about a path that is known, a disc's or the best so far", low=0.0, high=0.95)
     spread: float = parameter(1.0, "how far from it", unit="m", low=0.05, high=20.0)
     yaw_spread: float = parameter(0.4, "and from its heading", unit="rad", low=0.01, high=3.2)
-    improve: int = parameter(200, "iterations for a better path, once there is one", low=0, high=10_000_000)
+    improve: int = parameter(50, "iterations for a better path, once there is one", low=0, high=10_000_000)
     shortcuts: int = parameter(
-        150, "pairs of poses between which a shorter curve is tried, whenever a better path is found", low=0
+        50, "pairs of poses between which a shorter curve is tried, whenever a better path is found", low=0
     )
 
 
