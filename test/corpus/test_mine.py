@@ -16,7 +16,7 @@
 
 import json
 
-from hypothesis import given, strategies
+from hypothesis import given, settings, strategies
 import numpy as np
 import pytest
 
@@ -131,6 +131,7 @@ def straight(x, y, heading, speed, seconds=12.0):
     return Motion(place, np.full(len(time), heading), np.full(len(time), speed))
 
 
+@settings(deadline=None)
 @given(
     turned=strategies.floats(-3.0, 3.0),
     case=strategies.sampled_from(
