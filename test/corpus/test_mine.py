@@ -55,6 +55,8 @@ def test_every_row_that_is_left_out_is_counted_by_file(archive, corpus):
     wrong = sum(mined.account[cause] for cause in mined.account if "clocks" in cause or "2004" in cause)
     assert 0.9 * truth["wrong_times"] <= wrong <= truth["wrong_times"]  # a few agree with the other clock by chance
     assert any("borne by several vehicles" in note for note in mined.notes)
+    page = (corpus[0] / "encounters.html").read_text()
+    assert page.count("<svg") == mined.encounters and "<script" not in page
     assert mined.files and not mined.failed
 
 
