@@ -23,12 +23,12 @@ from scenario_gen.fitting import fit_template
 from scenario_gen.nearest import attempt, nearest_if_impossible
 from scenario_gen.roads import build_road
 from scenario_gen.routing import plan_routes
-from scenario_gen.sampling import Progress, sample_scenarios
+from scenario_gen.sampling import freed_states, Progress, sample_scenarios
 from scenario_gen.segmentation import segment
 from scenario_gen.template.interaction import waits_to_keep
 from scenario_gen.template.size import refuse_too_large
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.generation import GenerationResult, UNIFORM, WITHOUT
+from scenario_gen.types.generation import GenerationResult, NARROW, UNIFORM, WITHOUT
 from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road
 from scenario_gen.validity import Checker
@@ -71,6 +71,7 @@ def generate(
         fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
         routes = plan_routes(road, fit, config.planning, seed)
         waits = waits_to_keep(encounter, segmentation)
+        fit = replace(fit, asked=freed_states(fit.asked, encounter, config.sampling, request))
         check = Checker.of_template(encounter, road, fit.asked, waits, config.limits).check
         generated = sample_scenarios(
             encounter, segmentation, road, routes, fit.asked, check, config.sampling,
@@ -92,6 +93,9 @@ def with_references(
     """
     road, fit = made.placed()
     others = {WITHOUT: without_changepoints(made.segmentation)}
+    if config.sampling.variety == "wide":
+        others[NARROW] = made.segmentation
+        config = replace(config, sampling=replace(config.sampling, variety="narrow"))
     if config.evaluation.uniform and made.segmentation.changepoints.size:
         others[UNIFORM] = uniform_changepoints(made.segmentation)
     references, refusals = {}, {}
@@ -99,7 +103,14 @@ def with_references(
     for name, segmentation in others.items():
         try:
             references[name] = attempt(
-                made.encounter, segmentation, road, config, request, count=few, seed=made.seed, waits=()
+                made.encounter,
+                segmentation,
+                road,
+                config,
+                request,
+                count=few,
+                seed=made.seed,
+                waits=None if name == NARROW else (),
             ).generated
         except RefusedError as error:
             refusals[name] = str(error)

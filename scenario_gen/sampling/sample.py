@@ -56,7 +56,7 @@ LEVEL_SLOTS = 8  # levels that an index has room for; after them come the next L
 KEPT = 1000  # scenarios up to which a set stays in memory
 BLOCK = 32  # candidates whose random numbers are drawn together
 PILOT = 2 * BLOCK  # candidates by which a level is judged
-ENOUGH = 0.3  # share of valid candidates below which the next level is tried
+ENOUGH = {"narrow": 0.3, "wide": 0.1}  # share of valid candidates below which the next level is tried
 
 
 def index_of(level: int, candidate: int) -> int:
@@ -99,6 +99,12 @@ class Sampler:
         batch = self.model.draw(self._normal(level, number)[row : row + 1], LEVELS[level])
         (whole,) = batch.scenarios(self.seed, [index], self.frame_id)
         return None if whole is None else self.published(whole)
+
+    def undisturbed(self) -> Scenario | None:
+        """The drive without deviations; None where nothing is free, or it has no speed profile."""
+        if all(vehicle.freedom is None for vehicle in self.model.vehicles):
+            return None
+        return self.model.draw(np.zeros((1, self.model.size)), LEVELS[0]).scenarios(self.seed, [0], self.frame_id)[0]
 
     def redraw(self, index: Sequence[int]) -> list[Scenario]:
         """The scenarios of indices that are of one block, bit for bit as in a whole set."""
@@ -175,6 +181,7 @@ def sample_scenarios(
     else:
         sampler = Sampler(prepared.model, seed, road.frame_id, ego)
         loop = _Loop(sampler, check, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
+        loop.enough = ENOUGH[config.variety]
         loop.run(config.attempts * count)
         sentences = (*prepared.adaptations, *loop.adaptations)
         made = ScenarioSet(count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot)
@@ -220,15 +227,20 @@ class _Loop:
     refused: Counter[Cause] = field(default_factory=Counter)
     candidates: int = 0
     adaptations: list[str] = field(default_factory=list)
+    enough: float = ENOUGH["narrow"]
+    absent: int = 0  # conflicts of the template that the road or the clock of all leaves out; no candidate may lose more
 
     def run(self, budget: int) -> None:
         """Judge the levels by their first candidates, then stay with the first that is good enough, or the best."""
+        undisturbed = self.sampler.undisturbed()
+        if undisturbed is not None:
+            self.absent = self.check([undisturbed])[0].not_applicable
         blocks = [self._blocks(level) for level in range(len(LEVELS))]
         share = []
         for level in range(len(LEVELS)):
             seen, good = self._spend(blocks[level], min(PILOT, budget - self.candidates))
             share.append(good / seen if seen else 0.0)
-            if self._done(budget) or share[-1] >= ENOUGH:
+            if self._done(budget) or share[-1] >= self.enough:
                 break
         best = int(np.argmax(share))
         while not self._done(budget) and self._spend(blocks[best], budget - self.candidates)[0]:
@@ -260,7 +272,8 @@ class _Loop:
                     break
                 seen += 1
                 verdict = None if scenario is None else next(verdicts)
-                if scenario is not None and verdict is not None and verdict.valid:
+                lost = verdict is not None and verdict.valid and verdict.not_applicable > self.absent
+                if scenario is not None and verdict is not None and verdict.valid and not lost:
                     good += 1
                     published = self.sampler.published(scenario)
                     self.index.append(number)
@@ -268,7 +281,7 @@ class _Loop:
                         self.kept.append(published)
                     self.found(published)
                 else:
-                    self.refused[verdict.violations[0].cause if verdict else Cause.SPEED_PROFILE] += 1
+                    self.refused[_cause(verdict)] += 1
             self.progress(len(self.index), self.count, self.candidates + seen)
         self.candidates += seen
         return seen, good
@@ -285,3 +298,10 @@ class _Loop:
             )
         if self.cancelled():
             self.adaptations.append("cancelled")
+
+
+def _cause(verdict: Verdict | None) -> Cause:
+    """Why a candidate is refused; without a verdict it has no speed."""
+    if verdict is None:
+        return Cause.SPEED_PROFILE
+    return verdict.violations[0].cause if verdict.violations else Cause.CONFLICT_LOST
