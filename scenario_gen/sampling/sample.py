@@ -46,15 +46,18 @@ OnValid = Callable[[Scenario, BoundaryStates, EgoSlot | None], None]  # a valid 
 
 LEVELS = (
     Scale(),
-    Scale(lateral=0.5),
-    Scale(lateral=0.5, longitudinal=0.5),
-    Scale(lateral=0.25, longitudinal=0.25, time=0.5),
-    Scale(lateral=0.1, longitudinal=0.1, time=0.25),
+    Scale(lateral=0.5, own=0.5),
+    Scale(lateral=0.5, longitudinal=0.5, own=0.25),
+    Scale(lateral=0.25, longitudinal=0.25, time=0.5, own=0.1),
+    Scale(lateral=0.1, longitudinal=0.1, time=0.25, own=0.03),
 )
 LEVEL_SIZE = 1 << 20  # candidates of one level whose indices follow each other
 LEVEL_SLOTS = 8  # levels that an index has room for; after them come the next LEVEL_SIZE candidates of the first
 KEPT = 1000  # scenarios up to which a set stays in memory
 BLOCK = 32  # candidates whose random numbers are drawn together
+LEAST_COUNT = (
+    20  # preset `wide`: candidates as for so many scenarios are drawn, however few are wanted, so that levels can be tried
+)
 PILOT = 2 * BLOCK  # candidates by which a level is judged
 ENOUGH = {"narrow": 0.3, "wide": 0.1}  # share of valid candidates below which the next level is tried
 
@@ -100,9 +103,14 @@ class Sampler:
         (whole,) = batch.scenarios(self.seed, [index], self.frame_id)
         return None if whole is None else self.published(whole)
 
+    @property
+    def free(self) -> bool:
+        """Whether vehicles have clocks of their own."""
+        return any(vehicle.freedom is not None for vehicle in self.model.vehicles)
+
     def undisturbed(self) -> Scenario | None:
         """The drive without deviations; None where nothing is free, or it has no speed profile."""
-        if all(vehicle.freedom is None for vehicle in self.model.vehicles):
+        if not self.free:
             return None
         return self.model.draw(np.zeros((1, self.model.size)), LEVELS[0]).scenarios(self.seed, [0], self.frame_id)[0]
 
@@ -182,7 +190,7 @@ def sample_scenarios(
         sampler = Sampler(prepared.model, seed, road.frame_id, ego)
         loop = _Loop(sampler, check, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
         loop.enough = ENOUGH[config.variety]
-        loop.run(config.attempts * count)
+        loop.run(config.attempts * max(count, LEAST_COUNT if config.variety == "wide" else 1))
         sentences = (*prepared.adaptations, *loop.adaptations)
         made = ScenarioSet(count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot)
     if request.moves and not made.scenarios and not cancelled():
@@ -292,9 +300,10 @@ class _Loop:
             self.adaptations.append("few candidates were valid, and smaller standard deviations did not help")
         elif tried > 1:
             s = LEVELS[best]
+            own = f", {s.own:g} of each vehicle's own clock" if self.sampler.free else ""
             self.adaptations.append(
                 f"few candidates were valid: standard deviations multiplied by {s.lateral:g} across the route, "
-                f"{s.longitudinal:g} along it, {s.time:g} in time"
+                f"{s.longitudinal:g} along it, {s.time:g} in time{own}"
             )
         if self.cancelled():
             self.adaptations.append("cancelled")
