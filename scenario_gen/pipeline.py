@@ -18,7 +18,7 @@ from dataclasses import replace
 
 from scenario_gen.config import PipelineConfig
 from scenario_gen.errors import RefusedError
-from scenario_gen.evaluation import evaluate, MEASURED, replay, uniform_changepoints, without_changepoints
+from scenario_gen.evaluation import evaluate, MEASURED, MEASURES, replay, uniform_changepoints, without_changepoints
 from scenario_gen.fitting import fit_template
 from scenario_gen.nearest import attempt, nearest_if_impossible
 from scenario_gen.roads import build_road
@@ -54,7 +54,7 @@ def generate(
         config: the parameters of every stage.
         count: valid scenarios wanted.
         seed: of all randomness.
-        request: a vehicle to be left out for a planner under test, and start and end states.
+        request: a vehicle to be left out for a planner under test, start and end states, a target, a choice, an order.
         progress: called with scenarios so far, scenarios wanted, candidates so far.
 
     Raises:
@@ -71,10 +71,10 @@ def generate(
         fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
         routes = plan_routes(road, fit, config.planning, seed)
         waits = waits_to_keep(encounter, segmentation)
-        check = Checker.of_template(encounter, road, fit.asked, waits, config.limits).check
+        check = Checker.of_template(encounter, road, fit.asked, waits, config.limits, request.order).check
         generated = sample_scenarios(
             encounter, segmentation, road, routes, fit.asked, check, config.sampling,
-            count=count, seed=seed, waits=waits, request=request, progress=progress,
+            count=count, seed=seed, waits=waits, request=request, progress=progress, measures=MEASURES,
         )  # fmt: skip
     made = GenerationResult(encounter, segmentation, road, fit, routes, generated, seed)
     return with_evaluation(with_references(made, config, request), config)
@@ -88,9 +88,11 @@ def with_references(
     """Add what a result is measured against: sets without changepoints and, if `evaluation.uniform`, with uniform ones.
 
     A reference knows of the template what its own changepoints tell, so no wait is asked of it: a wait whose ends were known
-    besides would be two more of them. Of a reference no more scenarios are made than are measured.
+    besides would be two more of them. Nor is a target, a choice or another order. Of a reference no more scenarios
+    are made than are measured.
     """
     road, fit = made.placed()
+    plain = request.plain
     others = {WITHOUT: without_changepoints(made.segmentation)}
     if config.evaluation.uniform and made.segmentation.changepoints.size:
         others[UNIFORM] = uniform_changepoints(made.segmentation)
@@ -99,7 +101,7 @@ def with_references(
     for name, segmentation in others.items():
         try:
             references[name] = attempt(
-                made.encounter, segmentation, road, config, request, count=few, seed=made.seed, waits=()
+                made.encounter, segmentation, road, config, plain, count=few, seed=made.seed, waits=()
             ).generated
         except RefusedError as error:
             refusals[name] = str(error)
