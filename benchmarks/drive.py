@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Closed loop: what two planners come to, the witness as ego, egos that do anything, throughput, lock-step over DDS."""
+"""Closed loop: what planners come to, the witness as ego, egos that do anything, throughput, lock-step over DDS.
+
+About 8 minutes of CPU time; `--count` is the number of drives of each of our planners; the reactive planner gets a fifth of them.
+Counts of every row stand beside it. The judges' rows need `make judges`, the peer's `make bench`.
+"""
 
 from collections.abc import Callable
 import os
@@ -21,6 +25,8 @@ from time import process_time
 
 import numpy as np
 
+from benchmarks._drive_judges import contacts, reactive_planner
+from benchmarks._drive_peers import highway_env
 from benchmarks._driving_worlds import Anything, draw_scenario, Witness
 from benchmarks._sampling_cases import cases, Prepared
 from benchmarks._size import sized
@@ -39,6 +45,7 @@ PLANNERS = "scenario_gen.closed_loop.planners"
 BAD, GOOD = f"{PLANNERS}:ConstantSpeed", f"{PLANNERS}:IdmFollower"
 WITNESSES = sized(1000, quick=4)
 RUNS = sized(10_000, quick=5)
+KEPT = sized(600, quick=5)  # drives of egos that do anything, that are looked at for collisions
 FAR = Pose(1e4, 1e4, 0.0, 0.0)
 PATIENCE = 3000  # steps after which others that the ego has left alone count as stuck
 
@@ -46,10 +53,13 @@ PATIENCE = 3000  # steps after which others that the ego has left alone count as
 def run(count: int = sized(200, quick=2)) -> list[Row]:
     """Measure; `count` drives of each planner."""
     trials, made = recorded(max(WITNESSES, count))
-    rows = []
+    rows: list[Row] = []
+    driven: list[Outcome] = []
     if trials:
-        rows += planners(spread(trials, count)) + witnesses(spread(trials, WITNESSES))
-    return rows + anything() + speed() + dds(made)
+        found, driven = planners(spread(trials, count))
+        rows += found + reactive_planner(spread(trials, max(count // 5, 1))) + witnesses(spread(trials, WITNESSES))
+    found, wild = anything()
+    return rows + found + collisions([*driven, *wild]) + speed() + dds(made)
 
 
 def recorded(count: int) -> tuple[list[Trial], GenerationResult | None]:
@@ -79,8 +89,8 @@ def spread(trials: list[Trial], count: int) -> list[Trial]:
     return [trials[k] for k in np.unique(np.linspace(0, len(trials) - 1, count).round().astype(int)).tolist()]
 
 
-def planners(trials: list[Trial]) -> list[Row]:
-    """What constant speed and the follower come to; the same bytes in two runs and for two workers."""
+def planners(trials: list[Trial]) -> tuple[list[Row], list[Outcome]]:
+    """What constant speed and the follower come to, the same bytes in two runs and for two workers; and their drives."""
     bad, good = (run_trials(trials, name) for name in (BAD, GOOD))
     found = {"constant speed": rates(bad), "IDM follower": rates(good)}
     rows = [
@@ -94,19 +104,31 @@ def planners(trials: list[Trial]) -> list[Row]:
     config = ClosedLoopConfig()
     same = as_json(good[:40], GOOD, config) == as_json(again, GOOD, config)
     rows.append(Row("same bytes in a second run, with two workers", float(same), "", "higher", 1.0))
-    wrong, beyond = dense([*bad, *good])
-    return [
-        *rows,
-        Row("collisions at 1 ms that the verdict lacks", float(wrong), "", "lower", 0.0, f"{len(bad) + len(good)} drives"),
-        Row(
-            "collisions of the verdict that 1 ms does not show",
-            float(beyond),
-            "",
-            "lower",
-            0.0,
-            "deeper than nothing for less",
-        ),
+    return rows, [*bad, *good]
+
+
+def collisions(outcomes: list[Outcome]) -> list[Row]:
+    """The verdict's collisions beside those at every millisecond, and those of the drivability checker at every instant."""
+    lacking, beyond = dense(outcomes)
+    hits = sum(outcome.verdict.collision is not None for outcome in outcomes)
+    of = f"{len(outcomes)} drives, {hits} with a collision"
+    rows = [
+        Row("collisions at 1 ms that the verdict lacks", float(lacking), "", "lower", 0.0, of),
+        Row("collisions of the verdict that 1 ms does not show", float(beyond), "", "lower", 0.0, of),
     ]
+    theirs = contacts(outcomes)
+    if theirs is not None:
+        both = list(zip(theirs, outcomes, strict=True))
+        missed = sum(k is not None and one.verdict.collision is None for k, one in both)
+        late = sum(
+            k is not None and one.verdict.collision is not None and one.verdict.collision.time > 0.1 * k + 1e-3 for k, one in both
+        )
+        said = f"commonroad-drivability-checker 2025.4.0: {sum(k is not None for k in theirs)} of {len(theirs)} drives"
+        rows += [
+            Row("collisions of the drivability checker that the verdict lacks", float(missed), "", "lower", 0.0, said),
+            Row("collisions that it has earlier than the verdict", float(late), "", "lower", 0.0, said),
+        ]
+    return rows
 
 
 def dense(outcomes: list[Outcome]) -> tuple[int, int]:
@@ -129,7 +151,8 @@ def seen_at(drive: Drive) -> float | None:
         if i == ego or not len(steps):
             continue
         near = np.hypot(*(motion.position[i] - motion.position[ego]).T)
-        reach = 15.0 + motion.speed[[i, ego]].sum(axis=0) * (motion.time[1] - motion.time[0])
+        moved = np.linalg.norm(np.diff(motion.position[[i, ego]], axis=1), axis=2).sum(axis=0)  # an ego may jump
+        reach = 15.0 + moved + motion.speed[[i, ego]].max(axis=1).sum() * (motion.time[1] - motion.time[0])
         steps = steps[near[steps] < reach[steps]]
         if not len(steps):
             continue
@@ -198,9 +221,10 @@ def witnesses(trials: list[Trial]) -> list[Row]:
     return rows
 
 
-def anything() -> list[Row]:
-    """Drawn scenarios of 2 to 5 vehicles with egos that do anything, then leave."""
-    contacts = stuck = forced = 0
+def anything() -> tuple[list[Row], list[Outcome]]:
+    """Drawn scenarios of 2 to 5 vehicles with egos that do anything, then leave; and the first of these drives."""
+    met = stuck = forced = 0
+    kept: list[Outcome] = []
     for seed in range(RUNS):
         scenario = draw_scenario(seed)
         ego = seed % len(scenario.vehicles)
@@ -208,7 +232,9 @@ def anything() -> list[Row]:
         steps = len(scenario.time) // 2 + seed % 50
         drive = loop.drive(planner, after(steps))
         verdict = judge(loop, drive)
-        contacts += verdict.among_others
+        met += verdict.among_others
+        if len(kept) < KEPT:
+            kept.append(Outcome(str(seed), verdict, drive))
         forced += verdict.forced > 0
         state = loop.start()
         planner.reset(loop.task())
@@ -223,11 +249,12 @@ def anything() -> list[Row]:
             stuck += 1
     bounds = wilson(forced, RUNS, 0.95)
     said = f"{forced} of {RUNS}, {100 * bounds.low:.1f} to {100 * bounds.high:.1f} %"
-    return [
-        Row("ego doing anything: contacts among the others", float(contacts), "", "lower", 0.0, f"{RUNS} runs"),
+    rows = [
+        Row("ego doing anything: contacts among the others", float(met), "", "lower", 0.0, f"{RUNS} runs"),
         Row("ego doing anything: runs with a circle without the ego", float(stuck), "", "lower", 0.0, f"{RUNS} runs"),
         Row("ego doing anything: runs with braking beyond the strongest", bounds.value, "", "lower", None, said),
     ]
+    return rows, kept
 
 
 def speed() -> list[Row]:
@@ -244,6 +271,7 @@ def speed() -> list[Row]:
                 steps += drive.here.size
             best = max(best, steps / (process_time() - began))
         rows.append(Row(f"in process, reactive, {vehicles} vehicles", best, "vehicle-steps/s", "higher", 20_000.0))
+        rows += highway_env(vehicles)
     return rows
 
 

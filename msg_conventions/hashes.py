@@ -22,6 +22,7 @@ from collections.abc import Mapping
 import hashlib
 import re
 
+from msg_conventions import lanes
 from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status
 from scenario_gen.errors import InputError
 
@@ -35,13 +36,15 @@ def hash_of(topic: str, data: bytes) -> str:
 
     So the same geometry has the same hash, whatever template it was made for.
     """
+    if topic == lanes.TOPIC:
+        data = data[: len(data) - (len(data) - lanes.TAIL) % 4]  # without what DDS fills it up with
     return hashlib.sha256(_timeless(data) if topic == "map" else data).hexdigest()[:DIGITS]
 
 
 def _timeless(grid: bytes) -> bytes:
     """Return the bytes of a map without stamp, load time, and what follows its cells; of a damaged one, whatever is there.
 
-    DDS fills small messages up to a multiple of 4 bytes. All other messages that are named by a hash end at one.
+    DDS fills small messages up to a multiple of 4 bytes. All others that are named by a hash end at one, but for `road/lanes`.
     """
     load_time = 16 + int.from_bytes(grid[12:16], "little")  # behind the frame, at a multiple of 4
     load_time += -load_time % 4

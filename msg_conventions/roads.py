@@ -24,6 +24,7 @@ The road's name does not travel: nothing is computed from it.
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.lanes import decode_lanes
 from msg_conventions.trajectory import FARTHEST
 from msg_conventions.yaw import check_quaternions, half_angle, yaw
 from scenario_gen.arrays import Floats
@@ -88,8 +89,10 @@ def decode_poses(data: bytes, what: str = "poses") -> tuple[int, str, Floats]:
     return stamp_ns, frame_id, poses_of(reader.floats(7 * count).reshape(count, 7), what)
 
 
-def decode_map(data: bytes, entries: bytes | None = None, exits: bytes | None = None, name: str = "map") -> tuple[int, Road]:
-    """Return the stamp [ns] and the road; without entries and exits it has none (a plain map server sends none).
+def decode_map(
+    data: bytes, entries: bytes | None = None, exits: bytes | None = None, lanes: bytes | None = None, name: str = "map"
+) -> tuple[int, Road]:
+    """Return the stamp [ns] and the road; without entries, exits and lanes it has none (a plain map server sends none).
 
     Raises:
         InputError: the message is damaged, the map is rotated or empty, or the frames disagree.
@@ -116,6 +119,9 @@ def decode_map(data: bytes, entries: bytes | None = None, exits: bytes | None = 
         if frame != frame_id:
             raise InputError(f"{what}: frame {frame!r} is not the map's ({frame_id!r})")
         ends.append(values)
+    frame, network = (frame_id, None) if lanes is None else decode_lanes(lanes)
+    if frame != frame_id:
+        raise InputError(f"road/lanes: frame {frame!r} is not the map's ({frame_id!r})")
     road = Road(
         name=name,
         drivable=((cells >= 0) & (cells < OCCUPIED_FROM)).reshape(height, width),
@@ -125,5 +131,6 @@ def decode_map(data: bytes, entries: bytes | None = None, exits: bytes | None = 
         entries=ends[0],
         exits=ends[1],
         frame_id=frame_id,
+        lanes=network,
     )
     return stamp_ns, road

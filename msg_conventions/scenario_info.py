@@ -40,6 +40,7 @@ from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, FACTS, S
 INFO = "scenarios/info"
 REFUSED, ADAPTATION, TARGET = "refused.", "adaptation.", "target."
 MESSAGES, PRESENT = "messages", "present"  # of a scenario in which not all are there throughout
+FREED = "freed"  # metres and m/s by which start and end of each vehicle may differ from the asked states
 EGO_WITNESS = "ego_witness"  # of one with an ego slot
 Values = Mapping[str, str]
 
@@ -136,7 +137,17 @@ class ScenarioEntry:
         if witness:
             own = (_states(f"[{values[key]}]", where) for _, key in keys)
             start, end = (np.concatenate(rows) for rows in zip((start, end), own, strict=True))
-        return BoundaryStates(start, end)
+        return BoundaryStates(start, end, self._freed(len(start), where))
+
+    def _freed(self, count: int, where: str) -> Floats:
+        """Return by how much the first of `count` vehicles' states may be left (count, 2, 2) [m, m/s]; 0 where it is not said."""
+        freed = np.zeros((count, 2, 2))
+        with guarded(where):
+            own = np.array(json.loads(self.status.values.get(FREED, "[]")), dtype=np.float64).reshape(-1, 2, 2)
+        if len(own) > count or not np.isfinite(own).all() or (own < 0.0).any():
+            raise InputError(f"{where}: {FREED} is not metres and m/s of at most {count} vehicles")
+        freed[: len(own)] = own
+        return freed
 
 
 @dataclass(frozen=True)
@@ -276,6 +287,7 @@ def scenario_entry(
         **({} if scenario.witness is None else {EGO_WITNESS: digest(encode_scenario(scenario.witness, stamp_of(data, INFO)))}),
         "asked_start": json.dumps(asked.start[rows].tolist()),
         "asked_end": json.dumps(asked.end[rows].tolist()),
+        **({FREED: json.dumps(asked.freed[rows].tolist())} if asked.freed[rows].any() else {}),
     }
     status = Status(f"{node}: scenario", Level.OK, f"scenario {scenario.index} of request {request}", values)
     return ScenarioEntry(request, scenario.index, scenario.seed, sha256, status)

@@ -16,7 +16,7 @@
 
 import re
 
-from msg_conventions import autoware, changepoints, diagnostics, driving, ego, frames, paths, pictures, roads, trajectory
+from msg_conventions import autoware, changepoints, diagnostics, driving, ego, frames, lanes, paths, pictures, roads, trajectory
 from scenario_gen.types.qos import Quality
 
 FIX_TYPE = "sensor_msgs/msg/NavSatFix"
@@ -33,6 +33,7 @@ TOPICS: dict[str, tuple[str, Quality]] = {
     "map": (roads.MAP_TYPE, LATCHED),
     "road/entries": (roads.POSES_TYPE, LATCHED),
     "road/exits": (roads.POSES_TYPE, LATCHED),
+    lanes.TOPIC: (lanes.MARKER_TYPE, LATCHED),
     "road/info": (diagnostics.TYPE, LATCHED),
     "tracks": (trajectory.TYPE, LATCHED),
     "changepoints": (trajectory.TYPE, LATCHED),

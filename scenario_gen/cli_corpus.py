@@ -170,3 +170,26 @@ def find(
         if report is not None:
             finding.write_page(bag, report)
             lines([f"report: {report}"])
+
+
+@commands.command()
+def library(
+    corpus: Annotated[Path, typer.Argument(help="a corpus that `mine` wrote; the library goes to CORPUS/library")],
+    most: Annotated[int, typer.Option(min=4, help="pairs of vehicles that are fitted at most; the others are assigned")] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="same seed, same library")] = 0,
+    workers: WorkersOption = 0,
+    scheduler: SchedulerOption = "",
+    assignments: Annotated[list[str] | None, typer.Option("--set", help="a parameter of the segmentation, as name=value")] = None,
+) -> None:
+    """Segment the encounters of a corpus together: primitives that they share, with frequencies, transitions and examples."""
+    from scenario_gen.corpus.library import build
+    from scenario_gen.parameters import assigned
+    from scenario_gen.segmentation.segmenter import SegmentationConfig
+
+    config = SegmentationConfig()
+    for assignment in assignments or []:
+        config = assigned(config, assignment)
+    with telling() as told:
+        built = build(corpus, config, most=most, seed=seed, workers=workers, scheduler=scheduler, told=told)
+    lines(built.lines())
+    conclude(built.failed, corpus / "library")

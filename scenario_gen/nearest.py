@@ -31,7 +31,7 @@ from scenario_gen.fitting import fit_template
 from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room
 from scenario_gen.roads.ways import draw_route
 from scenario_gen.routing import plan_routes
-from scenario_gen.sampling import Cancelled, OnValid, Progress, sample_scenarios
+from scenario_gen.sampling import Cancelled, freed_states, OnValid, Progress, sample_scenarios
 from scenario_gen.sampling.directed import TargetError
 from scenario_gen.template.interaction import Wait, waits_to_keep
 from scenario_gen.template.separation import footprint_gap
@@ -150,6 +150,7 @@ def attempt(
     waits = waits_to_keep(encounter, segmentation) if waits is None else waits
     fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
     routes = plan_routes(road, fit, config.planning, seed)
+    fit = replace(fit, asked=freed_states(fit.asked, encounter, config.sampling, request))
     check = Checker.of_template(encounter, road, fit.asked, waits, config.limits, request.order).check
     generated = sample_scenarios(
         encounter, segmentation, road, routes, fit.asked, check, config.sampling,

@@ -23,7 +23,7 @@ from scenario_gen.fitting import fit_template
 from scenario_gen.nearest import attempt, nearest_if_impossible
 from scenario_gen.roads import build_road
 from scenario_gen.routing import plan_routes
-from scenario_gen.sampling import Progress, sample_scenarios
+from scenario_gen.sampling import freed_states, Progress, sample_scenarios
 from scenario_gen.segmentation import segment
 from scenario_gen.template.interaction import waits_to_keep
 from scenario_gen.template.size import refuse_too_large
@@ -71,6 +71,7 @@ def generate(
         fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
         routes = plan_routes(road, fit, config.planning, seed)
         waits = waits_to_keep(encounter, segmentation)
+        fit = replace(fit, asked=freed_states(fit.asked, encounter, config.sampling, request))
         check = Checker.of_template(encounter, road, fit.asked, waits, config.limits, request.order).check
         generated = sample_scenarios(
             encounter, segmentation, road, routes, fit.asked, check, config.sampling,

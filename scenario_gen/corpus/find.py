@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from scenario_gen.corpus.messages import database
+from scenario_gen.corpus.messages import database, quoted
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.folders import replaced_folder
 from scenario_gen.recordings.write import add_message
@@ -61,7 +61,8 @@ def find(batch: Path, condition: str = "true", limit: int = 0) -> Hits:
     columns = f"the columns are {', '.join(COLUMNS)}, seed, sha256"
     with database(batch, MEMORY, f"condition {condition!r}", columns) as base:
         base.execute(
-            f"CREATE TABLE scenarios AS SELECT * FROM read_parquet({tables!r}, hive_partitioning=true, hive_types_autocast=false)"
+            f"CREATE TABLE scenarios AS SELECT * FROM read_parquet([{quoted(tables)}], hive_partitioning=true, "
+            "hive_types_autocast=false)"
         )
         base.execute("SET enable_external_access = false")  # a condition reads no files
         order = "ORDER BY pet NULLS LAST, ttc, template, road, index" + (f" LIMIT {limit}" if limit else "")

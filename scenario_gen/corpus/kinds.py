@@ -38,7 +38,7 @@ BESIDE, ALIKE = 2.5, np.radians(30.0)  # m, rad: on the same path
 MOSTLY, HARDLY = 0.7, 0.3
 TURNS, AGAINST = np.radians(45.0), np.radians(150.0)
 BEYOND = 150.0  # m by which a path goes on at both ends
-STEP = 2.0  # m between the points of a path
+STEP = 4.0  # m between the points of a path
 MOVES = 0.5  # m/s below which a heading tells nothing new
 MEETS = 1e-6  # of a step: ways that cross in the end of one cross, whatever is rounded
 EVERY = 0.3  # s between the samples that are compared with all others
@@ -52,6 +52,10 @@ class Motion:
     position: Floats
     heading: Floats
     speed: Floats
+
+    def part(self, own: slice) -> "Motion":
+        """Return a part of the samples."""
+        return Motion(self.position[own], self.heading[own], self.speed[own])
 
     def every(self, step: int) -> "Motion":
         """Return each `step`-th sample."""
@@ -92,9 +96,11 @@ def kind_of(a: Motion, b: Motion, dt: float) -> str:
     """
     one, other = (motion.every(max(round(EVERY / dt), 1)) for motion in (a, b))
     path, others = path_of(one), path_of(other)
-    on = np.stack([_on_path(one, others), _on_path(other, path)])
     quarter = max(len(one.speed) // 4, 1)
-    early, late = float(on[:, :quarter].mean(axis=1).max()), float(on[:, -quarter:].mean(axis=1).max())
+    early, late = (
+        max(float(_on_path(motion.part(own), way).mean()) for motion, way in ((one, others), (other, path)))
+        for own in (slice(None, quarter), slice(-quarter, None))
+    )
     if late >= MOSTLY and early >= MOSTLY:
         return "following"
     if late >= MOSTLY and early < HARDLY:
@@ -117,7 +123,7 @@ def turned(motion: Motion) -> float:
 
 
 def path_of(motion: Motion) -> tuple[Floats, Floats]:
-    """Return points (P, 2) [m] of a path, 2 m apart, with a straight at both ends, and its heading (P,) [rad] there."""
+    """Return points (P, 2) [m] of a path, 4 m apart, with a straight at both ends, and its heading (P,) [rad] there."""
     moved = np.concatenate([[True], exact.hypot(*np.diff(motion.position, axis=0).T) > 0.0])
     places = motion.position[moved]
     driven = np.concatenate([[0.0], np.cumsum(exact.hypot(*np.diff(places, axis=0).T))])
@@ -151,10 +157,11 @@ def _intersect(a: Motion, b: Motion) -> bool:
     r, s = np.diff(a.position, axis=0), np.diff(b.position, axis=0)
     between = q[None, :, :] - p[:, None, :]
     denominator = r[:, None, 0] * s[None, :, 1] - r[:, None, 1] * s[None, :, 0]
-    safe = np.where(denominator == 0.0, 1.0, denominator)
+    parallel = np.abs(denominator) < 1e-12
+    safe = np.where(parallel, 1.0, denominator)
     t = (between[..., 0] * s[None, :, 1] - between[..., 1] * s[None, :, 0]) / safe
     u = (between[..., 0] * r[:, None, 1] - between[..., 1] * r[:, None, 0]) / safe
     angle = np.abs(wrap_angle(a.heading[:-1][:, None] - b.heading[:-1][None, :]))
     inside = (np.minimum(t, u) >= -MEETS) & (np.maximum(t, u) <= 1.0 + MEETS)
-    hit = (denominator != 0.0) & inside & (angle > ALIKE) & (angle < AGAINST)
+    hit = ~parallel & inside & (angle > ALIKE) & (angle < AGAINST)
     return bool(hit.any())

@@ -20,8 +20,8 @@ proximity and what a vehicle drives in between: each looks into its own cell and
 proposes: what decides is computed from the messages with `scenario_gen.exact`.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 import json
 from pathlib import Path
 from typing import Any
@@ -32,20 +32,24 @@ from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints, runs
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
-from scenario_gen.corpus.messages import database, HOUR
+from scenario_gen.corpus.messages import database, HOUR, quoted
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.geodesy import local_frame
+from scenario_gen.kernels import F1, I1, kernel, OUT2, OUTI1
 from scenario_gen.logs.groups import APART, shortest, ticks, windows
 
 BIN = 500_000  # µs
 FASTEST = 35.0  # m/s: what a vehicle drives in a bin widens the cells
 METRES = 110_574.0  # of a degree of latitude, at the least
+NORTH = 111_120.0  # m of one, within 0.5 % of it anywhere
 LONGITUDE = 111_320.0  # m of a degree of longitude at the equator
-SPREAD = 0.0006  # degrees of latitude between two messages of one vehicle in one bin: further, and there are two of them
+SPREAD = 0.0006  # degrees, 65 m or so, between two messages of one vehicle in one bin: further, and there are two of them
+ASKEW = 0.37  # of the longitude, added to the latitude, so that one number tells two places apart
 ROW = 1 << 24  # cells in a row around the globe, at the most
 SHARED = 3  # such bins make an id one that is shared
+MOST = 64  # vehicles that share an id in an hour
 ELSEWHERE = 1 << 40  # added to a shared id for each further vehicle that bears it
-MEDIAN, OUTLIER = 2, 15.0  # messages on both sides, and m from their median: further is no position
+OUTLIER = 15.0  # m from the median of five messages, beyond what is driven meanwhile: further is no position
+MARGIN = 3_000_000  # µs of messages that are kept before and after a meeting
 
 
 @dataclass(frozen=True)
@@ -84,34 +88,61 @@ def _search(base: Any, hour: int, files: tuple[Path, ...], target: Path, config:
     edge = overlap(config)
     begin, end = hour * HOUR - edge, (hour + 1) * HOUR + edge
     names = [str(path) for path in files]
-    base.execute(f"CREATE TEMP VIEW messages AS SELECT * FROM read_parquet({names!r}) WHERE t >= {begin} AND t < {end}")
+    base.execute(f"CREATE TEMP VIEW messages AS SELECT * FROM read_parquet([{quoted(names)}]) WHERE t >= {begin} AND t < {end}")
     shared = _bins(base)
-    _candidates(base, config)
-    found: list[dict[str, Any]] = []
-    for component in _components(base, config):
-        found += [meeting for meeting in component if hour * HOUR <= meeting["start"] < (hour + 1) * HOUR]
+    pairs = _candidates(base, config)
+    rows = _messages(base, "told_apart" if shared else "messages")
+    tracks = tracks_of(rows)
+    found = [
+        meeting
+        for a, b, first, last in zip(*(pairs[name].tolist() for name in ("a", "b", "first", "last")), strict=True)
+        if a in tracks and b in tracks
+        for meeting in meetings(tracks[a], tracks[b], ((first - 2) * BIN, (last + 3) * BIN), config)
+        if hour * HOUR <= meeting["start"] < (hour + 1) * HOUR
+    ]
     found.sort(key=lambda one: (one["start"], one["a"], one["b"]))
     numbers = dict.fromkeys(("gap", "distance", "travel", "lat", "lon"), pa.float64())
     kinds = {**dict.fromkeys(("a", "b", "start", "end"), pa.int64()), **numbers, "kind": pa.string()}
-    schema = pa.schema(list(kinds.items()))
-    table = pa.Table.from_pylist(found, schema=schema).replace_schema_metadata({"shared": json.dumps(shared)})
-    base.register("found", table)
-    source = "messages" if not shared else "told_apart"
+    table = pa.Table.from_pylist(found, schema=pa.schema(list(kinds.items())))
+    wanted = _excerpt(rows, found)
     with arriving(target.with_suffix(".rows.parquet")) as part:
-        base.execute(
-            'COPY (WITH span AS (SELECT device, min(start) AS low, max(finish) AS high FROM (SELECT a AS device, start, "end" AS '
-            'finish FROM found UNION ALL SELECT b, start, "end" FROM found) GROUP BY device, start // 60000000) '
-            f"SELECT DISTINCT m.* FROM {source} m JOIN span ON m.device = span.device AND m.t >= span.low - 3000000 AND "
-            f"m.t <= span.high + 3000000 ORDER BY m.device, m.t, m.lat, m.lon, m.speed, m.heading) TO '{part}' "
-            "(FORMAT parquet, COMPRESSION zstd)"
-        )
+        parquet.write_table(pa.table({name: values[wanted] for name, values in rows.items()}), part, compression="zstd")
     with arriving(target) as part:
-        parquet.write_table(table, part, compression="zstd")
+        parquet.write_table(table.replace_schema_metadata({"shared": json.dumps(shared)}), part, compression="zstd")
+
+
+def _messages(base: Any, source: str) -> dict[str, Any]:
+    """Return the messages (M,) of all candidates by column, in order of vehicle and time, one for each stamp."""
+    rows = base.execute(
+        f"SELECT * FROM {source} WHERE device IN (SELECT a FROM candidates UNION SELECT b FROM candidates) "
+        "ORDER BY device, t, lat, lon, speed, heading"
+    ).fetchnumpy()
+    device, t = rows["device"], rows["t"]
+    new = np.concatenate([np.ones(min(len(t), 1), dtype=bool), (np.diff(t) != 0) | (np.diff(device) != 0)])
+    return {name: np.asarray(values[new]) for name, values in rows.items()}
+
+
+def _excerpt(rows: dict[str, Any], found: list[dict[str, Any]]) -> Bools:
+    """(M,) which messages are of those who meet, from 3 s before to 3 s after."""
+    wanted = np.zeros(len(rows["t"]), dtype=bool)
+    own = {int(rows["device"][first]): (first, last) for first, last in runs_of(rows["device"])}
+    for one in found:
+        for device in (one["a"], one["b"]):
+            first, last = own[device]
+            low, high = np.searchsorted(rows["t"][first:last], [one["start"] - MARGIN, one["end"] + MARGIN + 1])
+            wanted[first + low : first + high] = True
+    return wanted
+
+
+def runs_of(values: Ints) -> list[tuple[int, int]]:
+    """Return begin and end (exclusive) of each run of equal values (M,)."""
+    edges = [0, *(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values)]
+    return list(pairwise(edges)) if len(values) else []
 
 
 MEAN = f"""
-    SELECT device, t // {BIN} AS bin, avg(t % {BIN}) AS late, avg(lat) AS lat, avg(lon) AS lon, avg(speed) AS speed,
-           any_value(heading) AS heading, max(lat) - min(lat) AS high, max(lon) - min(lon) AS wide
+    SELECT device, t // {BIN} AS bin, avg(t % {BIN}) AS late, avg(lat) AS lat, avg(lon) AS lon, any_value(speed) AS speed,
+           any_value(heading) AS heading, max(lat + {ASKEW} * lon) - min(lat + {ASKEW} * lon) AS spread
     FROM {{source}} GROUP BY ALL"""
 
 
@@ -119,27 +150,27 @@ def _bins(base: Any) -> dict[str, int]:
     """Make the table `binned`; return which ids are shared, and by how many vehicles."""
     base.execute("CREATE TEMP TABLE means AS " + MEAN.format(source="messages"))
     ids = base.execute(
-        f"SELECT device FROM means WHERE high > {SPREAD} OR wide > {1.5 * SPREAD} GROUP BY device HAVING count(*) >= {SHARED} "
-        "ORDER BY device"
+        f"SELECT device FROM means WHERE spread > {SPREAD} GROUP BY device HAVING count(*) >= {SHARED} ORDER BY device"
     ).fetchnumpy()["device"]
     shared: dict[str, int] = {}
     if len(ids):
-        parts = []
-        for device in ids.tolist():
-            rows = base.sql(
-                f"SELECT * FROM messages WHERE device = {device} ORDER BY t, lat, lon, speed, heading"
-            ).to_arrow_table()
-            who = tell_apart(*(rows.column(name).to_numpy() for name in ("t", "lat", "lon", "speed")))
-            shared[str(device)] = int(who.max()) + 1
-            parts.append(rows.set_column(0, "device", [device + who * ELSEWHERE]))
         import pyarrow as pa
 
-        base.register("split", pa.concat_tables(parts))
-        listed = f"({', '.join(map(str, ids.tolist()))})"
+        who_shares = f"({', '.join(map(str, ids.tolist()))})"
+        rows = base.sql(
+            f"SELECT * FROM messages WHERE device IN {who_shares} ORDER BY device, t, lat, lon, speed, heading"
+        ).to_arrow_table()
+        device, *columns = (rows.column(name).to_numpy() for name in ("device", "t", "lat", "lon", "speed"))
+        who = np.zeros(len(device), dtype=np.int64)
+        for first, last in runs_of(device):
+            who[first:last] = tell_apart(*(column[first:last] for column in columns))
+            shared[str(device[first])] = int(who[first:last].max()) + 1
+        base.register("split", rows.set_column(0, "device", pa.array(device + who * ELSEWHERE)))
         base.execute(
-            f"CREATE TEMP VIEW told_apart AS SELECT * FROM messages WHERE device NOT IN {listed} UNION ALL SELECT * FROM split"
+            f"CREATE TEMP VIEW told_apart AS SELECT * FROM messages WHERE device NOT IN {who_shares} "
+            "UNION ALL SELECT * FROM split"
         )
-        base.execute(f"DELETE FROM means WHERE device IN {listed}")
+        base.execute(f"DELETE FROM means WHERE device IN {who_shares}")
         base.execute("INSERT INTO means " + MEAN.format(source="split"))
     side = 117.5
     row = f"floor(lat * {METRES} / {side})"
@@ -158,8 +189,8 @@ def _bins(base: Any) -> dict[str, int]:
     return shared
 
 
-def _candidates(base: Any, config: CorpusConfig) -> None:
-    """Make the table `candidates`: pairs and the bins from which to which they are near, roughly."""
+def _candidates(base: Any, config: CorpusConfig) -> dict[str, Ints]:
+    """Make the table `candidates`: pairs a, b and the bins first, last from which to which they are near, roughly; return it."""
     reach = config.log.proximity + config.slack
     least = max(int(shortest(config.log) * config.log.period / 0.5) - 2, 1)
     key, above = f"r * {ROW} + c", f"(r + 1) * {ROW} + d"
@@ -177,32 +208,8 @@ def _candidates(base: Any, config: CorpusConfig) -> None:
         "(bin - lag(bin, 1, -99) OVER (PARTITION BY a, b ORDER BY bin) > 4)::INTEGER AS new FROM near)) "
         f"GROUP BY a, b, part HAVING count(*) >= {max(least // 2, 1)} ORDER BY a, b, first"
     )
-
-
-def _components(base: Any, config: CorpusConfig) -> Iterator[list[dict[str, Any]]]:
-    """Yield the meetings of each pair of candidates."""
-    told = base.execute("SELECT count(*) FROM duckdb_views() WHERE view_name = 'told_apart'").fetchone()[0]
-    pairs = base.execute("FROM candidates").fetchnumpy()
-    if not len(pairs["a"]):
-        return
-    rows = base.execute(
-        "WITH wanted AS (SELECT DISTINCT device, unnest(range(first // 20 - 1, last // 20 + 2)) AS span FROM "
-        "(SELECT a AS device, first, last FROM candidates UNION ALL SELECT b, first, last FROM candidates)) "
-        f"SELECT m.* FROM {'told_apart' if told else 'messages'} m SEMI JOIN wanted ON m.device = wanted.device AND "
-        f"m.t // {20 * BIN} = wanted.span ORDER BY m.device, m.t, m.lat, m.lon, m.speed, m.heading"
-    ).fetchnumpy()
-    device = rows["device"]
-    edges = np.flatnonzero(np.diff(device)) + 1
-    slices = dict(
-        zip(device[[0, *edges]].tolist(), zip([0, *edges.tolist()], [*edges.tolist(), len(device)], strict=True), strict=True)
-    )
-    tracks: dict[int, Track] = {}
-    for a, b, first, last in zip(*(pairs[name].tolist() for name in ("a", "b", "first", "last")), strict=True):
-        for who in (a, b):
-            if who not in tracks:
-                own = slice(*slices[who])
-                tracks[who] = Track.of(who, *(rows[name][own] for name in ("t", "lat", "lon", "speed", "heading")))
-        yield meetings(tracks[a], tracks[b], (first * BIN - 2 * BIN, (last + 3) * BIN), config)
+    found: dict[str, Ints] = base.execute("FROM candidates").fetchnumpy()
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,34 +223,46 @@ class Track:
     speed: Floats
     heading: Floats
 
-    @classmethod
-    def of(cls, device: int, t: Ints, lat: Floats, lon: Floats, speed: Floats, heading: Floats) -> "Track":
-        """Take messages in order of time; what is repeated or far from the messages about it is left out.
 
-        Args:
-            device: its number.
-            t: (M,) µs since 2004.
-            lat: (M,) degrees.
-            lon: (M,) degrees.
-            speed: (M,) m/s.
-            heading: (M,) degrees clockwise from north.
-        """
-        new = np.concatenate([[True], np.diff(t) > 0])
-        t, lat, lon = np.asarray(t[new]), np.asarray(lat[new]), np.asarray(lon[new])
-        good = np.ones(len(t), dtype=bool)
-        if len(t) > 2 * MEDIAN:
-            for values, metres in ((lat, METRES), (lon, LONGITUDE * exact.cos(float(np.median(lat)) * np.pi / 180.0))):
-                windowed = np.lib.stride_tricks.sliding_window_view(np.pad(values, MEDIAN, mode="edge"), 2 * MEDIAN + 1)
-                good &= np.abs(values - np.median(windowed, axis=1)) * metres < OUTLIER + 2.0 * FASTEST * _reach(t)
-        facing = (np.pi / 2.0 - np.asarray(heading[new], dtype=np.float64) * (np.pi / 180.0))[good]
-        return cls(device, t[good], lat[good], lon[good], np.asarray(speed[new], dtype=np.float64)[good], facing)
+def tracks_of(rows: dict[str, Any]) -> dict[int, Track]:
+    """Return the vehicles' tracks without what lies far from the messages about it.
+
+    Args:
+        rows: (M,) by column, in order of vehicle and time, one for each stamp; heading in degrees clockwise from north.
+    """
+    device, t = rows["device"], rows["t"]
+    own = runs_of(device)
+    if not own:
+        return {}
+    lengths = np.array([last - first for first, last in own])
+    first, last = (np.repeat(np.array(ends), lengths) for ends in zip(*own, strict=True))
+    at = np.arange(len(t))
+    around = [np.clip(at + k, first, last - 1) for k in (-2, -1, 0, 1, 2)]
+    seconds = np.minimum((t[around[4]] - t[around[0]]) * 1e-6, 2.0)
+    good = np.ones(len(t), dtype=bool)
+    wide = LONGITUDE * exact.cos(rows["lat"] * (np.pi / 180.0))
+    for name, metres in (("lat", METRES), ("lon", wide)):
+        middle = median_of_five(*(rows[name][index] for index in around))
+        good &= np.abs(rows[name] - middle) * metres < OUTLIER + FASTEST * seconds
+    heading = np.pi / 2.0 - rows["heading"].astype(np.float64) * (np.pi / 180.0)
+    speed = rows["speed"].astype(np.float64)
+    found = {}
+    for begin, end in own:
+        kept = np.flatnonzero(good[begin:end]) + begin
+        if len(kept) > 1:
+            found[int(device[begin])] = Track(
+                int(device[begin]), t[kept], rows["lat"][kept], rows["lon"][kept], speed[kept], heading[kept]
+            )
+    return found
 
 
-def _reach(t: Ints) -> Floats:
-    """(M,) seconds from the message before last to the one after next, at the ends as far as there are any."""
-    padded = np.pad(t, MEDIAN, mode="edge")
-    seconds: Floats = np.minimum((padded[2 * MEDIAN :] - padded[: -2 * MEDIAN]) * 1e-6, 2.0)
-    return seconds
+def median_of_five(a: Floats, b: Floats, c: Floats, d: Floats, e: Floats) -> Floats:
+    """Return the medians (M,) of five numbers each (M,), without sorting them."""
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    low2, high2 = np.minimum(c, d), np.maximum(c, d)
+    least, most = np.maximum(low, low2), np.minimum(high, high2)  # neither the smallest nor the largest of four
+    middle: Floats = np.maximum(np.minimum(least, most), np.minimum(np.maximum(least, most), e))
+    return middle
 
 
 def meetings(a: Track, b: Track, span: tuple[int, int], config: CorpusConfig) -> list[dict[str, Any]]:
@@ -294,7 +313,8 @@ def _at(track: Track, at: Ints, origin: tuple[float, float], config: CorpusConfi
     low, high = np.searchsorted(track.t, [at[0], at[-1]])
     own = slice(max(int(low) - 1, 0), int(high) + 1)
     t = track.t[own]
-    place = local_frame(track.lat[own], track.lon[own], origin)
+    wide = LONGITUDE * exact.cos(origin[0] * (np.pi / 180.0))
+    place = np.stack([(track.lon[own] - origin[1]) * wide, (track.lat[own] - origin[0]) * NORTH], axis=1)
     seconds, when = (t - at[0]) * 1e-6, (at - at[0]) * 1e-6
     position = np.stack([np.interp(when, seconds, place[:, 0]), np.interp(when, seconds, place[:, 1])], axis=1)
     after = np.clip(np.searchsorted(t, at), 1, len(t) - 1)
@@ -307,20 +327,37 @@ def tell_apart(t: Ints, lat: Floats, lon: Floats, speed: Floats) -> Ints:
     """Return (M,) which of the vehicles that share an id sent each message: 0, 1, …, in order of their first.
 
     A message belongs to the vehicle that could have driven there from its message before, the nearest such.
+
+    Args:
+        t: (M,) µs, ascending.
+        lat: (M,) degrees.
+        lon: (M,) degrees.
+        speed: (M,) m/s.
     """
-    places: list[tuple[int, float, float, float]] = []
     who = np.zeros(len(t), dtype=np.int64)
     wide = exact.cos(float(lat.mean()) * np.pi / 180.0) * LONGITUDE
-    for k, (stamp, north, east, fast) in enumerate(zip(t.tolist(), lat.tolist(), lon.tolist(), speed.tolist(), strict=True)):
+    _tell_apart(
+        np.asarray(t, dtype=np.int64), lat * METRES, lon * wide, np.asarray(speed, dtype=np.float64), np.zeros((MOST, 4)), who
+    )
+    return who
+
+
+@kernel(I1, F1, F1, F1, OUT2, OUTI1)
+def _tell_apart(t: Ints, north: Floats, east: Floats, speed: Floats, places: Floats, who: Ints) -> None:
+    """`places` (V, 4) takes the last message of each vehicle: t, north, east, speed; the last one takes whoever is left."""
+    count = 0
+    for k in range(len(t)):
         best, nearest = -1, np.inf
-        for n, (before, y, x, v) in enumerate(places):
-            seconds = (stamp - before) * 1e-6
-            away = max(abs(north - y) * METRES, abs(east - x) * wide)
-            if away < nearest and away < 20.0 + 1.5 * max(fast, v, 5.0) * seconds and seconds < 600.0:
+        for n in range(count):
+            seconds = (t[k] - places[n, 0]) * 1e-6
+            away = max(abs(north[k] - places[n, 1]), abs(east[k] - places[n, 2]))
+            if away < nearest and seconds < 600.0 and away < 20.0 + 1.5 * max(speed[k], places[n, 3], 5.0) * seconds:
                 best, nearest = n, away
         if best < 0:
-            best = len(places)
-            places.append((0, 0.0, 0.0, 0.0))
-        places[best] = (stamp, north, east, fast)
+            best = min(count, len(places) - 1)
+            count = best + 1
+        places[best, 0] = t[k]
+        places[best, 1] = north[k]
+        places[best, 2] = east[k]
+        places[best, 3] = speed[k]
         who[k] = best
-    return who

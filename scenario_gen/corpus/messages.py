@@ -123,13 +123,13 @@ def parse_range(task: RangeTask) -> None:
         for k, (path, begin, end) in enumerate(task.pieces):
             whole = begin == 0 and end == path.stat().st_size
             names[str(path if whole else _extract(path, begin, end, Path(place) / f"{k}.csv"))] = str(path)
-        account = _parse(base, names)
+        account, kept = _parse(base, names)
         with arriving(task.target.with_suffix(".json")) as part:
             write_text(part, json.dumps(account, indent=1) + "\n")
         with arriving(task.target) as part:
             base.execute(
-                "COPY (SELECT device, t, lat, lon, speed, heading FROM parsed JOIN files USING (filename) "
-                f"WHERE cause = 0 AND (NOT checked OR NOT off) ORDER BY t // {HOUR}) TO '{part}' "
+                f"COPY (SELECT device, t, lat, lon, speed, heading FROM parsed WHERE {kept} ORDER BY t // {HOUR}) "
+                f"TO {quoted([str(part)])} "
                 "(FORMAT parquet, COMPRESSION zstd)"
             )
 
@@ -151,8 +151,8 @@ def _extract(path: Path, begin: int, end: int, target: Path) -> Path:
     return target
 
 
-def _parse(base: Any, names: dict[str, str]) -> dict[str, Any]:
-    """Parse files (read name -> true name) into the table `parsed`; return the account."""
+def _parse(base: Any, names: dict[str, str]) -> tuple[dict[str, Any], str]:
+    """Parse files (read name -> true name) into the table `parsed`; return the account, and the condition of rows to keep."""
     files = [name for name in names if Path(name).stat().st_size]
     columns = ", ".join(f"'{name}': '{TYPES.get(name, 'VARCHAR')}'" for name in COLUMNS)
     cause = " ".join(f"WHEN {condition} THEN {k}" for k, condition in enumerate(CAUSES.values(), start=1))
@@ -163,8 +163,8 @@ def _parse(base: Any, names: dict[str, str]) -> dict[str, Any]:
     source = "(SELECT NULL::VARCHAR AS filename, " + ", ".join(f"NULL::{TYPES[name]} AS {name}" for name in TYPES) + " LIMIT 0)"
     if files:
         source = (
-            f"read_csv({files!r}, header=false, auto_detect=false, delim=',', quote='', escape='', columns={{{columns}}}, "
-            "store_rejects=true, filename=true, max_line_size=65536)"
+            f"read_csv([{quoted(files)}], columns={{{columns}}}, header=false, auto_detect=false, delim=',', quote='', "
+            "escape='', store_rejects=true, filename=true, max_line_size=65536)"
         )
     base.execute(
         f"CREATE TEMP TABLE parsed AS SELECT filename, TxDevice AS device, Gentime AS t, Latitude AS lat, Longitude AS lon, "
@@ -178,9 +178,11 @@ def _parse(base: Any, names: dict[str, str]) -> dict[str, Any]:
     )
     account: dict[str, Counter[str]] = {name: Counter() for name in names.values()}
     notes: list[str] = []
+    unchecked: list[str] = []
     for name, rows, checked in base.execute("FROM files ORDER BY filename").fetchall():
         account[names[name]]["rows"] += rows
         if not checked:
+            unchecked.append(name)
             notes.append(f"{names[name]}: DSecond disagrees with Gentime in most rows, and is not asked")
     causes = "SELECT filename, cause, count(*) FROM parsed WHERE cause > 0 GROUP BY ALL"
     for name, number, count in base.execute(causes).fetchall():
@@ -193,13 +195,19 @@ def _parse(base: Any, names: dict[str, str]) -> dict[str, Any]:
         account[names[name]]["left out: no row of 19 fields with numbers"] += count
     for name, backwards, foreign in _clocks(base, names):
         account[names[name]] += Counter({"said: stamps that run backwards": backwards, "said: stamps of another day": foreign})
-    kept = "FROM parsed JOIN files USING (filename) WHERE cause = 0 AND (NOT checked OR NOT off)"
-    hours = base.execute(f"SELECT t // {HOUR}, count(*) {kept} GROUP BY ALL ORDER BY ALL").fetchall()
-    return {
+    kept = f"cause = 0 AND (NOT off{f' OR filename IN ({quoted(unchecked)})' if unchecked else ''})"
+    hours = base.execute(f"SELECT t // {HOUR}, count(*) FROM parsed WHERE {kept} GROUP BY ALL ORDER BY ALL").fetchall()
+    found = {
         "files": {name: dict(sorted(found.items())) for name, found in sorted(account.items())},
         "hours": {str(hour): rows for hour, rows in hours},
         "notes": sorted(set(notes)),
     }
+    return found, kept
+
+
+def quoted(names: Sequence[str]) -> str:
+    """Return names as texts in SQL, separated by commas."""
+    return ", ".join("'" + name.replace("'", "''") + "'" for name in names)
 
 
 def _rejected(base: Any) -> list[tuple[str, int]]:

@@ -195,7 +195,7 @@ def hour_tasks(ranged: Sequence[RangeTask], out: Path, config: CorpusConfig) -> 
     room = 0
     sides = -(-overlap(config) // HOUR)
     for hour in sorted(rows):
-        if (out / "hours" / f"hour-{hour}.parquet").exists():
+        if rows[hour] + rows[hour + 1] < least_rows(config) or (out / "hours" / f"hour-{hour}.parquet").exists():
             continue
         if not tasks or rows[hour] > room:
             tasks.append([])
@@ -204,6 +204,11 @@ def hour_tasks(ranged: Sequence[RangeTask], out: Path, config: CorpusConfig) -> 
         tasks[-1].append((hour, tuple(near)))
         room -= rows[hour]
     return [HourTask(f"hours {own[0][0]} to {own[-1][0]}", tuple(own), out / "hours", config) for own in tasks]
+
+
+def least_rows(config: CorpusConfig) -> int:
+    """Return the fewest messages that a meeting can have: without a gap that is too long, for long enough, of two vehicles."""
+    return 2 * (int(min(config.log.min_presence, config.log.min_duration) / max(config.log.longest_gap, config.log.period)) + 1)
 
 
 def clean_tasks(out: Path, config: CorpusConfig) -> list[CleanTask]:

@@ -31,7 +31,7 @@ from scenario_gen.types.names import tokens
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import Scenario
 
-TOPICS = ("tracks", "map", "ego/track", SCENARIOS, INFO)
+TOPICS = ("tracks", "map", "road/lanes", "fit/info", "ego/track", SCENARIOS, INFO)
 
 
 @dataclass(frozen=True, eq=False)

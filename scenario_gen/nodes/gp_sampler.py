@@ -22,6 +22,7 @@ from collections.abc import Mapping
 from functools import partial
 
 from msg_conventions.diagnostics import Level
+from msg_conventions.lanes import TOPIC as LANES
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.nodes.base import StageNode
@@ -38,14 +39,14 @@ ENDS = ("road/entries", "road/exits")  # of use only where start or end states a
 class GpSampler(StageNode):
     """Samples valid scenarios around the planned routes."""
 
-    INPUTS = ("map", *ENDS, "tracks", "changepoints", "fit", "fit/info")
+    INPUTS = ("map", *ENDS, LANES, "tracks", "changepoints", "fit", "fit/info")
     STAGES = ("template", "roads", "fitting", "routing", "sampling", "validity")
     OUTPUTS = ("scenarios", "scenarios/info", "markers")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("gp_sampler", Config(), namespace)
         paired = ("tracks", "changepoints", "fit", "fit/info", *(("map",) if self.config.pair_map else ()))
-        self.inputs = Inputs(paired, () if self.config.pair_map else ("map",))
+        self.inputs = Inputs(paired, () if self.config.pair_map else ("map",), (LANES,))
         self._routes: set[str] = set()
         self._requests = OpenRequests(self)
 
@@ -74,9 +75,9 @@ class GpSampler(StageNode):
         return self.inputs.missing() or [topic for topic in ends if topic not in self.messages()]
 
     def messages(self) -> dict[str, bytes]:
-        """The template's messages; entries and exits only if the fit was made with them."""
+        """The template's messages; entries, exits and lanes only if the fit was made with them."""
         messages = self.inputs.complete() or {}
-        return {t: data for t, data in messages.items() if t not in ENDS or self.inputs.named("fit/info", t)}
+        return {t: data for t, data in messages.items() if t not in (*ENDS, LANES) or self.inputs.named("fit/info", t)}
 
     def _follow(self, tracks: bytes) -> None:
         """Listen to the routes of the vehicles in the tracks, and no longer to those of others."""

@@ -21,6 +21,8 @@ from msg_conventions import trajectory
 from msg_conventions.cdr import stamp_of
 from msg_conventions.fits import decode_fit
 from msg_conventions.hashes import decode_hashes, hash_of, INFOS
+from msg_conventions.lanes import decode_lanes
+from msg_conventions.lanes import TOPIC as LANES
 from msg_conventions.paths import decode_path
 from msg_conventions.roads import decode_map, decode_poses
 from msg_conventions.tracks import decode_tracks
@@ -53,6 +55,7 @@ DECODERS: dict[str, Callable[[bytes, str], object]] = {
     "map": lambda data, what: decode_map(data, name=what),
     "road/entries": decode_poses,
     "road/exits": decode_poses,
+    LANES: decode_lanes,
     "changepoints": trajectory.decode,
     "fit": decode_fit,
     "route": decode_path,
@@ -86,11 +89,13 @@ class Inputs:
     Args:
         paired: topics that must bear the same stamp.
         unpaired: topics whose newest message counts, whatever its stamp.
+        if_named: topics that count only where an info names them, and are waited for there.
     """
 
-    def __init__(self, paired: Iterable[str], unpaired: Iterable[str] = ()) -> None:
+    def __init__(self, paired: Iterable[str], unpaired: Iterable[str] = (), if_named: Iterable[str] = ()) -> None:
         self._paired = set(paired)
         self._unpaired = set(unpaired)
+        self._if_named = set(if_named)
         self._newest: dict[str, _Message] = {}
 
     def expect(self, topics: Iterable[str]) -> None:
@@ -140,10 +145,18 @@ class Inputs:
             f"{info} of this {topic}"
             for info in INFOS
             for topic, named in (held[info].together.items() if info in held else ())
-            if topic in held and held[topic].hash != named
+            if (topic in held and held[topic].hash != named) or (topic in self._if_named and topic not in held)
         ]
+        if not any(info in held for info in INFOS):  # it may name them: what is done without would be done again
+            others += [f"road/info of this {topic}" for topic in sorted(self._if_named & set(held))]
         return silent + old + others
 
     def complete(self) -> dict[str, bytes] | None:
         """Return all messages if none is missing and all belong together."""
-        return None if self.missing() else {topic: message.data for topic, message in self._newest.items()}
+        if self.missing():
+            return None
+        return {
+            topic: message.data
+            for topic, message in self._newest.items()
+            if topic not in self._if_named or any(self.named(info, topic) for info in INFOS)
+        }

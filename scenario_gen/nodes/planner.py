@@ -34,6 +34,7 @@ from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.diagnostics import Level, written
 from msg_conventions.fits import anchor_stamps, encode_fit, fit_statuses
 from msg_conventions.hashes import encode_hashes, template_hashes
+from msg_conventions.lanes import TOPIC as LANES
 from msg_conventions.paths import encode_path, encode_route
 from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
@@ -70,7 +71,7 @@ class Config(Parameters):
 class Planner(StageNode):
     """Fits each template to the road and plans every vehicle's route between its changepoints."""
 
-    INPUTS = (*ROAD, "road/info", "tracks", "changepoints")
+    INPUTS = (*ROAD, LANES, "road/info", "tracks", "changepoints")
     STAGES = ("template", "roads", "fitting", "routing")
     OUTPUTS = ("fit", "fit/info")
 
@@ -81,7 +82,7 @@ class Planner(StageNode):
         self._reasons: deque[tuple[int, str]] = deque(maxlen=EXPLAINED)  # stamp of a request, and why there is no path
         paired = self.config.pair_map
         self._asked = 0
-        self.inputs = Inputs(("tracks", "changepoints", *(ROAD if paired else ())), () if paired else ("map",))
+        self.inputs = Inputs(("tracks", "changepoints", *(ROAD if paired else ())), () if paired else ("map",), (LANES,))
 
     def stopped(self) -> None:
         """Forget the inputs: being latched, they come again."""
@@ -89,7 +90,7 @@ class Planner(StageNode):
 
     def received(self, topic: str, data: bytes) -> None:
         """Plan when road, tracks and changepoints are those of one template."""
-        if topic == "road/info" and not self.config.pair_map:
+        if topic in ("road/info", LANES) and not self.config.pair_map:
             return  # a map server of the user's own does not say what belongs to its map
         self.inputs.put(topic, data)
         messages = self.inputs.complete()  # if not all is there, the work on what was there is cancelled all the same
@@ -99,7 +100,7 @@ class Planner(StageNode):
         config = self.config
         encounter = decode_tracks(messages["tracks"])
         segmentation = decode_changepoints(messages["changepoints"], encounter)
-        _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"))
+        _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"), messages.get(LANES))
         fit = fit_template(encounter, segmentation, road, config.fitting)
         routes = plan_routes(road, fit, config.planning, config.seed)
         stop_if_cancelled()

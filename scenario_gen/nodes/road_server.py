@@ -32,6 +32,8 @@ from rclpy.serialization import deserialize_message
 from msg_conventions.cdr import stamp_of
 from msg_conventions.diagnostics import Level
 from msg_conventions.hashes import encode_hashes, template_hashes
+from msg_conventions.lanes import encode_lanes
+from msg_conventions.lanes import TOPIC as LANES
 from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.cancelling import stop_if_cancelled
@@ -76,13 +78,14 @@ class RoadServer(StageNode):
 
     INPUTS = ("tracks",)
     STAGES = ("roads",)
-    OUTPUTS = ("map", "road/entries", "road/exits", "road/info")
+    OUTPUTS = ("map", "road/entries", "road/exits", LANES, "road/info")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("road_server", Config(), namespace)
         self._tracks: bytes | None = None
         self._name = self.config.road_name
         self._grid: bytes | None = None
+        self._with_lanes = False  # whether the road before had lanes, which are to be taken back then
         self.serve(GetMap, "~/get_map", self._get_map)
         self._asked = 0
         self.create_service(LoadMap, "~/load_map", self._load_map, qos_profile=REQUESTS)
@@ -107,7 +110,12 @@ class RoadServer(StageNode):
             "road/exits": encode_poses(road.exits, road.frame_id, stamp_ns),
             "map": encode_map(road, stamp_ns),
         }
+        if road.lanes is not None:
+            messages = {LANES: encode_lanes(road.lanes, road.frame_id, stamp_ns), **messages}  # before the map that they are of
         stop_if_cancelled()
+        if self._with_lanes and road.lanes is None:
+            self.outputs.send(LANES, encode_lanes(None, road.frame_id, stamp_ns))
+        self._with_lanes = road.lanes is not None
         for topic, data in messages.items():
             self.outputs.send(topic, data)
         template = {"tracks": tracks} if tracks else {}

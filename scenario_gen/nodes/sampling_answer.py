@@ -29,7 +29,7 @@ from scenario_gen.parameters import parameter
 from scenario_gen.recordings.provenance import parameter_texts, versions
 from scenario_gen.recordings.template import decode_template
 from scenario_gen.routing import PlanningConfig
-from scenario_gen.sampling import sample_scenarios, SamplingConfig
+from scenario_gen.sampling import freed_states, sample_scenarios, SamplingConfig
 from scenario_gen.template.interaction import waits_to_keep
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.generation import GenerationResult
@@ -154,9 +154,10 @@ def answer_request(
             )
     else:
         waits = waits_to_keep(encounter, segmentation)
-        check = Checker.of_template(encounter, road, fit.asked, waits, config.limits, config.order).check
+        asked = freed_states(fit.asked, encounter, config.sampling, config)
+        check = Checker.of_template(encounter, road, asked, waits, config.limits, config.order).check
         generated = sample_scenarios(
-            encounter, segmentation, road, template.routes, fit.asked, check, config.sampling, count=config.count,
+            encounter, segmentation, road, template.routes, asked, check, config.sampling, count=config.count,
             seed=config.seed, waits=waits, request=config, progress=advance, cancelled=cancelled, found=out.scenario,
             measures=MEASURES,
         )  # fmt: skip

@@ -40,7 +40,7 @@ from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.recordings.of_scenarios import decode_with_witness, joined_messages
 from scenario_gen.recordings.requests import RequestTracker
-from scenario_gen.recordings.template import anchor_index, decode_routes, template_statuses
+from scenario_gen.recordings.template import anchor_index, decode_routes, lanes_beside, template_statuses
 from scenario_gen.storage.bag import BagMessage, read_messages, within
 from scenario_gen.storage.config import BagConfig
 from scenario_gen.types.encounter import Encounter
@@ -66,12 +66,12 @@ __all__ = [
 SCENARIOS = "scenarios"
 NO_ENTRY = f"{INFO} has no entry for them (lost with the end of a recording?)"
 READ = re.compile(
-    r"(?:(?P<namespace>.*?)/)?(?P<topic>tracks|changepoints|posterior|map|road/entries|road/exits|fit|fit/info|vehicle_\w+/route"
+    r"(?:(?P<namespace>.*?)/)?(?P<topic>tracks|changepoints|posterior|map|road/entries|road/exits|road/lanes|fit|fit/info|vehicle_\w+/route"
     r"|ego/(?:start|goal|track|witness)|scenarios|scenarios/info|diagnostics)",
     re.DOTALL,
 )
 TEMPLATE_TOPIC = re.compile(
-    r"tracks|changepoints|map|fit|road/entries|road/exits|vehicle_\w+/route|ego/(?:start|goal|track)", re.DOTALL
+    r"tracks|changepoints|map|fit|road/entries|road/exits|road/lanes|vehicle_\w+/route|ego/(?:start|goal|track)", re.DOTALL
 )
 Statuses = Mapping[str, Mapping[str, str]]  # key-values of diagnostics, by subject
 
@@ -321,7 +321,8 @@ class Namespace:
         return self._decode_road(data) if data else None
 
     def _decode_road(self, data: bytes) -> Road:
-        return replace(decode_map(data, name=self.where("map"))[1], name=self.road_name)
+        lanes = lanes_beside(data, self.data("map"), self.data("road/lanes"), self.data("fit/info"))
+        return replace(decode_map(data, lanes=lanes, name=self.where("map"))[1], name=self.road_name)
 
     @cached_property
     def roads_differ(self) -> bool:

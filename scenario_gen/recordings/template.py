@@ -21,6 +21,8 @@ import numpy as np
 from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.diagnostics import decode_diagnostics, TEMPLATE, template_of
 from msg_conventions.fits import anchor_stamps, decode_fit
+from msg_conventions.hashes import decode_hashes, hash_of
+from msg_conventions.lanes import TOPIC as LANES
 from msg_conventions.paths import decode_route
 from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
@@ -48,7 +50,7 @@ def missing_topics(messages: Mapping[str, bytes]) -> list[str]:
 
 
 def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
-    """Return the fitted template that the messages (by topic) describe; the road's entries and exits may be missing.
+    """Return the fitted template that the messages (by topic) describe; the road's entries, exits and lanes may be missing.
 
     Of the fit it has the states asked, not what was decided for each vehicle, which the messages do not say.
 
@@ -57,7 +59,7 @@ def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
     """
     encounter = decode_tracks(messages["tracks"])
     segmentation = decode_changepoints(messages["changepoints"], encounter)
-    _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"))
+    _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"), messages.get(LANES))
     _, frame, asked, poses = decode_fit(messages["fit"])
     anchors = anchor_stamps(encounter, segmentation.changepoints)
     if poses.shape[:2] != (len(encounter.vehicles), len(anchors)):
@@ -86,6 +88,26 @@ def decode_routes(messages: Mapping[str, bytes], encounter: Encounter, anchors_n
             raise InputError(f"{topic} is missing, though tracks has a vehicle {name!r}")
         found.append((topic, *decode_route(messages[topic], anchors_ns, topic)))
     return found
+
+
+def lanes_beside(grid: bytes, maps: Iterable[bytes], lanes: Sequence[bytes], infos: Iterable[bytes]) -> bytes | None:
+    """Return the lanes that belong to a map: those that a `fit/info` names beside it; where none does, those of a bag of one map.
+
+    Args:
+        grid: the map's message.
+        maps: all of the bag.
+        lanes: all messages of `road/lanes`.
+        infos: all messages of `fit/info`.
+
+    Raises:
+        InputError: one of `infos` is damaged.
+    """
+    own = hash_of("map", grid)
+    for info in infos if lanes else ():
+        together = decode_hashes(info, "fit/info")
+        if together.get("map") == own:
+            return next((data for data in lanes if hash_of(LANES, data) == together.get(LANES)), None)
+    return lanes[-1] if lanes and len({hash_of("map", data) for data in maps}) == 1 else None
 
 
 def anchor_index(encounter: Encounter, changepoints: Ints) -> Ints:

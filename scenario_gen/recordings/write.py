@@ -22,6 +22,8 @@ from msg_conventions.diagnostics import encode_diagnostics
 from msg_conventions.ego import ego_messages, WITNESS
 from msg_conventions.fits import anchor_stamps, encode_fit, fit_statuses
 from msg_conventions.hashes import encode_hashes, template_hashes
+from msg_conventions.lanes import encode_lanes
+from msg_conventions.lanes import TOPIC as LANES
 from msg_conventions.paths import encode_route
 from msg_conventions.pictures import encode_footprint, scenario_markers
 from msg_conventions.roads import encode_map, encode_poses
@@ -58,6 +60,8 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
         "road/entries": encode_poses(road.entries, road.frame_id, stamp),
         "road/exits": encode_poses(road.exits, road.frame_id, stamp),
     }
+    if road.lanes is not None:
+        template[LANES] = encode_lanes(road.lanes, road.frame_id, stamp)
     hashes, infos = template_hashes(template), {"road/info": encode_hashes("road", template, stamp)}
     template["changepoints"] = encode_changepoints(encounter, result.segmentation)
     template["fit"] = encode_fit(encounter, fit, road.frame_id)

@@ -28,7 +28,7 @@ from scenario_gen.recordings.read import INFO, Namespace, read_recording, Reques
 from scenario_gen.recordings.template import decode_template, missing_topics
 from scenario_gen.recordings.write import add_message, same_tracks, scenario_bytes
 from scenario_gen.routing import plan_routes, PlanningConfig
-from scenario_gen.sampling import regenerate, SamplingConfig
+from scenario_gen.sampling import freed_states, regenerate, SamplingConfig
 from scenario_gen.segmentation import segment, SegmentationConfig
 from scenario_gen.storage.bag import bag_topics, BagMessage, within
 from scenario_gen.storage.config import BagConfig
@@ -106,12 +106,13 @@ def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
         fit = fit_template(encounter, segmentation, road, fitting, request=asked, max_speed=sampling.max_speed)
         routes = plan_routes(road, fit, planning, seed)
     waits = waits_to_keep(encounter, segmentation)
+    states = freed_states(fit.asked, encounter, sampling, asked)
     check = None
     if asked.target or asked.order == "swap":  # a proposal is found again with them
         limits = read_parameters(Limits(), values, "limits.", what)
-        check = Checker.of_template(encounter, road, fit.asked, waits, limits, asked.order).check
+        check = Checker.of_template(encounter, road, states, waits, limits, asked.order).check
     scenario = regenerate(
-        encounter, segmentation, road, routes, fit.asked, sampling, seed=seed, index=index, waits=waits, request=asked,
+        encounter, segmentation, road, routes, states, sampling, seed=seed, index=index, waits=waits, request=asked,
         check=check, measures=MEASURES,
     )  # fmt: skip
     data, sha256 = (b"", "") if scenario is None else scenario_bytes(scenario, encounter)

@@ -118,7 +118,9 @@ def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = B
     Raises:
         InputError: the bag is missing or damaged, holds no scenarios, or one of its tracks, maps, … cannot be read.
     """
-    namespaces = read_recording(path, config, ("tracks", "changepoints", "map", "fit", SCENARIOS, INFO)).namespaces.values()
+    namespaces = read_recording(
+        path, config, ("tracks", "changepoints", "map", "road/lanes", "fit", "fit/info", SCENARIOS, INFO)
+    ).namespaces.values()
     found = [namespace for namespace in namespaces if SCENARIOS in namespace.messages]
     if not found:
         raise InputError(f"{path}: no topic `scenarios` in any namespace; there is nothing to check")

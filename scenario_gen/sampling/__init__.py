@@ -15,6 +15,7 @@
 """Speed profile and Gaussian process -> candidate scenarios (paper III-C)."""
 
 from scenario_gen.sampling.config import SamplingConfig
+from scenario_gen.sampling.freedom import freed_states
 from scenario_gen.sampling.sample import Cancelled, OnValid, Progress, regenerate, sample_scenarios
 
-__all__ = ["Cancelled", "OnValid", "Progress", "SamplingConfig", "regenerate", "sample_scenarios"]
+__all__ = ["Cancelled", "OnValid", "Progress", "SamplingConfig", "freed_states", "regenerate", "sample_scenarios"]

@@ -26,6 +26,22 @@ class SamplingConfig(Parameters):
     Source: σ_f and l of eq 14, σ_ω of eq 13; the others are ours.
     """
 
+    variety: str = parameter(
+        "wide",
+        "what is free: `narrow` keeps one clock, sizes, start and end states; `wide` frees them, each by its parameter",
+        choices=("narrow", "wide"),
+    )
+    arrival_sigma: float = parameter(
+        1.5, "wide: standard deviation of each vehicle's own shift in time against the others", unit="s", low=0.0, high=10.0
+    )
+    pace_sigma: float = parameter(0.04, "wide: standard deviation of each vehicle's own pace, as a share", low=0.0, high=0.2)
+    wait_sigma: float = parameter(1.0, "wide: standard deviation of the length of each wait", unit="s", low=0.0, high=10.0)
+    end_speed_sigma: float = parameter(0.4, "wide: standard deviation of start and end speeds", unit="m/s", low=0.0, high=5.0)
+    place_sigma: float = parameter(0.2, "wide: standard deviation of the place in the lane", unit="m", low=0.0, high=2.0)
+    sizes: str = parameter(
+        "catalogue", "wide: sizes of cars, from the catalogue of eight or as recorded", choices=("catalogue", "recorded")
+    )
+    freedom: float = parameter(2.5, "wide: standard deviations at which all that is free is cut", low=0.5, high=4.0)
     lateral_sigma: float = parameter(
         0.3, "σ_f: standard deviation across the route, between anchors", unit="m", low=0.0, high=10.0
     )

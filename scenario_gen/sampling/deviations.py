@@ -34,6 +34,7 @@ MAX_ROOM_SIGMAS = 5.0  # more room than so many standard deviations is not looke
 BEND_FROM_SHARE = 0.6  # share of the room from which on a deviation is bent back
 _FLANK_STEP = 0.5  # m
 _ROOM_STEP = 0.1  # m
+_SIDE = 0.3  # m, to either side of who drives straight on
 _SMOOTHING = 4.0  # m along the route, each of two passes
 _COURSE = 1.5  # s, of each of two passes: what is slower is a driver's course, not a correction
 _SLOW = 3.0  # m/s, below which corrections are made over a distance rather than a time
@@ -157,6 +158,23 @@ def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> F
     for _ in range(2):
         smooth = uniform_filter1d(smooth, 2 * reach + 1, mode="nearest")
     return np.asarray(smooth)
+
+
+def road_ahead(path: BasePath, vehicle: Vehicle, road: Road, most: Floats) -> Floats:
+    """Metres (2,), at most `most` (2,), for which the road is free straight on before the route and behind it."""
+    found = np.zeros(2)
+    if len(path.node) == 1:
+        return found
+    for end, sign in ((0, -1.0), (-1, 1.0)):
+        x, y, yaw = path.node[end].tolist()
+        ahead = np.array([float(exact.cos(yaw)), float(exact.sin(yaw))])
+        step = np.arange(_FLANK_STEP, most[end] + 0.5 * vehicle.length + _FLANK_STEP, _FLANK_STEP)
+        side = np.array([-0.5, 0.0, 0.5]) * (vehicle.width + 2.0 * _SIDE)
+        points = np.array([x, y]) + sign * step[:, None, None] * ahead + side[:, None] * np.array([-ahead[1], ahead[0]])
+        free = road.drivable_at(points).all(axis=1)
+        clear = float(step[-1]) if free.all() else _FLANK_STEP * int(np.argmin(free))
+        found[end] = min(max(clear - 0.5 * vehicle.length - _FLANK_STEP, 0.0), most[end])
+    return found
 
 
 def soft_clipped(deviation: Floats, room: Floats) -> Floats:

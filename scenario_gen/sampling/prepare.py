@@ -19,11 +19,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats
+from scenario_gen.arrays import Bools, Floats
 from scenario_gen.errors import InputError
 from scenario_gen.sampling.candidates import CandidateModel, VehicleModel
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.deviations import lateral_covariance_root, lateral_room, MAX_ROOM_SIGMAS, ROOM_SIGMAS, Steering
+from scenario_gen.sampling.deviations import (
+    lateral_covariance_root,
+    lateral_room,
+    MAX_ROOM_SIGMAS,
+    road_ahead,
+    ROOM_SIGMAS,
+    Steering,
+)
+from scenario_gen.sampling.freedom import FADES, Freedom, freedom_of, MOST_ONWARD
 from scenario_gen.sampling.pace import clock_of, slowed_clock, template_grid
 from scenario_gen.sampling.path import BasePath
 from scenario_gen.sampling.speed_profile.knots import speed_knots, SpeedKnots, STAND
@@ -91,6 +99,7 @@ class _Drive:
         ends: asked speeds [m/s] at start and end.
         jerk: m/s³ that it keeps to; bend: m/s² sideways above which the pace is lowered.
         steering: the small corrections of its driver.
+        rests: begin and end [s] of the stands in which its speed is zero.
     """
 
     vehicle: Vehicle
@@ -105,6 +114,7 @@ class _Drive:
     jerk: float
     bend: float
     steering: Steering
+    rests: list[tuple[float, float]]
 
     def target(self, clock: Clock) -> Target:
         """What its mean speed should be near to, on this clock."""
@@ -209,7 +219,22 @@ def prepare(
         sentences.append(f"clock stretched by {share:.1f} % so that every vehicle can keep to its limits and its changepoints")
     warp = TimeWarp(clock_of(clock.grid, stretch * clock.rate), config, least_shares(clock.grid, waits))
     vehicles = [_model(d, road, *mean, config, sentences) for d, mean in zip(drives, found, strict=True)]
+    if config.variety == "wide":
+        tied = (asked.freed[..., 0] == 0.0).any(axis=0)
+        vehicles = [
+            replace(v, freedom=_freedom(drive, v, warp.nominal, asked.freed[n], tied, road, config))
+            for n, (v, drive) in enumerate(zip(vehicles, drives, strict=True))
+        ]
     return Prepared(CandidateModel(tuple(vehicles), warp), tuple(sentences))
+
+
+def _freedom(
+    drive: _Drive, model: VehicleModel, nominal: Clock, freed: Floats, tied: Bools, road: Road, config: SamplingConfig
+) -> Freedom:
+    """What preset `wide` frees of a vehicle."""
+    fastest = drive.speed[[0, -1]] + config.freedom * config.end_speed_sigma + config.max_acceleration * FADES
+    ahead = road_ahead(drive.path, drive.vehicle, road, MOST_ONWARD * fastest)
+    return freedom_of(drive.vehicle, drive.path.arc, nominal, drive.rests, freed, tied, ahead, config)
 
 
 def _slowed(drives: Sequence[_Drive], grid: Floats, config: SamplingConfig) -> tuple[Clock, list[str]]:
@@ -259,7 +284,8 @@ def _drive(
     scale = min(path.length / driven, _MOST_SCALE) if driven > 1e-3 else 1.0
     knots = speed_knots(times, dwells, stands, time, speed, ends, 0.0, creeps)
     standing = [v if v > STAND or not still else 0.0 for v, still in zip(ends, knots.still[[0, -1]], strict=True)]
-    spline = SpeedSpline.over(float(times[0]), float(times[-1]), _at_rest(knots, times))
+    rests = _at_rest(knots, times)
+    spline = SpeedSpline.over(float(times[0]), float(times[-1]), rests)
     recorded = [0.0 if still else scale * float(speed[k]) for k, still in zip((0, -1), knots.still[[0, -1]], strict=True)]
     lines = rounded_lines(spline, knots, time, scale * speed, (recorded[0], recorded[1]))
     jerk, sideways = _largest_jerk(scale * speed, encounter.dt), _largest_sideways(encounter, n)
@@ -278,6 +304,7 @@ def _drive(
             config.bend_acceleration or max(_BEND_SHARE * sideways, _LEAST_BEND), _CURVE_MARGIN * config.max_lateral_acceleration
         ),
         Steering.of(time, clean_tracks(encounter)[n].poses[here, 2], encounter.speed[n, here], path.length),
+        rests,
     )
 
 

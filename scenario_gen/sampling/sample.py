@@ -23,151 +23,46 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.sampling.candidates import Batch, CandidateModel, Scale
+from scenario_gen.sampling.adapt import adapted, aim_of, Cancelled, Check, Judge, label_of
+from scenario_gen.sampling.candidates import Batch
 from scenario_gen.sampling.config import SamplingConfig
-from scenario_gen.sampling.directed import (
-    Aim,
-    CHUNK,
-    estimated,
-    FAIR,
-    GOOD,
-    Measures,
-    PATIENCE,
-    PLAIN,
-    Proposal,
-    reachable,
-    Seen,
-    STAGE,
-    STAGES,
-    TargetError,
-)
+from scenario_gen.sampling.directed import Aim, estimated, Measures, reachable, STAGE, TargetError
 from scenario_gen.sampling.diverse import POOL_SHARE, spread_out
 from scenario_gen.sampling.lazy import LazyScenarios
 from scenario_gen.sampling.prepare import prepare
-from scenario_gen.template.interaction import closest_crossing, Conflict, find_conflicts, pair_conflict, Wait
-from scenario_gen.types.ego import with_witness
+from scenario_gen.sampling.sampler import (
+    BLOCK,
+    DIRECTED,
+    ENOUGH,
+    index_of,
+    LEVEL_SIZE,
+    LEVEL_SLOTS,
+    LEVELS,
+    place_of,
+    Sampler,
+)
+from scenario_gen.template.interaction import Wait
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario, ScenarioSet, Verdict
+from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario, ScenarioSet
 from scenario_gen.types.segmentation import Segmentation
-from scenario_gen.types.target import Reached, Target
+from scenario_gen.types.target import Reached
 
-Check = Callable[[Sequence[Scenario]], list[Verdict]]
+__all__ = [
+    "BLOCK", "KEPT", "LEVELS", "LEVEL_SIZE", "LEVEL_SLOTS", "PILOT", "Cancelled", "OnValid", "Progress", "Sampler", "index_of",
+    "place_of", "regenerate", "sample_scenarios",
+]  # fmt: skip
+
 Progress = Callable[[int, int, int], None]  # of scenarios so far, scenarios wanted, candidates so far
-Cancelled = Callable[[], bool]
-Label = Callable[[Scenario], dict[str, str]]
 OnValid = Callable[[Scenario, BoundaryStates, EgoSlot | None], None]  # a valid one, the states asked, what the ego is asked
 
-LEVELS = (
-    Scale(),
-    Scale(lateral=0.5),
-    Scale(lateral=0.5, longitudinal=0.5),
-    Scale(lateral=0.25, longitudinal=0.25, time=0.5),
-    Scale(lateral=0.1, longitudinal=0.1, time=0.25),
-)
-LEVEL_SIZE = 1 << 20  # candidates of one level whose indices follow each other
-LEVEL_SLOTS = 8  # levels that an index has room for; after them come the next LEVEL_SIZE candidates of the first
 KEPT = 1000  # scenarios up to which a set stays in memory
-BLOCK = 32  # candidates whose random numbers are drawn together
 PILOT = 2 * BLOCK  # candidates by which a level is judged
-ENOUGH = 0.3  # share of valid candidates below which the next level is tried
-DIRECTED, STAGED = 5, 6  # slots of the candidates of a proposal, and of those by which it is found
 DIRECTED_BUDGET = 10  # times the budget of a request without a target
 HOPELESS = 20 * BLOCK  # candidates of a proposal after which it is given up if none of them is valid and in the range
-
-
-def index_of(level: int, candidate: int) -> int:
-    """Return the index of a level's candidate: level * LEVEL_SIZE + candidate while that suffices, and unique beyond."""
-    page, within = divmod(candidate, LEVEL_SIZE)
-    return (page * LEVEL_SLOTS + level) * LEVEL_SIZE + within
-
-
-def place_of(index: int) -> tuple[int, int]:
-    """Return level and number of the candidate with this index.
-
-    Raises:
-        InputError: no candidate has it.
-    """
-    slot, within = divmod(index, LEVEL_SIZE)
-    page, level = divmod(slot, LEVEL_SLOTS)
-    if index < 0 or level > DIRECTED:
-        raise InputError(f"no candidate has the index {index}; take one of `scenarios/info`")
-    return level, page * LEVEL_SIZE + within
-
-
-@dataclass(frozen=True, eq=False)
-class Sampler:
-    """Draws candidates by their index: the same seed and index give the same candidate, whatever was drawn before."""
-
-    model: CandidateModel
-    seed: int
-    frame_id: str
-    ego: int | None = None  # of the vehicle that is left out of what is published, and is its witness
-    base: int = 0  # level whose standard deviations the candidates of a proposal have
-    proposal: Proposal | None = None
-    label: Label = lambda _: {}  # facts of a candidate of all vehicles
-    weighted: bool = True  # whether the candidates of a proposal say their weights
-
-    def block(self, level: int, number: int) -> tuple[Batch, list[int]]:
-        """Candidates number·BLOCK … of a level, and their indices."""
-        first = index_of(level, number * BLOCK)
-        return self.model.draw(self.numbers(level, number), self._scale(level)), list(range(first, first + BLOCK))
-
-    def scenario(self, index: int) -> Scenario | None:
-        """The candidate with this index, bit for bit as in a whole set; None if it has no speed profile."""
-        level, candidate = place_of(index)
-        number, row = divmod(candidate, BLOCK)
-        batch = self.model.draw(self.numbers(level, number)[row : row + 1], self._scale(level))
-        (whole,) = batch.scenarios(self.seed, [index], self.frame_id)
-        return None if whole is None else self.published(whole)
-
-    def redraw(self, index: Sequence[int]) -> list[Scenario]:
-        """The scenarios of indices that are of one block, bit for bit as in a whole set."""
-        level, candidate = place_of(index[0])
-        batch, own = self.block(level, candidate // BLOCK)
-        drawn = batch.scenarios(self.seed, own, self.frame_id)
-        return [self.published(whole) for whole in (drawn[one - own[0]] for one in index) if whole is not None]
-
-    def published(self, whole: Scenario) -> Scenario:
-        """A candidate of all vehicles as it is published: with its facts, the ego's motion apart, as witness."""
-        facts = self.label(whole)
-        if self.proposal is not None and self.weighted:
-            facts = {"weight": repr(self.weight(whole.index)), **facts}
-        named = replace(whole, facts=facts) if facts else whole
-        return named if self.ego is None else with_witness(named, self.ego)
-
-    def weight(self, index: int) -> float:
-        """The importance weight of the candidate with this index against natural ones; 1 where there is no proposal."""
-        level, candidate = place_of(index)
-        if self.proposal is None or level != DIRECTED:
-            return 1.0
-        number, row = divmod(candidate, BLOCK)
-        return float(self.proposal.weights(self.numbers(level, number)[row : row + 1])[0])
-
-    def numbers(self, level: int, number: int) -> Floats:
-        """The numbers (BLOCK, size) of a block: standard normal ones, of a proposal moved by it."""
-        if self.proposal is None or level < DIRECTED:
-            return self._normal(level, number, self.model.size)
-        z = self._normal(level, number, self.model.size + 1)
-        return self.proposal.moved(z[:, :-1], z[:, -1])
-
-    def _scale(self, level: int) -> Scale:
-        return LEVELS[level if level < DIRECTED else self.base]
-
-    def _normal(self, level: int, number: int, size: int) -> Floats:
-        """Standard normal numbers (BLOCK, size), every other row the mirror image of the one before.
-
-        The mean of a set is then the drive without deviations, to first order, however few samples the set has (antithetic
-        variates, Hammersley and Morton 1956).
-        """
-        generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([self.seed, level, number])))
-        z = exact.standard_normal(generator, (BLOCK // 2, size))
-        return np.stack([z, -z], axis=1).reshape(BLOCK, -1)
 
 
 def sample_scenarios(
@@ -224,9 +119,10 @@ def sample_scenarios(
     if prepared.model is None:
         made = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot)
     else:
-        aim = _aim(encounter, request, measures)
-        sampler = Sampler(prepared.model, seed, road.frame_id, ego, label=_label(encounter, request, aim))
-        loop = _Loop(sampler, check, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
+        aim = aim_of(encounter, request, measures)
+        sampler = Sampler(prepared.model, seed, road.frame_id, ego, label=label_of(encounter, request, aim))
+        judge = Judge.of(sampler, check, ENOUGH[config.variety])
+        loop = _Loop(sampler, judge, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
         loop.aim, loop.measures = aim, measures
         loop.run_request(config.attempts, diverse=request.choose == "diverse")
         sentences = (*prepared.adaptations, *loop.adaptations)
@@ -262,132 +158,13 @@ def regenerate(
     prepared = prepare(encounter, segmentation, road, routes, asked, waits, config)
     if prepared.model is None:
         return None
-    ego, aim = request.ego_of(encounter), _aim(encounter, request, measures)
-    sampler = Sampler(prepared.model, seed, road.frame_id, ego, label=_label(encounter, request, aim))
+    ego, aim = request.ego_of(encounter), aim_of(encounter, request, measures)
+    sampler = Sampler(prepared.model, seed, road.frame_id, ego, label=label_of(encounter, request, aim))
     if place_of(index)[0] == DIRECTED:
         if aim is None or check is None:
             raise InputError(f"index {index} is of a proposal, but no target was asked for")
-        sampler = _adapted(sampler, check, aim, lambda: False).sampler
+        sampler = adapted(sampler, Judge.of(sampler, check, ENOUGH[config.variety]), aim, lambda: False).sampler
     return sampler.scenario(index)
-
-
-def _aim(encounter: Encounter, request: Request, measures: Measures | None) -> Aim | None:
-    """What is aimed at: the targets, and for a swapped order the arrival gap of the other sign; None if nothing is.
-
-    Raises:
-        InputError: a target names a vehicle that does not exist, or nothing can be measured.
-    """
-    targets = request.targets
-    if request.order == "swap":
-        closest = closest_crossing(_conflicts(encounter))
-        if closest is not None:
-            names = tuple(encounter.vehicles[n].id for n in (closest.first, closest.second))
-            targets = (Target("arrival_gap", -np.inf, 0.0, names), *targets)
-    if not targets:
-        return None
-    if measures is None:
-        raise InputError("a target or another order is asked for, but nothing is given that measures scenarios (`measures`)")
-    return Aim.of(targets, encounter, measures.figure)
-
-
-def _conflicts(encounter: Encounter) -> tuple[Conflict, ...]:
-    return find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
-
-
-def _label(encounter: Encounter, request: Request, aim: Aim | None) -> Label:
-    """Return what says a scenario's facts: the figures of the targets, and, unless it is kept, the order at each conflict."""
-    conflicts = () if request.order == "keep" else _conflicts(encounter)
-
-    def label(whole: Scenario) -> dict[str, str]:
-        facts = {}
-        if aim is not None:
-            facts = {f"target.{t.label}": f"{v:.6g}" for t, v in zip(aim.targets, aim.values(whole), strict=True)}
-        if request.order == "keep":
-            return facts
-        said = [_order(encounter, own, whole) for own in conflicts]
-        return facts | {"order": request.order, "passing_order": "; ".join(said) or "nobody meets anybody"}
-
-    return label
-
-
-def _order(encounter: Encounter, own: Conflict, whole: Scenario) -> str:
-    """Say who goes first in a scenario at one of the template's conflicts."""
-    a, b = sorted((own.first, own.second))
-    found = pair_conflict(whole.vehicles, whole.time, whole.position, whole.heading, a, b, whole.present)
-    one, two = (encounter.vehicles[n].id for n in (own.first, own.second))
-    if found is None:
-        return f"{one} and {two} do not meet (in the template {one} goes first)"
-    return f"{one} before {two}, as in the template" if found.first == own.first else f"{two} before {one}, swapped"
-
-
-@dataclass(frozen=True, eq=False)
-class _Adapted:
-    """A sampler with its proposal, None where natural candidates do, and what was seen on the way."""
-
-    sampler: Sampler
-    seen: Seen
-    stages: int
-    candidates: int
-
-
-def _adapted(sampler: Sampler, check: Check, aim: Aim, cancelled: Cancelled) -> _Adapted:
-    """Find a proposal, stage by stage; the same request gives the same.
-
-    The levels are judged by pilots as without a target, and the first that is good enough, or the best, is the natural one.
-    """
-    pilots, share = [], []
-    for level in range(len(LEVELS)):
-        pilots.append(Seen())
-        share.append(_stage(sampler, level, 0, check, aim, pilots[-1], np.ones(len(aim.targets))))
-        if share[-1] >= ENOUGH or cancelled():
-            break
-    best = int(np.argmax(share))
-    seen = pilots[best]
-    unit = seen.scale()
-    candidates, hits = len(pilots) * STAGE, seen.hits()
-    staged = replace(sampler, base=best)
-    if hits >= PLAIN * STAGE:
-        return _Adapted(staged, seen, 0, candidates)
-    seen.rescale(aim, unit)
-    most, since = hits, 0
-    for stage in range(STAGES):
-        proposal = seen.proposal()
-        if proposal is None or cancelled():
-            break
-        _stage(replace(staged, proposal=proposal), STAGED, stage, check, aim, seen, unit)
-        candidates += STAGE
-        now = seen.hits() - hits
-        hits, since = seen.hits(), 0 if now > most else since + 1
-        most = max(most, now)
-        if most >= GOOD * STAGE or (most >= FAIR * STAGE and since >= 1) or (most and since >= PATIENCE):
-            break
-    return _Adapted(replace(staged, proposal=seen.proposal() if seen.hits() else None), seen, len(seen.z) - 1, candidates)
-
-
-def _stage(sampler: Sampler, level: int, stage: int, check: Check, aim: Aim, seen: Seen, unit: Floats) -> float:
-    """Draw a stage's candidates, measure them, check those nearest to the range; return the share of the checked that is valid.
-
-    Of a pilot all are checked.
-    """
-    blocks = range(stage * (STAGE // BLOCK), (stage + 1) * (STAGE // BLOCK))
-    z = np.concatenate([sampler.numbers(level, number) for number in blocks])
-    drawn: list[Scenario | None] = []
-    for number in blocks:
-        batch, index = sampler.block(level, number)
-        drawn += batch.scenarios(sampler.seed, index, sampler.frame_id)
-    seen.add(aim, z, sampler.proposal, drawn, unit)
-    checked = good = 0
-    nearest = [k for k in np.argsort(seen.distance[-1], kind="stable").tolist() if drawn[k] is not None]
-    for start in range(0, len(nearest), CHUNK):
-        rows = nearest[start : start + CHUNK]
-        verdicts = check([scenario for k in rows if (scenario := drawn[k]) is not None])
-        for k, verdict in zip(rows, verdicts, strict=True):
-            checked, good = checked + 1, good + verdict.valid
-            seen.judge(k, valid=verdict.valid)
-        in_range = bool(seen.distance[-1][rows[-1]] == 0.0)
-        if level >= DIRECTED and good >= CHUNK // 2 and not in_range:
-            break
-    return good / STAGE if level < DIRECTED else good / max(checked, 1)
 
 
 @dataclass
@@ -395,7 +172,7 @@ class _Loop:
     """The account of one request."""
 
     sampler: Sampler
-    check: Check
+    judge: Judge
     count: int
     progress: Progress
     cancelled: Cancelled
@@ -463,12 +240,16 @@ class _Loop:
         """
         aim = self.aim
         assert aim is not None
-        made = _adapted(self.sampler, self.check, aim, self.cancelled)
+        made = adapted(self.sampler, self.judge, aim, self.cancelled)
         self.sampler = made.sampler
         weights: list[float] = []
         if made.seen.hits() and not self.cancelled():
             level = self.sampler.base if made.sampler.proposal is None else DIRECTED
             blocks = self._blocks(level)
+            if made.sampler.proposal is None:
+                self._take_pilot(made.pilot)
+                blocks = itertools.islice(blocks, STAGE // BLOCK, None)
+                weights = [1.0] * len(self.index)
             while not self._done(budget) and (self.index or self.candidates < HOPELESS):
                 before = len(self.index)
                 if not self._spend(blocks, min(BLOCK, budget - self.candidates))[0]:
@@ -489,6 +270,17 @@ class _Loop:
                 raise TargetError(said)
             self.adaptations.append(said)
 
+    def _take_pilot(self, pilot: Sequence[tuple[int, Scenario | None, Cause | None]]) -> None:
+        """Take the candidates of a level that were drawn and checked already."""
+        for number, scenario, cause in pilot:
+            if len(self.index) == self.count or self.cancelled():
+                break
+            self.candidates += 1
+            if scenario is None or cause is not None or not self._in_range(scenario):
+                self.refused[cause or (Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE)] += 1
+            else:
+                self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
+
     def run(self, budget: int) -> None:
         """Judge the levels by their first candidates, then stay with the first that is good enough, or the best."""
         blocks = [self._blocks(level) for level in range(len(LEVELS))]
@@ -496,7 +288,7 @@ class _Loop:
         for level in range(len(LEVELS)):
             seen, good = self._spend(blocks[level], min(PILOT, budget - self.candidates))
             share.append(good / seen if seen else 0.0)
-            if self._done(budget) or share[-1] >= ENOUGH:
+            if self._done(budget) or share[-1] >= self.judge.enough:
                 break
         best = int(np.argmax(share))
         while not self._done(budget) and self._spend(blocks[best], budget - self.candidates)[0]:
@@ -523,19 +315,17 @@ class _Loop:
             batch, index = next(blocks)
             drawn = batch.scenarios(self.sampler.seed, index, self.sampler.frame_id)
             aimed = [scenario is not None and self._in_range(scenario) for scenario in drawn]
-            verdicts = iter(self.check([s for s, ok in zip(drawn, aimed, strict=True) if ok and s is not None]))
+            causes = iter(self.judge([s for s, ok in zip(drawn, aimed, strict=True) if ok and s is not None]))
             for number, scenario, ok in zip(index, drawn, aimed, strict=True):
                 if seen == most or len(self.index) == self.count or self.cancelled():
                     break
                 seen += 1
-                verdict = next(verdicts) if ok else None
-                if scenario is not None and verdict is not None and verdict.valid:
+                cause = next(causes) if ok else Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE
+                if scenario is not None and cause is None:
                     good += 1
                     self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
-                elif verdict is not None:
-                    self.refused[verdict.violations[0].cause] += 1
                 else:
-                    self.refused[Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE] += 1
+                    self.refused[cause or Cause.SPEED_PROFILE] += 1
             self.progress(len(self.index), self.count, self.candidates + seen)
         self.candidates += seen
         return seen, good

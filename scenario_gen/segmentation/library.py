@@ -189,7 +189,11 @@ def build_library(
     for encounter, start, stop, own_points in zip(encounters, (0, *ends[:-1]), ends, points, strict=True):
         own_labels = labels[start:stop]
         segmentation = Segmentation(
-            in_order(own_labels), own_points, posterior.probability[start:stop], describe_segments(encounter, own_points)
+            in_order(own_labels),
+            own_points,
+            posterior.probability[start:stop],
+            describe_segments(encounter, own_points),
+            float(posterior.r_hat.max()),
         )
         assignments.append(Assignment(segmentation, frozen_ints(own_labels[[0, *own_points]])))
     return library, tuple(assignments)

@@ -89,12 +89,19 @@ class Scenario:
 
 @dataclass(frozen=True, eq=False)
 class BoundaryStates:
-    """What was asked of each vehicle's first and last instant: (N, 4) each, columns x [m], y [m], yaw [rad], speed [m/s]."""
+    """What was asked of each vehicle's first and last instant.
+
+    Attributes:
+        start, end: (N, 4) x [m], y [m], yaw [rad], speed [m/s].
+        freed: (N, 2, 2) metres and m/s by which a scenario's start and end may differ from that; 0 where it was asked for.
+    """
 
     start: Floats
     end: Floats
+    freed: Floats = field(default_factory=lambda: np.zeros((0, 2, 2)))
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "freed", frozen(self.freed if len(self.freed) else np.zeros((len(self.start), 2, 2))))
         object.__setattr__(self, "start", canonical_poses(self.start))
         object.__setattr__(self, "end", canonical_poses(self.end))
 
@@ -113,6 +120,7 @@ class Cause(StrEnum):
     CURVATURE = "curvature"
     PASSING_ORDER = "passing_order"  # not the template's order at a conflict
     STOP_NOT_KEPT = "stop_not_kept"  # a vehicle does not keep a stop of the template
+    CONFLICT_LOST = "conflict_lost"  # the stretch in which all are there leaves out a conflict of the template
     NOT_FINITE = "not_finite"
     OUT_OF_RANGE = "out_of_range"  # not in the range that was asked for; it was not checked
 

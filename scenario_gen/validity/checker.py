@@ -161,14 +161,18 @@ class Checker:
         if self.asked is None:
             return
         limits = self.limits
+        freed = self.asked.freed.tolist()
         for name, k, asked in (("start", 0, self.asked.start), ("end", -1, self.asked.end)):  # too few numbers for arrays
             # a vehicle's row is held outside of its presence: its first or last value is that at its own first or last instant
             ends = zip(scenario.position[:, k].tolist(), scenario.speed[:, k].tolist(), asked.tolist(), strict=True)
             for i, ((x, y), speed, (x_asked, y_asked, _, speed_asked)) in enumerate(ends):
                 distance, difference = exact.hypot(x - x_asked, y - y_asked), abs(speed - speed_asked)
                 far, off = self._within_a_step(scenario, i, k)
-                if distance > limits.position_tolerance + far + 1e-9 or difference > limits.speed_tolerance + off + 1e-9:
-                    message = f"vehicle {i}: {name} is {distance:.3f} m and {difference:.3f} m/s from what was asked"
+                free, faster = freed[i][k]
+                far, off = far + free + limits.position_tolerance, off + faster + limits.speed_tolerance
+                if distance > far + 1e-9 or difference > off + 1e-9:
+                    bounds = f" (free are {free:.3f} m and {faster:.3f} m/s)" if free or faster else ""
+                    message = f"vehicle {i}: {name} is {distance:.3f} m and {difference:.3f} m/s from what was asked{bounds}"
                     yield Violation(Cause.BOUNDARY_STATE, float(scenario.time[scenario.present[i, k]]), (i,), message)
 
     @staticmethod

@@ -16,7 +16,8 @@
 
 `python commonroad_files.py check FOLDER`: the schema (lxml), commonroad-io's reading against the file's own numbers, and the
 drivability checker: collisions, who leaves the road, and whether both are found where they are planted.
-`python commonroad_files.py drive FOLDER`: commonroad-reactive-planner at each planning problem. One JSON object on the last line.
+`python commonroad_files.py drive FOLDER`: commonroad-reactive-planner at each planning problem; its track is then beside it, in
+NAME.track.json. One JSON object on the last line.
 """
 
 import json
@@ -30,6 +31,7 @@ import commonroad.scenario_definition
 from commonroad_dc.boundary.boundary import create_road_boundary_obstacle
 from commonroad_dc.collision.collision_detection.pycrcc_collision_dispatch import create_collision_object
 from commonroad_rp.reactive_planner import ReactivePlanner
+from commonroad_rp.state import ReactivePlannerState
 from commonroad_rp.utility.config import ReactivePlannerConfiguration
 from commonroad_rp.utility.utils_coordinate_system import create_coordinate_system, create_initial_ref_path
 from lxml import etree
@@ -110,8 +112,15 @@ def desired_speed(planner, cruise):
     return max(SLOWEST, min(cruise, float(np.sqrt(COMFORT / max(ahead.max(initial=1e-6), 1e-6)))))
 
 
+def track_of(planner):
+    """Return where the ego's centre was at each step: x, y [m], yaw [rad], speed [m/s]."""
+    axle = planner.vehicle_params.wb_rear_axle
+    states = [ReactivePlannerState.shift_state_to_center(state, axle) for state in planner.record_state_list]
+    return [[*map(float, state.position), float(state.orientation), float(state.velocity)] for state in states]
+
+
 def drive(path):
-    """Return how the reactive planner fares with a file's problem, and after how many steps."""
+    """Return how the reactive planner fares with a file's problem, after how many steps, and its track."""
     scenario, problems = CommonRoadFileReader(str(path)).open()
     (problem,) = problems.planning_problem_dict.values()
     config = ReactivePlannerConfiguration()
@@ -131,7 +140,7 @@ def drive(path):
     while not planner.goal_reached():
         step = len(planner.record_state_list) - 1
         if step >= last:
-            return "late", step
+            return "late", step, track_of(planner)
         k = step % config.planning.replanning_frequency
         if planned is None or k == 0:
             speed = max(
@@ -140,7 +149,7 @@ def drive(path):
             planner.set_desired_velocity(desired_velocity=desired_speed(planner, cruise), current_speed=speed)
             planned, k = planner.plan(), 0
             if not planned:
-                return "no trajectory", step
+                return "no trajectory", step, track_of(planner)
         planner.record_state_and_input(planned[0].state_list[1 + k])
         planner.reset(
             initial_state_cart=planner.record_state_list[-1],
@@ -148,14 +157,15 @@ def drive(path):
             collision_checker=planner.collision_checker,
             coordinate_system=planner.coordinate_system,
         )
-    return "reached", len(planner.record_state_list) - 1
+    return "reached", len(planner.record_state_list) - 1, track_of(planner)
 
 
 def drive_all(folder):
     outcomes = {}
     for path in sorted(folder.rglob("*.xml")):
         try:
-            outcomes[path.name] = drive(path)
+            *outcomes[path.name], track = drive(path)
+            path.with_suffix(".track.json").write_text(json.dumps(track))
         except Exception as error:
             outcomes[path.name] = (f"{type(error).__name__}: {error}"[:160], 0)
         print(path.name, *outcomes[path.name], file=sys.stderr, flush=True)

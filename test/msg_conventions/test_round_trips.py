@@ -30,6 +30,7 @@ from msg_conventions import (
     diagnostics,
     ego,
     fits,
+    lanes,
     paths,
     pictures,
     roads,
@@ -43,6 +44,7 @@ from scenario_gen.errors import InputError
 from scenario_gen.types.ego import with_witness
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.lanes import Lane, LaneNetwork
 from scenario_gen.types.names import token, tokens
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
@@ -90,11 +92,11 @@ def test_changepoints_and_posterior(seed, k):
 
 @given(seeds, st.integers(1, 30), st.integers(1, 30), st.integers(0, 4))
 @settings(max_examples=30, deadline=None)
-def test_road(seed, height, width, lanes):
+def test_road(seed, height, width, ways):
     rng = generator(seed)
     drivable = rng.random((height, width)) < 0.5
     drivable[0, 0] = True
-    ends = np.column_stack([rng.normal(0, 50, (lanes, 2)), rng.choice(NASTY_HEADINGS, lanes)])
+    ends = np.column_stack([rng.normal(0, 50, (ways, 2)), rng.choice(NASTY_HEADINGS, ways)])
     sent = Road("map", drivable, 0.2, rng.normal(0, 50, 2), ends, ends[::-1], "a" * (seed % 5 + 1))
     grid = roads.encode_map(sent, 99)
     entries, exits = (roads.encode_poses(poses, sent.frame_id, 99) for poses in (sent.entries, sent.exits))
@@ -102,6 +104,45 @@ def test_road(seed, height, width, lanes):
     assert stamp == 99
     assert_same(sent, got, *(f for f in sent.__dataclass_fields__))
     assert len(roads.decode_map(grid)[1].entries) == 0
+
+
+@given(seeds, st.integers(1, 4))
+@settings(max_examples=20, deadline=None)
+def test_lanes(seed, count):
+    rng = generator(seed)
+    own = []
+    for k in range(count):
+        left, right = rng.normal(0, 50, (2, 2 + int(rng.integers(5)), 2))
+        limit = math.nan if k % 2 else float(rng.random())
+        own.append(Lane(f"é.{k}", left, right, (int(rng.integers(count)),), tuple(range(k)), limit, "j" * k))
+    sent = LaneNetwork("map", tuple(own), ("read so",))
+    road = Road("map", np.ones((2, 2), dtype=bool), 0.5, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
+    got = roads.decode_map(roads.encode_map(road, 1), lanes=lanes.encode_lanes(sent, "map", 9))[1].lanes
+    assert (got.name, got.notes) == (sent.name, sent.notes)
+    for one, other in zip(sent.lanes, got.lanes, strict=True):
+        assert_same(one, other, "id", "left", "right", "successors", "beside", "junction")
+        assert np.array_equal(one.speed_limit, other.speed_limit, equal_nan=True)
+    with pytest.raises(InputError, match="frame 'odom' is not the map's"):
+        roads.decode_map(roads.encode_map(road, 1), lanes=lanes.encode_lanes(sent, "odom", 9))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (b'"points": 3', b'"points": 9', "borders of 9 points"),
+        (b'"points": 3', b'"points": 2', "belong to no lane"),
+        (b'"points": 3', b'"points":[]', "TypeError"),
+        (b'"successors": [0]', b'"successors": [8]', "leads to a lane that is not there"),
+        (b'{"name"', b'{"nome"', "KeyError"),
+        (b'{"name"', b'["name"', "does not say what its lanes are"),
+    ],
+)
+def test_lanes_that_say_what_cannot_be_are_refused(old, new, said):
+    border = np.column_stack((np.arange(3.0), np.zeros(3)))
+    data = lanes.encode_lanes(LaneNetwork("m", (Lane("7", border + 1.0, border, (0,)),)), "map", 5)
+    assert old in data
+    with pytest.raises(InputError, match=said):
+        lanes.decode_lanes(data.replace(old, new))
 
 
 def test_unknown_cells_are_not_drivable():

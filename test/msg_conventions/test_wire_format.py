@@ -26,8 +26,21 @@ import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
-from msg_conventions import changepoints, diagnostics, ego, paths, pictures, roads, scenario_info, scenarios, tracks, trajectory
+from msg_conventions import (
+    changepoints,
+    diagnostics,
+    ego,
+    lanes,
+    paths,
+    pictures,
+    roads,
+    scenario_info,
+    scenarios,
+    tracks,
+    trajectory,
+)
 from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.lanes import Lane, LaneNetwork
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates
 
@@ -50,6 +63,9 @@ def _messages():
         ends = np.array([[1.0, 2.0, 3.0]] * (seed - 1)).reshape(-1, 3)
         road = Road("r", np.eye(seed, dtype=bool), 0.1, np.ones(2), ends, ends, frame)
         yield roads.MAP_TYPE, roads.encode_map(road, 5)
+        border = np.column_stack((np.arange(seed + 1.0), np.zeros(seed + 1)))
+        network = LaneNetwork("m", (Lane("7", border + 1.0, border, (0,), (), 8.5 * seed, "j" * seed),), ("née",))
+        yield lanes.MARKER_TYPE, lanes.encode_lanes(network if seed > 1 else None, frame, 5)
         yield roads.POSES_TYPE, roads.encode_poses(road.entries, frame, 5)
         sent = scenario(seed)
         asked = BoundaryStates(np.zeros((2, 4)), np.ones((2, 4)))

@@ -25,6 +25,7 @@ from suite_processes import Client, whole_chain
 
 from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.hashes import decode_hashes, hash_of
+from msg_conventions.lanes import decode_lanes
 from scenario_gen.review.validation import validate_bag
 from scenario_gen.storage.bag import read_messages
 
@@ -97,10 +98,38 @@ def test_routes_of_an_old_map_are_not_driven_on_one_that_the_planner_refuses(sui
     assert len(client.heard["/scenarios/info"]) == before
 
 
+def _straight_lanes() -> str:
+    """A CommonRoad map of two lanes in each direction, 1 km long."""
+
+    def bound(tag: str, y: float, ends: tuple[float, float]) -> str:
+        return f"<{tag}>" + "".join(f"<point><x>{x}</x><y>{y}</y></point>" for x in ends) + f"</{tag}>"
+
+    lanes = ""
+    for k, y in enumerate((-7.0, -3.5, 0.0, 3.5)):
+        east = k < 2
+        ends = (0.0, 1000.0) if east else (1000.0, 0.0)
+        left, right = (y + 3.5, y) if east else (y, y + 3.5)
+        lanes += f'<lanelet id="{k + 1}">{bound("leftBound", left, ends)}{bound("rightBound", right, ends)}</lanelet>'
+    return f'<commonRoad commonRoadVersion="2020a" timeStepSize="0.1">{lanes}</commonRoad>'
+
+
+def test_lanes_of_a_vector_map_travel_from_the_road_server_to_the_sampler(suite, client, tmp_path):
+    client.hear("/scenarios/info", "/map", "/fit/info", "/road/lanes")
+    (tmp_path / "lanes.xml").write_text(_straight_lanes())
+    before = len(client.heard["/map"])
+    assert client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=str(tmp_path / "lanes.xml"))).result == 0
+    own = hash_of("map", client.wait("/map", before + 1)[-1])
+    client.until(lambda: _closed(client, own), "a set on the lanes")
+    network = decode_lanes(client.heard["/road/lanes"][-1])[1]
+    assert len(network.lanes) == 4
+    together = decode_hashes(client.heard["/fit/info"][-1], "fit/info")
+    assert together["road/lanes"] == hash_of("road/lanes", client.heard["/road/lanes"][-1])
+
+
 def test_the_bag_is_valid_with_each_scenario_on_its_own_map(suite):
     assert suite.end() == dict.fromkeys(NODES, 0)
     bag = suite.folder / "bag"
     (found,) = validate_bag(bag)
     assert (found.invalid, found.unaccounted, found.found) == (0, 0, {}), json.dumps(found.left_out)
     assert not any("off_road" in sentence for sentence in found.left_out)
-    assert len({hash_of("map", m.data) for m in read_messages(bag) if m.topic == "/map"}) == LOADS + 2
+    assert len({hash_of("map", m.data) for m in read_messages(bag) if m.topic == "/map"}) == LOADS + 3

@@ -23,6 +23,7 @@ import yaml
 
 from msg_conventions.cdr import CdrWriter
 from msg_conventions.hashes import encode_hashes
+from msg_conventions.lanes import encode_lanes
 from scenario_gen.errors import InputError
 from scenario_gen.nodes.inputs import Inputs
 from scenario_gen.nodes.road_server import road_of_url
@@ -76,6 +77,24 @@ def test_inputs_are_complete_only_if_they_are_those_that_belong_together():
         inputs.put("fit/info", _message(1))
     inputs.put("fit/info", encode_hashes("fit", messages | {"map": other}, 1))
     assert inputs.complete() is not None
+
+
+def test_lanes_count_only_where_an_info_names_them_and_are_waited_for_there():
+    inputs = Inputs(("tracks", "map"), (), ("road/lanes",))
+    messages = {"tracks": _message(1), "map": _message(1)}
+    for topic, data in messages.items():
+        inputs.put(topic, data)
+    assert set(inputs.complete()) == {"tracks", "map"}  # of a map server that knows no lanes
+    lanes = encode_lanes(None, "map", 1)
+    inputs.put("road/lanes", lanes)
+    assert inputs.missing() == ["road/info of this road/lanes"]
+    inputs.put("road/info", encode_hashes("road", messages | {"road/lanes": lanes + bytes(3)}, 1))  # as DDS fills it up
+    assert set(inputs.complete()) == {"tracks", "map", "road/info", "road/lanes"}
+    inputs.put("road/info", encode_hashes("road", messages, 1))
+    assert "road/lanes" not in inputs.complete()
+    inputs.put("road/info", encode_hashes("road", messages | {"road/lanes": lanes}, 1))
+    inputs.forget(["road/lanes"])
+    assert inputs.missing() == ["road/info of this road/lanes"]
 
 
 def test_a_waiting_job_is_replaced_and_a_running_one_cancelled():

@@ -76,7 +76,7 @@ class SpeedModel:
         """Standard normal numbers needed per sample."""
         return int(self.factor.shape[1])
 
-    def draw(self, z: Floats, longer: Floats, pace: Floats, ends: Floats) -> tuple[Floats, Bools]:
+    def draw(self, z: Floats, longer: Floats, pace: Floats, ends: Floats, faster: Floats) -> tuple[Floats, Bools]:
         """Coefficients (S, n) [m/s] and whether they keep what must hold (S,).
 
         Args:
@@ -84,9 +84,10 @@ class SpeedModel:
             longer: (S,) metres by which the sample's path is longer than the route.
             pace: (S, b) rate of the sample's clock over the nominal one, at the times of the bounds.
             ends: (S, 2) the same at the ends, where the speed of the vehicle, not that on the template's clock, is given.
+            faster: (S, 2) m/s by which the vehicle is faster at the ends.
         """
         base = self.mean + longer[:, None] * self.longer
-        base = base + exact.matmul((ends - 1.0) * self.mean[[0, -1]], self.faster.T)
+        base = base + exact.matmul((ends - 1.0) * self.mean[[0, -1]] + faster, self.faster.T)
         ok = np.ones(len(z), dtype=np.bool_)
         coefficients = base + exact.matmul(z, self.factor.T)
         if len(self.rows):

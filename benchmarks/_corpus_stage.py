@@ -1,0 +1,76 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One stage of the corpus in a process of its own, so that CPU and memory are its own: `python -m benchmarks._corpus_stage`."""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+import json
+from pathlib import Path
+import resource
+import sys
+import tempfile
+import time
+
+from scenario_gen.corpus.config import CorpusConfig
+from scenario_gen.corpus.encounters import clean_found
+from scenario_gen.corpus.meetings import search_hours
+from scenario_gen.corpus.messages import parse_range, ranges
+from scenario_gen.corpus.mine import clean_tasks, grouped, hour_tasks, inventory
+from scenario_gen.corpus.synthetic import ArchiveConfig, write_archive
+
+STAGES = ("parse", "search", "group", "clean")
+
+
+def work(name: str, archive: Path, out: Path) -> Iterator[Callable[[], object]]:
+    """Yield the tasks of a stage of `mine` on an archive."""
+    config = CorpusConfig()
+    messages, _ = inventory([archive])
+    ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
+    if name == "parse":
+        yield from (partial(parse_range, task) for task in ranged)
+    elif name == "search":
+        yield from (partial(search_hours, task) for task in hour_tasks(ranged, out, config))
+    elif name == "group":
+        yield partial(grouped, out, config)
+    else:
+        yield from (partial(clean_found, task) for task in clean_tasks(out, config))
+
+
+def warm(name: str) -> None:
+    """Do the same on next to nothing, so that libraries and kernels are loaded."""
+    with tempfile.TemporaryDirectory() as folder:
+        archive = write_archive(Path(folder) / "archive", ArchiveConfig(rows=6000, encounters=2, outside=0))
+        for before in STAGES[: STAGES.index(name) + 1]:
+            for task in work(before, archive, Path(folder) / "corpus"):
+                task()
+
+
+def main() -> None:
+    """Run what the command line names: a stage, the archive, the corpus; or `write`, the archive, its settings."""
+    name, archive, rest = sys.argv[1:]
+    if name == "write":
+        write_archive(Path(archive), ArchiveConfig(**json.loads(rest)), seed=11)
+        return
+    warm(name)
+    found = []
+    for task in work(name, Path(archive), Path(rest)):
+        begun = time.process_time()
+        task()
+        found.append(time.process_time() - begun)
+    print(json.dumps({"tasks": found, "mebibytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0}))
+
+
+if __name__ == "__main__":
+    main()

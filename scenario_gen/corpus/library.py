@@ -1,0 +1,265 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`library`: one library of primitives for all encounters of a corpus, by pairs of vehicles.
+
+By pairs, because a primitive of N vehicles has 3 N features and their combinations multiply: libraries per number of vehicles
+share nothing, and of most numbers there are few encounters. Of an encounter those pairs count that have to do with each other.
+The vehicle that is first where the two come closest in space and time is the first of the pair: who yields is always the second.
+
+The library is fitted to a sample; then all pairs are assigned to its primitives, without fitting anything anew.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from itertools import combinations, pairwise
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenario_gen.arrays import Ints
+from scenario_gen.corpus.config import CorpusConfig
+from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.kinds import Motion, space_time_gap
+from scenario_gen.corpus.page import sketch, write_page
+from scenario_gen.corpus.tasks import arriving, spread, Told
+from scenario_gen.errors import InputError
+from scenario_gen.folders import Kind, replaced_folder
+from scenario_gen.segmentation.estimator import USUAL_R_HAT
+from scenario_gen.segmentation.library import assign, build_library, PrimitiveLibrary
+from scenario_gen.segmentation.segmenter import DEFAULT, SegmentationConfig
+from scenario_gen.types.encounter import Encounter
+
+LIBRARY = Kind("primitive library")
+NAME, SEGMENTS, PAGE, SUMMARY = "library.json", "segments", "library.html", "summary.json"
+SHORTEST = 2.0  # s that a pair must be there together
+EXAMPLES = 2
+
+
+@dataclass(frozen=True)
+class AssignTask:
+    """A table of encounters to assign to a library, and the table of segments to write."""
+
+    name: str
+    library: Path
+    table: Path
+    target: Path
+    config: SegmentationConfig
+
+
+@dataclass(frozen=True)
+class Built:
+    """What became of a corpus: primitives, pairs fitted and assigned, agreement of the two, and of two seeds."""
+
+    primitives: int
+    fitted: int
+    assigned: int
+    segments: int
+    r_hat: float
+    agreement: float
+    seeds: float
+    growth: tuple[tuple[int, int], ...]
+    limit: int
+    failed: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """Return the summary for people."""
+        said = [
+            f"{self.primitives} primitives, fitted to {self.fitted} pairs; {self.segments} segments in all {self.assigned} pairs",
+            f"convergence: split R̂ at most {self.r_hat:.3f}; two seeds agree to {self.seeds:.2f} (adjusted Rand)",
+            f"pairs assigned agree with the fit to {self.agreement:.2f} (adjusted Rand)",
+            "primitives by pairs fitted: " + ", ".join(f"{found} of {count}" for count, found in self.growth),
+        ]
+        if self.r_hat > USUAL_R_HAT:
+            said.append("R̂ is above 1.1: the chains have not mixed; rely on what two seeds agree on, or raise sampler.sweeps")
+        if 0 < self.limit <= self.primitives:
+            said.append(f"all {self.limit} states are in use: raise sampler.states")
+        return [*said, *self.failed]
+
+
+def pair_encounters(encounter: Encounter, interaction: float) -> Iterator[Encounter]:
+    """Yield the pairs of an encounter that have to do with each other, in canonical order, while both are there.
+
+    Args:
+        encounter: of N vehicles.
+        interaction: space-time gap [m] up to which two have.
+    """
+    for i, j in combinations(range(len(encounter.vehicles)), 2):
+        first = int(max(encounter.present[i, 0], encounter.present[j, 0]))
+        last = int(min(encounter.present[i, 1], encounter.present[j, 1]))
+        if (last - first) * encounter.dt < SHORTEST:
+            continue
+        own = slice(first, last + 1)
+        a, b = (Motion(encounter.position[n, own], encounter.heading[n, own], encounter.speed[n, own]) for n in (i, j))
+        gap, when_a, when_b = space_time_gap(a, b, encounter.dt)
+        if gap > interaction and len(encounter.vehicles) > 2:
+            continue
+        faster = float(b.speed.mean()) > float(a.speed.mean())
+        order = [j, i] if when_b < when_a or (when_a == when_b and faster) else [i, j]
+        vehicles = tuple(encounter.vehicles[n] for n in order)
+        yield Encounter(
+            f"{encounter.name} {vehicles[0].id} {vehicles[1].id}", vehicles, encounter.start_ns + first * encounter.dt_ns,
+            encounter.dt_ns, encounter.position[order, own], encounter.heading[order, own], encounter.speed[order, own],
+            encounter.origin,
+        )  # fmt: skip
+
+
+def build(
+    corpus: Path,
+    config: SegmentationConfig = DEFAULT,
+    *,
+    most: int = 1000,
+    seed: int = 0,
+    workers: int = 1,
+    scheduler: str = "",
+    told: Told = lambda *_: None,
+) -> Built:
+    """Fit a library to the encounters of a corpus, assign all of them, and write `library/` in it.
+
+    Args:
+        corpus: that `mine` wrote.
+        config: of the segmentation.
+        most: pairs to fit at most; a sample by the digest of their names, the same whatever else is in the corpus.
+        seed: of the sampler; the fit is repeated with `seed` + 1, to say how far two seeds agree.
+        workers: processes; 0 takes one for each core.
+        scheduler: address of a Dask scheduler, instead.
+        told: how far it is.
+
+    Raises:
+        InputError: the corpus has no pairs, or its encounters have several sampling periods.
+    """
+    tables = tables_of(corpus)
+    pairs = [pair for row in rows_of(tables) for pair in pair_encounters(encounter_of(row), CorpusConfig().interaction)]
+    pairs.sort(key=lambda pair: sha256(pair.name.encode()).digest())
+    sample = pairs[:most]
+    if not sample:
+        raise InputError(f"{corpus} holds no two vehicles that have to do with each other for {SHORTEST:g} s")
+    library, assignments = build_library(sample, config, seed)
+    labels = np.concatenate(
+        [labels_of(one.segmentation.changepoints, one.primitives, pair) for one, pair in zip(assignments, sample, strict=True)]
+    )
+    other = build_library(sample, config, seed + 1)[1]
+    again = np.concatenate(
+        [labels_of(one.segmentation.changepoints, one.primitives, pair) for one, pair in zip(other, sample, strict=True)]
+    )
+    growth = [
+        (len(sample) // part, len(build_library(sample[: len(sample) // part], config, seed)[0].means))
+        for part in (8, 4, 2)
+        if len(sample) >= 4 * part
+    ]
+    with replaced_folder(corpus / "library", LIBRARY) as folder, spread(workers, scheduler, told) as go:
+        library.save(folder / NAME)
+        tasks = [AssignTask(table.stem, folder / NAME, table, folder / SEGMENTS / table.name, config) for table in tables]
+        failed = go(assign_table, tasks)
+        rows = list(rows_of(sorted((folder / SEGMENTS).glob("*.parquet"))))
+        assigned = {row["pair"]: row for row in rows}
+        fresh = np.concatenate([_labels_again(assigned[pair.name], pair) for pair in sample])
+        built = Built(
+            primitives=len(library.means),
+            fitted=len(sample),
+            assigned=len(rows),
+            segments=sum(len(row["primitives"]) for row in rows),
+            r_hat=max(one.segmentation.r_hat for one in assignments),
+            agreement=adjusted_rand(labels, fresh),
+            seeds=adjusted_rand(labels, again),
+            growth=(*growth, (len(sample), len(library.means))),
+            limit=config.sampler.states,
+            failed=tuple(failed),
+        )
+        (folder / SUMMARY).write_text(json.dumps(vars(built), indent=1) + "\n", encoding="utf-8")
+        _write_page(folder / PAGE, library, rows, {pair.name: pair for pair in pairs}, built)
+    return built
+
+
+def labels_of(points: Ints, primitives: Ints, pair: Encounter) -> Ints:
+    """(T,) primitive of each sample, from the changepoints (K,) and the primitive (K + 1,) of each segment."""
+    edges = np.array([0, *points, len(pair.time)])
+    return np.repeat(np.asarray(primitives, dtype=np.int64), np.diff(edges))
+
+
+def _labels_again(row: Mapping[str, Any], pair: Encounter) -> Ints:
+    return labels_of(np.array(row["changepoints"], dtype=np.int64), np.array(row["primitives"]), pair)
+
+
+def assign_table(task: AssignTask) -> None:
+    """Write, for each pair of a table's encounters, its changepoints and the primitive of each segment."""
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    library = PrimitiveLibrary.load(task.library)
+    rows = []
+    for row in rows_of([task.table]):
+        for pair in pair_encounters(encounter_of(row), CorpusConfig().interaction):
+            found = assign(pair, library, task.config)
+            rows.append({
+                "encounter": row["name"], "kind": row["kind"], "pair": pair.name, "seconds": pair.duration,
+                "changepoints": found.segmentation.changepoints.tolist(), "primitives": found.primitives.tolist(),
+            })  # fmt: skip
+    ints = pa.list_(pa.int64())
+    kinds: dict[str, Any] = {**dict.fromkeys(("encounter", "kind", "pair"), pa.string()), "seconds": pa.float64()}
+    schema = pa.schema([*kinds.items(), ("changepoints", ints), ("primitives", ints)])
+    with arriving(task.target) as part:
+        parquet.write_table(pa.Table.from_pylist(rows, schema=schema), part, compression="zstd")
+
+
+def adjusted_rand(one: Ints, other: Ints) -> float:
+    """Return how far two labellings (T,) agree: 1 the same, 0 as by chance (Hubert & Arabie 1985)."""
+    table = np.zeros((int(one.max()) + 1, int(other.max()) + 1), dtype=np.int64)
+    np.add.at(table, (one, other), 1)
+
+    def choices(counts: Ints) -> float:
+        return float((counts * (counts - 1) // 2).sum())
+
+    together, rows, columns = choices(table), choices(table.sum(axis=1)), choices(table.sum(axis=0))
+    expected, most = rows * columns / choices(np.array([len(one)])), (rows + columns) / 2.0
+    return 1.0 if most == expected else (together - expected) / (most - expected)
+
+
+def _write_page(
+    path: Path, library: PrimitiveLibrary, rows: Sequence[Mapping[str, Any]], pairs: Mapping[str, Encounter], built: Built
+) -> None:
+    """Write the page of primitives: how frequent, how long, what follows, and examples."""
+    seconds: Counter[int] = Counter()
+    segments: Counter[int] = Counter()
+    follows: Counter[tuple[int, int]] = Counter()
+    kinds: dict[int, Counter[str]] = {}
+    examples: dict[int, list[tuple[str, tuple[int, int]]]] = {}
+    for row in rows:
+        pair = pairs[row["pair"]]
+        edges = [0, *row["changepoints"], len(pair.time)]
+        for primitive, (begin, end) in zip(row["primitives"], pairwise(edges), strict=True):
+            seconds[primitive] += end - begin
+            segments[primitive] += 1
+            kinds.setdefault(primitive, Counter())[row["kind"]] += 1
+            if len(examples.setdefault(primitive, [])) < EXAMPLES:
+                examples[primitive].append((row["pair"], (begin, end)))
+        follows.update(pairwise(row["primitives"]))
+    dt = next(iter(pairs.values())).dt
+    total = sum(int(n) for n in seconds.values())
+    cards = []
+    for k, count in segments.most_common():
+        after = sorted(((n, to) for (start, to), n in follows.items() if start == k), reverse=True)[:3]
+        lines = [
+            f"{count} segments, {100.0 * seconds[k] / total:.1f} % of the time, {seconds[k] * dt / count:.1f} s each",
+            "in " + ", ".join(f"{n} × {kind}" for kind, n in kinds[k].most_common(4)),
+            "followed by " + (", ".join(f"{to} ({n} ×)" for n, to in after) or "nothing"),
+            *(f"{name}, {begin * dt:.1f} to {end * dt:.1f} s" for name, (begin, end) in examples[k]),
+        ]
+        pictures = [sketch(pairs[name], span) for name, span in examples[k]]
+        cards.append({"title": f"{k}: {library.descriptions[k]}", "lines": lines, "pictures": pictures})
+    write_page(path, "Primitives of pairs of vehicles", built.lines()[0], cards, built.lines()[1:])

@@ -1,0 +1,277 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What preset `wide` frees: the clock of each vehicle, its place in the lane, its end speeds and its size.
+
+Every vehicle has a clock of its own: the shared one, shifted by a_n, faster or slower by a share p_n, and standing longer or
+shorter by q_n in each wait. A scenario is the stretch of time in which all clocks run, so one mechanism frees where and how fast
+a vehicle starts, who arrives when, how long it waits, and where and when the scenario ends. What was asked for stays: where a
+start or an end state is asked of any vehicle, all own clocks agree with the shared one there.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import Bools, Floats
+from scenario_gen.sampling.config import SamplingConfig
+from scenario_gen.sampling.time_warp import Clock, LONGEST_SHARE, SHORTEST_SHARE
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.request import Request
+from scenario_gen.types.scenario import BoundaryStates
+
+CATALOGUE = ((3.60, 1.62), (4.05, 1.75), (4.25, 1.79), (4.46, 1.83), (4.63, 1.83), (4.69, 1.85), (4.77, 1.88), (4.96, 1.93))
+"""Length and width [m] of cars, each as likely: our choice of typical ones, from a city car to a large saloon."""
+_CARS = 3.2, 5.4  # m: a vehicle of such a length gets the size of another car
+_RAMP, _RAMP_SHARE = (
+    6.0,
+    1.0 / 3.0,
+)  # s, and share of the duration: over which an own clock leaves the shared one where states are asked
+_TAPER = 30.0  # m, over which a vehicle goes to its place in the lane
+_LEAST_STAND, _LEAST_SHARE = 1.5, 0.5  # s and share of a wait that is left of it; of a speed, while acceleration dies away
+FADES = 0.7  # s, in which it does
+MOST_ONWARD = 4.0  # s, for which a vehicle drives straight on before or behind its route
+_FASTEST = 0.5  # m/s by which a speed may leave what the template has near its ends, besides its stated bounds
+
+
+def cut(z: Floats, bound: float) -> Floats:
+    """Standard normal numbers cut at +-bound: the truncated normal number with the same probability, monotone in z."""
+    low = exact.ndtr(np.array(-bound))
+    return np.asarray(exact.ndtri(low + (1.0 - 2.0 * low) * exact.ndtr(z)))
+
+
+def freed_states(asked: BoundaryStates, encounter: Encounter, config: SamplingConfig, request: Request) -> BoundaryStates:
+    """Return the states with how far each may be left: 0 where it was asked for, or nothing is freed.
+
+    A vehicle that starts a seconds later or earlier, starts as far along its lane as it drives in that time.
+    """
+    if config.variety != "wide":
+        return asked
+    ego = request.ego_of(encounter)
+    freed = np.zeros((len(encounter.vehicles), 2, 2))
+    own = [np.asarray(np.isfinite(request.rows(end, encounter)).any(axis=1)) for end in ("starts", "goals")]
+    if ego is not None:
+        for rows in own:
+            rows[ego] = True
+    length = encounter.duration
+    seconds = (
+        2.0 * config.freedom * (config.arrival_sigma + 0.5 * length * config.pace_sigma) + config.freedom * config.wait_sigma
+    )
+    seconds += config.duration_tolerance * length
+    slowest = 1.0 / SHORTEST_SHARE
+    steps = max(int(np.ceil(slowest * seconds / encounter.dt)), 1)
+    across = config.freedom * config.place_sigma
+    for n, (first, last) in enumerate(encounter.present.tolist()):
+        speed = encounter.speed[n, first : last + 1]
+        for end, (near, state) in enumerate(((speed[: steps + 1], asked.start[n]), (speed[-steps - 1 :], asked.end[n]))):
+            if own[end][n]:
+                continue
+            top, there = max(float(near.max()), float(state[3])), float(state[3])
+            faster = config.freedom * config.end_speed_sigma
+            along = 0.0 if own[end].any() else slowest * seconds * (top + faster)
+            off = 0.0 if own[end].any() else max(slowest * top - there, there - float(near.min()))
+            freed[n, end] = along + across, off + faster + _FASTEST
+    return replace(asked, freed=np.ceil(1000.0 * freed) / 1000.0)
+
+
+@dataclass(frozen=True, eq=False)
+class OwnClock:
+    """How the clock of one vehicle leaves the shared one.
+
+    Attributes:
+        shift: (G,) seconds at template times, of one second's shift: 1, but 0 where states are asked.
+        pace: (G,) the same of a pace slower by 1.
+        waits: (W, G) the same of one second more in each wait.
+        shift_rate, pace_rate, wait_rates: their derivatives.
+        sigma: (2 + W,) standard deviations of shift [s], pace and waits [s].
+        low, high: (W,) bounds [s] of a wait's.
+        bound: standard deviations at which all are cut.
+    """
+
+    shift: Floats
+    pace: Floats
+    waits: Floats
+    shift_rate: Floats
+    pace_rate: Floats
+    wait_rates: Floats
+    sigma: Floats
+    low: Floats
+    high: Floats
+    bound: float
+
+    @classmethod
+    def of(
+        cls, nominal: Clock, rests: Sequence[tuple[float, float]], asked: tuple[bool, bool], config: SamplingConfig
+    ) -> "OwnClock":
+        """Prepare.
+
+        Args:
+            nominal: the clock without deviation.
+            rests: when the vehicle stands [s], on the template's clock.
+            asked: whether start and end states are asked of any vehicle.
+            config: the standard deviations.
+        """
+        grid, ramp = nominal.grid, min(_RAMP, _RAMP_SHARE * float(nominal.grid[-1]))
+        shift, shift_rate = np.ones(len(grid)), np.zeros(len(grid))
+        for tied, since, sign in ((asked[0], grid - grid[0], 1.0), (asked[1], grid[-1] - grid, -1.0)):
+            if tied:
+                value, rate = _smooth_step(since / ramp)
+                shift, shift_rate = shift * value, shift_rate * value + shift * sign * rate / ramp
+        about = nominal.time - 0.5 * nominal.time[-1]
+        steps = [_smooth_step((grid - a) / (b - a)) for a, b in rests]
+        length = np.array([b - a for a, b in rests])
+        none = np.zeros((0, len(grid)))
+        most = config.freedom * config.wait_sigma
+        shortest = np.maximum(np.minimum(_LEAST_SHARE * length, length - _LEAST_STAND), 0.0)
+        return cls(
+            shift,
+            about * shift,
+            np.array([value for value, _ in steps]) if steps else none,
+            shift_rate,
+            about * shift_rate + nominal.rate * shift,
+            np.array([rate / (b - a) for (_, rate), (a, b) in zip(steps, rests, strict=True)]) if steps else none,
+            np.array([config.arrival_sigma, config.pace_sigma, *(config.wait_sigma for _ in rests)]),
+            -np.minimum(shortest, most),
+            np.full(len(rests), most),
+            config.freedom,
+        )
+
+    @property
+    def size(self) -> int:
+        """Standard normal numbers needed per sample."""
+        return len(self.sigma)
+
+    def sample(self, z: Floats, scale: float, shared: Clock, nominal: Clock) -> Clock:
+        """Clocks (S, G) of the vehicle from numbers z (S, size), deviations multiplied by `scale`."""
+        off = scale * self.sigma * cut(z, self.bound)
+        waits = np.clip(off[:, 2:], self.low, self.high)
+        rate = off[:, :1] * self.shift_rate + off[:, 1:2] * self.pace_rate
+        room = np.where(rate < 0.0, shared.rate - SHORTEST_SHARE * nominal.rate, LONGEST_SHARE * nominal.rate - shared.rate)
+        damped = np.clip((np.maximum(room, 0.0) / np.maximum(np.abs(rate), 1e-9)).min(axis=1), 0.0, 1.0)[:, None]
+        time = shared.time + damped * (off[:, :1] * self.shift + off[:, 1:2] * self.pace) + exact.matmul(waits, self.waits)
+        return Clock(shared.grid, time, shared.rate + damped * rate + exact.matmul(waits, self.wait_rates))
+
+
+@dataclass(frozen=True, eq=False)
+class Freedom:
+    """What else is free of one vehicle.
+
+    Attributes:
+        clock: its own clock.
+        place: (G,) share of its place in the lane at the nodes of its route: 1, but 0 where its state is asked.
+        place_sigma: m; end_speed: (2,) m/s, standard deviations.
+        bound: standard deviations at which all are cut.
+        sizes: (C, 2) length and width [m] to choose from; empty to keep its own.
+        ahead: (2,) metres of free road straight on before its route and behind it; 0 where its state is asked.
+    """
+
+    clock: OwnClock
+    place: Floats
+    place_sigma: float
+    end_speed: Floats
+    bound: float
+    sizes: Floats
+    ahead: Floats
+
+    @property
+    def size(self) -> int:
+        """Standard normal numbers needed per sample."""
+        return self.clock.size + 4
+
+    def across(self, z: Floats) -> Floats:
+        """Metres (S, G) to the left, of numbers z (S,)."""
+        return np.asarray(self.place_sigma * cut(z, self.bound)[:, None] * self.place)
+
+    def faster(self, z: Floats, least: Floats) -> Floats:
+        """By how much (S, 2) [m/s] start and end are faster, not by less than `least` (2,), of numbers z (S, 2)."""
+        return np.maximum(self.end_speed * cut(z, self.bound), least)
+
+    def vehicles(self, z: Floats, own: Vehicle) -> list[Vehicle]:
+        """The vehicle in the size that each of the numbers z (S,) chooses."""
+        if len(self.sizes) == 0:
+            return [own] * len(z)
+        chosen = np.minimum((exact.ndtr(z) * len(self.sizes)).astype(np.int64), len(self.sizes) - 1)
+        return [replace(own, length=float(length), width=float(width)) for length, width in self.sizes[chosen].tolist()]
+
+
+def onward(state: Floats, since: Floats, sign: float) -> Floats:
+    """States (S, T, 5) of vehicles that drive straight on from theirs (S, 5): the acceleration dies away, speed and yaw stay.
+
+    Args:
+        state: x, y [m], yaw [rad], speed [m/s], acceleration [m/s²].
+        since: (S, T) seconds after it, or before it.
+        sign: 1 after it, -1 before it.
+    """
+    x, y, yaw, speed, acceleration = (column[:, None] for column in state.T)
+    gains = sign * acceleration
+    fades = np.where(gains < 0.0, np.minimum(FADES, _LEAST_SHARE * speed / np.maximum(-gains, 1e-9)), FADES)
+    left = exact.exp(-since / np.maximum(fades, 1e-6))
+    driven = sign * (speed * since + gains * fades * (since - fades * (1.0 - left)))
+    out = np.empty((*since.shape, 5))
+    out[..., 0], out[..., 1] = x + driven * exact.cos(yaw), y + driven * exact.sin(yaw)
+    out[..., 2], out[..., 3], out[..., 4] = yaw, speed + gains * fades * (1.0 - left), acceleration * left
+    return out
+
+
+def seconds_onward(state: Floats, ahead: float, sign: float) -> Floats:
+    """Return for how long (S,) [s] vehicles in states (S, 5) drive no more than `ahead` metres straight on."""
+    fastest = state[:, 3] + np.maximum(sign * state[:, 4], 0.0) * FADES
+    return np.asarray(np.minimum(ahead / np.maximum(fastest, 1e-3), MOST_ONWARD))
+
+
+def freedom_of(
+    vehicle: Vehicle,
+    arc: Floats,
+    nominal: Clock,
+    rests: Sequence[tuple[float, float]],
+    freed: Floats,
+    asked: Bools,
+    ahead: Floats,
+    config: SamplingConfig,
+) -> Freedom:
+    """Return what is free of a vehicle.
+
+    Args:
+        vehicle: itself.
+        arc: (G,) arc lengths [m] of its route's nodes.
+        nominal: the clock without deviation.
+        rests: when it stands [s], on the template's clock.
+        freed: (2, 2) metres and m/s by which its start and end may differ from what is given.
+        asked: (2,) whether start and end states are asked of any vehicle.
+        ahead: (2,) metres of free road straight on before its route and behind it.
+        config: the standard deviations.
+    """
+    place = np.ones(len(arc))
+    for end, since in ((0, arc - arc[0]), (1, arc[-1] - arc)):
+        if freed[end, 0] == 0.0:
+            place = place * _smooth_step(since / max(min(_TAPER, _RAMP_SHARE * float(arc[-1])), 1e-9))[0]
+    still = len(arc) == 1 or freed[:, 0].min() == 0.0
+    other_size = config.sizes == "catalogue" and _CARS[0] <= vehicle.length <= _CARS[1] and not still
+    return Freedom(
+        OwnClock.of(nominal, rests, (bool(asked[0]), bool(asked[1])), config),
+        place if len(arc) > 1 else np.zeros(1),
+        config.place_sigma,
+        np.where(freed[:, 1] > 0.0, config.end_speed_sigma, 0.0),
+        config.freedom,
+        np.array(CATALOGUE) if other_size else np.zeros((0, 2)),
+        np.where(asked, 0.0, ahead),
+    )
+
+
+def _smooth_step(x: Floats) -> tuple[Floats, Floats]:
+    """The step from 0 at x <= 0 to 1 at x >= 1 whose first and second derivatives vanish at both, and its derivative."""
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * x * x * (1.0 - x) * (1.0 - x)

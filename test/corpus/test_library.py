@@ -1,0 +1,64 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The library: pairs in canonical order, segments that are shared, agreement as scikit-learn counts it, and the page."""
+
+import numpy as np
+import pytest
+from sklearn.metrics import adjusted_rand_score
+
+from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.library import adjusted_rand, build, pair_encounters
+from scenario_gen.segmentation.library import PrimitiveLibrary
+from scenario_gen.types.encounter import Encounter, Vehicle
+
+pytestmark = pytest.mark.xdist_group("corpus")
+
+
+def following(order):
+    """Vehicle "late" 1.5 s behind vehicle "early"; the order of the rows is `order`."""
+    time = np.arange(0.0, 10.0, 0.1)
+    ways = {"early": 10.0 * time, "late": 10.0 * time - 15.0}
+    position = np.array([np.stack([ways[name], np.zeros(100)], axis=1) for name in order])
+    vehicles = tuple(Vehicle(name) for name in order)
+    return Encounter("e", vehicles, 0, 100_000_000, position, np.zeros((2, 100)), np.full((2, 100), 10.0))
+
+
+def test_who_is_first_does_not_depend_on_the_order_in_the_log():
+    for order in (("early", "late"), ("late", "early")):
+        (pair,) = pair_encounters(following(order), 6.0)
+        assert [vehicle.id for vehicle in pair.vehicles] == ["early", "late"]
+
+
+def test_agreement_is_that_of_scikit_learn():
+    random = np.random.default_rng(1)
+    for _ in range(20):
+        one, other = random.integers(0, 4, 60), random.integers(0, 3, 60)
+        assert adjusted_rand(one, other) == pytest.approx(adjusted_rand_score(one, other), abs=1e-12)
+    assert adjusted_rand(one, 3 - one) == 1.0
+
+
+def test_a_library_of_a_corpus(corpus):
+    out, mined = corpus
+    built = build(out, most=12)
+    assert built.fitted == 12 and built.assigned >= mined.encounters and built.primitives >= 2
+    library = PrimitiveLibrary.load(out / "library" / "library.json")
+    pairs = {pair.name: pair for row in rows_of(tables_of(out)) for pair in pair_encounters(encounter_of(row), 6.0)}
+    rows = list(rows_of(sorted((out / "library" / "segments").glob("*.parquet"))))
+    assert {row["pair"] for row in rows} == set(pairs)
+    for row in rows:
+        assert len(row["primitives"]) == len(row["changepoints"]) + 1 and max(row["primitives"]) < len(library.means)
+        assert all(0 < point < len(pairs[row["pair"]].time) for point in row["changepoints"])
+    page = (out / "library" / "library.html").read_text()
+    assert library.descriptions[0] in page and "<svg" in page and "<script" not in page
