@@ -79,7 +79,7 @@ def mine(
         config = assigned(config, assignment)
     with telling() as told:
         result = mined(archive, out, config, workers=workers, scheduler=scheduler, told=told)
-    lines(result.lines())
+    lines([*result.lines(), f"page: {out / 'encounters.html'}"])
     conclude(result.failed, out)
 
 

@@ -31,10 +31,21 @@ from pathlib import Path
 from typing import Any
 
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.encounters import account_of, clean_found, CleanTask, LogTask, read_one_log, rows_of, tables_of
+from scenario_gen.corpus.encounters import (
+    account_of,
+    clean_found,
+    CleanTask,
+    encounter_of,
+    LogTask,
+    read_one_log,
+    rows_of,
+    tables_of,
+)
 from scenario_gen.corpus.grouping import Found, group, Meeting
+from scenario_gen.corpus.kinds import KINDS
 from scenario_gen.corpus.meetings import HourTask, overlap, search_hours
 from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
+from scenario_gen.corpus.page import sketch, write_page
 from scenario_gen.corpus.tasks import arriving, spread, sweep, Told
 from scenario_gen.errors import InputError, needs
 from scenario_gen.folders import write_text
@@ -43,7 +54,8 @@ from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.read import is_bag, is_spmd, is_table
 from scenario_gen.parameters import flatten
 
-ARCHIVE = "archive.json"
+ARCHIVE, PAGE = "archive.json", "encounters.html"
+MOST_DRAWN = 120  # encounters on the page
 MOST_SHOWN = 20  # failures and files that are named; the corpus holds all
 
 
@@ -123,7 +135,32 @@ def mine(
             failed += go(search_hours, hour_tasks(ranged, out, config))
             if not failed:
                 failed += go(clean_found, clean_tasks(out, config))
-        return summary(out, failed)
+        made = summary(out, failed)
+        with arriving(out / PAGE) as part:
+            _write_gallery(part, out, made)
+        return made
+
+
+def _write_gallery(path: Path, out: Path, made: Mined) -> None:
+    """Write a page that shows the encounters, of a large corpus the first ones of each kind."""
+    tables = sorted((out / "encounters").glob("*.parquet"))
+    shown: Counter[str] = Counter()
+    cards = []
+    for table in tables:
+        kinds = [row["kind"] for row in rows_of([table], ["kind"])]
+        if made.encounters > MOST_DRAWN and all(shown[kind] >= MOST_DRAWN // len(KINDS) for kind in kinds):
+            continue
+        for row in rows_of([table]):
+            if made.encounters > MOST_DRAWN and shown[row["kind"]] >= MOST_DRAWN // len(KINDS):
+                continue
+            shown[row["kind"]] += 1
+            lines = [
+                f"{row['count']} vehicles, {row['seconds']:.1f} s, nearest {row['distance']:.1f} m, gap {row['gap']:.1f} m",
+                ", ".join(f"{pair}: {kind}" for pair, kind in json.loads(row["kinds"]).items()),
+            ]
+            cards.append({"title": f"{row['kind']}: {row['name']}", "lines": lines, "pictures": [sketch(encounter_of(row))]})
+    first, *rest = made.lines()
+    write_page(path, "Encounters mined", first, cards, rest)
 
 
 def inventory(archives: Sequence[Path]) -> tuple[list[Path], list[list[Path]]]:
@@ -290,4 +327,4 @@ def summary(out: Path, failed: list[str]) -> Mined:
     )
 
 
-__all__ = ["ARCHIVE", "Mined", "inventory", "mine", "tables_of"]
+__all__ = ["ARCHIVE", "PAGE", "Mined", "inventory", "mine", "tables_of"]

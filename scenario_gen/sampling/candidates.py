@@ -25,7 +25,7 @@ from itertools import pairwise
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, Ints
+from scenario_gen.arrays import Bools, Floats, Ints, wrap_angle
 from scenario_gen.sampling.deviations import soft_clipped
 from scenario_gen.sampling.freedom import Freedom, onward, seconds_onward
 from scenario_gen.sampling.path import BasePath, states
@@ -33,6 +33,8 @@ from scenario_gen.sampling.speed_profile.model import SpeedModel
 from scenario_gen.sampling.time_warp import Clock, DT, template_times, TimeWarp
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import Scenario
+
+_APART = 0.05  # m, from which on two poses tell a curvature
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,12 @@ class VehicleModel:
         return _Drawn(vehicles, clock, curve, arc, np.ascontiguousarray(speed), ok)
 
 
+def curvature(two: Floats) -> Floats:
+    """Curvature (S,) [1/m] between two states (S, 2, 5) that follow each other."""
+    apart = exact.hypot(*(two[:, 1, :2] - two[:, 0, :2]).T)
+    return np.asarray(np.where(apart > _APART, wrap_angle(two[:, 1, 2] - two[:, 0, 2]) / np.maximum(apart, _APART), 0.0))
+
+
 def nearest_cell(clock: Clock, at: Floats) -> Ints:
     """Indices of the clock's grid that are nearest to template times [s]."""
     step = clock.grid[1] - clock.grid[0]
@@ -143,7 +151,7 @@ class Batch:
         models: the models of the vehicles.
         drawn: what is drawn of each.
         ends: (S, N, 2) when each comes to the start and to the end of its route [s], on its clock.
-        at_ends: (N, S, 2, 5) its states there, see `states`.
+        at_ends: (N, S, 4, 5) its states there and 0.1 s behind and before, see `states`; None where nothing is free.
         begin: (S,) when a scenario begins [s], on the clocks.
         count: (S,) instants of the published grid.
         present: (S, N, 2) first and last of them at which each vehicle is there.
@@ -174,15 +182,15 @@ class Batch:
         there = np.column_stack([times[:, 0] <= grid[0] + 1e-9, times[:, 1] >= grid[-1] - 1e-9])
         reach, at_ends = ends.copy(), None
         if any(model.freedom is not None for model in models):
-            two = np.full(len(ends), 2)
+            four, near = np.full(len(ends), 4), np.array([0.0, DT, -DT, 0.0])
             numbered = enumerate(zip(models, drawn, strict=True))
-            at_ends = np.stack([one.states(m, np.ascontiguousarray(ends[:, n]), two)[0] for n, (m, one) in numbered])
+            at_ends = np.stack([one.states(m, ends[:, n, [0, 0, 1, 1]] + near, four)[0] for n, (m, one) in numbered])
             for n, model in enumerate(models):
                 for end, sign in ((0, -1.0), (1, 1.0)):
                     if there[n, end] and model.speed.spline.still[-end]:
                         reach[:, n, end] = sign * np.inf
                     elif there[n, end] and model.freedom is not None:
-                        reach[:, n, end] += sign * seconds_onward(at_ends[n, :, end], float(model.freedom.ahead[end]), sign)
+                        reach[:, n, end] += sign * seconds_onward(at_ends[n, :, -end], float(model.freedom.ahead[end]), sign)
         begin = np.maximum(reach[:, there[:, 0], 0].max(axis=1, initial=-np.inf), ends[..., 0].min(axis=1))
         end = np.minimum(reach[:, there[:, 1], 1].min(axis=1, initial=np.inf), ends[..., 1].max(axis=1))
         ends_shown = ends.copy()
@@ -211,8 +219,11 @@ class Batch:
                 continue
             for end, sign in ((0, -1.0), (1, 1.0)):
                 since = np.maximum(sign * (at - self.ends[:, n, end : end + 1]), 0.0)
-                if since.any() and not model.speed.spline.still[-end]:
-                    out[n] = np.where((since > 0.0)[..., None], onward(self.at_ends[n][:, end], since, sign), out[n])
+                beyond = np.flatnonzero((since > 0.0).any(axis=0))
+                if len(beyond) and not model.speed.spline.still[-end]:
+                    since, state = since[:, beyond], self.at_ends[n][:, -end]
+                    further = onward(state, curvature(self.at_ends[n][:, 2 * end : 2 * end + 2]), since, sign)
+                    out[n][:, beyond] = np.where((since > 0.0)[..., None], further, out[n][:, beyond])
         return out
 
     def scenarios(self, seed: int, index: Sequence[int], frame_id: str) -> list[Scenario | None]:

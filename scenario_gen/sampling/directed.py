@@ -50,6 +50,7 @@ POOL = 256  # candidates of which the regression is made at most, the latest
 HORIZON = 10.0  # s; a time to collision above it says nothing
 _RIDGE = 0.1  # variance that the regression leaves to what is not linear, as a share of the response's
 _PASSES = 3  # of the regression, each with the last one's squared coefficients as prior variances
+_INVALID = 1.0  # what is not valid, or not checked, counts as so much farther from the range
 _SPREAD = 1.25  # the proposal's standard deviations over the elite's
 _LEAST, _MOST = 0.3, 1.5  # the least and greatest of them
 
@@ -229,11 +230,8 @@ class Seen:
         """Return the next proposal; None if nothing can be learned."""
         z, guides = np.concatenate(self.z), np.concatenate(self.guides)
         distance, valid = np.concatenate(self.distance), np.concatenate(self.valid)
-        elite = np.flatnonzero(valid & np.isfinite(distance))
-        if not len(elite):
-            elite = np.flatnonzero(np.isfinite(distance))
-        elite = elite[np.argsort(distance[elite], kind="stable")]
-        elite = elite[: max(ELITE, int((distance[elite] == 0.0).sum()))]
+        order = np.argsort(distance + np.where(valid, 0.0, _INVALID), kind="stable")
+        elite = order[np.isfinite(distance[order])][: max(ELITE, self.hits())]
         basis = directions(z[-POOL:], guides[-POOL:])
         if len(elite) < 2 or not len(basis):
             return None

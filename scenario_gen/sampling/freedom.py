@@ -42,7 +42,9 @@ _RAMP, _RAMP_SHARE = (
 )  # s, and share of the duration: over which an own clock leaves the shared one where states are asked
 _TAPER = 30.0  # m, over which a vehicle goes to its place in the lane
 _LEAST_STAND, _LEAST_SHARE = 1.5, 0.5  # s and share of a wait that is left of it; of a speed, while acceleration dies away
-FADES = 0.7  # s, in which it does
+FADES, _LEAST_FADES = 0.7, 0.4  # s, in which it does
+EASES = 4.0  # m, in which curvature does
+_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 MOST_ONWARD = 4.0  # s, for which a vehicle drives straight on before or behind its route
 _FASTEST = 0.5  # m/s by which a speed may leave what the template has near its ends, besides its stated bounds
 
@@ -207,29 +209,51 @@ class Freedom:
         return [replace(own, length=float(length), width=float(width)) for length, width in self.sizes[chosen].tolist()]
 
 
-def onward(state: Floats, since: Floats, sign: float) -> Floats:
-    """States (S, T, 5) of vehicles that drive straight on from theirs (S, 5): the acceleration dies away, speed and yaw stay.
+def onward(state: Floats, bend: Floats, since: Floats, sign: float) -> Floats:
+    """States (S, T, 5) of vehicles that drive on from theirs (S, 5): acceleration and curvature die away, the speed is kept.
 
     Args:
         state: x, y [m], yaw [rad], speed [m/s], acceleration [m/s²].
+        bend: (S,) curvature [1/m] there.
         since: (S, T) seconds after it, or before it.
         sign: 1 after it, -1 before it.
     """
     x, y, yaw, speed, acceleration = (column[:, None] for column in state.T)
-    gains = sign * acceleration
-    fades = np.where(gains < 0.0, np.minimum(FADES, _LEAST_SHARE * speed / np.maximum(-gains, 1e-9)), FADES)
-    left = exact.exp(-since / np.maximum(fades, 1e-6))
-    driven = sign * (speed * since + gains * fades * (since - fades * (1.0 - left)))
+    gains, fades = sign * acceleration, _fades(state, sign)[:, None]
+    left = exact.exp(-since / fades)
+    driven = speed * since + gains * fades * (since - fades * (1.0 - left))
     out = np.empty((*since.shape, 5))
-    out[..., 0], out[..., 1] = x + driven * exact.cos(yaw), y + driven * exact.sin(yaw)
-    out[..., 2], out[..., 3], out[..., 4] = yaw, speed + gains * fades * (1.0 - left), acceleration * left
+    turned, along, aside = _eased(sign * bend[:, None], driven)
+    cos, sin = exact.cos(yaw), exact.sin(yaw)
+    out[..., 0], out[..., 1] = x + sign * (along * cos - aside * sin), y + sign * (along * sin + aside * cos)
+    out[..., 2], out[..., 3], out[..., 4] = yaw + turned, speed + gains * fades * (1.0 - left), acceleration * left
     return out
 
 
+def _eased(bend: Floats, driven: Floats) -> tuple[Floats, Floats, Floats]:
+    """Heading [rad] and place ahead and aside [m] after `driven` metres (S, T), of a curvature `bend` (S, 1) that dies away."""
+    curved = np.minimum(driven, 4.0 * EASES)
+    along, aside = np.zeros_like(driven), np.zeros_like(driven)
+    for node, weight in zip(_GAUSS_NODES.tolist(), _GAUSS_WEIGHTS.tolist(), strict=True):
+        part = curved * (0.5 + 0.5 * node)
+        turned = bend * EASES * (1.0 - exact.exp(-part / EASES))
+        along, aside = along + 0.5 * weight * curved * exact.cos(turned), aside + 0.5 * weight * curved * exact.sin(turned)
+    turned = bend * EASES * (1.0 - exact.exp(-curved / EASES))
+    rest = driven - curved
+    return turned, along + rest * exact.cos(turned), aside + rest * exact.sin(turned)
+
+
+def _fades(state: Floats, sign: float) -> Floats:
+    """Seconds (S,) in which the acceleration of vehicles in states (S, 5) dies away: before they stand."""
+    loses = np.maximum(-sign * state[:, 4], 1e-9)
+    return np.minimum(FADES, np.maximum(_LEAST_SHARE * state[:, 3] / loses, 1e-6))
+
+
 def seconds_onward(state: Floats, ahead: float, sign: float) -> Floats:
-    """Return for how long (S,) [s] vehicles in states (S, 5) drive no more than `ahead` metres straight on."""
+    """Return for how long (S,) [s] vehicles in states (S, 5) can drive on within `ahead` metres; 0 if only with a jerk."""
     fastest = state[:, 3] + np.maximum(sign * state[:, 4], 0.0) * FADES
-    return np.asarray(np.minimum(ahead / np.maximum(fastest, 1e-3), MOST_ONWARD))
+    seconds = np.minimum(ahead / np.maximum(fastest, 1e-3), MOST_ONWARD)
+    return np.where(_fades(state, sign) < _LEAST_FADES, 0.0, seconds)
 
 
 def freedom_of(

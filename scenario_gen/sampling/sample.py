@@ -121,7 +121,7 @@ def sample_scenarios(
     else:
         aim = aim_of(encounter, request, measures)
         sampler = Sampler(prepared.model, seed, road.frame_id, ego, label=label_of(encounter, request, aim))
-        judge = Judge.of(sampler, check, ENOUGH[config.variety])
+        judge = Judge.of(sampler, check, _enough(config, request))
         loop = _Loop(sampler, judge, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
         loop.aim, loop.measures = aim, measures
         loop.run_request(config.attempts, diverse=request.choose == "diverse")
@@ -163,8 +163,13 @@ def regenerate(
     if place_of(index)[0] == DIRECTED:
         if aim is None or check is None:
             raise InputError(f"index {index} is of a proposal, but no target was asked for")
-        sampler = adapted(sampler, Judge.of(sampler, check, ENOUGH[config.variety]), aim, lambda: False).sampler
+        sampler = adapted(sampler, Judge.of(sampler, check, _enough(config, request)), aim, lambda: False).sampler
     return sampler.scenario(index)
+
+
+def _enough(config: SamplingConfig, request: Request) -> float:
+    """Return the share of valid candidates by which a level is good enough; any, where the order alone makes most invalid."""
+    return 0.0 if request.order == "swap" else ENOUGH[config.variety]
 
 
 @dataclass

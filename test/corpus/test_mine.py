@@ -16,7 +16,7 @@
 
 import json
 
-from hypothesis import given, strategies
+from hypothesis import given, settings, strategies
 import numpy as np
 import pytest
 
@@ -55,6 +55,8 @@ def test_every_row_that_is_left_out_is_counted_by_file(archive, corpus):
     wrong = sum(mined.account[cause] for cause in mined.account if "clocks" in cause or "2004" in cause)
     assert 0.9 * truth["wrong_times"] <= wrong <= truth["wrong_times"]  # a few agree with the other clock by chance
     assert any("borne by several vehicles" in note for note in mined.notes)
+    page = (corpus[0] / "encounters.html").read_text()
+    assert page.count("<svg") == mined.encounters and "<script" not in page
     assert mined.files and not mined.failed
 
 
@@ -131,6 +133,7 @@ def straight(x, y, heading, speed, seconds=12.0):
     return Motion(place, np.full(len(time), heading), np.full(len(time), speed))
 
 
+@settings(deadline=None)
 @given(
     turned=strategies.floats(-3.0, 3.0),
     case=strategies.sampled_from(

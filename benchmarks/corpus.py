@@ -1,0 +1,328 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Corpus: what mining finds, what it costs, batches by one and two processes and through SIGKILLs, the library.
+
+Everything is synthetic but the full recordings. CPU seconds depend on what else the machine does; DuckDB's own copy of the same
+text to Parquet stands beside them, from the same run.
+"""
+
+from collections import Counter
+from functools import cache
+import json
+import os
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+
+from benchmarks._corpus_kills import killed_batch
+from benchmarks._corpus_primitives import f1, labels_between, planted_encounter, score
+from benchmarks._size import sized
+from benchmarks.row import Row
+from scenario_gen.corpus.config import CorpusConfig
+from scenario_gen.corpus.encounters import rows_of
+from scenario_gen.corpus.library import adjusted_rand
+from scenario_gen.corpus.mine import mine
+from scenario_gen.corpus.synthetic import Planted, read_planted
+from scenario_gen.folders import sha256_of
+from scenario_gen.logs.tables import COLUMNS
+from scenario_gen.segmentation import segment
+from scenario_gen.segmentation.library import assign, build_library
+
+DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+ROWS = sized(10_000_000, quick=40_000)
+DENSE = {"rows": ROWS, "hours": 6.0, "encounters": sized(1000, quick=6), "outside": sized(500, quick=6)}
+SPARSE = {"rows": 5 * ROWS, "hours": 30.0, "encounters": sized(537, quick=6), "outside": sized(268, quick=6)}
+"""As many encounters in a row as the Safety Pilot's archive has: 462,161 in 43 · 10⁹."""
+ARCHIVES = {"dense": DENSE, "sparse": SPARSE}
+CLEANED = sized(300, quick=10)
+TEMPLATES, COUNT = sized((200, 50), quick=(2, 2))
+ROADS = ("corridor", "t_intersection")
+KILLS = sized(20, quick=1)
+LIBRARY, NEW = sized((1000, 100), quick=(8, 2))
+TRUE = 1 << 40
+
+
+def run(part: str = "all") -> list[Row]:
+    """Measure; `part` is mine, memory, recorded, batch, kills or library."""
+    rows: list[Row] = []
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        for name, function in PARTS.items():
+            if part in ("all", name):
+                rows += function(place)
+    return rows
+
+
+def _stage(name: str, archive: Path, rest: str) -> dict[str, list[float] | float]:
+    """Run a stage in a process of its own; return CPU seconds of its tasks, and MiB at its peak."""
+    words = [sys.executable, "-m", "benchmarks._corpus_stage", name, str(archive), rest]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    found: dict[str, list[float] | float] = json.loads(done.stdout.splitlines()[-1]) if done.stdout else {}
+    return found
+
+
+@cache
+def _mined(place: Path, name: str) -> tuple[dict[str, float], dict[str, float], Path, Path]:
+    """Write an archive and mine it up to the table of encounters; return CPU s and MiB by stage, archive and corpus."""
+    archive, out = place / f"{name}-archive", place / name
+    _stage("write", archive, json.dumps(ARCHIVES[name]))
+    seconds, memory = {}, {}
+    for stage in ("parse", "search", "group"):
+        found = _stage(stage, archive, str(out))
+        tasks = found["tasks"]
+        assert isinstance(tasks, list) and isinstance(found["mebibytes"], float)
+        seconds[stage], memory[stage] = float(np.sum(tasks)), found["mebibytes"]
+        seconds[f"{stage}, a task"] = float(np.median(tasks))
+    return seconds, memory, archive, out
+
+
+def _scores(planted: list[Planted], out: Path) -> tuple[float, float, float]:
+    """Recall, precision and share of right kinds of the table of encounters."""
+    from pyarrow import parquet
+
+    rows = parquet.read_table(out / "found.parquet").to_pylist()
+    found = {frozenset(device % TRUE for device in row["devices"]): row["kind"] for row in rows}
+    true = {frozenset(one.devices): one.kind for one in planted if one.inside}
+    hit = found.keys() & true.keys()
+    return len(hit) / len(true), len(hit) / max(len(rows), 1), float(np.mean([found[who] == true[who] for who in hit]))
+
+
+def _peer(archive: Path, place: Path) -> float:
+    """CPU seconds of DuckDB's own copy of the archive's numbers to Parquet, in one thread, with nothing counted or checked."""
+    import duckdb
+
+    wanted = {"TxDevice", "Gentime", "DSecond", "Latitude", "Longitude", "Speed", "Heading"}
+    columns = ", ".join(f"'{name}': '{'DOUBLE' if name in wanted else 'VARCHAR'}'" for name in COLUMNS)
+    with duckdb.connect() as base:
+        base.execute("SET threads = 1")
+        begun = time.process_time()
+        base.execute(
+            f"COPY (SELECT {', '.join(sorted(wanted))} FROM read_csv('{archive}/*.csv', header=false, auto_detect=false, "
+            f"columns={{{columns}}}, ignore_errors=true)) TO '{place / 'peer.parquet'}' (FORMAT parquet, COMPRESSION zstd)"
+        )
+        return time.process_time() - begun
+
+
+def mining(place: Path) -> list[Row]:
+    """Encounters planted among 10⁷ rows, ten times as densely as in the Safety Pilot's archive: found, and at what cost."""
+    seconds, memory, archive, out = _mined(place, "dense")
+    recall, precision, kinds = _scores(read_planted(archive), out)
+    rows = json.loads((archive / "synthetic.json").read_text())["rows"]
+    accounts = [json.loads(path.read_text()) for path in (out / "messages").glob("*.json")]
+    kept = sum(int(count) for account in accounts for count in account["hours"].values())
+    all_of_it = seconds["parse"] + seconds["search"] + seconds["group"]
+    peer = f"DuckDB's copy of the text to Parquet alone: {rows / _peer(archive, place) / 1e6:.2f}"
+    what = f"{rows / 1e6:.1f} M rows, {DENSE['encounters']} encounters and {DENSE['outside']} just outside"
+    stored = sum(path.stat().st_size for path in (out / "messages").glob("*.parquet"))
+    shuffled = sum(path.stat().st_size for path in (out / "hours").glob("*.rows.parquet"))
+    cleaned = _cleaning(archive, place)
+    return [
+        Row(f"recall, {what}", recall, "", "higher", 0.99),
+        Row("precision", precision, "", "higher", 0.99),
+        Row("kinds", kinds, "", "higher", 0.95),
+        Row("from text to the table of encounters", rows / all_of_it / 1e6, "M rows/CPU s", "higher", 0.6, peer),
+        Row(
+            "from Parquet to the table of encounters", kept / (all_of_it - seconds["parse"]) / 1e6, "M rows/CPU s", "higher", 2.5
+        ),
+        Row("text to Parquet", rows / seconds["parse"] / 1e6, "M rows/CPU s", "higher", None, peer),
+        Row("cleaning of found encounters", cleaned, "CPU s each", "lower"),
+        Row("messages as Parquet", stored / kept, "bytes/row", "lower"),
+        Row("shuffle: messages of who meets, written once more", shuffled / stored, "of Parquet", "lower"),
+        *(Row(f"a task of {stage}", seconds[f"{stage}, a task"], "CPU s", "higher") for stage in ("parse", "search")),
+        *(Row(f"peak memory of {stage}", memory[stage], "MiB", "lower", 1024.0) for stage in memory),
+    ]
+
+
+def _cleaning(archive: Path, place: Path) -> float:
+    """CPU seconds for each of some encounters of an archive with as many as are to be cleaned."""
+    settings = {"rows": 1000 * CLEANED + 5000, "hours": 1.0, "encounters": CLEANED, "outside": 0}
+    small, out = place / "small-archive", place / "small"
+    _stage("write", small, json.dumps(settings))
+    for stage in ("parse", "search", "group"):
+        _stage(stage, small, str(out))
+    found = _stage("clean", small, str(out))["tasks"]
+    assert isinstance(found, list)
+    return float(np.sum(found)) / CLEANED
+
+
+def memory_of(place: Path) -> list[Row]:
+    """Five times the rows at the density of the Safety Pilot's archive: memory, and rates."""
+    few = _mined(place, "dense")[1]
+    seconds, memory, archive, out = _mined(place, "sparse")
+    recall, precision, kinds = _scores(read_planted(archive), out)
+    rows = json.loads((archive / "synthetic.json").read_text())["rows"]
+    searching = seconds["search"] + seconds["group"]
+    what = f"{rows / 1e6:.0f} M rows, {SPARSE['encounters']} encounters"
+    return [
+        Row(f"{what}: recall", recall, "", "higher", 0.99),
+        Row(f"{what}: precision", precision, "", "higher", 0.99),
+        Row(f"{what}: kinds", kinds, "", "higher", 0.95),
+        Row(f"{what}: from text", rows / (seconds["parse"] + searching) / 1e6, "M rows/CPU s", "higher", 0.6),
+        Row(f"{what}: from Parquet", rows / searching / 1e6, "M rows/CPU s", "higher", 2.5),
+        Row(f"{what}: peak memory", max(memory.values()), "MiB", "lower", 1024.0),
+        Row(f"{what}: peak memory by that of {ROWS / 1e6:.0f} M", max(memory.values()) / max(few.values()), "", "lower", 1.2),
+    ]
+
+
+RECORDED = {  # what is known of the full recordings: how they are read, and at least how many encounters they hold
+    "cats_av_lane_change": (
+        ("cats_vehicle1_full.csv", "cats_vehicle2_full.csv", "cats_vehicle3_full.csv", "cats_vehicle4_full.csv"),
+        10,
+    ),
+    "psu_2obu": (("psu_meet_full.csv",), 1),
+    "openacc_zalazone": (("openacc_no_ACC_handling_part22_first150s.csv",), 1),
+    "ngsim_commonroad": (("USA_Lanker-2_13_T-1_all_vehicles.csv",), 1),
+}
+
+
+def recorded(place: Path) -> list[Row]:
+    """The full recordings, each its own corpus."""
+    rows = []
+    for folder, (files, least) in RECORDED.items():
+        if not (DATA / "trajectories" / folder).is_dir():
+            continue
+        source = place / "recorded" / folder
+        source.mkdir(parents=True)
+        for file in files:
+            shutil.copy(DATA / "trajectories" / folder / file, source)
+        mined = mine([source], place / "recorded" / f"{folder}-corpus", CorpusConfig())
+        kinds = ", ".join(f"{n} {kind}" for kind, n in sorted(mined.kinds.items()))
+        rows.append(Row(f"encounters in {folder} ({kinds})", mined.encounters, "", "higher", least))
+    return rows
+
+
+def _corpus(place: Path) -> Path:
+    """A corpus of as many synthetic templates as a batch takes."""
+    out = place / "templates"
+    if not out.exists():
+        settings = {"rows": 1500 * TEMPLATES + 5000, "hours": 1.0, "encounters": TEMPLATES, "outside": 0}
+        _stage("write", place / "templates-archive", json.dumps(settings))
+        mine([place / "templates-archive"], out)
+    return out
+
+
+def _words(corpus: Path, out: Path, workers: int, count: int, templates: int) -> list[str]:
+    words = ["batch", str(corpus), "--out", str(out), "--roads", ",".join(ROADS), "--workers", str(workers)]
+    return [*words, "--count", str(count), "--templates", str(templates)]
+
+
+def _digests(out: Path) -> dict[str, str]:
+    """SHA-256 of each table and bag."""
+    found = (path for path in out.rglob("*") if path.suffix in (".parquet", ".mcap", ".yaml"))
+    return {str(path.relative_to(out)): sha256_of(path) for path in found}
+
+
+def batch(place: Path) -> list[Row]:
+    """200 templates × 2 roads × 50 scenarios, by one process and by two."""
+    corpus = _corpus(place)
+    cpu, wall = {}, {}
+    for workers in (1, 2):
+        begun, before = time.monotonic(), os.times()
+        out = place / f"batch-{workers}"
+        subprocess.run(
+            [sys.executable, "-m", "scenario_gen", *_words(corpus, out, workers, COUNT, TEMPLATES)],
+            check=True,
+            capture_output=True,
+        )
+        after = os.times()
+        cpu[workers] = after.children_user + after.children_system - before.children_user - before.children_system
+        wall[workers] = time.monotonic() - begun
+    cases = list(rows_of(sorted((place / "batch-1" / "cases").rglob("*.parquet"))))
+    scenarios = sum(int(case["published"]) for case in cases)
+    what = f"{TEMPLATES} templates × {len(ROADS)} roads × {COUNT}"
+    causes = Counter(case["cause"] for case in cases if not case["published"])
+    without = "; ".join(f"{n} × {cause}" for cause, n in causes.most_common(3))
+    return [
+        Row(f"{what}: CPU with two processes by that with one", cpu[2] / cpu[1], "", "lower", 1.15),
+        Row(f"{what}: the same bytes", float(_digests(place / "batch-1") == _digests(place / "batch-2")), "", "higher", 1.0),
+        Row(f"{what}: scenarios (cases without any: {without})", scenarios, "", "higher"),
+        Row("CPU of a template on a road", cpu[1] / len(cases), "s", "lower"),
+        Row("CPU of a scenario", cpu[1] / max(scenarios, 1), "s", "lower"),
+        *(Row(f"time with {n} processes", wall[n], "s", "lower") for n in (1, 2)),
+    ]
+
+
+def kills(place: Path) -> list[Row]:
+    """SIGKILLs of workers and of the run, and what is then missing, doubled or other."""
+    corpus, few = _corpus(place), min(40, TEMPLATES)
+    subprocess.run(
+        [sys.executable, "-m", "scenario_gen", *_words(corpus, place / "whole", 1, 5, few)], check=True, capture_output=True
+    )
+    workers, runs = killed_batch(_words(corpus, place / "killed", 2, 5, few), place / "killed", KILLS)
+    return [
+        Row(f"SIGKILLs ({workers} of a worker, {runs} of the run)", workers + runs, "", "higher", KILLS),
+        Row("after them the same bytes", float(_digests(place / "whole") == _digests(place / "killed")), "", "higher", 1.0),
+    ]
+
+
+def library(place: Path) -> list[Row]:
+    """A library of encounters whose primitives are planted, and all recorded ones beside; new ones assigned."""
+    random = np.random.default_rng(2)
+    made = [planted_encounter(random, str(k)) for k in range(LIBRARY + NEW)]
+    old, new = made[:LIBRARY], made[LIBRARY:]
+    begun = time.process_time()
+    found, assignments = build_library([encounter for encounter, _, _ in old], seed=0)
+    fitted = time.process_time() - begun
+    labels = [
+        np.concatenate(
+            [
+                labels_between(a.segmentation.changepoints, a.primitives, len(e.time))
+                for a, (e, _, _) in zip(each, old, strict=True)
+            ]
+        )
+        for each in (assignments, build_library([encounter for encounter, _, _ in old], seed=1)[1])
+    ]
+    planted = np.concatenate([own for _, _, own in old])
+    assigned = score([f1(assign(e, found).segmentation.changepoints, points) for e, points, _ in new])
+    alone = score([f1(segment(e).changepoints, points) for e, points, _ in new])
+    again = np.concatenate(
+        [labels_between(a.segmentation.changepoints, a.primitives, len(e.time)) for e, _, _ in new for a in [assign(e, found)]]
+    )
+    truth = np.concatenate([own for _, _, own in new])
+    return [
+        Row(
+            f"library of {LIBRARY} synthetic encounters ({len(found.means)} primitives, 8 planted)",
+            fitted,
+            "CPU s",
+            "lower",
+            1200.0,
+        ),
+        Row("two seeds, adjusted Rand", adjusted_rand(*labels), "", "higher", 0.8),
+        Row("planted primitives, adjusted Rand", adjusted_rand(planted, labels[0]), "", "higher", 0.9),
+        Row(
+            f"F1 of {NEW} new ones, alone less assigned",
+            alone - assigned,
+            "",
+            "lower",
+            0.05,
+            f"alone {alone:.3f}, assigned {assigned:.3f}",
+        ),
+        Row("new ones, planted primitives, adjusted Rand", adjusted_rand(truth, again), "", "higher"),
+    ]
+
+
+PARTS = {
+    "mine": mining,
+    "memory": memory_of,
+    "recorded": recorded,
+    "batch": batch,
+    "kills": kills,
+    "library": library,
+}
