@@ -93,7 +93,7 @@ def test_an_index_of_no_candidate_is_refused():
 def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
     """Beyond LEVEL_SIZE candidates numbering goes on behind the last level, and each one can be had again."""
     plain = made(chain, 200)
-    monkeypatch.setattr(sample, "LEVEL_SIZE", 2 * BLOCK)
+    monkeypatch.setattr(sampler, "LEVEL_SIZE", 2 * BLOCK)
     beyond = made(chain, 200)
     assert len(beyond.scenarios) == 200
     assert len({s.index for s in beyond.scenarios}) == 200
