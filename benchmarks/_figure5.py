@@ -30,6 +30,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.nearest import attempt
 from scenario_gen.report.page import render, ReportInput
 from scenario_gen.roads import build_road
+from scenario_gen.sampling import SamplingConfig
 from scenario_gen.segmentation import segment
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation
@@ -74,7 +75,7 @@ def encounters(data: Path) -> Iterator[tuple[Encounter, list[str]]]:
 
 def measure(data: Path, say: Callable[[str], None]) -> Iterator[Measured]:
     """Run every case with every seed: own roads all, and of the others the first that fits."""
-    config = PipelineConfig()
+    config = PipelineConfig(sampling=SamplingConfig(variety="narrow"))
     for encounter, own in encounters(data):
         segmentation = segment(encounter, config.segmentation, SEEDS[0])
         for name in own:

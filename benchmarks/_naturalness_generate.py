@@ -20,7 +20,7 @@ to stdout.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 import json
 import os
 from pathlib import Path
@@ -121,13 +121,15 @@ def run(job: Job) -> Iterator[Made]:
         yield generated(job.name, encounter, road, job.count, own=own)
 
 
-def generated(name: str, encounter: Any, road: str, count: int, *, own: bool) -> Made:
+def generated(name: str, encounter: Any, road: str, count: int, *, own: bool, variety: str = "narrow") -> Made:
     """Put one encounter on one road."""
     from scenario_gen.errors import ScenarioGenError
     from scenario_gen.evaluation import EvaluationConfig
     from scenario_gen.pipeline import generate, PipelineConfig
 
-    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
+    config: Any = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
+    if hasattr(config.sampling, "variety"):  # older versions have one preset
+        config = replace(config, sampling=replace(config.sampling, variety=variety))
     started = process_time()
     try:
         made: Any = generate(encounter, road, config, count=count, seed=SEED)

@@ -62,7 +62,7 @@ class Prepared:
     waits: tuple[Wait, ...]
 
     def sample(
-        self, count: int, seed: int = 0, config: SamplingConfig = SamplingConfig(), *, checked: bool = True
+        self, count: int, seed: int = 0, config: SamplingConfig = SamplingConfig(variety="narrow"), *, checked: bool = True
     ) -> ScenarioSet:
         """Sample `count` scenarios; unchecked, every candidate counts as valid."""
         checker = Checker(self.road, self.fit.asked, self.conflicts, self.waits)

@@ -28,7 +28,7 @@ from scenario_gen.segmentation import segment
 from scenario_gen.template.interaction import waits_to_keep
 from scenario_gen.template.size import refuse_too_large
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.generation import GenerationResult, UNIFORM, WITHOUT
+from scenario_gen.types.generation import GenerationResult, NARROW, UNIFORM, WITHOUT
 from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road
 from scenario_gen.validity import Checker
@@ -93,6 +93,9 @@ def with_references(
     """
     road, fit = made.placed()
     others = {WITHOUT: without_changepoints(made.segmentation)}
+    if config.sampling.variety == "wide":
+        others[NARROW] = made.segmentation
+        config = replace(config, sampling=replace(config.sampling, variety="narrow"))
     if config.evaluation.uniform and made.segmentation.changepoints.size:
         others[UNIFORM] = uniform_changepoints(made.segmentation)
     references, refusals = {}, {}
@@ -100,7 +103,14 @@ def with_references(
     for name, segmentation in others.items():
         try:
             references[name] = attempt(
-                made.encounter, segmentation, road, config, request, count=few, seed=made.seed, waits=()
+                made.encounter,
+                segmentation,
+                road,
+                config,
+                request,
+                count=few,
+                seed=made.seed,
+                waits=None if name == NARROW else (),
             ).generated
         except RefusedError as error:
             refusals[name] = str(error)

@@ -95,8 +95,8 @@ class Case:
 
     @cached_property
     def lanes(self) -> tuple[Lane, ...]:
-        """All lanes."""
-        return lanes_of(self.lane_map)
+        """All lanes; of a vector map its own."""
+        return self.lane_map.network or lanes_of(self.lane_map)
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,7 @@ from scenario_gen.arrays import Floats
 from scenario_gen.errors import RefusedError
 from scenario_gen.exchange.cases import Case, Exported
 from scenario_gen.exchange.config import ExportConfig
-from scenario_gen.exchange.lanes import Lane, LaneMap, stations
+from scenario_gen.exchange.lanes import Lane, stations
 from scenario_gen.exchange.motion import at_even_steps, even_step
 from scenario_gen.exchange.xml import add, comment, Element, serialized
 from scenario_gen.types.body import is_truck
@@ -78,17 +78,17 @@ def write_commonroad(case: Case, one: Exported, export: ExportConfig = ExportCon
             "timeStepSize": f"{step:.9f}".rstrip("0"),
         },
     )
-    comment(root, f"lanelets: {case.lane_map.origin}")
+    comment(root, f"lanelets: {case.lane_map.network_origin or case.lane_map.origin}")
     location = add(root, "location")
     add(location, "geoNameId", "-999")  # the format's value for unknown, as 999 below
     add(location, "gpsLatitude", "999")
     add(location, "gpsLongitude", "999")
     tags = add(root, "scenarioTags")
     add(tags, "simulated")
-    if case.lane_map.joints:
+    if any(lane.turn for lane in case.lanes):
         add(tags, "intersection")
     for lane in case.lanes:
-        _lanelet(root, lane, case.lane_map)
+        _lanelet(root, lane)
     _intersection(root, case.lanes)
     for n, vehicle in enumerate(scenario.vehicles):
         comment(root, f"vehicle {vehicle.id}")
@@ -118,7 +118,7 @@ def _points(parent: Element, tag: str, points: Floats) -> None:
         add(point, "y", y)
 
 
-def _lanelet(root: Element, lane: Lane, lane_map: LaneMap) -> None:
+def _lanelet(root: Element, lane: Lane) -> None:
     lanelet = add(root, "lanelet", id=lane.id)
     _points(lanelet, "leftBound", lane.left)
     _points(lanelet, "rightBound", lane.right)
@@ -129,7 +129,7 @@ def _lanelet(root: Element, lane: Lane, lane_map: LaneMap) -> None:
     for tag, beside in (("adjacentLeft", lane.left_of), ("adjacentRight", lane.right_of)):
         if beside is not None:
             add(lanelet, tag, ref=beside[0], drivingDir="same" if beside[1] else "opposite")
-    add(lanelet, "laneletType", "unknown" if lane_map.is_derived(lane.strip) else "urban")
+    add(lanelet, "laneletType", "unknown" if lane.derived else "urban")
     if lane.turn:
         add(lanelet, "laneletType", "intersection")
     add(lanelet, "userOneWay", "vehicle")
@@ -138,7 +138,7 @@ def _lanelet(root: Element, lane: Lane, lane_map: LaneMap) -> None:
 def _intersection(root: Element, lanes: Sequence[Lane]) -> None:
     """Say of every strip that leads into the junction where one can go from it."""
     by_id = {lane.id: lane for lane in lanes}
-    incoming = [lane for lane in lanes if lane.successors and not lane.turn]
+    incoming = [lane for lane in lanes if not lane.turn and any(by_id[other].turn for other in lane.successors)]
     if not incoming:
         return
     intersection = add(root, "intersection", id=INTERSECTION)

@@ -23,7 +23,8 @@ from shapely import contains_xy, covers, make_valid, Polygon, polygons, prepare,
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.curve import Curve
-from scenario_gen.exchange.lanes import Lane, LaneMap, lanes_of, Strip
+from scenario_gen.exchange.lanes import Lane, LaneMap, lanes_of, network_lanes, Strip
+from scenario_gen.types.lanes import LaneNetwork
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import Scenario
 
@@ -72,7 +73,33 @@ def with_all_vehicles(lane_map: LaneMap, scenarios: Sequence[Scenario], road: Ro
     They do not where a footprint leaves them in some scenario, or where no lane has the vehicle's direction, as of one that turns
     off the road across the others' lanes.
     """
-    lanes = lanes_of(lane_map)
+    missing = _not_kept(lanes_of(lane_map), scenarios)
+    if not missing:
+        return lane_map
+    strips = [_lane(f"along vehicle {name}", path, {name}, scenarios, road, lane_width, 0.0) for name, path in missing.items()]
+    if lane_map.side == "left":
+        strips = [replace(s, offset=s.offset - s.right[0], left=s.right, right=s.left) for s in strips]
+    origin = f"{lane_map.origin}, and a derived one along the path of vehicle {', '.join(missing)}, which does not keep to them"
+    return replace(lane_map, strips=(*lane_map.strips, *strips), added=len(strips), origin=origin)
+
+
+def with_network(
+    lane_map: LaneMap, network: LaneNetwork, scenarios: Sequence[Scenario], road: Road, lane_width: float
+) -> LaneMap:
+    """Return derived lanes with the lanes of a vector map beside them, and a derived one for who does not keep to those."""
+    own = network_lanes(network)
+    missing = _not_kept(own, scenarios)
+    strips = [_lane(f"along vehicle {name}", path, {name}, scenarios, road, lane_width, 0.0) for name, path in missing.items()]
+    added = lanes_of(replace(lane_map, strips=tuple(strips))) if strips else ()
+    lanes = (*own, *(replace(lane, id=len(own) + lane.id) for lane in added))
+    origin = f"the lanes of map {network.name}"
+    if missing:
+        origin += f", and a derived one along the path of vehicle {', '.join(missing)}, which does not keep to them"
+    return replace(lane_map, network=lanes, network_origin=origin)
+
+
+def _not_kept(lanes: Sequence[Lane], scenarios: Sequence[Scenario]) -> dict[str, Curve]:
+    """Return the paths, by id, of vehicles that leave the lanes or drive across them."""
     area = union_all(make_valid([Polygon(np.concatenate([lane.left, lane.right[::-1]])) for lane in lanes]))
     prepare(area)
     missing: dict[str, Curve] = {}
@@ -82,13 +109,7 @@ def with_all_vehicles(lane_map: LaneMap, scenarios: Sequence[Scenario], road: Ro
                 path = driven_path(scenario, n)
                 if not covers(area, polygons(footprints(scenario, n))).all() or _unled(path, lanes) > CUT:
                     missing[vehicle.id] = path
-    if not missing:
-        return lane_map
-    strips = [_lane(f"along vehicle {name}", path, {name}, scenarios, road, lane_width, 0.0) for name, path in missing.items()]
-    if lane_map.side == "left":
-        strips = [replace(s, offset=s.offset - s.right[0], left=s.right, right=s.left) for s in strips]
-    origin = f"{lane_map.origin}, and a derived one along the path of vehicle {', '.join(missing)}, which does not keep to them"
-    return replace(lane_map, strips=(*lane_map.strips, *strips), added=len(strips), origin=origin)
+    return missing
 
 
 def _unled(path: Curve, lanes: Sequence[Lane]) -> float:

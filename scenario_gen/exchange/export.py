@@ -74,7 +74,7 @@ def export_bag(
     with replaced_folder(out, EXPORTED, [bag]) as folder:
         for case in cases:
             about = f"case {case.number}, {case.road_name}{f' in {case.namespace}' if case.namespace else ''}"
-            notes.append(f"{about}: {len(case.scenarios)} scenarios; {case.lane_map.origin}")
+            notes.append(f"{about}: {len(case.scenarios)} scenarios; {_origin(case, target)}")
             for name, data in SHARED[target](case).items():
                 _write(folder, name, data)
             for one in case.scenarios:
@@ -84,7 +84,7 @@ def export_bag(
                     notes.append(f"{about}: left out: {error}")
                     continue
                 notes += [f"{about}, scenario {one.index}: {sentence}" for sentence in said.notes]
-                entries.append(_entry(case, one, said.names))
+                entries.append(_entry(case, one, said.names, target))
         if not entries:
             raise RefusedError("nothing could be exported:\n" + "\n".join(notes))
         digests = {str(p.relative_to(folder)): _digest(p) for p in sorted(folder.rglob("*")) if p.is_file()}
@@ -101,6 +101,15 @@ class _Written:
     notes: tuple[str, ...] = ()
 
 
+def _has_own_lanes(case: Case, target: str) -> bool:
+    """Say whether the lanes of a vector map are written; OpenDRIVE has derived ones in their place."""
+    return target == "commonroad" and bool(case.lane_map.network)
+
+
+def _origin(case: Case, target: str) -> str:
+    return case.lane_map.network_origin if _has_own_lanes(case, target) else case.lane_map.origin
+
+
 def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
@@ -109,13 +118,13 @@ def _write(folder: Path, name: str, data: bytes) -> None:
     (folder / name).write_bytes(data)
 
 
-def _entry(case: Case, one: Exported, names: tuple[str, ...]) -> dict[str, object]:
+def _entry(case: Case, one: Exported, names: tuple[str, ...], target: str) -> dict[str, object]:
     """Return what the manifest says of a scenario; obstacles and entities of a file are in the order of `vehicles`."""
     return {
         "files": list(names),
         "namespace": case.namespace,
         "road": case.road_name,
-        "lanes": "derived" if case.lane_map.derived else "true",
+        "lanes": "derived" if case.lane_map.derived and not _has_own_lanes(case, target) else "true",
         "index": one.index,
         "seed": one.seed,
         "sha256": one.sha256,

@@ -22,6 +22,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
+from scenario_gen.types.lanes import LaneNetwork
 
 DECIMALS = 6
 """Of the metres of a lane's edges: rounded, lanes that follow or lie beside each other have the very same points there."""
@@ -97,6 +98,8 @@ class LaneMap:
         origin: what the lanes are: true ones of a road, or derived from what; for people.
         derived: whether they are derived.
         added: how many strips at the end are derived, among true ones.
+        network: the lanes of a vector map, in place of those of the strips where a format has lanes alone; () for other roads.
+        network_origin: what those are.
     """
 
     strips: tuple[Strip, ...]
@@ -105,6 +108,8 @@ class LaneMap:
     origin: str
     derived: bool
     added: int = 0
+    network: tuple["Lane", ...] = ()
+    network_origin: str = ""
 
     def is_derived(self, strip: int) -> bool:
         """Whether the strip of an index is derived."""
@@ -133,6 +138,7 @@ class Lane:
         successors, predecessors: ids.
         left_of, right_of: id of the lane beside it and whether that has the same direction; None if there is none.
         turn: "left", "straight" or "right" through a junction; "" elsewhere.
+        derived: whether it is along what is driven, and no lane of the road.
     """
 
     id: int
@@ -146,6 +152,7 @@ class Lane:
     left_of: tuple[int, bool] | None
     right_of: tuple[int, bool] | None
     turn: str
+    derived: bool
 
     @property
     def middle(self) -> Floats:
@@ -194,6 +201,36 @@ def lanes_of(lane_map: LaneMap) -> tuple[Lane, ...]:
                 left_of=left_of,
                 right_of=right_of,
                 turn=turns.get(strip, ""),
+                derived=lane_map.is_derived(strip),
+            )
+        )
+    return tuple(found)
+
+
+def network_lanes(network: LaneNetwork) -> tuple[Lane, ...]:
+    """Return the lanes of a vector map, numbered from 1 in their order; those beside them to which one may change."""
+    found = []
+    for k, lane in enumerate(network.lanes):
+        sides: dict[str, tuple[int, bool]] = {}
+        across = lane.left[0] - lane.right[0]
+        for other in lane.beside:
+            gap = network.lanes[other].centre - lane.centre[0]
+            nearest = gap[int(np.argmin(np.square(gap).sum(axis=1)))]
+            sides["left" if float((nearest * across).sum()) > 0.0 else "right"] = (other + 1, True)
+        found.append(
+            Lane(
+                id=k + 1,
+                strip=-1,
+                side="",
+                place=0,
+                left=lane.left,
+                right=lane.right,
+                successors=tuple(sorted(other + 1 for other in lane.successors)),
+                predecessors=tuple(sorted(other + 1 for other in network.predecessors[k])),
+                left_of=sides.get("left"),
+                right_of=sides.get("right"),
+                turn="",
+                derived=False,
             )
         )
     return tuple(found)

@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.exchange.derived_lanes import derived_lanes, with_all_vehicles
+from scenario_gen.exchange.derived_lanes import derived_lanes, with_all_vehicles, with_network
 from scenario_gen.exchange.drawn_lanes import drawn_lanes
 from scenario_gen.exchange.lanes import LaneMap
 from scenario_gen.recordings.provenance import read_parameters
@@ -61,7 +61,10 @@ def lane_map_of(
             found = true_lanes(road, candidate, tracks, config, scenarios, run_out)
             if found is not None:
                 return found
-    return derived_lanes(scenarios, road, config.lane_width, run_out)
+    made = derived_lanes(scenarios, road, config.lane_width, run_out)
+    if road is None or road.lanes is None:
+        return made
+    return with_network(made, road.lanes, scenarios, road, config.lane_width)
 
 
 def true_lanes(

@@ -26,6 +26,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 import json
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -69,6 +70,7 @@ from scenario_gen.types.road import Road
 
 OUTPUTS = ("/clock", "/tf", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
 LOOK_AROUND = 10  # steps between two looks at who commands the ego
+LOOK = 0.05  # seconds of real time between two looks at whether a wait is at its end
 GRID_EVERY = 0.2  # seconds of the drive between two local maps
 
 
@@ -106,6 +108,8 @@ class Traffic(Node):  # type: ignore[misc]
         self._states: list[State] = []
         self._heard: Heard | None = None
         self._waiting: Future | None = None
+        self._until = 0.0  # when that ends, on the steady clock [s]
+        self.create_timer(LOOK, self._end_waiting, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._paused = False
         self._sources: list[str] = []
         self._outcomes: list[Outcome] = []
@@ -286,14 +290,14 @@ class Traffic(Node):  # type: ignore[misc]
         """Return when a command has come since this state was told, or after `patience` [s] of real time."""
         if self._heard is not None and self._heard.step >= state.step:
             return
-        waiting = self._waiting = Future(executor=self.executor)
-        timer = self.create_timer(
-            patience,
-            lambda: None if waiting.done() else waiting.set_result(None),
-            clock=Clock(clock_type=ClockType.STEADY_TIME),
-        )
-        await waiting
-        self.destroy_timer(timer)
+        self._until = monotonic() + patience
+        self._waiting = Future(executor=self.executor)
+        await self._waiting
+
+    def _end_waiting(self) -> None:
+        """End a wait for a command that has come to the end of its patience."""
+        if self._waiting is not None and not self._waiting.done() and monotonic() > self._until:
+            self._waiting.set_result(None)
 
     def _why_no_step(self) -> str:
         if not self.config.lock_step:

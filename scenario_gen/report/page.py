@@ -99,7 +99,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "remark": case.segmentation.remark(duration),
         "rate": len(case.segmentation.changepoints) / duration,
         "errors": {
-            (arm, key): _found(evaluation, case.row if arm == WITH else arm, key)
+            (arm, key): _found(evaluation, case.similar_row if arm == WITH else arm, key)
             for arm in (WITH, WITHOUT, UNIFORM, ORACLE)
             for key in ERRORS
         },

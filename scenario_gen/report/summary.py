@@ -88,6 +88,6 @@ def _not_kept(values: Mapping[str, Interval]) -> list[str]:
 
 def _errors(case: GenerationResult, metric: str) -> Text:
     """E with and without changepoints; green where changepoints bring it down."""
-    values = [case.evaluation.value(row, metric) for row in (WITH, WITHOUT)]
+    values = [case.evaluation.value(row, metric) for row in (case.similar_row, WITHOUT)]
     one, other = (f"{value:.3f}" if math.isfinite(value) else "–" for value in values)
     return Text(f"{one} | {other}", style="green" if values[0] < values[1] else "")

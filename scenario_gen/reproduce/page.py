@@ -29,6 +29,7 @@ from scenario_gen.reproduce.chain import ROADS
 from scenario_gen.reproduce.claims import Claim, claims_of
 from scenario_gen.reproduce.measure import PaperCase, run_case
 from scenario_gen.results import provenance_of
+from scenario_gen.sampling.config import SamplingConfig
 
 PAGE, FIGURES = "reproduce.html", "reproduce.json"
 VERDICTS = {True: ", as claimed", False: ", not as claimed", None: ""}
@@ -120,7 +121,7 @@ def reproduce(
         InputError: a log cannot be read, or `out` holds something else.
         RefusedError: not one encounter could be placed on a road of the paper; the page is written all the same.
     """
-    config = PipelineConfig()
+    config = PipelineConfig(sampling=SamplingConfig(variety="narrow"))  # the paper's variety
     files = [path for group in logs for path in group]
     with replaced_folder(out, REPRODUCED, files) as partial:
         found = [read_log(list(group), config.log) for group in logs]

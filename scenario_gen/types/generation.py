@@ -27,6 +27,7 @@ from scenario_gen.types.scenario import Scenario, ScenarioSet
 from scenario_gen.types.segmentation import Segmentation
 
 WITH, WITHOUT, UNIFORM, ORACLE = "with changepoints", "without changepoints", "uniform changepoints", "oracle"
+NARROW = "with changepoints, narrow"
 """Names of the rows of an evaluation: what was generated, and what it is measured against."""
 
 
@@ -43,7 +44,8 @@ class GenerationResult:
         generated: the valid scenarios, and the account of every candidate.
         seed: of the request.
         evaluation: of `generated`, `references` and `oracle`; without rows if they were not evaluated.
-        references: sets made with other changepoints, by row: WITHOUT is the paper's ablation, UNIFORM as many evenly spaced.
+        references: sets made with other changepoints, by row: WITHOUT is the paper's ablation, UNIFORM as many evenly spaced,
+            NARROW the same changepoints where `generated` is of preset `wide`, for E compares sets of one preset.
         refusals: why a reference is missing, by row.
         oracle: the fitted template replayed.
         row: name of the evaluation's row of `generated`.
@@ -65,6 +67,11 @@ class GenerationResult:
     row: str = WITH
     provenance: Mapping[str, str] = field(default_factory=dict)
     valid: int | None = None
+
+    @property
+    def similar_row(self) -> str:
+        """Row of the set whose E is held against the references': all with preset `narrow`."""
+        return NARROW if NARROW in self.references else self.row
 
     def placed(self) -> tuple[Road, Fit]:
         """Return road and fit.

@@ -26,6 +26,8 @@ from scenario_gen.exchange.lanes import lanes_of
 from scenario_gen.exchange.road_lanes import lane_map_of, true_lanes
 from scenario_gen.roads import RoadConfig
 from scenario_gen.roads.build import build_road
+from scenario_gen.types.lanes import Lane as VectorLane
+from scenario_gen.types.lanes import LaneNetwork
 
 
 def area_of(lanes):
@@ -108,6 +110,33 @@ def test_who_leaves_the_true_lanes_gets_a_lane_and_that_is_said(side):
     area = area_of(lanes_of(lane_map))
     for n in range(2):
         assert all(area.covers(Polygon(corners)) for corners in footprints(scenario, n))
+
+
+def test_a_vector_maps_own_lanes_are_written():
+    config = RoadConfig()
+    road = build_road("straight", None, config)
+    y = float(road.entries[0, 1])
+    x = np.linspace(-20.0, 200.0, 30)
+    border = [np.column_stack((x, np.full(30, y + k * 3.5 - 1.75))) for k in range(3)]
+    own = (
+        VectorLane("a.1", border[1], border[0], (), (1,)),
+        VectorLane("a.2", border[2], border[1], (2,), (0,), 8.0),
+        VectorLane("a.3", border[2] + (220.0, 0.0), border[1] + (220.0, 0.0)),
+    )
+    road = replace(road, lanes=LaneNetwork("town", own))
+    scenario = moving([[10.0, y, 0.0, 8.0, 0.0, 0.0], [40.0, y - 3.0, 0.0, 8.0, 0.0, 0.0]])
+    made = lane_map_of(road, "town", None, {}, [scenario], 5.0)
+    assert made.derived and made.network_origin.startswith(
+        "the lanes of map town, and a derived one along the path of vehicle 2,"
+    )
+    assert [(lane.id, lane.derived, lane.successors, lane.predecessors) for lane in made.network] == [
+        (1, False, (), ()),
+        (2, False, (3,), ()),
+        (3, False, (), (2,)),
+        (4, True, (), ()),
+    ]
+    assert made.network[0].left_of == (2, True) and made.network[1].right_of == (1, True) and made.network[0].right_of is None
+    assert np.array_equal(made.network[1].left, own[1].left)
 
 
 def test_derived_lanes_hold_every_footprint_and_followers_share_one():
