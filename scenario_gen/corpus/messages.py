@@ -236,3 +236,8 @@ def _rejected(base: Any) -> list[tuple[str, int]]:
         "SELECT file_path, count(DISTINCT line) FROM reject_errors JOIN reject_scans USING (scan_id, file_id) GROUP BY ALL"
     ).fetchall()
     return found
+
+
+def quoted(names: Sequence[str]) -> str:
+    """Return names as texts in SQL, separated by commas."""
+    return ", ".join("'" + name.replace("'", "''") + "'" for name in names)
