@@ -35,7 +35,7 @@ from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
 from scenario_gen.corpus.messages import database, HOUR, quoted
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.kernels import F1, I1, kernel, OUT2, OUTI1
-from scenario_gen.logs.groups import APART, shortest, ticks, windows
+from scenario_gen.logs.groups import APART, LAG, shortest, ticks, windows
 
 BIN = 500_000  # µs
 FASTEST = 35.0  # m/s: what a vehicle drives in a bin widens the cells
@@ -88,7 +88,10 @@ def _search(base: Any, hour: int, files: tuple[Path, ...], target: Path, config:
     edge = overlap(config)
     begin, end = hour * HOUR - edge, (hour + 1) * HOUR + edge
     names = [str(path) for path in files]
-    base.execute(f"CREATE TEMP VIEW messages AS SELECT * FROM read_parquet([{quoted(names)}]) WHERE t >= {begin} AND t < {end}")
+    base.execute(
+        "CREATE TEMP VIEW messages AS SELECT device, t, lat, lon, speed, heading FROM "
+        f"read_parquet([{quoted(names)}]) WHERE t >= {begin} AND t < {end} AND cause = 0"
+    )
     shared = _bins(base)
     pairs = _candidates(base, config)
     rows = _messages(base, "told_apart" if shared else "messages")
@@ -209,7 +212,44 @@ def _candidates(base: Any, config: CorpusConfig) -> dict[str, Ints]:
         f"GROUP BY a, b, part HAVING count(*) >= {max(least // 2, 1)} ORDER BY a, b, first"
     )
     found: dict[str, Ints] = base.execute("FROM candidates").fetchnumpy()
+    kept = _near_in_time(base, found, config)
+    found = {name: np.asarray(values[kept]) for name, values in found.items()}
+    import pyarrow as pa
+
+    base.register("remaining", pa.table(found))
+    base.execute("CREATE OR REPLACE TEMP TABLE candidates AS FROM remaining")
     return found
+
+
+def _near_in_time(base: Any, pairs: dict[str, Ints], config: CorpusConfig) -> Bools:
+    """(C,) which candidates may have to do with each other: somewhere they come near within the seconds that count.
+
+    With bins a half second apart places are missed by what is driven in a quarter of a second, and by the slack of a bin.
+    """
+    rows = base.execute(
+        "SELECT device, bin, lat, lon FROM binned WHERE device IN (SELECT a FROM candidates UNION SELECT b FROM candidates) "
+        "ORDER BY device, bin"
+    ).fetchnumpy()
+    own = {int(rows["device"][first]): slice(first, last) for first, last in runs_of(rows["device"])}
+    steps = int(config.interaction / LAG / (BIN * 1e-6)) + 1
+    reach = config.interaction + config.slack + FASTEST * BIN * 0.25e-6
+    kept = np.zeros(len(pairs["a"]), dtype=bool)
+    for k, (a, b, first, last) in enumerate(zip(*(pairs[name].tolist() for name in ("a", "b", "first", "last")), strict=True)):
+        places = []
+        for device in (a, b):
+            bins = rows["bin"][own[device]]
+            low, high = np.searchsorted(bins, [first - steps, last + steps + 1])
+            dense = np.full((last - first + 1 + 2 * steps, 2), np.nan)
+            at = bins[low:high] - (first - steps)
+            for column, name in enumerate(("lat", "lon")):
+                dense[at, column] = rows[name][own[device]][low:high]
+            places.append(dense)
+        one, other = places
+        scale = np.array([NORTH, LONGITUDE * exact.cos(float(rows["lat"][own[a]][0]) * np.pi / 180.0)])
+        one, other = one * scale, np.lib.stride_tricks.sliding_window_view(other * scale, 2 * steps + 1, axis=0)
+        apart = np.square(one[steps : len(one) - steps, :, None] - other).sum(axis=1)
+        kept[k] = not np.isnan(apart).all() and float(np.nanmin(apart)) <= np.square(reach)
+    return kept
 
 
 @dataclass(frozen=True, eq=False)

@@ -77,7 +77,11 @@ def test_ranges_and_whole_files_give_the_same_rows(archive, tmp_path):
             parse_range(task)
         tables = sorted((tmp_path / name / "messages").glob("*.parquet"))
         rows = np.concatenate(
-            [np.stack([parquet.read_table(t)[c].to_numpy() for c in ("device", "t", "lat")]) for t in tables], 1
+            [
+                np.stack([parquet.read_table(t, filters=[("cause", "=", 0)])[c].to_numpy() for c in ("device", "t", "lat")])
+                for t in tables
+            ],
+            1,
         )
         counts = [json.loads(t.with_suffix(".json").read_text())["files"] for t in tables]
         seen.append((rows[:, np.lexsort(rows)], sum(causes["rows"] for one in counts for causes in one.values())))
@@ -109,6 +113,21 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
     mined = mine([tmp_path / "in"], tmp_path / "out")
     assert mined.encounters == 0 and len(mined.failed) == 1 and "one.csv" in mined.failed[0]
     assert mined.account == {"rows": 4, "left out: no row of 19 fields with numbers": 2, "left out: no vehicle": 1}
+
+
+def test_a_second_clock_that_is_another_one_is_not_asked_and_said(archive, tmp_path):
+    """DSecond 20 s off in all rows of one of two files of a range; both of `_p001` and of a day that is not theirs."""
+    (tmp_path / "in").mkdir()
+    lines = (archive / sorted(archive.glob("*.csv"))[0].name).read_text().splitlines()[:2000]
+    for name, add in (("TripStart_bsmrx_41000_p001.csv", 20_000), ("plain.csv", 0)):
+        rows = [line.split(",") for line in lines]
+        rows = [[*row[:6], str((int(row[6]) + add) % 60_000), *row[7:]] for row in rows if len(row) == 19]
+        (tmp_path / "in" / name).write_text("\n".join(map(",".join, rows)) + "\n")
+    mined = mine([tmp_path / "in"], tmp_path / "out")
+    assert [note for note in mined.notes if "DSecond" in note and "41000" in note] and not mined.failed
+    off, good = (mined.files[str(tmp_path / "in" / name)] for name in ("TripStart_bsmrx_41000_p001.csv", "plain.csv"))
+    assert off["said: stamps of another day"] > 1900 and not [why for why in off if "clocks" in why]
+    assert good["said: stamps that run backwards"] == off["said: stamps that run backwards"] or "said" not in str(good)
 
 
 def test_nothing_to_read_is_an_error(tmp_path):
