@@ -14,12 +14,12 @@
 
 """Is every scenario of a bag valid? For any bag of the conventions, ours or not.
 
-A scenario is checked against what bears its stamp in its own namespace: the states asked of it and how far they may be left (its own in
-`scenarios/info`), the conflicts and waits of its template (`tracks`; waits if there are `changepoints`), and the road: the `map` that
-its entry on `scenarios/info` names by hash, else the newest one of the stamp, or of all. What is not there is not checked,
-and said. Vehicles are matched by id, so one may be left out for an ego; with its witness, all are
-checked together. Where there are entries, a scenario is not to stand in the place of another that was published; one without any
-entry is counted, and checked as far as that goes.
+A scenario is checked against what bears its stamp in its own namespace: the states asked of it and how far they may be left
+(its own in `scenarios/info`), the conflicts and waits of its template (`tracks`; waits if there are `changepoints`), in the
+order that was asked, and the road: the `map` that its entry on `scenarios/info` names by hash, else the newest one of the
+stamp, or of all. What is not there is not checked, and said. Vehicles are matched by id, so one may be left out for an ego;
+with its witness, all are checked together. Where there are entries, a scenario is not to stand in the place of another that was
+published; one without any entry is counted, and checked as far as that goes.
 """
 
 from collections.abc import Collection, Sequence
