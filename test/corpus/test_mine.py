@@ -112,6 +112,7 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
     (tmp_path / "in" / "one.csv").write_text("t,x,y\n0,0,0\n1,1,0\n")
     mined = mine([tmp_path / "in"], tmp_path / "out")
     assert mined.encounters == 0 and len(mined.failed) == 1 and "one.csv" in mined.failed[0]
+    assert (tmp_path / "out" / "found.parquet").exists()
     assert mined.account == {"rows": 4, "left out: no row of 19 fields with numbers": 2, "left out: no vehicle": 1}
 
 
