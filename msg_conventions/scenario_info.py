@@ -34,10 +34,11 @@ from msg_conventions.scenarios import digest, encode_scenario, messages_of
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import guarded, InputError
 from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario, ScenarioSet
+from scenario_gen.types.request import ORDERS
+from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, FACTS, Scenario, ScenarioSet
 
 INFO = "scenarios/info"
-REFUSED, ADAPTATION = "refused.", "adaptation."
+REFUSED, ADAPTATION, TARGET = "refused.", "adaptation.", "target."
 MESSAGES, PRESENT = "messages", "present"  # of a scenario in which not all are there throughout
 FREED = "freed"  # metres and m/s by which start and end of each vehicle may differ from the asked states
 EGO_WITNESS = "ego_witness"  # of one with an ego slot
@@ -90,6 +91,23 @@ class ScenarioEntry:
     def witness(self) -> str:
         """SHA-256 of the message of its ego's witness; "" where it has none (no ego, or before version 0.6)."""
         return self.status.values.get(EGO_WITNESS, "")
+
+    @property
+    def order(self) -> str:
+        """Who was to go first: "keep" (also where it is not said), "free" or "swap".
+
+        Raises:
+            InputError: it is none of these.
+        """
+        text = self.status.values.get("order", "keep")
+        if text not in ORDERS:
+            raise InputError(f"{INFO}: order of {self.status.message} is none of {', '.join(ORDERS)}")
+        return text
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """What it says besides of a scenario, see `Scenario.facts`."""
+        return {key: text for key, text in self.status.values.items() if key.startswith(FACTS)}
 
     @property
     def template_hash(self) -> str | None:
@@ -159,11 +177,11 @@ class RequestSummary:
     @property
     def provenance(self) -> dict[str, str]:
         """What is needed to make it again, and its seed: what is neither its identity nor its outcome."""
-        known = {"request", "requested", "published", "candidates", MAP_HASH, TEMPLATE_HASH}
+        known = {"request", "requested", "published", "candidates", "chosen_from", MAP_HASH, TEMPLATE_HASH}
         return {
             key: value
             for key, value in self.values.items()
-            if key not in known and not key.startswith((REFUSED, ADAPTATION, "ego"))
+            if key not in known and not key.startswith((REFUSED, ADAPTATION, TARGET, "ego"))
         }
 
     def result(self, scenarios: tuple[Scenario, ...] = ()) -> ScenarioSet:
@@ -264,6 +282,7 @@ def scenario_entry(
         **({} if scenario.all_present else {PRESENT: json.dumps(spans)}),
         **({MESSAGES: json.dumps([digest(message) for message in several])} if len(several) > 1 else {}),
         **(about or {}),
+        **scenario.facts,
         **ego_values(ego),
         **({} if scenario.witness is None else {EGO_WITNESS: digest(encode_scenario(scenario.witness, stamp_of(data, INFO)))}),
         "asked_start": json.dumps(asked.start[rows].tolist()),
@@ -289,6 +308,8 @@ def request_summary(
         "candidates": str(result.candidates),
         **{f"{REFUSED}{cause.value}": str(count) for cause, count in sorted(result.refused.items())},
         **{f"{ADAPTATION}{k}": text for k, text in enumerate(result.adaptations)},
+        **({} if result.reached is None else {f"{TARGET}{key}": text for key, text in result.reached.figures().items()}),
+        **({"chosen_from": str(result.chosen)} if result.chosen else {}),
     }
     level = Level.OK if len(result.scenarios) == result.requested else Level.WARN
     message = f"{len(result.scenarios)} of {result.requested} scenarios from {result.candidates} candidates"

@@ -121,6 +121,18 @@ def generate(
         list[str] | None, typer.Option(help=r"a vehicle's start state, 'id: x y yaw \[speed]', on the road; repeatable")
     ] = None,
     goal: Annotated[list[str] | None, typer.Option(help="a vehicle's end state, likewise; repeatable")] = None,
+    target: Annotated[
+        list[str] | None,
+        typer.Option(
+            help=r"a range, e.g. 'pet=0.5..1.5' or 'ttc\[1,2]=1..2', of pet, ttc, gap, arrival_gap, closing_speed; repeatable"
+        ),
+    ] = None,
+    choose: Annotated[
+        str, typer.Option(help="natural: as sampled; diverse: of many valid candidates those that cover best")
+    ] = "natural",
+    order: Annotated[
+        str, typer.Option(help="who goes first: keep (as in the template), free, swap (the other one at the closest crossing)")
+    ] = "keep",
     obstacle: Annotated[
         list[str] | None,
         typer.Option(help="something in the way, 'x y yaw length width' on the road, e.g. a parked car; repeatable"),
@@ -140,7 +152,7 @@ def generate(
         count=count,
         seed=seed,
         encounters=encounter or [],
-        request=Request(ego, "; ".join(start or []), "; ".join(goal or [])),
+        request=Request(ego, "; ".join(start or []), "; ".join(goal or []), "; ".join(target or []), choose, order),
         also_read=[parameter_file] if parameter_file else [],
         progress=progress_bars,
     )

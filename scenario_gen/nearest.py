@@ -26,11 +26,13 @@ from scenario_gen.arrays import Floats, wrap_angle
 from scenario_gen.config import PipelineConfig
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError, ScenarioGenError
+from scenario_gen.evaluation import MEASURES
 from scenario_gen.fitting import fit_template
 from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room
 from scenario_gen.roads.ways import draw_route
 from scenario_gen.routing import plan_routes
 from scenario_gen.sampling import Cancelled, freed_states, OnValid, Progress, sample_scenarios
+from scenario_gen.sampling.directed import TargetError
 from scenario_gen.template.interaction import Wait, waits_to_keep
 from scenario_gen.template.separation import footprint_gap
 from scenario_gen.types.encounter import Encounter, Vehicle
@@ -116,6 +118,8 @@ def nearest_if_impossible(
     """
     try:
         yield
+    except TargetError:  # the states are not what is impossible
+        raise
     except RefusedError as error:
         if not request.moves:
             raise
@@ -147,10 +151,11 @@ def attempt(
     fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
     routes = plan_routes(road, fit, config.planning, seed)
     fit = replace(fit, asked=freed_states(fit.asked, encounter, config.sampling, request))
-    check = Checker.of_template(encounter, road, fit.asked, waits, config.limits).check
+    check = Checker.of_template(encounter, road, fit.asked, waits, config.limits, request.order).check
     generated = sample_scenarios(
         encounter, segmentation, road, routes, fit.asked, check, config.sampling,
         count=count, seed=seed, waits=waits, request=request, progress=progress, cancelled=cancelled, found=found,
+        measures=MEASURES,
     )  # fmt: skip
     return GenerationResult(encounter, segmentation, road, fit, routes, generated, seed)
 

@@ -18,7 +18,7 @@ from dataclasses import replace
 
 from scenario_gen.config import PipelineConfig
 from scenario_gen.errors import RefusedError
-from scenario_gen.evaluation import evaluate, MEASURED, replay, uniform_changepoints, without_changepoints
+from scenario_gen.evaluation import evaluate, MEASURED, MEASURES, replay, uniform_changepoints, without_changepoints
 from scenario_gen.fitting import fit_template
 from scenario_gen.nearest import attempt, nearest_if_impossible
 from scenario_gen.roads import build_road
@@ -54,7 +54,7 @@ def generate(
         config: the parameters of every stage.
         count: valid scenarios wanted.
         seed: of all randomness.
-        request: a vehicle to be left out for a planner under test, and start and end states.
+        request: a vehicle to be left out for a planner under test, start and end states, a target, a choice, an order.
         progress: called with scenarios so far, scenarios wanted, candidates so far.
 
     Raises:
@@ -72,10 +72,10 @@ def generate(
         routes = plan_routes(road, fit, config.planning, seed)
         waits = waits_to_keep(encounter, segmentation)
         fit = replace(fit, asked=freed_states(fit.asked, encounter, config.sampling, request))
-        check = Checker.of_template(encounter, road, fit.asked, waits, config.limits).check
+        check = Checker.of_template(encounter, road, fit.asked, waits, config.limits, request.order).check
         generated = sample_scenarios(
             encounter, segmentation, road, routes, fit.asked, check, config.sampling,
-            count=count, seed=seed, waits=waits, request=request, progress=progress,
+            count=count, seed=seed, waits=waits, request=request, progress=progress, measures=MEASURES,
         )  # fmt: skip
     made = GenerationResult(encounter, segmentation, road, fit, routes, generated, seed)
     return with_evaluation(with_references(made, config, request), config)
@@ -89,9 +89,11 @@ def with_references(
     """Add what a result is measured against: sets without changepoints and, if `evaluation.uniform`, with uniform ones.
 
     A reference knows of the template what its own changepoints tell, so no wait is asked of it: a wait whose ends were known
-    besides would be two more of them. Of a reference no more scenarios are made than are measured.
+    besides would be two more of them. Nor is a target, a choice or another order. Of a reference no more scenarios
+    are made than are measured.
     """
     road, fit = made.placed()
+    plain = request.plain
     others = {WITHOUT: without_changepoints(made.segmentation)}
     if config.sampling.variety == "wide":
         others[NARROW] = made.segmentation
@@ -107,7 +109,7 @@ def with_references(
                 segmentation,
                 road,
                 config,
-                request,
+                plain,
                 count=few,
                 seed=made.seed,
                 waits=None if name == NARROW else (),

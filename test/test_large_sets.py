@@ -37,8 +37,8 @@ from scenario_gen.recordings.write import write_recording
 from scenario_gen.report.page import render, ReportInput
 from scenario_gen.report.summary import summary
 from scenario_gen.roads import build_road
-from scenario_gen.sampling import regenerate, sample
-from scenario_gen.sampling.sample import BLOCK, index_of, LEVEL_SIZE, LEVELS, place_of
+from scenario_gen.sampling import regenerate, sample, sampler
+from scenario_gen.sampling.sampler import BLOCK, DIRECTED, index_of, LEVEL_SIZE, LEVELS, place_of
 from scenario_gen.segmentation import segment
 from scenario_gen.template.interaction import waits_to_keep
 from scenario_gen.types.generation import UNIFORM, WITH, WITHOUT
@@ -85,7 +85,7 @@ def test_an_index_is_wide_enough_for_any_candidate(level, candidate):
 
 
 def test_an_index_of_no_candidate_is_refused():
-    for index in (-1, len(LEVELS) * LEVEL_SIZE):
+    for index in (-1, (DIRECTED + 1) * LEVEL_SIZE):
         with pytest.raises(InputError, match="scenarios/info"):
             place_of(index)
 
@@ -93,11 +93,11 @@ def test_an_index_of_no_candidate_is_refused():
 def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
     """Beyond LEVEL_SIZE candidates numbering goes on behind the last level, and each one can be had again."""
     plain = made(chain, 200)
-    monkeypatch.setattr(sample, "LEVEL_SIZE", 2 * BLOCK)
+    monkeypatch.setattr(sampler, "LEVEL_SIZE", 2 * BLOCK)
     beyond = made(chain, 200)
     assert len(beyond.scenarios) == 200
     assert len({s.index for s in beyond.scenarios}) == 200
-    assert max(s.index for s in beyond.scenarios) >= sample.LEVEL_SLOTS * 2 * BLOCK
+    assert max(s.index for s in beyond.scenarios) >= sampler.LEVEL_SLOTS * 2 * BLOCK
     assert all(a.position.tobytes() == b.position.tobytes() for a, b in zip(plain.scenarios, beyond.scenarios, strict=True))
     last = beyond.scenarios[-1]
     placed, waits = answer(chain, Request(), count=1), waits_to_keep(chain.encounter, chain.segmentation)

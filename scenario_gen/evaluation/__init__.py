@@ -17,11 +17,13 @@
 from scenario_gen.evaluation.compare import compare, comparison_table, Difference, read_evaluations
 from scenario_gen.evaluation.dtw import Alignment, dtw, dtw_distance, feature_matrix
 from scenario_gen.evaluation.evaluate import evaluate, evaluate_scenarios, EvaluationConfig, MEASURED
+from scenario_gen.evaluation.measures import MEASURES
 from scenario_gen.evaluation.oracle import replay
 from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints, without_changepoints
 
 __all__ = [
     "MEASURED",
+    "MEASURES",
     "Alignment",
     "Difference",
     "EvaluationConfig",

@@ -23,6 +23,7 @@ from msg_conventions.pictures import encode_footprint, scenario_markers
 from msg_conventions.scenario_info import encode_info, INFO, request_summary, RequestSummary, scenario_entry
 from msg_conventions.scenarios import encode_scenario, messages_of
 from msg_conventions.topics import vehicle_topic
+from scenario_gen.evaluation.measures import MEASURES
 from scenario_gen.fitting import FittingConfig
 from scenario_gen.parameters import parameter
 from scenario_gen.recordings.provenance import parameter_texts, versions
@@ -154,10 +155,11 @@ def answer_request(
     else:
         waits = waits_to_keep(encounter, segmentation)
         asked = freed_states(fit.asked, encounter, config.sampling, config)
-        check = Checker.of_template(encounter, road, asked, waits, config.limits).check
+        check = Checker.of_template(encounter, road, asked, waits, config.limits, config.order).check
         generated = sample_scenarios(
             encounter, segmentation, road, template.routes, asked, check, config.sampling, count=config.count,
             seed=config.seed, waits=waits, request=config, progress=advance, cancelled=cancelled, found=out.scenario,
+            measures=MEASURES,
         )  # fmt: skip
         made = replace(template, generated=generated, seed=config.seed)
     result = made.generated

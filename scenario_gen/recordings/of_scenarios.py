@@ -43,6 +43,8 @@ def decode_with_witness(
     seed, index = (entry.seed, entry.index) if entry else (0, k)
     left_out = bool(entry and entry.ego)  # who is left out may have been the first
     stamp, scenario = decode_scenario(data, seed=seed, index=index, what=what, late=left_out)
+    if entry and entry.facts:
+        scenario = replace(scenario, facts=entry.facts)
     if witness is None:
         return stamp, scenario
     of, own = decode_scenario(witness, seed=seed, index=index, what=f"{where}, of scenario {index}", late=True)

@@ -26,7 +26,7 @@ from scenario_gen.recordings.read import Namespace, NO_ENTRY, read_recording, SC
 from scenario_gen.review.validation import Reference
 from scenario_gen.storage.bag import within
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.template.interaction import find_conflicts, find_waits
+from scenario_gen.template.interaction import find_conflicts, find_waits, orders_asked
 from scenario_gen.types.ego import together
 from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.generation import GenerationResult, WITHOUT
@@ -107,12 +107,15 @@ def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Lim
         entry = namespace.entry(k)
         map_hash = entry.map_hash if entry else None
         scenario = together(one)
-        key = (map_hash or "", *(vehicle.id for vehicle in scenario.vehicles))
+        order = entry.order if entry else "keep"
+        key = (map_hash or "", order, *(vehicle.id for vehicle in scenario.vehicles))
         if key not in checkers:
             road = namespace.road
             if namespace.roads_differ:
                 road = namespace.road_of(entry, encounter.start_ns) if map_hash else None
-            checkers[key] = Reference(road, None, names, tuple(conflicts), waits).checker(scenario, limits)
+            checkers[key] = Reference(road, None, names, tuple(conflicts), waits, orders_asked(conflicts, order)).checker(
+                scenario, limits
+            )
         verdicts += checkers[key].check([scenario])
     return verdicts
 

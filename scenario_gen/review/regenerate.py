@@ -15,10 +15,11 @@
 """One published scenario again, bit for bit, from what its bag says: template, road, parameters, seed and index."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 from scenario_gen.errors import InputError, ScenarioGenError
+from scenario_gen.evaluation.measures import MEASURES
 from scenario_gen.fitting import fit_template, FittingConfig
 from scenario_gen.folders import Kind, sha256_of
 from scenario_gen.logs import LogConfig, read_log
@@ -38,6 +39,7 @@ from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import Scenario
 from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.validity import Checker, Limits
 
 TEMPLATE = ("tracks", "changepoints", "map", "fit")
 
@@ -92,7 +94,7 @@ def regenerate_scenario(
 def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
     """Make the scenario that was found; `what` names bag and request in messages."""
     values, seed, index = found.summary.values, found.entry.seed, found.entry.index
-    asked = Request(**{name: values.get(name, "") for name in ("ego", "starts", "goals")})
+    asked = Request(**{entry.name: values.get(entry.name, str(entry.default)) for entry in fields(Request)})
     template = found.template(what)
     encounter, segmentation, routes, (road, fit) = template.encounter, template.segmentation, template.routes, template.placed()
     if log is not None:
@@ -105,9 +107,14 @@ def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
         routes = plan_routes(road, fit, planning, seed)
     waits = waits_to_keep(encounter, segmentation)
     states = freed_states(fit.asked, encounter, sampling, asked)
+    check = None
+    if asked.target or asked.order == "swap":  # a proposal is found again with them
+        limits = read_parameters(Limits(), values, "limits.", what)
+        check = Checker.of_template(encounter, road, states, waits, limits, asked.order).check
     scenario = regenerate(
-        encounter, segmentation, road, routes, states, sampling, seed=seed, index=index, waits=waits, request=asked
-    )
+        encounter, segmentation, road, routes, states, sampling, seed=seed, index=index, waits=waits, request=asked,
+        check=check, measures=MEASURES,
+    )  # fmt: skip
     data, sha256 = (b"", "") if scenario is None else scenario_bytes(scenario, encounter)
     witness = None if scenario is None else scenario.witness
     own = "" if witness is None else scenario_bytes(witness, encounter)[1]

@@ -33,7 +33,7 @@ from scenario_gen.errors import InputError
 from scenario_gen.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS, WITNESS
 from scenario_gen.storage.bag import within
 from scenario_gen.storage.config import BagConfig
-from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, Wait
+from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, orders_asked, Wait
 from scenario_gen.types.ego import together
 from scenario_gen.types.names import tokens
 from scenario_gen.types.road import Road
@@ -83,13 +83,17 @@ class Validation:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What the scenarios of one stamp are held against; vehicles by id, states (4,) x, y, yaw, speed."""
+    """What the scenarios of one stamp are held against; vehicles by id, states (4,) x, y, yaw, speed.
+
+    `first` says who must go first at each conflict, by index in `template`, None for anyone; nothing: as in the template.
+    """
 
     road: Road | None
     asked: dict[str, tuple[Floats, Floats]] | None
     template: tuple[str, ...] | None
     conflicts: tuple[Conflict, ...]
     waits: tuple[Wait, ...] | None
+    first: tuple[int | None, ...] = ()
 
     def checker(self, scenario: Scenario, limits: Limits | None, asked: BoundaryStates | None = None) -> Checker:
         """Return the checker of scenarios with this one's vehicles; `asked` is in place of the template's states."""
@@ -100,9 +104,12 @@ class Reference:
         if self.template is None or not set(ids) <= set(self.template):
             return Checker(self.road, asked, None, None, limits)
         at = {self.template.index(name): k for k, name in enumerate(ids)}
-        conflicts = [replace(c, first=at[c.first], second=at[c.second]) for c in self.conflicts if {c.first, c.second} <= set(at)]
+        known = [k for k, c in enumerate(self.conflicts) if {c.first, c.second} <= set(at)]
+        conflicts = [replace(c, first=at[c.first], second=at[c.second]) for c in (self.conflicts[k] for k in known)]
+        asked_first = self.first or tuple(c.first for c in self.conflicts)
+        first = [None if one is None else at[one] for one in (asked_first[k] for k in known)]
         waits = None if self.waits is None else [replace(w, vehicle=at[w.vehicle]) for w in self.waits if w.vehicle in at]
-        return Checker(self.road, asked, conflicts, waits, limits)
+        return Checker(self.road, asked, conflicts, waits, limits, first)
 
 
 def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = BagConfig()) -> tuple[Validation, ...]:
@@ -149,7 +156,7 @@ def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
             states = entry.asked(namespace.where(INFO), witness=scenario.witness is not None)
         scenario = together(scenario)
         is_lost = k in namespace.unknown and entry is None
-        place = (stamp, is_lost, entry and entry.template_hash, entry and entry.map_hash)
+        place = (stamp, is_lost, entry and entry.template_hash, entry and entry.map_hash, entry and entry.order)
         if place not in references:
             references[place] = _reference(namespace, stamp, entry, is_lost)
         of_these = b"" if states is None else states.start.tobytes() + states.end.tobytes()
@@ -192,4 +199,5 @@ def _reference(namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is
     waits = None  # without changepoints there is no dwell to hold: waits are not asked for
     if segmentation is not None:
         waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()
-    return Reference(road, asked, tokens(vehicle.id for vehicle in encounter.vehicles), tuple(conflicts), waits)
+    names = tokens(vehicle.id for vehicle in encounter.vehicles)
+    return Reference(road, asked, names, tuple(conflicts), waits, orders_asked(conflicts, entry.order if entry else "keep"))

@@ -17,115 +17,52 @@
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import itertools
 from typing import Any
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.sampling.candidates import Batch, CandidateModel, Scale
+from scenario_gen.sampling.adapt import adapted, aim_of, Cancelled, Check, Judge, label_of
+from scenario_gen.sampling.candidates import Batch
 from scenario_gen.sampling.config import SamplingConfig
+from scenario_gen.sampling.directed import Aim, estimated, Measures, reachable, STAGE, TargetError
+from scenario_gen.sampling.diverse import POOL_SHARE, spread_out
 from scenario_gen.sampling.lazy import LazyScenarios
 from scenario_gen.sampling.prepare import prepare
+from scenario_gen.sampling.sampler import (
+    BLOCK,
+    DIRECTED,
+    ENOUGH,
+    index_of,
+    LEVEL_SIZE,
+    LEVEL_SLOTS,
+    LEVELS,
+    place_of,
+    Sampler,
+)
 from scenario_gen.template.interaction import Wait
-from scenario_gen.types.ego import with_witness
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario, ScenarioSet, Verdict
+from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario, ScenarioSet
 from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.types.target import Reached
 
-Check = Callable[[Sequence[Scenario]], list[Verdict]]
+__all__ = [
+    "BLOCK", "KEPT", "LEVELS", "LEVEL_SIZE", "LEVEL_SLOTS", "PILOT", "Cancelled", "OnValid", "Progress", "Sampler", "index_of",
+    "place_of", "regenerate", "sample_scenarios",
+]  # fmt: skip
+
 Progress = Callable[[int, int, int], None]  # of scenarios so far, scenarios wanted, candidates so far
-Cancelled = Callable[[], bool]
 OnValid = Callable[[Scenario, BoundaryStates, EgoSlot | None], None]  # a valid one, the states asked, what the ego is asked
 
-LEVELS = (
-    Scale(),
-    Scale(lateral=0.5),
-    Scale(lateral=0.5, longitudinal=0.5),
-    Scale(lateral=0.25, longitudinal=0.25, time=0.5),
-    Scale(lateral=0.1, longitudinal=0.1, time=0.25),
-)
-LEVEL_SIZE = 1 << 20  # candidates of one level whose indices follow each other
-LEVEL_SLOTS = 8  # levels that an index has room for; after them come the next LEVEL_SIZE candidates of the first
 KEPT = 1000  # scenarios up to which a set stays in memory
-BLOCK = 32  # candidates whose random numbers are drawn together
 PILOT = 2 * BLOCK  # candidates by which a level is judged
-ENOUGH = {"narrow": 0.3, "wide": 0.1}  # share of valid candidates below which the next level is tried
-
-
-def index_of(level: int, candidate: int) -> int:
-    """Return the index of a level's candidate: level * LEVEL_SIZE + candidate while that suffices, and unique beyond."""
-    page, within = divmod(candidate, LEVEL_SIZE)
-    return (page * LEVEL_SLOTS + level) * LEVEL_SIZE + within
-
-
-def place_of(index: int) -> tuple[int, int]:
-    """Return level and number of the candidate with this index.
-
-    Raises:
-        InputError: no candidate has it.
-    """
-    slot, within = divmod(index, LEVEL_SIZE)
-    page, level = divmod(slot, LEVEL_SLOTS)
-    if index < 0 or level >= len(LEVELS):
-        raise InputError(f"no candidate has the index {index}; take one of `scenarios/info`")
-    return level, page * LEVEL_SIZE + within
-
-
-@dataclass(frozen=True, eq=False)
-class Sampler:
-    """Draws candidates by their index: the same seed and index give the same candidate, whatever was drawn before."""
-
-    model: CandidateModel
-    seed: int
-    frame_id: str
-    ego: int | None = None  # of the vehicle that is left out of what is published, and is its witness
-
-    def block(self, level: int, number: int) -> tuple[Batch, list[int]]:
-        """Candidates number·BLOCK … of a level, and their indices."""
-        first = index_of(level, number * BLOCK)
-        return self.model.draw(self._normal(level, number), LEVELS[level]), list(range(first, first + BLOCK))
-
-    def scenario(self, index: int) -> Scenario | None:
-        """The candidate with this index, bit for bit as in a whole set; None if it has no speed profile."""
-        level, candidate = place_of(index)
-        number, row = divmod(candidate, BLOCK)
-        batch = self.model.draw(self._normal(level, number)[row : row + 1], LEVELS[level])
-        (whole,) = batch.scenarios(self.seed, [index], self.frame_id)
-        return None if whole is None else self.published(whole)
-
-    def undisturbed(self) -> Scenario | None:
-        """The drive without deviations; None where nothing is free, or it has no speed profile."""
-        if all(vehicle.freedom is None for vehicle in self.model.vehicles):
-            return None
-        return self.model.draw(np.zeros((1, self.model.size)), LEVELS[0]).scenarios(self.seed, [0], self.frame_id)[0]
-
-    def redraw(self, index: Sequence[int]) -> list[Scenario]:
-        """The scenarios of indices that are of one block, bit for bit as in a whole set."""
-        level, candidate = place_of(index[0])
-        batch, own = self.block(level, candidate // BLOCK)
-        drawn = batch.scenarios(self.seed, own, self.frame_id)
-        return [self.published(whole) for whole in (drawn[one - own[0]] for one in index) if whole is not None]
-
-    def published(self, whole: Scenario) -> Scenario:
-        """A candidate of all vehicles as it is published: the ego's motion apart, as witness."""
-        return whole if self.ego is None else with_witness(whole, self.ego)
-
-    def _normal(self, level: int, number: int) -> Floats:
-        """Standard normal numbers (BLOCK, size), every other row the mirror image of the one before.
-
-        The mean of a set is then the drive without deviations, to first order, however few samples the set has (antithetic
-        variates, Hammersley and Morton 1956).
-        """
-        generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence([self.seed, level, number])))
-        z = exact.standard_normal(generator, (BLOCK // 2, self.model.size))
-        return np.stack([z, -z], axis=1).reshape(BLOCK, -1)
+DIRECTED_BUDGET = 10  # times the budget of a request without a target
+HOPELESS = 20 * BLOCK  # candidates of a proposal after which it is given up if none of them is valid and in the range
 
 
 def sample_scenarios(
@@ -144,6 +81,7 @@ def sample_scenarios(
     progress: Progress = lambda *_: None,
     cancelled: Cancelled = lambda: False,
     found: OnValid = lambda *_: None,
+    measures: Measures | None = None,
 ) -> ScenarioSet:
     """Draw candidates until `count` are valid or the budget is spent.
 
@@ -160,10 +98,12 @@ def sample_scenarios(
         count: valid scenarios wanted.
         seed: of all randomness; with a scenario's index it gives that scenario again.
         waits: when a vehicle stands, on the template's clock.
-        request: which vehicle is left out of every scenario, its own motion given as witness; whether states were asked for.
+        request: which vehicle is left out of every scenario, its own motion given as witness; whether states were asked for;
+            which range, choice and order.
         progress: called with (valid so far, count, candidates so far).
         cancelled: asked before each candidate; if True, the set so far is returned.
-        found: called with each valid scenario as it is drawn, in the set's order.
+        found: called with each valid scenario as it is drawn, in the set's order; of a chosen set, when it is chosen.
+        measures: what measures a scenario for a target or a choice, see `Measures`; `check` knows the order asked.
 
     Returns:
         At most `count` scenarios; fewer if the budget did not suffice, which the account (`refused`) explains. Of more than KEPT
@@ -171,7 +111,7 @@ def sample_scenarios(
 
     Raises:
         InputError: routes, segmentation and encounter disagree, or the ego is none of the vehicles.
-        RefusedError: states were asked for, and not one candidate that meets them is valid.
+        RefusedError: states or a target were asked for, and not one candidate that meets them is valid.
     """
     ego = request.ego_of(encounter)
     prepared = prepare(encounter, segmentation, road, routes, asked, waits, config)
@@ -179,12 +119,16 @@ def sample_scenarios(
     if prepared.model is None:
         made = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot)
     else:
-        sampler = Sampler(prepared.model, seed, road.frame_id, ego)
-        loop = _Loop(sampler, check, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
-        loop.enough = ENOUGH[config.variety]
-        loop.run(config.attempts * count)
+        aim = aim_of(encounter, request, measures)
+        sampler = Sampler(prepared.model, seed, road.frame_id, ego, label=label_of(encounter, request, aim))
+        judge = Judge.of(sampler, check, _enough(config, request))
+        loop = _Loop(sampler, judge, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
+        loop.aim, loop.measures = aim, measures
+        loop.run_request(config.attempts, diverse=request.choose == "diverse")
         sentences = (*prepared.adaptations, *loop.adaptations)
-        made = ScenarioSet(count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot)
+        made = ScenarioSet(
+            count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot, loop.reached, loop.chosen_from
+        )  # fmt: skip
     if request.moves and not made.scenarios and not cancelled():
         causes = ", ".join(f"{number} × {cause.value}" for cause, number in made.refused.most_common())
         more = f"; {'; '.join(made.adaptations)}" if made.adaptations else ""
@@ -204,12 +148,28 @@ def regenerate(
     index: int,
     waits: tuple[Wait, ...],
     request: Request = Request(),
+    check: Check | None = None,
+    measures: Measures | None = None,
 ) -> Scenario | None:
-    """The scenario with this seed and index again, bit for bit, without the others; arguments as in `sample_scenarios`."""
+    """The scenario with this seed and index again, bit for bit, without the others; arguments as in `sample_scenarios`.
+
+    One of a proposal needs `check` and `measures`, by which that is found again.
+    """
     prepared = prepare(encounter, segmentation, road, routes, asked, waits, config)
     if prepared.model is None:
         return None
-    return Sampler(prepared.model, seed, road.frame_id, request.ego_of(encounter)).scenario(index)
+    ego, aim = request.ego_of(encounter), aim_of(encounter, request, measures)
+    sampler = Sampler(prepared.model, seed, road.frame_id, ego, label=label_of(encounter, request, aim))
+    if place_of(index)[0] == DIRECTED:
+        if aim is None or check is None:
+            raise InputError(f"index {index} is of a proposal, but no target was asked for")
+        sampler = adapted(sampler, Judge.of(sampler, check, _enough(config, request)), aim, lambda: False).sampler
+    return sampler.scenario(index)
+
+
+def _enough(config: SamplingConfig, request: Request) -> float:
+    """Return the share of valid candidates by which a level is good enough; any, where the order alone makes most invalid."""
+    return 0.0 if request.order == "swap" else ENOUGH[config.variety]
 
 
 @dataclass
@@ -217,7 +177,7 @@ class _Loop:
     """The account of one request."""
 
     sampler: Sampler
-    check: Check
+    judge: Judge
     count: int
     progress: Progress
     cancelled: Cancelled
@@ -227,20 +187,113 @@ class _Loop:
     refused: Counter[Cause] = field(default_factory=Counter)
     candidates: int = 0
     adaptations: list[str] = field(default_factory=list)
-    enough: float = ENOUGH["narrow"]
-    absent: int = 0  # conflicts of the template that the road or the clock of all leaves out; no candidate may lose more
+    aim: Aim | None = None
+    measures: Measures | None = None
+    reached: Reached | None = None
+    chosen_from: int = 0
+    keep: int = KEPT
+    publish: bool = True
+
+    def run_request(self, attempts: int, *, diverse: bool) -> None:
+        """Sample what was asked: towards a target, and, if a choice is asked for, from a pool."""
+        wanted = self.count
+        if diverse:
+            self.count, self.keep, self.publish = wanted * POOL_SHARE, 0, False
+        if self.aim is None:
+            self.run(attempts * self.count)
+        else:
+            self.run_directed(DIRECTED_BUDGET * attempts * self.count)
+        if diverse:
+            self.choose(wanted)
+
+    def choose(self, wanted: int) -> None:
+        """Keep those of the pool that cover best."""
+        if self.measures is None:
+            raise InputError("choose: nothing is given that measures scenarios (`measures`)")
+        pool = list(self.index)
+        features = [self.measures.features(whole) for whole in self._whole(pool)]
+        chosen = spread_out(features, wanted)
+        self.chosen_from, self.count, self.keep, self.publish = len(pool), wanted, KEPT, True
+        self.index = array("q")
+        self.adaptations.append(
+            f"chosen for diversity: {len(chosen)} of {len(pool)} valid scenarios; such a set is no sample, so it has no weights"
+        )
+        self.sampler = replace(self.sampler, weighted=False)
+        for k in sorted(chosen):
+            scenario = self.sampler.scenario(pool[k])
+            if scenario is not None and not self.cancelled():
+                self._keep(pool[k], scenario)
+
+    def _whole(self, index: Sequence[int]) -> Iterator[Scenario]:
+        """Candidates of all vehicles, by ascending indices."""
+        plain = replace(self.sampler, ego=None, label=lambda _: {}, weighted=False)
+        for _, together in itertools.groupby(index, lambda one: one // BLOCK):
+            yield from plain.redraw(list(together))
+
+    def _keep(self, number: int, scenario: Scenario) -> None:
+        self.index.append(number)
+        if len(self.kept) < self.keep:
+            self.kept.append(scenario)
+        if self.publish:
+            self.found(scenario)
+
+    def run_directed(self, budget: int) -> None:
+        """Find a proposal, then draw from it.
+
+        Raises:
+            TargetError: not one valid candidate in the range was found; the message says which range there is.
+        """
+        aim = self.aim
+        assert aim is not None
+        made = adapted(self.sampler, self.judge, aim, self.cancelled)
+        self.sampler = made.sampler
+        weights: list[float] = []
+        if made.seen.hits() and not self.cancelled():
+            level = self.sampler.base if made.sampler.proposal is None else DIRECTED
+            blocks = self._blocks(level)
+            if made.sampler.proposal is None:
+                self._take_pilot(made.pilot)
+                blocks = itertools.islice(blocks, STAGE // BLOCK, None)
+                weights = [1.0] * len(self.index)
+            while not self._done(budget) and (self.index or self.candidates < HOPELESS):
+                before = len(self.index)
+                if not self._spend(blocks, min(BLOCK, budget - self.candidates))[0]:
+                    break
+                weights += [self.sampler.weight(number) for number in self.index[before:]]
+        share, low, high = estimated(np.array(weights), self.candidates)
+        if self.candidates:
+            directed = self.sampler.proposal is not None
+            self.reached = Reached(aim.targets, made.stages, made.candidates, share, low, high, directed)
+            self.adaptations.append(self.reached.sentence())
+            if self.sampler.base:
+                self._describe(self.sampler.base, 2)
+        if len(self.index) < self.count and not self.cancelled():
+            said = f"target {'; '.join(map(str, aim.targets))}: "
+            drawn = f"{made.candidates} candidates of {1 + made.stages} stage(s) and {self.candidates} more"
+            said += f"{len(self.index)} found in {drawn}; reachable: {reachable(aim, made.seen.values)}"
+            if not self.index:
+                raise TargetError(said)
+            self.adaptations.append(said)
+
+    def _take_pilot(self, pilot: Sequence[tuple[int, Scenario | None, Cause | None]]) -> None:
+        """Take the candidates of a level that were drawn and checked already."""
+        for number, scenario, cause in pilot:
+            if len(self.index) == self.count or self.cancelled():
+                break
+            self.candidates += 1
+            if scenario is None or cause is not None or not self._in_range(scenario):
+                self.refused[cause or (Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE)] += 1
+            else:
+                self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
 
     def run(self, budget: int) -> None:
         """Judge the levels by their first candidates, then stay with the first that is good enough, or the best."""
-        undisturbed = self.sampler.undisturbed()
-        if undisturbed is not None:
-            self.absent = self.check([undisturbed])[0].not_applicable
         blocks = [self._blocks(level) for level in range(len(LEVELS))]
         share = []
         for level in range(len(LEVELS)):
             seen, good = self._spend(blocks[level], min(PILOT, budget - self.candidates))
             share.append(good / seen if seen else 0.0)
-            if self._done(budget) or share[-1] >= self.enough:
+            if self._done(budget) or share[-1] >= self.judge.enough:
                 break
         best = int(np.argmax(share))
         while not self._done(budget) and self._spend(blocks[best], budget - self.candidates)[0]:
@@ -266,25 +319,24 @@ class _Loop:
         while seen < most and len(self.index) < self.count and not self.cancelled():
             batch, index = next(blocks)
             drawn = batch.scenarios(self.sampler.seed, index, self.sampler.frame_id)
-            verdicts = iter(self.check([s for s in drawn if s is not None]))
-            for number, scenario in zip(index, drawn, strict=True):
+            aimed = [scenario is not None and self._in_range(scenario) for scenario in drawn]
+            causes = iter(self.judge([s for s, ok in zip(drawn, aimed, strict=True) if ok and s is not None]))
+            for number, scenario, ok in zip(index, drawn, aimed, strict=True):
                 if seen == most or len(self.index) == self.count or self.cancelled():
                     break
                 seen += 1
-                verdict = None if scenario is None else next(verdicts)
-                lost = verdict is not None and verdict.valid and verdict.not_applicable > self.absent
-                if scenario is not None and verdict is not None and verdict.valid and not lost:
+                cause = next(causes) if ok else Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE
+                if scenario is not None and cause is None:
                     good += 1
-                    published = self.sampler.published(scenario)
-                    self.index.append(number)
-                    if len(self.kept) < KEPT:
-                        self.kept.append(published)
-                    self.found(published)
+                    self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
                 else:
-                    self.refused[_cause(verdict)] += 1
+                    self.refused[cause or Cause.SPEED_PROFILE] += 1
             self.progress(len(self.index), self.count, self.candidates + seen)
         self.candidates += seen
         return seen, good
+
+    def _in_range(self, scenario: Scenario) -> bool:
+        return self.aim is None or self.aim.holds(self.aim.values(scenario))
 
     def _describe(self, best: int, tried: int) -> None:
         """Put what was adapted into sentences."""
@@ -298,10 +350,3 @@ class _Loop:
             )
         if self.cancelled():
             self.adaptations.append("cancelled")
-
-
-def _cause(verdict: Verdict | None) -> Cause:
-    """Why a candidate is refused; without a verdict it has no speed."""
-    if verdict is None:
-        return Cause.SPEED_PROFILE
-    return verdict.violations[0].cause if verdict.violations else Cause.CONFLICT_LOST

@@ -21,6 +21,7 @@ The shared area of vehicles a and b is the intersection of their swept footprint
 so a is inside the shared area exactly while its footprint meets the sweep of b: two box tests replace polygon clipping.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -28,6 +29,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints, runs
+from scenario_gen.errors import RefusedError
 from scenario_gen.kernels import F1, F2, kernel, OUT1
 from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
 from scenario_gen.types.presence import ALWAYS
@@ -131,6 +133,35 @@ def find_conflicts(
         if answer is not None:
             found.append(answer)
     return tuple(found)
+
+
+def orders_asked(conflicts: Sequence[Conflict], order: str) -> tuple[int | None, ...]:
+    """Return who must go first at each of the template's conflicts, by vehicle index; None where anyone may.
+
+    Args:
+        conflicts: of the template.
+        order: "keep": as in the template; "free": anyone; "swap": the other one at the closest crossing or merging (least
+            post-encroachment time), anyone at other ones, and who follows still follows.
+
+    Raises:
+        RefusedError: "swap" is asked for and nobody crosses anybody's path.
+    """
+    if order == "keep":
+        return tuple(conflict.first for conflict in conflicts)
+    if order == "free":
+        return (None,) * len(conflicts)
+    closest = closest_crossing(conflicts)
+    if closest is None:
+        raise RefusedError(
+            "order: in the template nobody crosses another one's path or merges into it, so no order can be swapped"
+        )
+    return tuple(one.second if one is closest else one.first if one.following else None for one in conflicts)
+
+
+def closest_crossing(conflicts: Sequence[Conflict]) -> Conflict | None:
+    """Return the crossing or merging conflict with the least post-encroachment time; None without one."""
+    crossing = [one for one in conflicts if not one.following]
+    return min(crossing, key=lambda one: one.entry_second - one.exit_first, default=None)
 
 
 def pair_conflict(

@@ -25,9 +25,11 @@ from scenario_gen.errors import InputError
 from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.names import vehicle_index
+from scenario_gen.types.target import read_targets, Target
 
 State = tuple[float, ...]  # x [m], y [m], yaw [rad] and, unless it is the template's, speed [m/s]
 ENDS = ("starts", "goals")
+ORDERS = ("keep", "free", "swap")
 _FORM = "id: x y yaw [speed]"
 
 
@@ -40,16 +42,38 @@ class Request(Parameters):
         "", f"start states on the road, `{_FORM}`, vehicles parted by `;`; others are the fitting's", unit="m, rad, m/s"
     )
     goals: str = parameter("", f"end states, likewise `{_FORM}`", unit="m, rad, m/s")
+    target: str = parameter(
+        "", "ranges of pet, ttc, gap, arrival_gap, closing_speed, e.g. `pet=0.5..1.5; ttc[1,2]=1..2`: sampling is directed there"
+    )
+    choose: str = parameter(
+        "natural", "natural: as sampled; diverse: of many valid candidates those that cover best", choices=("natural", "diverse")
+    )
+    order: str = parameter(
+        "keep",
+        "who goes first at a conflict; keep: as in the template, free: anyone, swap: the other one at the closest crossing",
+        choices=ORDERS,
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ENDS:
             self.states(name)
+        read_targets(self.target)
+
+    @property
+    def targets(self) -> tuple[Target, ...]:
+        """The ranges asked for."""
+        return read_targets(self.target)
 
     @property
     def moves(self) -> bool:
         """Whether start or end states are asked for, so that the template must be fitted and planned anew."""
         return bool(self.starts or self.goals)
+
+    @property
+    def plain(self) -> "Request":
+        """The request without target, choice and order."""
+        return replace(self, target="", choose="natural", order="keep")
 
     def states(self, end: str) -> dict[str, State]:
         """Return the states asked for at one end ("starts" or "goals"), by vehicle id.

@@ -15,7 +15,7 @@
 """A scenario: what is generated, checked and published."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -24,6 +24,10 @@ import numpy as np
 from scenario_gen.arrays import Bools, canonical_heading, canonical_poses, Floats, frozen, Ints
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
+from scenario_gen.types.target import Reached
+
+FACTS = ("weight", "target.", "order", "passing_order")
+"""How the names of a scenario's facts begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +49,7 @@ class Scenario:
         present: (N, 2) first and last instant at which each vehicle is there, as in `Tracks`; default: everybody throughout.
         witness: of a scenario with an ego slot: a trajectory of the vehicle that was left out, as a scenario of that vehicle
             alone on the same clock. Both together were proven valid, so the slot can be driven.
+        facts: what else its entry in `scenarios/info` says: `weight`, `target.…`, `order`, `passing_order` (FACTS).
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -58,6 +63,7 @@ class Scenario:
     frame_id: str = "map"
     present: Ints = field(default_factory=lambda: ALWAYS)
     witness: "Scenario | None" = None
+    facts: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("position", "speed", "acceleration"):
@@ -116,6 +122,7 @@ class Cause(StrEnum):
     STOP_NOT_KEPT = "stop_not_kept"  # a vehicle does not keep a stop of the template
     CONFLICT_LOST = "conflict_lost"  # the stretch in which all are there leaves out a conflict of the template
     NOT_FINITE = "not_finite"
+    OUT_OF_RANGE = "out_of_range"  # not in the range that was asked for; it was not checked
 
     @classmethod
     def _missing_(cls, value: object) -> "Cause | None":
@@ -165,7 +172,8 @@ class ScenarioSet:
 
     `refused` counts refused candidates by their first cause; `adaptations` names what was changed to get there. `ego` is the
     vehicle that was left out for a planner under test, if one was; each scenario then has its witness.
-    The scenarios of a large set are not in memory but drawn again whenever they are looked at.
+    The scenarios of a large set are not in memory but drawn again whenever they are looked at. `reached` says what sampling
+    towards a target came to, `chosen` from how many valid candidates the set was chosen (0: as they were drawn).
     """
 
     requested: int
@@ -174,6 +182,8 @@ class ScenarioSet:
     refused: Counter[Cause] = field(default_factory=Counter)
     adaptations: Sequence[str] = ()
     ego: EgoSlot | None = None
+    reached: Reached | None = None
+    chosen: int = 0
 
     @property
     def acceptance(self) -> float:

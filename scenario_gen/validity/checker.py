@@ -24,7 +24,7 @@ from scenario_gen.arrays import Floats, runs
 from scenario_gen.errors import InputError
 from scenario_gen.roads.clearance import clearance_in_cells
 from scenario_gen.roads.vector.ground import drives_against
-from scenario_gen.template.interaction import Conflict, find_conflicts, pair_conflict, Wait
+from scenario_gen.template.interaction import Conflict, find_conflicts, orders_asked, pair_conflict, Wait
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.presence import together
 from scenario_gen.types.road import Road
@@ -52,16 +52,20 @@ class Checker:
         conflicts: Sequence[Conflict] | None,
         waits: Sequence[Wait] | None,
         limits: Limits | None = None,
+        first: Sequence[int | None] | None = None,
     ) -> None:
         """Prepare for many scenarios of one request.
 
         Args:
             road: the road they drive on.
             asked: start and end states, one per vehicle.
-            conflicts: the template's conflicts, whose order must be kept.
+            conflicts: the template's conflicts, whose order must be kept, unless `first` says otherwise.
             waits: the template's waits; in every scenario the vehicle stands, or creeps, as often, one after the other.
             limits: the limits; the default ones if None.
+            first: who must go first at each of them, by index, None for anyone (`orders_asked`); a conflict whose order is
+                not the template's must be there.
         """
+        self._first = tuple(conflict.first for conflict in conflicts or ()) if first is None else tuple(first)
         self.road, self.asked, self.conflicts, self.waits = road, asked, conflicts, waits
         self.limits = limits or Limits()
         self._limits = np.array([getattr(self.limits, name) for name in dynamics.LIMITS])
@@ -77,6 +81,7 @@ class Checker:
         asked: BoundaryStates,
         waits: Sequence[Wait],
         limits: Limits | None = None,
+        order: str = "keep",
     ) -> "Checker":
         """Return the checker of scenarios of a template, with all of its vehicles.
 
@@ -86,9 +91,13 @@ class Checker:
             asked: start and end states of all vehicles.
             waits: the template's waits that are kept.
             limits: the limits; the default ones if None.
+            order: who goes first, see `orders_asked`.
+
+        Raises:
+            RefusedError: an order is to be swapped, and there is none.
         """
         conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
-        return cls(road, asked, conflicts, waits, (limits or Limits()).for_template(encounter))
+        return cls(road, asked, conflicts, waits, (limits or Limits()).for_template(encounter), orders_asked(conflicts, order))
 
     @property
     def not_applicable(self) -> tuple[str, ...]:
@@ -252,17 +261,22 @@ class Checker:
     def _passing_orders(self, scenario: Scenario) -> tuple[list[Violation], int, int]:
         """Violations, and how many of the template's conflicts are present and absent in the scenario."""
         wrong, present = [], 0
-        for asked in self.conflicts or ():
+        for asked, first in zip(self.conflicts or (), self._first, strict=True):
             a, b = sorted((asked.first, asked.second))
             arrays = (scenario.time, scenario.position, scenario.heading)
             found = pair_conflict(scenario.vehicles, *arrays, a, b, scenario.present)
             present += found is not None
-            if found is not None and found.first != asked.first:
+            swapped = first == asked.second
+            wanted = "asked is that" if swapped else "in the template"
+            if found is not None and first is not None and found.first != first:
                 message = (
                     f"vehicle {found.first} goes first ({found.entry_first:.2f} s, vehicle {found.second} "
-                    f"{found.entry_second:.2f} s); in the template vehicle {asked.first} does"
+                    f"{found.entry_second:.2f} s); {wanted} vehicle {first} does"
                 )
                 wrong.append(Violation(Cause.PASSING_ORDER, found.entry_first, (found.first, found.second), message))
+            elif found is None and swapped:
+                message = f"vehicles {a} and {b} do not meet; {wanted} vehicle {first} goes first"
+                wrong.append(Violation(Cause.PASSING_ORDER, 0.0, (a, b), message))
         return wrong, present, len(self.conflicts or ()) - present
 
     def _waits(self, scenario: Scenario) -> Iterator[Violation]:

@@ -47,3 +47,14 @@ def following():
 def plain(chain):
     """What comes of it when nothing is asked."""
     return answer(chain, Request(), count=5)
+
+
+@pytest.fixture(scope="session")
+def crossing():
+    """Two cars of 4 x 2 m at 10 m/s on crossing axes, the second 20 m behind the first."""
+    time = np.arange(101) * 0.1
+    along = 10.0 * time
+    position = np.stack([np.stack([along - 40.0, 0.0 * time], axis=-1), np.stack([0.0 * time, along - 60.0], axis=-1)])
+    heading = np.stack([0.0 * time, 0.0 * time + 0.5 * np.pi])
+    vehicles = (Vehicle("a", 4.0, 2.0), Vehicle("b", 4.0, 2.0))
+    return Encounter("crossing", vehicles, 0, 100_000_000, position, heading, np.full((2, 101), 10.0))

@@ -1,0 +1,197 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a request aims at, and the proposal that gets there, found stage by stage."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenario_gen.arrays import Floats
+from scenario_gen.errors import InputError
+from scenario_gen.sampling.directed import Aim, CHUNK, FAIR, GOOD, Measures, PATIENCE, PLAIN, Seen, STAGE, STAGES
+from scenario_gen.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
+from scenario_gen.template.interaction import closest_crossing, Conflict, find_conflicts, pair_conflict
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.request import Request
+from scenario_gen.types.scenario import Cause, Scenario, Verdict
+from scenario_gen.types.target import Target
+
+Check = Callable[[Sequence[Scenario]], list[Verdict]]
+Cancelled = Callable[[], bool]
+
+
+Judged = tuple[int, Scenario | None, Cause | None]  # an index, the candidate if it has a speed profile, why it is refused
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Says why a candidate is refused.
+
+    Attributes:
+        check: the validity checker.
+        absent: conflicts of the template that the road or the clock of all leaves out; no candidate may lose more.
+        enough: share of valid candidates from which on a level of standard deviations is good enough.
+    """
+
+    check: Check
+    absent: int
+    enough: float
+
+    @classmethod
+    def of(cls, sampler: Sampler, check: Check, enough: float) -> "Judge":
+        """Look what the drive without deviations loses."""
+        undisturbed = sampler.undisturbed()
+        return cls(check, 0 if undisturbed is None else check([undisturbed])[0].not_applicable, enough)
+
+    def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
+        """Return the first cause for which each scenario is refused, None for a valid one."""
+        return [self._cause(verdict) for verdict in self.check(scenarios)]
+
+    def _cause(self, verdict: Verdict) -> Cause | None:
+        if verdict.violations:
+            return verdict.violations[0].cause
+        return Cause.CONFLICT_LOST if verdict.not_applicable > self.absent else None
+
+
+def aim_of(encounter: Encounter, request: Request, measures: Measures | None) -> Aim | None:
+    """What is aimed at: the targets, and for a swapped order the arrival gap of the other sign; None if nothing is.
+
+    Raises:
+        InputError: a target names a vehicle that does not exist, or nothing can be measured.
+    """
+    targets = request.targets
+    if request.order == "swap":
+        closest = closest_crossing(_conflicts(encounter))
+        if closest is not None:
+            names = tuple(encounter.vehicles[n].id for n in (closest.first, closest.second))
+            targets = (Target("arrival_gap", -np.inf, 0.0, names), *targets)
+    if not targets:
+        return None
+    if measures is None:
+        raise InputError("a target or another order is asked for, but nothing is given that measures scenarios (`measures`)")
+    return Aim.of(targets, encounter, measures.figure)
+
+
+def _conflicts(encounter: Encounter) -> tuple[Conflict, ...]:
+    return find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
+
+
+def label_of(encounter: Encounter, request: Request, aim: Aim | None) -> Label:
+    """Return what says a scenario's facts: the figures of the targets, and, unless it is kept, the order at each conflict."""
+    conflicts = () if request.order == "keep" else _conflicts(encounter)
+
+    def label(whole: Scenario) -> dict[str, str]:
+        facts = {}
+        if aim is not None:
+            facts = {f"target.{t.label}": f"{v:.6g}" for t, v in zip(aim.targets, aim.values(whole), strict=True)}
+        if request.order == "keep":
+            return facts
+        said = [_order(encounter, own, whole) for own in conflicts]
+        return facts | {"order": request.order, "passing_order": "; ".join(said) or "nobody meets anybody"}
+
+    return label
+
+
+def _order(encounter: Encounter, own: Conflict, whole: Scenario) -> str:
+    """Say who goes first in a scenario at one of the template's conflicts."""
+    a, b = sorted((own.first, own.second))
+    found = pair_conflict(whole.vehicles, whole.time, whole.position, whole.heading, a, b, whole.present)
+    one, two = (encounter.vehicles[n].id for n in (own.first, own.second))
+    if found is None:
+        return f"{one} and {two} do not meet (in the template {one} goes first)"
+    return f"{one} before {two}, as in the template" if found.first == own.first else f"{two} before {one}, swapped"
+
+
+@dataclass(frozen=True, eq=False)
+class Adapted:
+    """A sampler with its proposal, None where natural candidates do, and what was seen on the way."""
+
+    sampler: Sampler
+    seen: Seen
+    stages: int
+    candidates: int
+    pilot: Sequence[Judged] = ()
+
+
+def adapted(sampler: Sampler, judge: Judge, aim: Aim, cancelled: Cancelled) -> Adapted:
+    """Find a proposal, stage by stage; the same request gives the same.
+
+    The levels are judged by pilots as without a target, and the first that is good enough, or the best, is the natural one.
+    """
+    pilots: list[Seen] = []
+    share: list[float] = []
+    judged: list[list[Judged]] = []
+    for level in range(len(LEVELS)):
+        pilots.append(Seen())
+        judged.append([])
+        share.append(_stage(sampler, level, 0, judge, aim, pilots[-1], np.ones(len(aim.targets)), judged[-1]))
+        if share[-1] >= judge.enough or cancelled():
+            break
+    best = int(np.argmax(share))
+    seen = pilots[best]
+    unit = seen.scale()
+    candidates, hits = len(pilots) * STAGE, seen.hits()
+    staged = replace(sampler, base=best)
+    if hits >= PLAIN * STAGE:
+        return Adapted(staged, seen, 0, candidates, judged[best])
+    seen.rescale(aim, unit)
+    most, since = hits, 0
+    for stage in range(STAGES):
+        proposal = seen.proposal()
+        if proposal is None or cancelled():
+            break
+        _stage(replace(staged, proposal=proposal), STAGED, stage, judge, aim, seen, unit)
+        candidates += STAGE
+        now = seen.hits() - hits
+        hits, since = seen.hits(), 0 if now > most else since + 1
+        most = max(most, now)
+        if most >= GOOD * STAGE or (most >= FAIR * STAGE and since >= 1) or (most and since >= PATIENCE):
+            break
+    return Adapted(replace(staged, proposal=seen.proposal() if seen.hits() else None), seen, len(seen.z) - 1, candidates)
+
+
+def _stage(
+    sampler: Sampler, level: int, stage: int, judge: Judge, aim: Aim, seen: Seen, unit: Floats, judged: list[Judged] | None = None
+) -> float:
+    """Draw a stage's candidates, measure them, check those nearest to the range; return the share of the checked that is valid.
+
+    Of a pilot all are checked.
+    """
+    blocks = range(stage * (STAGE // BLOCK), (stage + 1) * (STAGE // BLOCK))
+    z = np.concatenate([sampler.numbers(level, number) for number in blocks])
+    drawn: list[Scenario | None] = []
+    numbers: list[int] = []
+    causes: dict[int, Cause | None] = {}
+    for number in blocks:
+        batch, index = sampler.block(level, number)
+        numbers += index
+        drawn += batch.scenarios(sampler.seed, index, sampler.frame_id)
+    seen.add(aim, z, sampler.proposal, drawn, unit)
+    checked = good = 0
+    nearest = [k for k in np.argsort(seen.distance[-1], kind="stable").tolist() if drawn[k] is not None]
+    for start in range(0, len(nearest), CHUNK):
+        rows = nearest[start : start + CHUNK]
+        found = judge([scenario for k in rows if (scenario := drawn[k]) is not None])
+        causes |= dict(zip(rows, found, strict=True))
+        for k, cause in zip(rows, found, strict=True):
+            checked, good = checked + 1, good + (cause is None)
+            seen.judge(k, valid=cause is None)
+        in_range = bool(seen.distance[-1][rows[-1]] == 0.0)
+        if level >= DIRECTED and good >= CHUNK // 2 and not in_range:
+            break
+    if judged is not None:
+        judged += [(number, drawn[k], causes.get(k)) for k, number in enumerate(numbers)]
+    return good / STAGE if level < DIRECTED else good / max(checked, 1)

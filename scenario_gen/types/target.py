@@ -1,0 +1,139 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How close vehicles come, as figures of one scenario, and the range of one that a request asks for."""
+
+from dataclasses import dataclass
+import math
+
+from scenario_gen.errors import InputError
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.names import vehicle_index
+
+UNITS = {"pet": "s", "ttc": "s", "gap": "m", "arrival_gap": "s", "closing_speed": "m/s"}
+"""The figures that a target can be set on, with their units; `scenario_gen.evaluation.measures` defines them."""
+Pair = tuple[int, int]  # of vehicle indices
+_FORM = "NAME=LOW..HIGH or NAME[a,b]=LOW..HIGH"
+_EXAMPLE = "pet=0.5..1.5; ttc[1,2]=1..2"
+
+
+@dataclass(frozen=True)
+class Target:
+    """A range of a figure, bounds included.
+
+    Attributes:
+        name: of the figure, one of UNITS.
+        low, high: the bounds; one of them may be infinite.
+        vehicles: ids of the pair it is of; none: the most critical of all pairs.
+    """
+
+    name: str
+    low: float
+    high: float
+    vehicles: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """The figure's name, with its pair if there is one."""
+        return f"{self.name}[{','.join(self.vehicles)}]" if self.vehicles else self.name
+
+    def __str__(self) -> str:
+        low, high = ("" if math.isinf(value) else f"{value:.10g}" for value in (self.low, self.high))
+        return f"{self.label}={low}..{high}"
+
+    def holds(self, value: float) -> bool:
+        """Whether a value is in the range; NaN is not."""
+        return self.low <= value <= self.high
+
+    def pair(self, encounter: Encounter) -> Pair | None:
+        """Return the indices of its two vehicles, None for all pairs.
+
+        Raises:
+            InputError: a vehicle is not the encounter's, or both are the same.
+        """
+        if not self.vehicles:
+            return None
+        a, b = (vehicle_index(encounter, name, "target") for name in self.vehicles)
+        if a == b:
+            raise InputError(f"target: {self.label} names one vehicle twice")
+        return a, b
+
+
+@dataclass(frozen=True)
+class Reached:
+    """What directed sampling came to.
+
+    Attributes:
+        targets: what was asked.
+        stages: of the adaptation; candidates: of all of them.
+        share: estimated share of natural candidates that are valid and in the range, with its 95 % interval low, high.
+        directed: whether a proposal was used; else candidates are as without a target, and all weights are 1.
+    """
+
+    targets: tuple[Target, ...]
+    stages: int
+    candidates: int
+    share: float
+    low: float
+    high: float
+    directed: bool
+
+    def figures(self) -> dict[str, str]:
+        """Return all of it as texts, by name."""
+        return {
+            "share": f"{self.share:.6g}",
+            "share_low": f"{self.low:.6g}",
+            "share_high": f"{self.high:.6g}",
+            "stages": str(self.stages),
+            "stage_candidates": str(self.candidates),
+            "directed": str(self.directed).lower(),
+        }
+
+    def sentence(self) -> str:
+        """Say it."""
+        asked = "; ".join(map(str, self.targets))
+        share, low, high = (f"{100 * value:.3g}" for value in (self.share, self.low, self.high))
+        said = f"target {asked}: {share} % [{low}, {high}] of natural candidates are valid and in the range"
+        if not self.directed:
+            return f"{said}; drawn as without a target, all weights are 1"
+        return f"{said}; drawn from a proposal (stages: {self.stages}, candidates: {self.candidates}), each with its weight"
+
+
+def read_targets(text: str) -> tuple[Target, ...]:
+    """Return the targets of a text such as `pet=0.5..1.5; ttc[1,2]=1..2`; a bound that is left out is open.
+
+    Raises:
+        InputError: it is not of that form, a figure is unknown or comes twice, or a range is empty.
+    """
+    found: list[Target] = []
+    for piece in filter(None, (part.strip() for part in text.split(";"))):
+        head, _, bounds = piece.partition("=")
+        name, bracket, inside = head.strip().partition("[")
+        ids = tuple(word.strip() for word in inside.rstrip("] ").split(",")) if bracket else ()
+        words = bounds.split("..")
+        if len(words) != 2 or (bracket and not (head.strip().endswith("]") and len(ids) == 2 and all(ids))):
+            raise InputError(f"target: {piece!r} is not of the form `{_FORM}`, e.g. `{_EXAMPLE}`")
+        if name.strip() not in UNITS:
+            raise InputError(f"target: {name.strip()!r} is none of {', '.join(UNITS)}")
+        try:
+            low, high = (float(word) if word.strip() else bound for word, bound in zip(words, (-math.inf, math.inf), strict=True))
+        except ValueError:
+            raise InputError(f"target: {piece!r}: the bounds must be numbers, as in `{_EXAMPLE}`") from None
+        if not low < high or (math.isinf(low) and math.isinf(high)):
+            raise InputError(f"target: {piece!r}: the lower bound must be below the upper one, and one of them finite")
+        target = Target(name.strip(), low, high, ids)
+        if target.label in {other.label for other in found}:
+            raise InputError(f"target: {target.label} comes twice")
+        found.append(target)
+    return tuple(found)

@@ -1,0 +1,149 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Targets, their proposals and weights, the order asked, and the choice that covers."""
+
+from dataclasses import replace
+
+from given import answer
+import numpy as np
+import pytest
+
+from scenario_gen.config import PipelineConfig
+from scenario_gen.errors import InputError
+from scenario_gen.evaluation.measures import features, figures_of, measure, MEASURES, most_critical
+from scenario_gen.pipeline import generate
+from scenario_gen.recordings.write import write_recording
+from scenario_gen.results import provenance_of
+from scenario_gen.review.regenerate import regenerate_scenario
+from scenario_gen.review.validation import validate_bag
+from scenario_gen.sampling import sample_scenarios
+from scenario_gen.sampling.directed import TargetError
+from scenario_gen.types.ego import together
+from scenario_gen.types.request import Request
+from scenario_gen.types.target import read_targets
+
+LOW, HIGH = 0.4, 0.9  # s of PET, of which few natural candidates of the case are
+
+
+@pytest.fixture(scope="module")
+def directed(chain):
+    return answer(chain, Request(target=f"pet={LOW}..{HIGH}"), count=20).generated
+
+
+def test_texts_are_read_and_written():
+    one, two = read_targets("pet=0.5..1.5; ttc[a b,2]=..2")
+    assert (one.name, one.low, one.high, one.vehicles) == ("pet", 0.5, 1.5, ())
+    assert two.vehicles == ("a b", "2") and two.low == -np.inf and not two.holds(np.nan) and two.holds(2.0)
+    assert read_targets(f"{one}; {two}") == (one, two)
+
+
+@pytest.mark.parametrize(
+    "text", ["pet", "pet=1", "pet=2..1", "pet=..", "speed=1..2", "pet[1]=1..2", "pet[1,2=1..2", "pet=a..2", "pet=1..2; pet=2..3"]
+)
+def test_other_texts_are_refused_and_named(text):
+    with pytest.raises(InputError, match="target"):
+        Request(target=text)
+
+
+def test_unknown_vehicles_are_named(chain):
+    with pytest.raises(InputError, match="target: no vehicle 'x'"):
+        answer(chain, Request(target="pet[1,x]=0..1"), count=1)
+
+
+def test_all_are_in_the_range_and_have_weights_and_figures(directed):
+    assert len(directed.scenarios) == 20
+    for scenario in directed.scenarios:
+        assert LOW <= measure(scenario, "pet") <= HIGH
+        assert float(scenario.facts["target.pet"]) == pytest.approx(measure(scenario, "pet"), rel=1e-5)
+        assert 0.0 < float(scenario.facts["weight"]) <= 10.0
+    assert directed.reached.directed and directed.reached.low <= directed.reached.share <= directed.reached.high
+
+
+def test_the_weighted_share_agrees_with_natural_sampling(chain, directed):
+    """Against 2,000 natural candidates: the interval of one overlaps that of the other."""
+    natural = answer(chain, Request(), count=1200).generated
+    hits = [LOW <= measure(scenario, "pet") <= HIGH for scenario in natural.scenarios]
+    share = sum(hits) / natural.candidates
+    half = 1.96 * np.sqrt(share * (1.0 - share) / natural.candidates)
+    assert directed.reached.low <= share + half and share - half <= directed.reached.high
+
+
+def test_a_range_that_cannot_be_had_is_refused_with_what_can(chain):
+    with pytest.raises(TargetError, match=r"pet=90\.\.91.*reachable: pet from"):
+        answer(chain, Request(target="pet=90..91"), count=3)
+
+
+def test_without_measures_a_target_is_refused(chain):
+    with pytest.raises(InputError, match="measures"):
+        made = answer(chain, Request(), count=1)
+        sample_scenarios(
+            made.encounter, made.segmentation, made.road, made.routes, made.fit.asked, lambda _: [],
+            count=1, waits=(), request=Request(target="pet=0..1"),
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "request_", [Request(target=f"pet={LOW}..{HIGH}", ego="1"), Request(order="free"), Request(choose="diverse")], ids=str
+)
+def test_each_comes_again_bit_for_bit_and_is_valid(chain, request_, tmp_path):
+    config = PipelineConfig()
+    config = replace(config, evaluation=replace(config.evaluation, resamples=10, uniform=False))
+    made = generate(chain.encounter, chain.road, config, count=3, seed=7, request=request_)
+    made = replace(made, provenance=provenance_of([], 7, 3, ["t_intersection"], config, request_))
+    bag = write_recording(tmp_path / "bag", made)
+    for scenario in made.generated.scenarios:
+        again = regenerate_scenario(bag, scenario.index).scenario
+        assert again.position.tobytes() == scenario.position.tobytes()
+    (found,) = validate_bag(bag)
+    assert found.scenarios == 3 and not found.invalid
+    if request_.target:
+        assert all(LOW <= measure(together(one), "pet") <= HIGH for one in made.generated.scenarios)
+
+
+def test_another_order_is_named_and_only_then_allowed(chain, tmp_path):
+    made = answer(chain, Request(order="swap"), count=3)
+    for scenario in made.generated.scenarios:
+        assert "swapped" in scenario.facts["passing_order"]
+        assert most_critical(figures_of(scenario)).first != most_critical(figures_of(chain.encounter)).first
+    bag = write_recording(tmp_path / "bag", replace(made, provenance={}))
+    (found,) = validate_bag(bag)
+    assert not found.invalid
+    kept = replace(made.generated, scenarios=tuple(replace(one, facts={}) for one in made.generated.scenarios))
+    (found,) = validate_bag(write_recording(tmp_path / "kept", replace(made, generated=kept)))
+    assert found.found.keys() == {"passing_order"} and found.invalid == 3
+
+
+def test_a_diverse_set_covers_more_bins_and_carries_no_weights(chain):
+    def bins(made):
+        return len({tuple(np.floor(features(one))) for one in made.scenarios})
+
+    natural = answer(chain, Request(), count=30).generated
+    diverse = answer(chain, Request(choose="diverse"), count=30).generated
+    assert len(diverse.scenarios) == 30 and diverse.chosen == 300
+    assert bins(diverse) > 1.3 * bins(natural)
+    assert all("weight" not in one.facts for one in diverse.scenarios) and any(
+        "no weights" in said for said in diverse.adaptations
+    )
+
+
+def test_measures_of_a_plain_crossing(crossing):
+    """Two cars of 4 × 2 m at 10 m/s on crossing axes; the second one's centre is 20 m later at the crossing."""
+    (one,) = figures_of(crossing)
+    assert one.first == 0
+    assert one.arrival_gap == pytest.approx(2.0, abs=0.02)
+    assert one.pet == pytest.approx(2.0 - 0.6, abs=0.02)  # the first is inside for 2 m + 4 m
+    assert measure(crossing, "arrival_gap", (1, 0)) == pytest.approx(-2.0, abs=0.02)
+    assert MEASURES.features(crossing)[:2] == pytest.approx((2.8, 4.0), abs=0.05)
+    assert one.ttc == np.inf
