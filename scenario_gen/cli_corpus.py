@@ -21,7 +21,7 @@ from typing import Annotated, TYPE_CHECKING
 
 import typer
 
-from scenario_gen.errors import RefusedError
+from scenario_gen.errors import InputError, RefusedError
 
 if TYPE_CHECKING:
     from scenario_gen.corpus.tasks import Told
@@ -135,13 +135,23 @@ def batch(
     conclude(result.failed, out)
 
 
+def needs_bag(bag: Path | None) -> None:
+    """Refuse a report without a bag.
+
+    Raises:
+        InputError: there is none.
+    """
+    if bag is None:
+        raise InputError("--report is on the bag of the hits: give --bag, too")
+
+
 @commands.command()
 def find(
     batch: Annotated[Path, typer.Argument(help="a batch, finished or not")],
     condition: Annotated[str, typer.Argument(help="SQL, e.g. \"kind = 'crossing' and pet < 1\"")] = "true",
     limit: Annotated[int, typer.Option(min=0, help="at most so many; 0: all")] = 20,
     bag: Annotated[Path | None, typer.Option(help="write the hits to this bag, with their templates and roads")] = None,
-    report: Annotated[Path | None, typer.Option(help="folder of the report on the hits; needs --bag")] = None,
+    report: Annotated[Path | None, typer.Option(help="folder of the report on the bag of the hits")] = None,
     again: Annotated[bool, typer.Option("--again", help="make each hit again, alone, and compare it bit for bit")] = False,
 ) -> None:
     """Find scenarios of a batch by what they are: kind, road, PET, time to collision, …."""
@@ -150,6 +160,8 @@ def find(
     from scenario_gen.corpus import find as finding
     from scenario_gen.terminal import Terminal
 
+    if report is not None:
+        needs_bag(bag)
     found = finding.find(batch, condition, limit)
     table = Table(*finding.COLUMNS)
     for row in found.rows:

@@ -18,7 +18,7 @@ from dataclasses import replace
 
 from scenario_gen.config import PipelineConfig
 from scenario_gen.errors import RefusedError
-from scenario_gen.evaluation import evaluate, MEASURED, MEASURES, replay, uniform_changepoints, without_changepoints
+from scenario_gen.evaluation import coverage_of, evaluate, MEASURED, MEASURES, replay, uniform_changepoints, without_changepoints
 from scenario_gen.fitting import fit_template
 from scenario_gen.nearest import attempt, nearest_if_impossible
 from scenario_gen.roads import build_road
@@ -121,5 +121,6 @@ def with_references(
 
 
 def with_evaluation(made: GenerationResult, config: PipelineConfig) -> GenerationResult:
-    """Add the evaluation of all sets of a result, and of the fitted template replayed (the oracle row)."""
-    return replace(made, evaluation=evaluate(made, config.evaluation))
+    """Add the evaluation of all sets of a result, and of the fitted template replayed (the oracle row), and its coverage."""
+    coverage = coverage_of(made.encounter, made.generated.scenarios)
+    return replace(made, evaluation=evaluate(made, config.evaluation), coverage=coverage)

@@ -69,10 +69,14 @@ def write_results(
 
 
 def _figures(case: GenerationResult) -> dict[str, Any]:
-    """Return a case's evaluation, what the fitting lost and decided, and, by vehicle, how its route was planned."""
+    """Return a case's evaluation and coverage, its target, what the fitting lost and decided, and how routes were planned."""
     vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
     figures: dict[str, Any] = json.loads(case.evaluation.to_json())
     fit = {} if case.fit is None else case.fit.figures()
+    coverage = {} if case.coverage is None else case.coverage.document()
+    reached = {} if case.generated.reached is None else case.generated.reached.figures()
+    weights = {str(one.index): one.facts["weight"] for one in case.generated.scenarios if "weight" in one.facts}
+    figures |= {"coverage": coverage, "target": {**reached, "weights": weights} if reached else {}}
     return figures | {"fit": fit, "routes": {vehicle.id: route.figures() for vehicle, route in vehicles}}
 
 

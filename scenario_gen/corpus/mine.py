@@ -131,11 +131,10 @@ def mine(
         failed = go(read_one_log, [task for task in log_tasks if not task.target.exists()])
         if messages:
             ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
-            failed += go(parse_range, [task for task in ranged if not task.target.exists()])
-            failed += go(search_hours, hour_tasks(ranged, out, config))
-            if not failed:
-                failed += go(clean_found, clean_tasks(out, config))
-        made = summary(out, failed)
+            lost = go(parse_range, [task for task in ranged if not task.target.exists()])
+            lost = lost or go(search_hours, hour_tasks(ranged, out, config))  # of all ranges, for an hour is done only once
+            failed += lost or go(clean_found, clean_tasks(out, config))
+        made = summary(out, config, failed)
         with arriving(out / PAGE) as part:
             _write_gallery(part, out, made)
         return made
@@ -222,17 +221,20 @@ def _agree(out: Path, messages: Sequence[Path], logs: Sequence[Sequence[Path]], 
 def hour_tasks(ranged: Sequence[RangeTask], out: Path, config: CorpusConfig) -> list[HourTask]:
     """Put the hours that are not searched into tasks of about `task_rows` rows."""
     rows: Counter[int] = Counter()
+    seen: set[int] = set()
     files: dict[int, list[Path]] = {}
     for task in ranged:
         if task.target.exists():
             for hour, count in json.loads(task.target.with_suffix(".json").read_text(encoding="utf-8"))["hours"].items():
-                rows[int(hour)] += count
-                files.setdefault(int(hour), []).append(task.target)
+                seen.add(int(hour))
+                if count >= least_rows(config):  # else every range is asked for the hours of its wrong stamps
+                    rows[int(hour)] += count
+                    files.setdefault(int(hour), []).append(task.target)
     tasks: list[list[tuple[int, tuple[Path, ...]]]] = []
     room = 0
     sides = -(-overlap(config) // HOUR)
-    for hour in sorted(rows):
-        if rows[hour] + rows[hour + 1] < least_rows(config) or (out / "hours" / f"hour-{hour}.parquet").exists():
+    for hour in sorted(seen & {hour for own in files for hour in (own - 1, own)}):  # a meeting may begin with an hour's last row
+        if (out / "hours" / f"hour-{hour}.parquet").exists():
             continue
         if not tasks or rows[hour] > room:
             tasks.append([])
@@ -292,17 +294,23 @@ def grouped(out: Path, config: CorpusConfig) -> list[Found]:
     return found
 
 
-def summary(out: Path, failed: list[str]) -> Mined:
+def summary(out: Path, config: CorpusConfig, failed: list[str]) -> Mined:
     """Return what is in a corpus, by listing it."""
     from pyarrow import parquet
 
     files: dict[str, Counter[str]] = {}
     notes: list[str] = []
+    strays, least = 0, least_rows(config)
     for path in sorted((out / "messages").glob("*.json")):
         account = json.loads(path.read_text(encoding="utf-8"))
         notes += account["notes"]
+        strays += sum(int(count) for count in account["hours"].values() if count < least)
         for file, causes in account["files"].items():
             files.setdefault(file, Counter()).update(causes)
+    if strays:
+        notes.append(
+            f"{strays} rows lie in an hour of which their range of text has fewer than {least} (wrong stamps?): not searched"
+        )
     shared: Counter[str] = Counter()
     for path in sorted((out / "hours").glob("hour-*[0-9].parquet")):
         shared.update(json.loads((parquet.read_schema(path).metadata or {}).get(b"shared", b"{}")).keys())

@@ -15,6 +15,7 @@
 """DTW features (paper V-B), realism and criticality."""
 
 from scenario_gen.evaluation.compare import compare, comparison_table, Difference, read_evaluations
+from scenario_gen.evaluation.coverage import coverage_of
 from scenario_gen.evaluation.dtw import Alignment, dtw, dtw_distance, feature_matrix
 from scenario_gen.evaluation.evaluate import evaluate, evaluate_scenarios, EvaluationConfig, MEASURED
 from scenario_gen.evaluation.measures import MEASURES
@@ -29,6 +30,7 @@ __all__ = [
     "EvaluationConfig",
     "compare",
     "comparison_table",
+    "coverage_of",
     "dtw",
     "dtw_distance",
     "evaluate",

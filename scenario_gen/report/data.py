@@ -42,7 +42,12 @@ MOTION_PERIOD, MAX_MOTION_FRAMES, MAX_MOTION_SAMPLES = 0.1, 400, 12
 def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
     """Return all that one case draws, ready for JSON; at most `samples` scenarios of each arm."""
     sets = {"with": case.generated, "without": case.references.get(WITHOUT), "uniform": case.references.get(UNIFORM)}
-    arms = {name: made.scenarios[:samples] for name, made in sets.items() if made is not None}
+    arms = {name: tuple(made.scenarios[:samples]) for name, made in sets.items() if made is not None}
+    covered = case.coverage
+    if covered is not None:  # the scenarios that stand out are always drawn
+        shown = {one.index for one in arms["with"]}
+        extra = {index for index in covered.picks.values() if index not in shown}
+        arms["with"] += tuple(one for one in case.generated.scenarios[samples:] if one.index in extra) if extra else ()
     ids = [vehicle.id for vehicle in case.encounter.vehicles]
     if case.oracle is not None:
         arms["oracle"] = (case.oracle,)
@@ -57,6 +62,7 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
         "fit": _fit(case.fit, case.routes) if case.fit else [],
         "arms": {name: _trajectories(group, frames, ids) for name, group in arms.items() if group},
         "motion": _motion(case.encounter, case.generated.scenarios[:MAX_MOTION_SAMPLES]),
+        "coverage": None if covered is None else covered.document(),
         "features": _features(case.encounter, arms, case.evaluation.vehicles),
     }
 

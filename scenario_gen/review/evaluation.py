@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from scenario_gen.errors import InputError
-from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
+from scenario_gen.evaluation import coverage_of, evaluate_scenarios, EvaluationConfig
 from scenario_gen.recordings.read import Namespace, NO_ENTRY, read_recording, SCENARIOS
 from scenario_gen.review.validation import Reference
 from scenario_gen.storage.bag import within
@@ -92,6 +92,7 @@ def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | Non
         refusals={WITHOUT: "the bag holds one set of scenarios"},
         row=SCENARIOS,
         valid=counts.candidates - sum(counts.refused.values()),
+        coverage=coverage_of(encounter, scenarios),
     )
 
 

@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from scenario_gen.errors import InputError
+from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation
 from scenario_gen.types.fit import Fit
@@ -50,6 +51,7 @@ class GenerationResult:
         oracle: the fitted template replayed.
         row: name of the evaluation's row of `generated`.
         provenance: what is needed to make it again: log hashes, versions, parameters.
+        coverage: what `generated` covers, None if it was not measured.
         valid: how many of those scenarios are valid, where all of a bag's are shown; None: all of them are.
     """
 
@@ -67,6 +69,7 @@ class GenerationResult:
     row: str = WITH
     provenance: Mapping[str, str] = field(default_factory=dict)
     valid: int | None = None
+    coverage: Coverage | None = None
 
     @property
     def similar_row(self) -> str:

@@ -28,9 +28,8 @@ from scenario_gen.recordings.write import write_recording
 from scenario_gen.results import provenance_of
 from scenario_gen.review.regenerate import regenerate_scenario
 from scenario_gen.review.validation import validate_bag
-from scenario_gen.sampling import sample_scenarios
+from scenario_gen.sampling import sample_scenarios, SamplingConfig
 from scenario_gen.sampling.directed import TargetError
-from scenario_gen.sampling import SamplingConfig
 from scenario_gen.types.ego import together
 from scenario_gen.types.request import Request
 from scenario_gen.types.target import read_targets

@@ -31,6 +31,20 @@ function speeds(set, sample, vehicle) {
   return Array.from({ length: set.frames }, (_, f) => (set.there(sample, vehicle, f / (set.frames - 1)) ? at(f) : null));
 }
 
+/** How one figure is distributed over the set, with the template's place in it. */
+function drawSpread(place, figure) {
+  const values = figure.values.filter((value) => value !== null);
+  const unit = plain(figure.unit);
+  const shapes = figure.template === null ? [] : [{
+    type: "line", xref: "x", yref: "paper", x0: figure.template, x1: figure.template, y0: 0, y1: 1, line: { color: "#0f172a", width: 2, dash: "dash" },
+  }];
+  plot(place, [{ x: values, type: "histogram", nbinsx: 20, marker: { color: "#2563eb", opacity: 0.75 }, hovertemplate: `%{y} at %{x} ${unit}<extra></extra>` }], {
+    shapes, margin: { l: 34, r: 8, t: 6, b: 40 }, bargap: 0.06,
+    xaxis: { ...GRID, title: { text: `${plain(figure.label)} [${unit}], ${values.length} of ${figure.values.length}`, standoff: 6, font: { size: 11 } } },
+    yaxis: { ...GRID, rangemode: "tozero" },
+  });
+}
+
 /** Figure 3: speed over time on the colours of its primitives, and the probability of a changepoint below. */
 function drawTemplate(place, data, template) {
   const { bounds, labels, descriptions, probability, probability_step: step } = data.template;

@@ -70,6 +70,18 @@ class Player {
     this.draw();
   }
 
+  /** Show the generated sample of that index, from its start. */
+  showSample(index) {
+    this.pause();
+    this.arm = "with";
+    this.find("arm").value = this.arm;
+    this.listSamples();
+    this.find("sample").selectedIndex = this.set.index.indexOf(index);
+    this.time = 0;
+    this.draw();
+    this.find("stage").scrollIntoView({ behavior: "smooth", block: "center" });
+  }
+
   toggle() { if (this.playing) this.pause(); else this.play(); }
 
   play() {
@@ -208,6 +220,8 @@ function open(section, data) {
       if (feature[kind][arm]) drawFeature(place, feature[kind][arm], template.durations[0], feature.pair.map((n) => data.vehicles[n].id));
     });
   };
+  section.querySelectorAll("[data-spread]").forEach((place) => drawSpread(place, data.coverage.figures[place.dataset.spread]));
+  section.querySelectorAll("[data-pick]").forEach((button) => button.addEventListener("click", () => player.showSample(Number(button.dataset.pick))));
   pairs.addEventListener("change", features);
   features();
   return { player, draw: () => { maps.forEach(([view, draw]) => draw(view)); if (player) player.draw(); } };

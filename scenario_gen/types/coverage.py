@@ -1,0 +1,81 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a set of scenarios covers: how its criticality is distributed, and which of its scenarios stand out."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import math
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Spread:
+    """One figure of every scenario, and the template's.
+
+    Attributes:
+        label: for people; unit: of the values.
+        values: of each measured scenario, NaN where it has none.
+        template: of the recorded encounter, NaN likewise.
+    """
+
+    label: str
+    unit: str
+    values: tuple[float, ...]
+    template: float
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """What the scenarios of one set cover.
+
+    Attributes:
+        index: of each measured scenario, as in `scenarios/info`.
+        spreads: figures of the most critical pair of each scenario, by name.
+        bins: names of the bins of PET.
+        pairs: how many pairs of vehicles of all scenarios are in each bin, by the pair's manoeuvres.
+        picks: index of the most critical, most typical and most different scenario, by those words; none of an empty set.
+        orders: how often each outcome of the passing order came, where it was free or swapped.
+    """
+
+    index: tuple[int, ...]
+    spreads: Mapping[str, Spread]
+    bins: tuple[str, ...]
+    pairs: Mapping[str, tuple[int, ...]]
+    picks: Mapping[str, int]
+    orders: Mapping[str, int]
+
+    def document(self) -> dict[str, Any]:
+        """Return all of it, ready for JSON; figures have five significant digits, null stands where there is none."""
+
+        def number(value: float) -> float | None:
+            return float(f"{value:.5g}") if math.isfinite(value) else None
+
+        spreads = {
+            name: {
+                "label": one.label,
+                "unit": one.unit,
+                "values": [number(value) for value in one.values],
+                "template": number(one.template),
+            }
+            for name, one in self.spreads.items()
+        }
+        return {
+            "index": list(self.index),
+            "figures": spreads,
+            "bins": list(self.bins),
+            "pairs": {name: list(counts) for name, counts in self.pairs.items()},
+            "picks": dict(self.picks),
+            "orders": dict(self.orders),
+        }
