@@ -192,7 +192,7 @@ class _Loop:
     measures: Measures | None = None
     reached: Reached | None = None
     chosen_from: int = 0
-    keep: int = KEPT
+    keep: int = field(default_factory=lambda: KEPT)
     publish: bool = True
 
     def run_request(self, attempts: int, *, diverse: bool) -> None:
