@@ -142,8 +142,8 @@ class Recheck:
         """End states, and the limits of the motion."""
         one = self.limits
         for k, asked in ((0, self.asked.start), (-1, self.asked.end)):
-            far = np.linalg.norm(s.position[:, k] - asked[:, :2], axis=1).max()
-            other = np.abs(s.speed[:, k] - asked[:, 3]).max()
+            far = (np.linalg.norm(s.position[:, k] - asked[:, :2], axis=1) - self.asked.freed[:, k, 0]).max()
+            other = (np.abs(s.speed[:, k] - asked[:, 3]) - self.asked.freed[:, k, 1]).max()
             if far > one.position_tolerance or other > one.speed_tolerance:
                 account.add("boundary_state", f"{far:.3f} m, {other:.3f} m/s in scenario {s.index}")
         h, slack = np.diff(s.time), 1e-5

@@ -102,7 +102,7 @@ def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
     last = beyond.scenarios[-1]
     placed, waits = answer(chain, Request(), count=1), waits_to_keep(chain.encounter, chain.segmentation)
     told = (chain.encounter, chain.segmentation, chain.road, placed.routes, placed.fit.asked)
-    assert same(regenerate(*told, seed=chain.seed, index=last.index, waits=waits), last)
+    assert same(regenerate(*told, chain.sampling, seed=chain.seed, index=last.index, waits=waits), last)
 
 
 @given(st.integers(MEASURED + 1, 10**12))

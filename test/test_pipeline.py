@@ -26,7 +26,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.report.page import render, ReportInput
-from scenario_gen.types.generation import ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.generation import NARROW, ORACLE, UNIFORM, WITH, WITHOUT
 
 QUICK = EvaluationConfig(resamples=50)
 
@@ -42,7 +42,7 @@ def case(encounter):
 
 
 def test_every_arm_has_its_row_and_its_account(case):
-    assert [row.name for row in case.evaluation.rows] == ["template", WITH, WITHOUT, UNIFORM, ORACLE]
+    assert [row.name for row in case.evaluation.rows] == ["template", WITH, WITHOUT, NARROW, UNIFORM, ORACLE]
     assert len(case.references[UNIFORM].scenarios) == 4 and not case.refusals
     accepted = case.evaluation.value(UNIFORM, "acceptance")
     assert accepted == pytest.approx(1.0 - sum(case.references[UNIFORM].refused.values()) / case.references[UNIFORM].candidates)

@@ -29,7 +29,7 @@ from scenario_gen.evaluation import EvaluationConfig
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.template.interaction import find_conflicts, find_waits
-from scenario_gen.types.generation import GenerationResult, WITH, WITHOUT
+from scenario_gen.types.generation import GenerationResult, WITHOUT
 
 ROADS = ("corridor", "four_way", "t_intersection", "straight")
 OWN_MAPS = ("USA_Lanker-2_13_T-1", "USA_Peach-4_2_T-1")
@@ -68,7 +68,7 @@ def assert_sound(case: GenerationResult) -> None:
 
 def assert_nearer(case: GenerationResult, figure: str) -> None:
     """Scenarios with changepoints are more like the template than those without."""
-    with_, without = case.evaluation.value(WITH, figure), case.evaluation.value(WITHOUT, figure)
+    with_, without = case.evaluation.value(case.similar_row, figure), case.evaluation.value(WITHOUT, figure)
     if without >= 0.03:
         assert with_ < without, f"{figure}: {with_:.3f} with, {without:.3f} without changepoints on {case.road.name}"
 

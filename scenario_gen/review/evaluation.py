@@ -114,9 +114,8 @@ def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Lim
             road = namespace.road
             if namespace.roads_differ:
                 road = namespace.road_of(entry, encounter.start_ns) if map_hash else None
-            checkers[key] = Reference(road, None, names, tuple(conflicts), waits, orders_asked(conflicts, order)).checker(
-                scenario, limits
-            )
+            reference = Reference(road, names, tuple(conflicts), waits, orders_asked(conflicts, order))
+            checkers[key] = reference.checker(scenario, limits, None)
         verdicts += checkers[key].check([scenario])
     return verdicts
 

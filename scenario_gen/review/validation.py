@@ -14,21 +14,18 @@
 
 """Is every scenario of a bag valid? For any bag of the conventions, ours or not.
 
-A scenario is checked against what bears its stamp in its own namespace: the states asked of it (its own in `scenarios/info`,
-else `fit`), the conflicts and waits of its template (`tracks`; waits if there are `changepoints`), and the road: the `map` that
-its entry on `scenarios/info` names by hash, else the newest one of the stamp, or of all. What is not there is not checked,
-and said. Vehicles are matched by id, so one may be left out for an ego; with its witness, all are
-checked together. Where there are entries, a scenario is not to stand in the place of another that was published; one without any
-entry is counted, and checked as far as that goes.
+A scenario is checked against what bears its stamp in its own namespace: the states asked of it and how far they may be left
+(its own in `scenarios/info`), the conflicts and waits of its template (`tracks`; waits if there are `changepoints`), in the
+order that was asked, and the road: the `map` that its entry on `scenarios/info` names by hash, else the newest one of the
+stamp, or of all. What is not there is not checked, and said. Vehicles are matched by id, so one may be left out for an ego;
+with its witness, all are checked together. Where there are entries, a scenario is not to stand in the place of another that was
+published; one without any entry is counted, and checked as far as that goes.
 """
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
-
-from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS, WITNESS
 from scenario_gen.storage.bag import within
@@ -83,24 +80,20 @@ class Validation:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What the scenarios of one stamp are held against; vehicles by id, states (4,) x, y, yaw, speed.
+    """What the scenarios of one stamp are held against.
 
     `first` says who must go first at each conflict, by index in `template`, None for anyone; nothing: as in the template.
     """
 
     road: Road | None
-    asked: dict[str, tuple[Floats, Floats]] | None
     template: tuple[str, ...] | None
     conflicts: tuple[Conflict, ...]
     waits: tuple[Wait, ...] | None
     first: tuple[int | None, ...] = ()
 
-    def checker(self, scenario: Scenario, limits: Limits | None, asked: BoundaryStates | None = None) -> Checker:
-        """Return the checker of scenarios with this one's vehicles; `asked` is in place of the template's states."""
+    def checker(self, scenario: Scenario, limits: Limits | None, asked: BoundaryStates | None) -> Checker:
+        """Return the checker of scenarios with this one's vehicles, of which `asked` was asked."""
         ids = tokens(vehicle.id for vehicle in scenario.vehicles)
-        if asked is None and self.asked is not None and all(name in self.asked for name in ids):
-            start, end = zip(*(self.asked[name] for name in ids), strict=True)
-            asked = BoundaryStates(np.array(start), np.array(end))
         if self.template is None or not set(ids) <= set(self.template):
             return Checker(self.road, asked, None, None, limits)
         at = {self.template.index(name): k for k, name in enumerate(ids)}
@@ -152,7 +145,7 @@ def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
             result.add(k, [*wrong, (UNUSABLE, str(error))], ())
             continue
         states = None
-        if entry is not None and namespace.entry(k):
+        if entry is not None:
             states = entry.asked(namespace.where(INFO), witness=scenario.witness is not None)
         scenario = together(scenario)
         is_lost = k in namespace.unknown and entry is None
@@ -185,19 +178,16 @@ def _reference(namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is
     Raises:
         InputError: a message of it is damaged.
     """
-    asked = namespace.asked_at(stamp)
     road = namespace.road_of(entry, stamp)
-    if is_lost:
-        asked = None
-        if namespace.roads_differ:
-            road = None
+    if is_lost and namespace.roads_differ:
+        road = None
     encounter = namespace.tracks_of(entry, stamp)
     if encounter is None:
-        return Reference(road, asked, None, (), None)
+        return Reference(road, None, (), None)
     segmentation = namespace.segmentation_of(encounter)
     conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
     waits = None  # without changepoints there is no dwell to hold: waits are not asked for
     if segmentation is not None:
         waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
-    return Reference(road, asked, names, tuple(conflicts), waits, orders_asked(conflicts, entry.order if entry else "keep"))
+    return Reference(road, names, tuple(conflicts), waits, orders_asked(conflicts, entry.order if entry else "keep"))

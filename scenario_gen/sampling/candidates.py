@@ -39,11 +39,12 @@ _APART = 0.05  # m, from which on two poses tell a curvature
 
 @dataclass(frozen=True)
 class Scale:
-    """Factors on the standard deviations of a candidate: across the route, along it, and in time."""
+    """Factors on the standard deviations of a candidate: across the route, along it, in time, and of each vehicle's own clock."""
 
     lateral: float = 1.0
     longitudinal: float = 1.0
     time: float = 1.0
+    own: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +80,7 @@ class VehicleModel:
         if self.freedom is not None:
             free = z[:, along:]
             own = self.freedom.clock.size
-            clock = self.freedom.clock.sample(free[:, :own], scale.time, shared, nominal)
+            clock = self.freedom.clock.sample(free[:, :own], scale.own, shared, nominal)
             deviation = deviation + scale.lateral * self.freedom.across(free[:, own])
             faster = scale.longitudinal * self.freedom.faster(free[:, own + 1 : own + 3], -0.8 * self.speed.mean[[0, -1]])
             if scale.lateral == 1.0:

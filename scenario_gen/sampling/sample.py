@@ -60,6 +60,7 @@ Progress = Callable[[int, int, int], None]  # of scenarios so far, scenarios wan
 OnValid = Callable[[Scenario, BoundaryStates, EgoSlot | None], None]  # a valid one, the states asked, what the ego is asked
 
 KEPT = 1000  # scenarios up to which a set stays in memory
+LEAST_COUNT = 20  # where clocks are free: scenarios for which candidates are drawn at least, so that levels can be tried
 PILOT = 2 * BLOCK  # candidates by which a level is judged
 DIRECTED_BUDGET = 10  # times the budget of a request without a target
 HOPELESS = 20 * BLOCK  # candidates of a proposal after which it is given up if none of them is valid and in the range
@@ -191,7 +192,7 @@ class _Loop:
     measures: Measures | None = None
     reached: Reached | None = None
     chosen_from: int = 0
-    keep: int = KEPT
+    keep: int = field(default_factory=lambda: KEPT)
     publish: bool = True
 
     def run_request(self, attempts: int, *, diverse: bool) -> None:
@@ -200,7 +201,7 @@ class _Loop:
         if diverse:
             self.count, self.keep, self.publish = wanted * POOL_SHARE, 0, False
         if self.aim is None:
-            self.run(attempts * self.count)
+            self.run(attempts * max(self.count, LEAST_COUNT if self.sampler.free else 1))
         else:
             self.run_directed(DIRECTED_BUDGET * attempts * self.count)
         if diverse:
@@ -344,9 +345,10 @@ class _Loop:
             self.adaptations.append("few candidates were valid, and smaller standard deviations did not help")
         elif tried > 1:
             s = LEVELS[best]
+            own = f", {s.own:g} of each vehicle's own clock" if self.sampler.free else ""
             self.adaptations.append(
                 f"few candidates were valid: standard deviations multiplied by {s.lateral:g} across the route, "
-                f"{s.longitudinal:g} along it, {s.time:g} in time"
+                f"{s.longitudinal:g} along it, {s.time:g} in time{own}"
             )
         if self.cancelled():
             self.adaptations.append("cancelled")

@@ -31,10 +31,10 @@ Label = Callable[[Scenario], dict[str, str]]
 
 LEVELS = (
     Scale(),
-    Scale(lateral=0.5),
-    Scale(lateral=0.5, longitudinal=0.5),
-    Scale(lateral=0.25, longitudinal=0.25, time=0.5),
-    Scale(lateral=0.1, longitudinal=0.1, time=0.25),
+    Scale(lateral=0.5, own=0.5),
+    Scale(lateral=0.5, longitudinal=0.5, own=0.25),
+    Scale(lateral=0.25, longitudinal=0.25, time=0.5, own=0.1),
+    Scale(lateral=0.1, longitudinal=0.1, time=0.25, own=0.03),
 )
 LEVEL_SIZE = 1 << 20  # candidates of one level whose indices follow each other
 LEVEL_SLOTS = 8  # levels that an index has room for; after them come the next LEVEL_SIZE candidates of the first
@@ -88,9 +88,14 @@ class Sampler:
         (whole,) = batch.scenarios(self.seed, [index], self.frame_id)
         return None if whole is None else self.published(whole)
 
+    @property
+    def free(self) -> bool:
+        """Whether vehicles have clocks of their own."""
+        return any(vehicle.freedom is not None for vehicle in self.model.vehicles)
+
     def undisturbed(self) -> Scenario | None:
         """The drive without deviations; None where nothing is free, or it has no speed profile."""
-        if all(vehicle.freedom is None for vehicle in self.model.vehicles):
+        if not self.free:
             return None
         return self.model.draw(np.zeros((1, self.model.size)), LEVELS[0]).scenarios(self.seed, [0], self.frame_id)[0]
 

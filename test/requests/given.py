@@ -35,7 +35,7 @@ class Given:
     seed: int
     fitting: FittingConfig = field(default_factory=FittingConfig)
     planning: PlanningConfig = field(default_factory=PlanningConfig)
-    sampling: SamplingConfig = field(default_factory=SamplingConfig)
+    sampling: SamplingConfig = field(default_factory=lambda: SamplingConfig(variety="narrow"))  # all states are as given
     limits: Limits = field(default_factory=Limits)
 
     @property

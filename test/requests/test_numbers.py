@@ -63,7 +63,7 @@ def tight(data):
     (log,) = (data / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn_*.csv")
     encounter = read_log(log).encounters[0]
     config = SamplingConfig(
-        lateral_sigma=0.3, observation_sigma=0.3, longitudinal_sigma=0.5, time_sigma=2.0, bend_acceleration=2.0
+        variety="narrow", lateral_sigma=0.3, observation_sigma=0.3, longitudinal_sigma=0.5, time_sigma=2.0, bend_acceleration=2.0
     )
     return Given(encounter, segment(encounter), build_road("t_intersection", encounter), 0, sampling=config)
 

@@ -30,6 +30,7 @@ from scenario_gen.recordings.write import write_recording
 from scenario_gen.results import provenance_of
 from scenario_gen.review.regenerate import regenerate_scenario, write_regenerated
 from scenario_gen.review.validation import validate_bag
+from scenario_gen.sampling import SamplingConfig
 from scenario_gen.storage.bag import read_messages
 from scenario_gen.storage.metadata import qos_yaml
 from scenario_gen.storage.writer import atomic_bag
@@ -43,7 +44,7 @@ REQUESTS = {"plain": Request(), "ego": Request(ego="1"), "moved": Request(goals=
 def bag(tmp_path_factory):
     """One bag, a namespace for each request."""
     (encounter,) = read_log([LOG]).encounters
-    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False))
+    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False), sampling=SamplingConfig(variety="narrow"))
     runs = {}
     for name, request in REQUESTS.items():
         case = generate(encounter, ROAD, config, count=3, seed=SEED, request=request)

@@ -48,7 +48,7 @@ def test_recorded_encounter(data, case, ablation):
     fit = fit_template(encounter, segmentation, road)
     routes = plan_routes(road, fit)
     conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
-    checker, config = Checker(road, fit.asked, conflicts, waits), SamplingConfig()
+    checker, config = Checker(road, fit.asked, conflicts, waits), SamplingConfig(variety="narrow")
     given = (encounter, segmentation, road, routes, fit.asked)
     found = sample_scenarios(*given, checker.check, config, count=30, seed=2, waits=waits)
     assert len(found.scenarios) == 30

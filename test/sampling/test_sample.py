@@ -15,10 +15,10 @@
 """Whole sets on hand-made routes: a straight crossed by a quarter turn, with a wait."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
+from sampling_scenes import CLOCK, route, scene, TIME, turn
 
 from scenario_gen.arrays import wrap_angle
 from scenario_gen.errors import InputError
@@ -28,60 +28,11 @@ from scenario_gen.sampling.candidates import Scale
 from scenario_gen.sampling.prepare import prepare
 from scenario_gen.sampling.sample import LEVEL_SIZE
 from scenario_gen.template.interaction import find_waits, Wait
-from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates, Cause, Verdict, Violation
-from scenario_gen.types.segmentation import Segmentation
 from scenario_gen.validity import Checker
 
-TIME = np.arange(201) * 0.1
-CHANGES = (60, 90, 140)
-CLOCK = TIME[[0, *CHANGES, 200]]
-
-
-def straight(length):
-    s = np.linspace(0.0, length, int(length / 0.4) + 2)
-    return np.column_stack([s, np.zeros_like(s), np.zeros_like(s)]), s
-
-
-def turn(before, radius, after):
-    """South to north, then a quarter turn to the left."""
-    total = before + 0.5 * np.pi * radius + after
-    s = np.linspace(0.0, total, int(total / 0.4) + 2)
-    angle = np.clip((s - before) / radius, 0.0, 0.5 * np.pi)
-    rest = np.maximum(s - before - 0.5 * np.pi * radius, 0.0)
-    x = 60.0 - radius * (1.0 - np.cos(angle)) - rest
-    y = -30.0 + np.minimum(s, before) + radius * np.sin(angle)
-    return np.column_stack([x, y, 0.5 * np.pi + angle]), s
-
-
-def route(points, s, speed):
-    driven = SpeedProfile(TIME, speed).state(CLOCK)[0]
-    anchor = np.searchsorted(s, driven - 1e-9).clip(0, len(s) - 1)
-    anchor[-1] = anchor[-1] if driven[-1] - driven[-2] < 1e-9 else len(s) - 1
-    return Route(points, anchor, s)
-
-
-@cache
-def scene(width=60.0):
-    """Vehicle 0 drives on, vehicle 1 waits from 7.0 s to 13.0 s, then turns left; vehicle 2 stands throughout."""
-    steady = np.full(201, 6.0) + np.sin(TIME / 3.0)
-    stopping = np.interp(TIME, [0.0, 4.0, 7.0, 13.0, 17.0, 20.0], [6.0, 6.0, 0.0, 0.0, 6.0, 6.0])
-    parts = [straight(SpeedProfile(TIME, steady).travelled[-1])]
-    total = SpeedProfile(TIME, stopping).travelled[-1]
-    parts.append(turn(35.0, 9.0, total - 35.0 - 4.5 * np.pi))
-    routes = [route(*part, speed) for part, speed in zip(parts, (steady, stopping), strict=True)]
-    routes.append(Route(np.array([[30.0, 15.0, 0.3]]), np.zeros(5, dtype=int), [0.0]))
-    speed = np.array([steady, stopping, np.zeros(201)])
-    vehicles = (Vehicle("a"), Vehicle("b"), Vehicle("c"))
-    encounter = Encounter("scene", vehicles, 0, 100_000_000, np.zeros((3, 201, 2)), np.zeros((3, 201)), speed)
-    segmentation = Segmentation(np.searchsorted(CHANGES, np.arange(201), side="right"), CHANGES, np.zeros(201), ("",) * 4)
-    road = Road("open", np.ones((int(2 * width), 500), dtype=bool), 0.5, [-50.0, -0.5 * width], [], [])
-    asked = BoundaryStates(
-        *(np.array([[*r.points[r.anchor[k]], v[k]] for r, v in zip(routes, speed, strict=True)]) for k in (0, -1))
-    )
-    return encounter, segmentation, road, tuple(routes), asked, (Wait(1, 7.0, 13.0),)
+PLAIN = SamplingConfig(variety="narrow", bend_acceleration=5.0)
 
 
 def all_valid(scenarios):
@@ -90,12 +41,12 @@ def all_valid(scenarios):
 
 def drawn(count=50, check=all_valid, config=None, seed=5):
     *head, waits = scene()
-    return sample_scenarios(*head, check, config or SamplingConfig(bend_acceleration=5.0), count=count, seed=seed, waits=waits)
+    return sample_scenarios(*head, check, config or PLAIN, count=count, seed=seed, waits=waits)
 
 
 def batch(samples=200, scale=None, **changes):
     *head, waits = scene(120.0)
-    model = prepare(*head, waits, SamplingConfig(bend_acceleration=5.0, **changes)).model
+    model = prepare(*head, waits, SamplingConfig(variety="narrow", bend_acceleration=5.0, **changes)).model
     return model, model.draw(np.random.default_rng(1).standard_normal((samples, model.size)), scale or Scale())
 
 
@@ -115,7 +66,7 @@ def test_grid_and_duration(fifty):
         assert np.array_equal(s.time, np.round(np.arange(len(s.time)) * 0.1, 9))
         assert 18.0 - 1e-9 <= s.time[-1] <= 22.0 + 1e-9
     assert len({len(s.time) for s in fifty.scenarios}) > 5
-    fixed = drawn(config=SamplingConfig(fixed_duration=True, bend_acceleration=5.0))
+    fixed = drawn(config=SamplingConfig(variety="narrow", fixed_duration=True, bend_acceleration=5.0))
     assert {s.time[-1] for s in fixed.scenarios} == {20.0}
 
 
@@ -168,7 +119,7 @@ def test_same_seed_same_bytes_and_any_one_again(fifty):
         assert a.position.tobytes() == b.position.tobytes() == c.position.tobytes()
         assert a.speed.tobytes() == b.speed.tobytes() == c.speed.tobytes()
     last = more.scenarios[-1]
-    one = regenerate(*head, SamplingConfig(bend_acceleration=5.0), seed=5, index=last.index, waits=waits)
+    one = regenerate(*head, PLAIN, seed=5, index=last.index, waits=waits)
     for name in ("time", "position", "heading", "speed", "acceleration"):
         assert getattr(one, name).tobytes() == getattr(last, name).tobytes()
     assert drawn(count=1, seed=6).scenarios[0].position.tobytes() != fifty.scenarios[0].position.tobytes()
@@ -184,17 +135,17 @@ def test_state_at_any_time_agrees_with_the_published_samples():
         between = some.states(np.linspace(0.0, s.time[-1], 5001))[:, k]
         for n in range(2):
             travelled = np.hypot(*np.diff(between[n, :, :2], axis=0).T).sum()
-            assert travelled == pytest.approx(some.arc[n][k, -1], abs=2e-3)
+            assert travelled == pytest.approx(some.drawn[n].arc[k, -1], abs=2e-3)
 
 
 def spread_across(b):
     """Mean standard deviation [m] of y on the straight."""
-    return float(b.curve[0][:, :, 1].std(axis=0).mean())
+    return float(b.drawn[0].curve[:, :, 1].std(axis=0).mean())
 
 
 def roughness(b):
     """Mean standard deviation of the slope of the lateral deviation on the straight."""
-    return float((b.curve[0][:, :, 3] / b.curve[0][:, :, 2]).std(axis=0).mean())
+    return float((b.drawn[0].curve[:, :, 3] / b.drawn[0].curve[:, :, 2]).std(axis=0).mean())
 
 
 @pytest.mark.parametrize(
@@ -215,7 +166,7 @@ def test_each_parameter_has_its_monotone_effect(name, values, measure, sign):
 
 def warped(b):
     """Times (S, K + 2) [s] of start, changepoints and end."""
-    return b.clock.time[:, np.searchsorted(b.clock.grid, CLOCK - 1e-9)]
+    return b.drawn[0].clock.time[:, np.searchsorted(b.drawn[0].clock.grid, CLOCK - 1e-9)]
 
 
 def stops(b):
@@ -227,15 +178,15 @@ def stops(b):
 def test_deviations_have_the_stated_standard_deviation():
     model, some = batch(4000, lateral_sigma=0.4, observation_sigma=10.0)
     middle = len(model.vehicles[0].path.node) // 2
-    assert some.curve[0][:, middle, 1].std() == pytest.approx(0.36, rel=0.05)  # tied down at both ends
+    assert some.drawn[0].curve[:, middle, 1].std() == pytest.approx(0.36, rel=0.05)  # tied down at both ends
 
 
 def test_clocks_are_monotone_and_shared_and_end_on_the_grid():
     _, some = batch(500, time_sigma=3.0)
-    rate = some.clock.rate
+    rate = some.drawn[0].clock.rate
     assert rate.min() > 0.7
     assert rate.max() < 1.4
-    assert np.abs(some.clock.time[:, -1] / 0.1 - np.round(some.clock.time[:, -1] / 0.1)).max() < 1e-9
+    assert np.abs(some.drawn[0].clock.time[:, -1] / 0.1 - np.round(some.drawn[0].clock.time[:, -1] / 0.1)).max() < 1e-9
     assert np.abs(rate[:, [0, -1]] - 1.0).max() < 1e-6  # speeds are given at both ends
 
 
@@ -244,9 +195,9 @@ def test_lateral_deviation_leaves_room_on_a_narrow_road():
     lane = np.zeros(road.drivable.shape, dtype=bool)
     lane[57:63] = True  # 1.5 m to either side of y = 0
     narrow = Road("lane", lane, 0.5, road.origin, [], [])
-    done = prepare(encounter, segmentation, narrow, routes, asked, waits, SamplingConfig())
+    done = prepare(encounter, segmentation, narrow, routes, asked, waits, SamplingConfig(variety="narrow"))
     some = done.model.draw(np.random.default_rng(0).standard_normal((500, done.model.size)), Scale())
-    assert np.abs(some.curve[0][..., 1]).max() < 1.5 - 0.5 * 1.9
+    assert np.abs(some.drawn[0].curve[..., 1]).max() < 1.5 - 0.5 * 1.9
     assert any("narrow" in sentence for sentence in done.adaptations)
 
 
@@ -263,17 +214,14 @@ def test_refusals_are_counted_by_cause_and_levels_are_tried():
     assert max(s.index for s in found.scenarios) >= LEVEL_SIZE
     *head, waits = scene()
     last = found.scenarios[-1]
-    assert (
-        regenerate(*head, SamplingConfig(bend_acceleration=5.0), seed=5, index=last.index, waits=waits).position.tobytes()
-        == last.position.tobytes()
-    )
+    assert regenerate(*head, PLAIN, seed=5, index=last.index, waits=waits).position.tobytes() == last.position.tobytes()
 
 
 def test_short_set_is_returned_with_its_account():
     def never(scenarios):
         return [Verdict((Violation(Cause.OVERLAP, 0.0, (0, 1), ""),)) for _ in scenarios]
 
-    found = drawn(count=10, check=never, config=SamplingConfig(attempts=5))
+    found = drawn(count=10, check=never, config=SamplingConfig(variety="narrow", attempts=5))
     assert found.scenarios == ()
     assert found.candidates == found.refused[Cause.OVERLAP] == 50
 
@@ -301,7 +249,7 @@ def test_nothing_is_given_out_after_a_cancellation():
 
 def test_a_wait_stands_where_the_vehicle_does_not_where_it_creeps():
     *head, _ = scene()
-    speed = prepare(*head, (Wait(1, 6.8, 13.2),), SamplingConfig()).model.vehicles[1].speed
+    speed = prepare(*head, (Wait(1, 6.8, 13.2),), SamplingConfig(variety="narrow")).model.vehicles[1].speed
     at_rest = speed.spline.breaks[speed.spline.design(speed.spline.breaks) @ speed.mean == 0.0]
     assert 7.0 <= at_rest[0] < 7.5
     assert 12.5 < at_rest[-1] <= 13.0
@@ -318,23 +266,22 @@ def test_a_creeping_wait_stays_slow_and_does_not_stand():
     waits = tuple(wait for wait in find_waits(creeping) if wait.vehicle == 1)
     assert [wait.creeps for wait in waits] == [True]
     given = (creeping, segmentation, road, (routes[0], own, routes[2]), BoundaryStates(asked.start, ends))
-    made = sample_scenarios(*given, all_valid, count=20, seed=1, waits=waits).scenarios
+    made = sample_scenarios(*given, all_valid, PLAIN, count=20, seed=1, waits=waits).scenarios
     verdicts = Checker(None, None, None, waits).check(made)
     assert not any(violation.cause is Cause.STOP_NOT_KEPT for verdict in verdicts for violation in verdict.violations)
     assert all((s.speed[1] > 0.0).all() for s in made)
-    stood = sample_scenarios(*given, all_valid, count=20, seed=1, waits=(replace(waits[0], creeps=False),)).scenarios
+    stood = sample_scenarios(*given, all_valid, PLAIN, count=20, seed=1, waits=(replace(waits[0], creeps=False),)).scenarios
     assert all((s.speed[1] == 0.0).sum() > 30 for s in stood)
 
 
 def test_stretched_clock_is_said():
     encounter, segmentation, road, routes, asked, waits = scene()
-    slow = SamplingConfig(max_speed=6.0)
+    slow = SamplingConfig(variety="narrow", max_speed=6.0)
     done = prepare(encounter, segmentation, road, routes, asked, waits, slow)
     assert done.model is not None
     assert any("stretched" in sentence for sentence in done.adaptations)
-    impossible = sample_scenarios(
-        encounter, segmentation, road, routes, asked, all_valid, SamplingConfig(max_speed=3.0), count=5, waits=waits
-    )
+    slowest = SamplingConfig(variety="narrow", max_speed=3.0)
+    impossible = sample_scenarios(encounter, segmentation, road, routes, asked, all_valid, slowest, count=5, waits=waits)
     assert impossible.refused[Cause.SPEED_PROFILE] == 1
     assert "cannot drive" in impossible.adaptations[0]
 

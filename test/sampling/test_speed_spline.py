@@ -129,7 +129,8 @@ def drawn(count=4000, sigma=0.8, jerk=3.0):
     model = speed_model(basis, mean, plain(basis), bounds, TIME, speed, sigma, 4.0)
     z = np.random.default_rng(3).standard_normal((count, model.size))
     longer = np.linspace(-0.2, 0.2, count)
-    return model, ends, longer, model.draw(z, longer, np.ones((count, len(model.time))), np.ones((count, 2)))
+    pace, same = np.ones((count, len(model.time))), np.ones((count, 2))
+    return model, ends, longer, model.draw(z, longer, pace, same, 0.0 * same)
 
 
 def test_draws_keep_ends_length_stands_and_bounds():
@@ -147,7 +148,7 @@ def test_draws_keep_ends_length_stands_and_bounds():
 def test_a_speed_that_is_given_holds_on_any_clock():
     model, ends, _, _ = drawn(1)
     pace = np.array([[0.9, 1.2]])
-    c, _ = model.draw(np.zeros((1, model.size)), np.zeros(1), np.ones((1, len(model.time))), pace)
+    c, _ = model.draw(np.zeros((1, model.size)), np.zeros(1), np.ones((1, len(model.time))), pace, np.zeros((1, 2)))
     assert c[0, [0, -1]] / pace[0] == pytest.approx(ends)
     assert model.spline.length @ (c[0] - model.mean) == pytest.approx(0.0, abs=1e-9)
 

@@ -123,7 +123,7 @@ def _while_there(scenario, road, asked, conflicts, waits, limits, dt):
             ]
             yield from oracle_violations(part, None, None, both if set(rows) <= set(always) else None, None, limits, dt)
             continue
-        states = None if asked is None else BoundaryStates(asked.start[rows], asked.end[rows])
+        states = None if asked is None else BoundaryStates(asked.start[rows], asked.end[rows], asked.freed[rows])
         wide = limits
         if rows[0] not in always:  # it comes and goes between two instants
             step = np.diff(part.time).max()
@@ -162,9 +162,10 @@ def _off_road(instants, position, heading, scenario, road):
 def _boundary(scenario, asked, limits):
     for name, k, states in (("start", 0, asked.start), ("end", -1, asked.end)):
         for i in range(len(scenario.vehicles)):
-            if np.linalg.norm(scenario.position[i, k] - states[i, :2]) > limits.position_tolerance + 1e-6:
+            free, faster = asked.freed[i, k]
+            if np.linalg.norm(scenario.position[i, k] - states[i, :2]) > limits.position_tolerance + free + 1e-6:
                 yield f"boundary_state: vehicle {i} {name} position"
-            if abs(scenario.speed[i, k] - states[i, 3]) > limits.speed_tolerance + 1e-6:
+            if abs(scenario.speed[i, k] - states[i, 3]) > limits.speed_tolerance + faster + 1e-6:
                 yield f"boundary_state: vehicle {i} {name} speed"
 
 
