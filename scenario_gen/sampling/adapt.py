@@ -33,6 +33,7 @@ Check = Callable[[Sequence[Scenario]], list[Verdict]]
 Cancelled = Callable[[], bool]
 
 
+MOST_BEYOND = 3.0  # s
 STARTS_INSIDE = 0.5  # s; who is in the shared area so soon has no way on which the other one could come first
 Judged = tuple[int, Scenario | None, Cause | None]  # an index, the candidate if it has a speed profile, why it is refused
 
@@ -79,7 +80,9 @@ def aim_of(encounter: Encounter, request: Request, measures: Measures | None) ->
         if closest is not None:
             names = tuple(encounter.vehicles[n].id for n in (closest.first, closest.second))
             targets = (Target("arrival_gap", -np.inf, 0.0, names), *targets)
-            beyond = closest.exit_first - closest.entry_first  # what goes first must have left when the other one comes
+            beyond = min(
+                closest.exit_first - closest.entry_first, MOST_BEYOND
+            )  # what goes first must have left when the other one comes
             if closest.entry_first <= STARTS_INSIDE:
                 note = f"; in the template vehicle {names[0]} is in the shared area {closest.entry_first:.1f} s after the start"
     if not targets:
@@ -192,7 +195,7 @@ def _stage(
         causes |= dict(zip(rows, found, strict=True))
         for k, cause in zip(rows, found, strict=True):
             checked, good = checked + 1, good + (cause is None)
-            seen.judge(k, cause)
+            seen.judge(aim, k, cause)
         in_range = bool(seen.distance[-1][rows[-1]] == 0.0)
         if level >= DIRECTED and good >= CHUNK // 2 and not in_range:
             break

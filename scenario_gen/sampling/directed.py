@@ -50,6 +50,7 @@ CHUNK = 16  # candidates that are checked together, the nearest to the range fir
 POOL = 256  # candidates of which the regression is made at most, the latest
 HORIZON = 10.0  # s; a time to collision above it says nothing
 _RIDGE = 0.1  # variance that the regression leaves to what is not linear, as a share of the response's
+_FEWEST = 8  # candidates of a regression, at least
 _PASSES = 3  # of the regression, each with the last one's squared coefficients as prior variances
 _INVALID = 1.0  # what is not valid, or not checked, counts as so much farther from the range
 _SPREAD = 1.25  # the proposal's standard deviations over the elite's
@@ -210,12 +211,14 @@ class Seen:
         self.valid.append(np.zeros(len(z), dtype=np.bool_))
         self._measure(aim, unit, len(self.z) - 1)
 
-    def judge(self, k: int, cause: Cause | None) -> None:
+    def judge(self, aim: Aim, k: int, cause: Cause | None) -> None:
         """Take in why candidate k of the last stage is refused; None: it is valid."""
         self.checked += 1
         self.valid[-1][k] = cause is None
         if cause is None:
             self.values.append(self.figures[-1][k])
+            if aim.holds(self.figures[-1][k]):
+                self.distance[-1][k] = 0.0  # though the search aims beyond
         else:
             self.refused[cause] += 1
 
@@ -234,7 +237,9 @@ class Seen:
 
     def _measure(self, aim: Aim, unit: Floats, stage: int) -> None:
         rows = zip(self.figures[stage], self.guides[stage].tolist(), strict=True)
-        self.distance[stage] = np.array([aim.distance(own, guides, unit.tolist()) for own, guides in rows])
+        distance = np.array([aim.distance(own, guides, unit.tolist()) for own, guides in rows])
+        taken = self.valid[stage] & np.array([aim.holds(own) for own in self.figures[stage]])
+        self.distance[stage] = np.where(taken, 0.0, distance)
 
     def hits(self) -> int:
         """How many are valid and in the range."""
@@ -271,12 +276,14 @@ def directions(z: Floats, guides: Floats) -> Floats:
         guides: (n, g) figures; rows with one that is not finite are left out.
     """
     known = np.isfinite(guides).all(axis=1)
-    rows = z[known] - z[known].mean(axis=0) if known.any() else z[known]
+    if known.sum() < _FEWEST:
+        return np.zeros((0, z.shape[1]))
+    rows = z[known] - z[known].mean(axis=0)
     found: list[Floats] = []
     for values in guides[known].T:
         response = values - values.mean()
-        variance = float(np.square(response).mean()) if len(response) else 0.0
-        if len(response) < 8 or variance < 1e-12:
+        variance = float(np.square(response).mean())
+        if variance < 1e-12:
             continue
         prior = np.full(rows.shape[1], 1.0 / rows.shape[1])
         for _ in range(_PASSES):
