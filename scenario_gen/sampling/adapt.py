@@ -33,6 +33,8 @@ Check = Callable[[Sequence[Scenario]], list[Verdict]]
 Cancelled = Callable[[], bool]
 
 
+MOST_BEYOND = 3.0  # s
+STARTS_INSIDE = 0.5  # s; who is in the shared area so soon has no way on which the other one could come first
 Judged = tuple[int, Scenario | None, Cause | None]  # an index, the candidate if it has a speed profile, why it is refused
 
 
@@ -72,17 +74,22 @@ def aim_of(encounter: Encounter, request: Request, measures: Measures | None) ->
     Raises:
         InputError: a target names a vehicle that does not exist, or nothing can be measured.
     """
-    targets = request.targets
+    targets, beyond, note = request.targets, 0.0, ""
     if request.order == "swap":
         closest = closest_crossing(_conflicts(encounter))
         if closest is not None:
             names = tuple(encounter.vehicles[n].id for n in (closest.first, closest.second))
             targets = (Target("arrival_gap", -np.inf, 0.0, names), *targets)
+            beyond = min(
+                closest.exit_first - closest.entry_first, MOST_BEYOND
+            )  # what goes first must have left when the other one comes
+            if closest.entry_first <= STARTS_INSIDE:
+                note = f"; in the template vehicle {names[0]} is in the shared area {closest.entry_first:.1f} s after the start"
     if not targets:
         return None
     if measures is None:
         raise InputError("a target or another order is asked for, but nothing is given that measures scenarios (`measures`)")
-    return Aim.of(targets, encounter, measures.figure)
+    return Aim.of(targets, encounter, measures.figure, beyond, note)
 
 
 def _conflicts(encounter: Encounter) -> tuple[Conflict, ...]:
@@ -188,7 +195,7 @@ def _stage(
         causes |= dict(zip(rows, found, strict=True))
         for k, cause in zip(rows, found, strict=True):
             checked, good = checked + 1, good + (cause is None)
-            seen.judge(k, valid=cause is None)
+            seen.judge(aim, k, cause)
         in_range = bool(seen.distance[-1][rows[-1]] == 0.0)
         if level >= DIRECTED and good >= CHUNK // 2 and not in_range:
             break

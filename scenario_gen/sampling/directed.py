@@ -23,6 +23,7 @@ standard deviations s, the rest stays as it is. So the weight of a candidate, ph
 One candidate in ten is drawn as without a target, which bounds every weight by ten.
 """
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import math
@@ -33,7 +34,7 @@ from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.errors import RefusedError
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.types.scenario import Cause, Scenario
 from scenario_gen.types.target import Pair, Target, UNITS
 
 Measure = Callable[[Scenario, str, Pair | None], float]  # a figure of a scenario; NaN if it has none
@@ -49,6 +50,7 @@ CHUNK = 16  # candidates that are checked together, the nearest to the range fir
 POOL = 256  # candidates of which the regression is made at most, the latest
 HORIZON = 10.0  # s; a time to collision above it says nothing
 _RIDGE = 0.1  # variance that the regression leaves to what is not linear, as a share of the response's
+_FEWEST = 8  # candidates of a regression, at least
 _PASSES = 3  # of the regression, each with the last one's squared coefficients as prior variances
 _INVALID = 1.0  # what is not valid, or not checked, counts as so much farther from the range
 _SPREAD = 1.25  # the proposal's standard deviations over the elite's
@@ -80,20 +82,26 @@ class Aim:
         targets: the ranges; at least one.
         pairs: the vehicles of each, None for the most critical pair.
         measure: returns a figure of a scenario.
+        beyond: by how much below the first target's upper bound the search aims; what is nearer to it is taken, too.
+        note: what a refusal says besides.
     """
 
     targets: tuple[Target, ...]
     pairs: tuple[Pair | None, ...]
     measure: Measure
+    beyond: float = 0.0
+    note: str = ""
 
     @classmethod
-    def of(cls, targets: tuple[Target, ...], encounter: Encounter, measure: Measure) -> "Aim":
+    def of(
+        cls, targets: tuple[Target, ...], encounter: Encounter, measure: Measure, beyond: float = 0.0, note: str = ""
+    ) -> "Aim":
         """Resolve the vehicles that the targets name.
 
         Raises:
             InputError: one of them does not exist.
         """
-        return cls(targets, tuple(target.pair(encounter) for target in targets), measure)
+        return cls(targets, tuple(target.pair(encounter) for target in targets), measure, beyond, note)
 
     @property
     def guided(self) -> int:
@@ -123,7 +131,8 @@ class Aim:
         total, k = 0.0, 0
         for target, value, unit in zip(self.targets, values, scale, strict=True):
             seen = min(value, HORIZON) if target.name == "ttc" else value
-            total += max(target.low - seen, seen - target.high, 0.0) / unit
+            high = target.high if target is not self.targets[0] else target.high - self.beyond
+            total += max(target.low - seen, seen - high, 0.0) / unit
             if target.name == "ttc":
                 total += 0.2 * guides[k + 1] if value > HORIZON else 0.0  # on no collision course: first as near as that
             k += 2 if target.name == "ttc" else 1
@@ -174,6 +183,7 @@ class Seen:
         proposals: one per stage, None for the natural distribution.
         values: the figures of those that were found valid.
         figures: those of the targets, of each candidate of each stage.
+        refused: why the checked ones that are not valid are not; checked: how many were.
     """
 
     z: list[Floats] = field(default_factory=list)
@@ -183,6 +193,8 @@ class Seen:
     proposals: list[Proposal | None] = field(default_factory=list)
     values: list[list[float]] = field(default_factory=list)
     figures: list[list[list[float]]] = field(default_factory=list)
+    refused: Counter[Cause] = field(default_factory=Counter)
+    checked: int = 0
 
     def add(self, aim: Aim, z: Floats, proposal: Proposal | None, drawn: Sequence[Scenario | None], unit: Floats) -> None:
         """Take in a stage's candidates, none of them checked yet.
@@ -207,11 +219,16 @@ class Seen:
         self.valid.append(np.zeros(len(z), dtype=np.bool_))
         self._measure(aim, unit, len(self.z) - 1)
 
-    def judge(self, k: int, *, valid: bool) -> None:
-        """Take in the verdict on candidate k of the last stage."""
-        self.valid[-1][k] = valid
-        if valid:
+    def judge(self, aim: Aim, k: int, cause: Cause | None) -> None:
+        """Take in why candidate k of the last stage is refused; None: it is valid."""
+        self.checked += 1
+        self.valid[-1][k] = cause is None
+        if cause is None:
             self.values.append(self.figures[-1][k])
+            if aim.holds(self.figures[-1][k]):
+                self.distance[-1][k] = 0.0  # though the search aims beyond
+        else:
+            self.refused[cause] += 1
 
     def scale(self) -> Floats:
         """Return the spread of each figure among the natural candidates (k,) [s, m or m/s], half of the middle two thirds."""
@@ -228,7 +245,9 @@ class Seen:
 
     def _measure(self, aim: Aim, unit: Floats, stage: int) -> None:
         rows = zip(self.figures[stage], self.guides[stage].tolist(), strict=True)
-        self.distance[stage] = np.array([aim.distance(own, guides, unit.tolist()) for own, guides in rows])
+        distance = np.array([aim.distance(own, guides, unit.tolist()) for own, guides in rows])
+        taken = self.valid[stage] & np.array([aim.holds(own) for own in self.figures[stage]])
+        self.distance[stage] = np.where(taken, 0.0, distance)
 
     def hits(self) -> int:
         """How many are valid and in the range."""
@@ -265,12 +284,14 @@ def directions(z: Floats, guides: Floats) -> Floats:
         guides: (n, g) figures; rows with one that is not finite are left out.
     """
     known = np.isfinite(guides).all(axis=1)
-    rows = z[known] - z[known].mean(axis=0) if known.any() else z[known]
+    if known.sum() < _FEWEST:
+        return np.zeros((0, z.shape[1]))
+    rows = z[known] - z[known].mean(axis=0)
     found: list[Floats] = []
     for values in guides[known].T:
         response = values - values.mean()
-        variance = float(np.square(response).mean()) if len(response) else 0.0
-        if len(response) < 8 or variance < 1e-12:
+        variance = float(np.square(response).mean())
+        if variance < 1e-12:
             continue
         prior = np.full(rows.shape[1], 1.0 / rows.shape[1])
         for _ in range(_PASSES):
@@ -304,13 +325,19 @@ def estimated(weights: Floats, candidates: int) -> tuple[float, float, float]:
     return share, max(0.0, share - half), min(1.0, share + half + (0.0 if len(weights) else 3.0 * most / candidates))
 
 
-def reachable(aim: Aim, values: Sequence[Sequence[float]]) -> str:
-    """Say which range of each target the valid candidates had."""
+def reachable(aim: Aim, seen_all: Seen) -> str:
+    """Say which range of each target the valid candidates had, or, where none of these has the figure, all of them."""
     said = []
     for k, target in enumerate(aim.targets):
-        seen = np.sort([row[k] for row in values if math.isfinite(row[k])])
+        seen = np.sort([row[k] for row in seen_all.values if math.isfinite(row[k])])
         if not len(seen):
-            said.append(f"{target.label}: no valid candidate has this figure")
+            every = [row[k] for stage in seen_all.figures for row in stage if math.isfinite(row[k])]
+            those = (
+                f"of {len(every)} others it is {min(every):.2f} to {max(every):.2f} {UNITS[target.name]}"
+                if every
+                else "nor any other"
+            )
+            said.append(f"{target.label}: no valid candidate has this figure, {those}")
             continue
         low, high = seen[int(0.05 * (len(seen) - 1))], seen[int(0.95 * (len(seen) - 1))]
         unit = UNITS[target.name]
@@ -318,4 +345,5 @@ def reachable(aim: Aim, values: Sequence[Sequence[float]]) -> str:
             f"{target.label} from {low:.2f} to {high:.2f} {unit} (5 % to 95 % of {len(seen)} valid candidates seen; "
             f"all: {seen[0]:.2f} to {seen[-1]:.2f} {unit})"
         )
-    return "; ".join(said)
+    causes = ", ".join(f"{number} × {cause.value}" for cause, number in seen_all.refused.most_common(3))
+    return "; ".join(said) + (f"; of {seen_all.checked} checked were refused: {causes}" if causes else "") + aim.note

@@ -274,7 +274,7 @@ class _Loop:
         if len(self.index) < self.count and not self.cancelled():
             said = f"target {'; '.join(map(str, aim.targets))}: "
             drawn = f"{made.candidates} candidates of {1 + made.stages} stage(s) and {self.candidates} more"
-            said += f"{len(self.index)} found in {drawn}; reachable: {reachable(aim, made.seen.values)}"
+            said += f"{len(self.index)} found in {drawn}; reachable: {reachable(aim, made.seen)}"
             if not self.index:
                 raise TargetError(said)
             self.adaptations.append(said)
