@@ -35,7 +35,8 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.trials import Outcome, Trial
 from scenario_gen.errors import InputError
 from scenario_gen.nodes.domain import free_domain, this_host_only
-from scenario_gen.nodes.traffic import Config, Traffic
+from scenario_gen.nodes.traffic import Traffic
+from scenario_gen.nodes.traffic_config import Config
 
 Progress = Callable[[int, int], None]
 START = 60.0  # seconds that a planner's node may take until it publishes commands

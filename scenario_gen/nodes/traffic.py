@@ -23,11 +23,9 @@ Topics, frames and units: msg_conventions/driving.py. What is wrong with the ego
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 import json
 from pathlib import Path
 from time import monotonic
-from typing import Any
 
 import numpy as np
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -36,7 +34,6 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from msg_conventions import driving
 from msg_conventions.autoware import EGO, OBJECTS
 from msg_conventions.diagnostics import Level
 from msg_conventions.ego import encode_state
@@ -44,7 +41,6 @@ from msg_conventions.hashes import hash_of
 from msg_conventions.paths import encode_path
 from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
-from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.results import write_verdicts
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
@@ -55,15 +51,8 @@ from scenario_gen.nodes.diagnostics import NodeDiagnostics
 from scenario_gen.nodes.ego_commands import FIRST_STAMP, Heard, INPUTS, stamp_of, understood, unusable
 from scenario_gen.nodes.ros_parameters import ConfigParameters
 from scenario_gen.nodes.topics import create_publisher, create_subscription, publish
-from scenario_gen.nodes.traffic_messages import (
-    encode_ego,
-    encode_odometries,
-    encode_poses,
-    encode_predictions,
-    encode_surroundings,
-    encode_verdict,
-)
-from scenario_gen.parameters import parameter, Parameters
+from scenario_gen.nodes.traffic_config import Config
+from scenario_gen.nodes.traffic_messages import encode_verdict, surroundings
 from scenario_gen.recordings.arriving import ArrivingScenarios, TOPICS
 from scenario_gen.types.names import tokens
 from scenario_gen.types.road import Road
@@ -71,27 +60,6 @@ from scenario_gen.types.road import Road
 OUTPUTS = ("/clock", "/tf", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
 LOOK_AROUND = 10  # steps between two looks at who commands the ego
 LOOK = 0.05  # seconds of real time between two looks at whether a wait is at its end
-GRID_EVERY = 0.2  # seconds of the drive between two local maps
-
-
-@dataclass(frozen=True)
-class Config(Parameters):
-    """The node's parameters; those of a drive are called drive.step, drive.policy and so on."""
-
-    bag: str = parameter("", "bag with scenarios; empty: they come live from `scenarios`, its `info` and `map`")
-    ego: str = parameter("", "id of the vehicle in whose place the ego drives; empty: the scenario's own ego slot, or its first")
-    index: int = parameter(0, "number of the first scenario, from 0, in the order of the bag", low=0)
-    rate: float = parameter(1.0, "how many times as fast as real time", low=0.01, high=1000.0)
-    lock_step: bool = parameter(False, "go one step for each call of ~/step, and not by a clock")
-    wait_for_ego: bool = parameter(True, "begin a drive with the ego's first command; else it brakes until one comes")
-    silence: float = parameter(0.5, "a command older than this is no command, and the ego brakes", unit="s", low=0.01)
-    patience: float = parameter(5.0, "in lock-step, wait so long for a command, in real time", unit="s", low=0.01)
-    follow_on: bool = parameter(True, "go on with the next scenario when one is over")
-    autoware: bool = parameter(
-        False, f"publish {OBJECTS} and {EGO}, too, as Autoware's planners take them; needs autoware_perception_msgs"
-    )
-    results: str = parameter("", "folder for drives.json and junit.xml, written anew after each drive; empty: none")
-    drive: ClosedLoopConfig = field(default_factory=ClosedLoopConfig)
 
 
 class Traffic(Node):  # type: ignore[misc]
@@ -117,8 +85,7 @@ class Traffic(Node):  # type: ignore[misc]
         self._arriving = ArrivingScenarios()
         self._verdict = ""
         self._out = {topic: create_publisher(self, topic) for topic in OUTPUTS}
-        self._odometry: dict[str, Any] = {}
-        self._autoware: dict[str, Any] = {}
+        self._autoware: tuple[str, ...] = ()
         for topic in INPUTS:
             create_subscription(self, topic, lambda data, topic=topic: self._hear(topic, data))
         for name, action in (("next", self._next), ("reset", self._reset), ("pause", self._pause), ("resume", self._resume)):
@@ -143,7 +110,8 @@ class Traffic(Node):  # type: ignore[misc]
         """
         config = self.config
         if config.autoware:
-            self._autoware = {topic: create_publisher(self, topic) for topic in (OBJECTS, EGO)}
+            self._autoware = (OBJECTS, EGO)
+            self._out |= {topic: create_publisher(self, topic) for topic in self._autoware}
         if config.bag:
             self._trials = read_trials(Path(config.bag), config.ego)
             if config.index >= len(self._trials):
@@ -195,8 +163,9 @@ class Traffic(Node):  # type: ignore[misc]
         self._names = tokens(vehicle.id for vehicle in scenario.vehicles)
         self._children = tuple(f"vehicle_{name}" for name in self._names)
         for name in self._names:
-            if name not in self._odometry:
-                self._odometry[name] = create_publisher(self, vehicle_topic(name, "odom"))
+            topic = vehicle_topic(name, "odom")
+            if topic not in self._out:
+                self._out[topic] = create_publisher(self, topic)
         task = self._loop.task()
         stamps = np.full(len(task.route), FIRST_STAMP, dtype=np.int64)
         self._publish("ego/goal", encode_state(task.goal, self._children[ego], scenario.frame_id, FIRST_STAMP))
@@ -341,33 +310,15 @@ class Traffic(Node):  # type: ignore[misc]
     def _publish(self, topic: str, data: bytes) -> None:
         publish(self, self._out[topic], data)
 
+    def _tell(self) -> None:
+        """Publish where everyone is now; the ego's odometry last, so that who answers it has heard of all else."""
+        if self._loop is not None:
+            for topic, data in surroundings(self._loop, self._states[-2:], self._names, self._autoware, self._is_heard):
+                self._publish(topic, data)
+
     def _is_heard(self, topic: str) -> bool:
         """Whether somebody listens: what is dear to make and not latched is made for nobody else."""
         return int(self._out[topic].get_subscription_count()) > 0
-
-    def _tell(self) -> None:
-        """Publish where everyone is now; the ego's odometry last, so that who answers it has heard of all else."""
-        loop, state = self._loop, self._states[-1]
-        if loop is None:
-            return
-        stamp, frame = stamp_of(state), loop.scenario.frame_id
-        self._publish("/clock", driving.encode_clock(stamp))
-        odometries = dict(encode_odometries(self._states[-2:], self._children, loop.config.step, frame))
-        own = odometries.pop(loop.ego)
-        for i, data in odometries.items():
-            publish(self, self._odometry[self._names[i]], data)
-        self._publish("/tf", encode_poses(state, self._children, frame))
-        vehicles = loop.scenario.vehicles
-        if self._is_heard("traffic/markers"):
-            markers = driving.encode_traffic_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp)
-            self._publish("traffic/markers", markers)
-        every = max(round(GRID_EVERY / loop.config.step), 1)
-        if state.step % every == 0 and loop.road is not None and self._is_heard("traffic/local_map"):
-            self._publish("traffic/local_map", encode_surroundings(loop, state))
-        for topic, publisher in self._autoware.items():
-            encode = encode_predictions if topic == OBJECTS else encode_ego
-            publish(self, publisher, encode(loop, self._states[-2:]))
-        publish(self, self._odometry[self._names[loop.ego]], own)
 
     def _say(self, level: Level, message: str, subject: str) -> None:
         self.diagnostics.status(level, message, subject, {}, log=False)

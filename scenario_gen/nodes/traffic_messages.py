@@ -14,20 +14,23 @@
 
 """What traffic says of a drive, as messages: where everyone is, and the verdict."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 import json
 
 import numpy as np
 
 from msg_conventions import driving
-from msg_conventions.autoware import encode_kinematic_state, encode_predicted_objects, HORIZON_NS, STEP_NS
+from msg_conventions.autoware import encode_kinematic_state, encode_predicted_objects, HORIZON_NS, OBJECTS, STEP_NS
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.frames import encode_frames
+from msg_conventions.topics import vehicle_topic
 from scenario_gen.arrays import Floats
 from scenario_gen.closed_loop.local_map import local_map
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.nodes.ego_commands import stamp_of
+
+GRID_EVERY = 0.2  # seconds of the drive between two local maps
 
 
 def encode_odometries(states: Sequence[State], children: Sequence[str], period: float, frame: str) -> Iterator[tuple[int, bytes]]:
@@ -99,3 +102,34 @@ def encode_verdict(node: str, outcome: Outcome, stamp_ns: int) -> bytes:
         values["first_faults"] = json.dumps(outcome.drive.faults[:5])
     level = Level.OK if verdict.passed else Level.ERROR
     return encode_diagnostics([Status(f"{node}: scenario {outcome.name}", level, verdict.sentence(), values)], stamp_ns)
+
+
+def surroundings(
+    loop: ClosedLoop, states: Sequence[State], names: Sequence[str], autoware: Sequence[str], is_heard: Callable[[str], bool]
+) -> Iterator[tuple[str, bytes]]:
+    """Yield the messages that tell of the last state, by topic; the ego's odometry comes last.
+
+    Args:
+        loop: the drive.
+        states: the last state, and the one before it if there is one.
+        names: tokens of the vehicles.
+        autoware: those of Autoware's topics that are wanted.
+        is_heard: whether somebody listens to a topic.
+    """
+    state, frame = states[-1], loop.scenario.frame_id
+    stamp, children = stamp_of(state), tuple(f"vehicle_{name}" for name in names)
+    yield "/clock", driving.encode_clock(stamp)
+    odometries = dict(encode_odometries(states, children, loop.config.step, frame))
+    own = odometries.pop(loop.ego)
+    for i, data in odometries.items():
+        yield vehicle_topic(names[i], "odom"), data
+    yield "/tf", encode_poses(state, children, frame)
+    if is_heard("traffic/markers"):
+        vehicles = loop.scenario.vehicles
+        yield "traffic/markers", driving.encode_traffic_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp)
+    every = max(round(GRID_EVERY / loop.config.step), 1)
+    if state.step % every == 0 and loop.road is not None and is_heard("traffic/local_map"):
+        yield "traffic/local_map", encode_surroundings(loop, state)
+    for topic in autoware:
+        yield topic, (encode_predictions if topic == OBJECTS else encode_ego)(loop, states)
+    yield vehicle_topic(names[loop.ego], "odom"), own

@@ -104,7 +104,7 @@ def curvature(two: Floats) -> Floats:
 
 
 def nearest_cell(clock: Clock, at: Floats) -> Ints:
-    """Indices of the clock's grid that are nearest to template times [s]."""
+    """Indices (k,) of the clock's grid that are nearest to template times (k,) [s]."""
     step = clock.grid[1] - clock.grid[0]
     return np.asarray(np.clip(np.round(at / step).astype(np.int64), 0, len(clock.grid) - 1))
 

@@ -161,7 +161,7 @@ class Proposal:
         return np.where(natural[:, None], z, z + step)
 
     def ratio(self, z: Floats) -> Floats:
-        """Return q(z) / phi(z) (S,) at samples z (S, d)."""
+        """Return q(z) / phi(z) (S,), a plain number, at samples z (S, d)."""
         u = exact.matmul(z, self.basis.T)
         power = 0.5 * (np.square(u) - np.square((u - self.mean) / self.sigma)).sum(axis=1)
         return np.asarray(NATURAL_SHARE + (1.0 - NATURAL_SHARE) * exact.exp(np.minimum(power, 600.0)) / np.prod(self.sigma))
@@ -197,7 +197,15 @@ class Seen:
     checked: int = 0
 
     def add(self, aim: Aim, z: Floats, proposal: Proposal | None, drawn: Sequence[Scenario | None], unit: Floats) -> None:
-        """Take in a stage's candidates, none of them checked yet; `unit` (k,) are those of the targets' distances."""
+        """Take in a stage's candidates, none of them checked yet.
+
+        Args:
+            aim: the targets.
+            z: (S, d) standard normal numbers, of unit 1.
+            proposal: what they were drawn with.
+            drawn: the candidates.
+            unit: (k,) s, m or m/s: the units of the targets' distances.
+        """
         figures = [None if scenario is None else aim.values(scenario) for scenario in drawn]
         guides = [
             [math.nan] * aim.guided if scenario is None or own is None else aim.guides(scenario, own)
@@ -223,7 +231,7 @@ class Seen:
             self.refused[cause] += 1
 
     def scale(self) -> Floats:
-        """Return the spread of each figure among the natural candidates (k,), half of the middle two thirds, in its own unit."""
+        """Return the spread of each figure among the natural candidates (k,) [s, m or m/s], half of the middle two thirds."""
         found = []
         for values in np.array(self.figures[0]).T:
             seen = np.sort(values[np.isfinite(values)])
@@ -231,7 +239,7 @@ class Seen:
         return np.asarray(np.maximum(np.array(found), 0.05))
 
     def rescale(self, aim: Aim, unit: Floats) -> None:
-        """Measure the distances of all candidates anew."""
+        """Measure the distances of all candidates anew, in units (k,) [s, m or m/s] of the targets."""
         for stage in range(len(self.z)):
             self._measure(aim, unit, stage)
 

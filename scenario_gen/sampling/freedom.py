@@ -50,7 +50,7 @@ _FASTEST = 0.5  # m/s by which a speed may leave what the template has near its 
 
 
 def cut(z: Floats, bound: float) -> Floats:
-    """Standard normal numbers cut at +-bound: the truncated normal number with the same probability, monotone in z."""
+    """Standard normal numbers (any shape) cut at +-bound: truncated normal ones with the same probability."""
     low = exact.ndtr(np.array(-bound))
     return np.asarray(exact.ndtri(low + (1.0 - 2.0 * low) * exact.ndtr(z)))
 

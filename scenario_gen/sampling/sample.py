@@ -155,6 +155,9 @@ def regenerate(
     """The scenario with this seed and index again, bit for bit, without the others; arguments as in `sample_scenarios`.
 
     One of a proposal needs `check` and `measures`, by which that is found again.
+
+    Raises:
+        InputError: no candidate has this index, or nothing is said of the target.
     """
     prepared = prepare(encounter, segmentation, road, routes, asked, waits, config)
     if prepared.model is None:

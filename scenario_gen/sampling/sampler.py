@@ -123,7 +123,7 @@ class Sampler:
         return float(self.proposal.weights(self.numbers(level, number)[row : row + 1])[0])
 
     def numbers(self, level: int, number: int) -> Floats:
-        """The numbers (BLOCK, size) of a block: standard normal ones, of a proposal moved by it."""
+        """The numbers (S, size) of a block of S = BLOCK candidates: standard normal ones, of a proposal moved by it."""
         if self.proposal is None or level < DIRECTED:
             return self._normal(level, number, self.model.size)
         z = self._normal(level, number, self.model.size + 1)

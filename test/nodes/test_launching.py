@@ -195,7 +195,7 @@ def test_a_drive_is_launched_with_its_parameters(domain, client, tmp_path):
     """The values that launch_ros would write for `traffic`: each is one of its parameters, and takes effect."""
     from rcl_interfaces.srv import GetParameters
 
-    from scenario_gen.nodes.traffic import Config
+    from scenario_gen.nodes.traffic_config import Config
 
     (only, *pictures) = launched("drive.launch.py", ego="2", policy="replay", lock_step="true", namespace="/a", rviz="true")
     assert (only.executable, only.namespace, [one.executable for one in pictures]) == ("traffic", "/a", ["rviz2"])
