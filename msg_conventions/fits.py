@@ -76,17 +76,6 @@ def decode_fit(data: bytes, what: str = "fit") -> tuple[int, str, BoundaryStates
     return message.stamp_ns, message.frame_id, BoundaryStates(start=state[:, 0], end=state[:, -1]), state[..., :3]
 
 
-def decode_asked(data: bytes, what: str = "fit") -> dict[str, tuple[Floats, Floats]]:
-    """Return the asked start and end (4,) x, y, yaw, speed by vehicle id.
-
-    Raises:
-        InputError: as `decode_fit`.
-    """
-    asked = decode_fit(data, what)[2]
-    vehicles = trajectory.decode(data, what).vehicles
-    return {vehicle.id: (asked.start[k], asked.end[k]) for k, vehicle in enumerate(vehicles)}
-
-
 def fit_statuses(fit: Fit, node: str, more: Mapping[str, str] | None = None, routes: Sequence[Route] = ()) -> tuple[Status, ...]:
     """Return what was decided: a status per vehicle, with figures of its route, one for the notes; each with what `more` says."""
     planned = [route.figures() for route in routes] or [{}] * len(fit.fitted)

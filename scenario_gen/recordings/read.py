@@ -36,7 +36,6 @@ from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import decode_info, encode_info, INFO, Info, RequestSummary, ScenarioEntry
 from msg_conventions.scenarios import decode_scenario, digest, messages_of
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.recordings.of_scenarios import decode_with_witness, joined_messages
 from scenario_gen.recordings.requests import RequestTracker
@@ -337,15 +336,6 @@ class Namespace:
         """
         data = self.newest("changepoints", encounter.start_ns)
         return decode_changepoints(data, encounter, self.where("changepoints")) if data else None
-
-    def asked_at(self, stamp_ns: int) -> dict[str, tuple[Floats, Floats]] | None:
-        """Return start and end (4,) x, y, yaw, speed by vehicle id of the newest `fit` of a stamp, None if there is none.
-
-        Raises:
-            InputError: a message is damaged.
-        """
-        data = self.newest("fit", stamp_ns)
-        return fits.decode_asked(data, self.where("fit")) if data else None
 
     def template_messages(self, entry: ScenarioEntry, stamp_ns: int) -> dict[str, BagMessage]:
         """Return what a scenario was made of, by topic: template, road, fit, routes, ego.

@@ -32,7 +32,7 @@ from scenario_gen.types.target import Target
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
 Cancelled = Callable[[], bool]
 
-
+ANY = 1 << 30  # conflicts: with one clock for all a road alone says which there are
 MOST_BEYOND = 3.0  # s
 STARTS_INSIDE = 0.5  # s; who is in the shared area so soon has no way on which the other one could come first
 Judged = tuple[int, Scenario | None, Cause | None]  # an index, the candidate if it has a speed profile, why it is refused
@@ -44,7 +44,7 @@ class Judge:
 
     Attributes:
         check: the validity checker.
-        absent: conflicts of the template that the road or the clock of all leaves out; no candidate may lose more.
+        absent: conflicts of the template that the undisturbed drive leaves out; where clocks are free none may lose more.
         enough: share of valid candidates from which on a level of standard deviations is good enough.
     """
 
@@ -56,7 +56,7 @@ class Judge:
     def of(cls, sampler: Sampler, check: Check, enough: float) -> "Judge":
         """Look what the drive without deviations loses."""
         undisturbed = sampler.undisturbed()
-        return cls(check, 0 if undisturbed is None else check([undisturbed])[0].not_applicable, enough)
+        return cls(check, ANY if undisturbed is None else check([undisturbed])[0].not_applicable, enough)
 
     def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
         """Return the first cause for which each scenario is refused, None for a valid one."""

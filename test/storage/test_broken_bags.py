@@ -174,7 +174,7 @@ def changed(bag, target, change):
     return target
 
 
-@pytest.mark.parametrize("topic", ["/tracks", "/map", "/fit", "/changepoints", "/scenarios/info", "/scenarios"])
+@pytest.mark.parametrize("topic", ["/tracks", "/map", "/changepoints", "/scenarios/info", "/scenarios"])
 @pytest.mark.parametrize("damage", ["cut", "length", "other type", "empty"])
 def test_damaged_messages_are_named_or_found(tmp_path, topic, damage):
     bag = write_recording(tmp_path / "bag", hand_made_run())
