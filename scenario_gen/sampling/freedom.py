@@ -41,7 +41,8 @@ _RAMP, _RAMP_SHARE = (
     1.0 / 3.0,
 )  # s, and share of the duration: over which an own clock leaves the shared one where states are asked
 _TAPER = 30.0  # m, over which a vehicle goes to its place in the lane
-_LEAST_STAND, _LEAST_SHARE = 1.5, 0.5  # s and share of a wait that is left of it; of a speed, while acceleration dies away
+_LEAST_STAND, _SHORTER = 1.5, 0.3  # s that are left of a wait, and share by which it is shorter at most: clocks run forward
+_LEAST_SHARE = 0.5  # of a speed, that is left while acceleration dies away
 FADES, _LEAST_FADES = 0.7, 0.4  # s, in which it does
 EASES = 4.0  # m, in which curvature does
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
@@ -137,7 +138,7 @@ class OwnClock:
         length = np.array([b - a for a, b in rests])
         none = np.zeros((0, len(grid)))
         most = config.freedom * config.wait_sigma
-        shortest = np.maximum(np.minimum(_LEAST_SHARE * length, length - _LEAST_STAND), 0.0)
+        shortest = np.maximum(np.minimum(_SHORTER * length, length - _LEAST_STAND), 0.0)
         return cls(
             shift,
             about * shift,
