@@ -48,6 +48,7 @@ class Job:
     roads: tuple[str, ...]
     own: tuple[bool, ...]
     count: int
+    variety: str = "narrow"  # the sampler's preset, where it has several
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +119,7 @@ def run(job: Job) -> Iterator[Made]:
         return
     encounter = max(found, key=lambda one: one.duration)
     for road, own in zip(job.roads, job.own, strict=True):
-        yield generated(job.name, encounter, road, job.count, own=own)
+        yield generated(job.name, encounter, road, job.count, own=own, variety=job.variety)
 
 
 def generated(name: str, encounter: Any, road: str, count: int, *, own: bool, variety: str = "narrow") -> Made:

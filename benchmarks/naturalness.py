@@ -132,6 +132,7 @@ def run(
     details: str | None = None,
     pictures: str | None = None,
     checkout: str | None = None,
+    variety: str = "narrow",
     *,
     held_out: bool = False,
 ) -> list[Row]:
@@ -143,6 +144,7 @@ def run(
         details: file to which a line of JSON per case is written.
         pictures: folder for a picture of each of the first ten cases.
         checkout: folder of another checkout that is measured.
+        variety: the sampler's preset.
         held_out: take the random cuts that are kept apart.
     """
     chosen = cuts()[1] if held_out else [*cuts()[0], *recorded(DATA)]
@@ -150,7 +152,7 @@ def run(
     if not chosen:
         return [Row("recorded encounters", 0.0, "cases", "higher", 1.0, "no recorded data (SCENARIO_GEN_DATA)")]
     names = roads.split(",") if roads else ["corridor"] if cases else ["corridor", "map", *ROADS]
-    jobs = [_job(cut, names, FEW if cases else COUNT) for cut in chosen[:LOGS][:cases]]
+    jobs = [_job(cut, names, FEW if cases else COUNT, variety) for cut in chosen[:LOGS][:cases]]
     rng = np.random.default_rng(0)
     found: list[Case] = []
     print(HEADER, file=sys.stderr, flush=True)
@@ -181,14 +183,14 @@ def _still(found: Sequence[Case], before: Sequence[list[str]]) -> list[Row]:
     return [Row("encounters and roads that generate at 665a212 and still do", share, "share", "higher", 0.85, told)]
 
 
-def _job(cut: Cut, names: Sequence[str], count: int) -> Job:
+def _job(cut: Cut, names: Sequence[str], count: int, variety: str) -> Job:
     """Where a cut is read from, and the roads that it is put on."""
     own_map = str(DATA / "maps" / "occupancy_grids" / f"{cut.map}.yaml") if cut.map else ""
     roads = [own_map if name == "map" else name for name in names]
     roads = [name for name in roads if name]
     own = tuple(name in ("corridor", own_map) for name in roads)
     paths = tuple(str(DATA / "trajectories" / file) for file in cut.files)
-    return Job(cut.name, paths, cut.vehicles, cut.start, cut.end, tuple(roads), own, count)
+    return Job(cut.name, paths, cut.vehicles, cut.start, cut.end, tuple(roads), own, count, variety)
 
 
 def figures(found: Sequence[Case], before: dict[str, float]) -> list[Row]:

@@ -90,13 +90,14 @@ class Case:
         self, request: Request = Request(), count: int = COUNT, config: SamplingConfig = SamplingConfig(), **more: Any
     ) -> tuple[ScenarioSet, float]:
         """Sample; return the set and the CPU seconds that it took."""
-        encounter, _, road, _ = self.given
+        encounter, segmentation, road, routes = self.given
         asked = freed_states(self.states, encounter, config, request)
         begun = process_time()
         check = Checker.of_template(encounter, road, asked, self.waits, None, request.order).check
         made = sample_scenarios(
-            *self.given, asked, check, config, count=count, waits=self.waits, request=request, measures=MEASURES, **more
-        )
+            encounter, segmentation, road, routes, asked, check, config,
+            count=count, waits=self.waits, request=request, measures=MEASURES, **more,
+        )  # fmt: skip
         return made, process_time() - begun
 
 

@@ -23,17 +23,17 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, wrap_angle
+from scenario_gen.checked import sample_checked
 from scenario_gen.config import PipelineConfig
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError, ScenarioGenError
-from scenario_gen.evaluation import MEASURES
 from scenario_gen.fitting import fit_template
 from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room
 from scenario_gen.roads.ways import draw_route
 from scenario_gen.routing import plan_routes
-from scenario_gen.sampling import Cancelled, freed_states, OnValid, Progress, sample_scenarios
+from scenario_gen.sampling import Cancelled, OnValid, Progress
 from scenario_gen.sampling.directed import TargetError
-from scenario_gen.template.interaction import Wait, waits_to_keep
+from scenario_gen.template.interaction import Wait
 from scenario_gen.template.separation import footprint_gap
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.generation import GenerationResult
@@ -41,7 +41,6 @@ from scenario_gen.types.names import vehicle_index
 from scenario_gen.types.request import ENDS, Request, State
 from scenario_gen.types.road import Road
 from scenario_gen.types.segmentation import Segmentation
-from scenario_gen.validity import Checker
 
 BISECTIONS = 7
 ENOUGH = 10  # valid scenarios by which a request counts as possible, if not fewer are wanted
@@ -147,17 +146,13 @@ def attempt(
     Raises:
         InputError, RefusedError: as the stages.
     """
-    waits = waits_to_keep(encounter, segmentation) if waits is None else waits
     fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
     routes = plan_routes(road, fit, config.planning, seed)
-    fit = replace(fit, asked=freed_states(fit.asked, encounter, config.sampling, request))
-    check = Checker.of_template(encounter, road, fit.asked, waits, config.limits, request.order).check
-    generated = sample_scenarios(
-        encounter, segmentation, road, routes, fit.asked, check, config.sampling,
-        count=count, seed=seed, waits=waits, request=request, progress=progress, cancelled=cancelled, found=found,
-        measures=MEASURES,
+    planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed)
+    return sample_checked(
+        planned, config.sampling, config.limits, request,
+        count=count, waits=waits, progress=progress, cancelled=cancelled, found=found,
     )  # fmt: skip
-    return GenerationResult(encounter, segmentation, road, fit, routes, generated, seed)
 
 
 class _Search:

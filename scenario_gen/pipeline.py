@@ -14,24 +14,27 @@
 
 """The whole method on one screen: an encounter and a road in, valid new scenarios and their evaluation out."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
+from scenario_gen.checked import sample_checked
 from scenario_gen.config import PipelineConfig
 from scenario_gen.errors import RefusedError
-from scenario_gen.evaluation import coverage_of, evaluate, MEASURED, MEASURES, replay, uniform_changepoints, without_changepoints
+from scenario_gen.evaluation import coverage_of, evaluate, MEASURED, replay, uniform_changepoints, without_changepoints
 from scenario_gen.fitting import fit_template
 from scenario_gen.nearest import attempt, nearest_if_impossible
 from scenario_gen.roads import build_road
 from scenario_gen.routing import plan_routes
-from scenario_gen.sampling import freed_states, Progress, sample_scenarios
+from scenario_gen.sampling import Progress
 from scenario_gen.segmentation import segment
-from scenario_gen.template.interaction import waits_to_keep
 from scenario_gen.template.size import refuse_too_large
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.generation import GenerationResult, NARROW, UNIFORM, WITHOUT
 from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road
-from scenario_gen.validity import Checker
+from scenario_gen.types.scenario import ScenarioSet
+from scenario_gen.types.segmentation import Segmentation
 
 __all__ = ["PipelineConfig", "generate", "with_evaluation", "with_references"]
 
@@ -70,14 +73,8 @@ def generate(
     with nearest_if_impossible(encounter, segmentation, road, config, request, count=count, seed=seed):
         fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
         routes = plan_routes(road, fit, config.planning, seed)
-        waits = waits_to_keep(encounter, segmentation)
-        fit = replace(fit, asked=freed_states(fit.asked, encounter, config.sampling, request))
-        check = Checker.of_template(encounter, road, fit.asked, waits, config.limits, request.order).check
-        generated = sample_scenarios(
-            encounter, segmentation, road, routes, fit.asked, check, config.sampling,
-            count=count, seed=seed, waits=waits, request=request, progress=progress, measures=MEASURES,
-        )  # fmt: skip
-    made = GenerationResult(encounter, segmentation, road, fit, routes, generated, seed)
+        planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed)
+        made = sample_checked(planned, config.sampling, config.limits, request, count=count, progress=progress)
     return with_evaluation(with_references(made, config, request), config)
 
 
@@ -93,27 +90,24 @@ def with_references(
     are made than are measured.
     """
     road, fit = made.placed()
-    plain = request.plain
-    others = {WITHOUT: without_changepoints(made.segmentation)}
+    plain, seed, few = request.plain, made.seed, min(made.generated.requested, MEASURED)
+    narrow = replace(config, sampling=replace(config.sampling, variety="narrow"))
+
+    def similar() -> ScenarioSet:
+        return sample_checked(made, narrow.sampling, narrow.limits, plain, count=few).generated
+
+    def with_changepoints(segmentation: Segmentation) -> ScenarioSet:
+        return attempt(made.encounter, segmentation, road, narrow, plain, count=few, seed=seed, waits=()).generated
+
+    rows: dict[str, Callable[[], ScenarioSet]] = {WITHOUT: partial(with_changepoints, without_changepoints(made.segmentation))}
     if config.sampling.variety == "wide":
-        others[NARROW] = made.segmentation
-        config = replace(config, sampling=replace(config.sampling, variety="narrow"))
+        rows[NARROW] = similar
     if config.evaluation.uniform and made.segmentation.changepoints.size:
-        others[UNIFORM] = uniform_changepoints(made.segmentation)
+        rows[UNIFORM] = partial(with_changepoints, uniform_changepoints(made.segmentation))
     references, refusals = {}, {}
-    few = min(made.generated.requested, MEASURED)
-    for name, segmentation in others.items():
+    for name, make in rows.items():
         try:
-            references[name] = attempt(
-                made.encounter,
-                segmentation,
-                road,
-                config,
-                plain,
-                count=few,
-                seed=made.seed,
-                waits=None if name == NARROW else (),
-            ).generated
+            references[name] = make()
         except RefusedError as error:
             refusals[name] = str(error)
     oracle = replay(made.encounter, fit, road.frame_id)

@@ -56,6 +56,7 @@ ORDER = (
     ("validity",),
     ("evaluation",),
     ("config",),
+    ("checked",),
     ("nearest",),
     ("pipeline",),
     ("report",),

@@ -283,7 +283,7 @@ def _pet(drive: Drive) -> float:
         vehicles = (motion.vehicles[ego], motion.vehicles[i])
         position, heading = motion.position[pair][:, part], motion.heading[pair][:, part]
         conflicts = find_conflicts(vehicles, motion.time[part], position, heading)
-        found += [one.entry_second - one.exit_first for one in conflicts if not one.following]
+        found += [one.encroachment for one in conflicts if not one.following]
     return min(found, default=math.nan)
 
 

@@ -59,7 +59,7 @@ def criticality(motion: Motion, horizon: float) -> Criticality:
     pairs = [(a, b, motion.together(a, b)) for a, b in combinations(range(len(motion.vehicles)), 2)]
     pairs = [(a, b, both) for a, b, both in pairs if both.stop > both.start]
     conflicts = find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading, motion.present)
-    encroachments = [c.entry_second - c.exit_first for c in conflicts if not c.following]
+    encroachments = [c.encroachment for c in conflicts if not c.following]
     return Criticality(
         min_distance=min((float(footprint_distance(motion, a, b)[both].min()) for a, b, both in pairs), default=float("nan")),
         min_ttc=min((horizon, *(float(time_to_collision(motion, a, b)[both].min()) for a, b, both in pairs)))

@@ -90,7 +90,7 @@ def figures_of(scenario: Scenario | Encounter) -> tuple[PairFigures, ...]:
         pet, arrival, first = math.nan, math.nan, None
         if conflict is not None:
             first = conflict.first
-            pet, arrival = conflict.entry_second - conflict.exit_first, conflict.entry_second - conflict.entry_first
+            pet, arrival = conflict.encroachment, conflict.arrival_gap
         ttc, gap = _figure(motion, "ttc", a, b), _figure(motion, "gap", a, b)
         found.append(PairFigures((a, b), first, pet, arrival, ttc, gap, _closing_speed(motion, a, b, conflict)))
     return tuple(found)
@@ -141,9 +141,8 @@ def _figure(motion: Motion, name: str, a: int, b: int) -> float:
     if conflict is None:
         return math.nan
     if name == "pet":
-        return conflict.entry_second - conflict.exit_first
-    arrival = conflict.entry_second - conflict.entry_first
-    return arrival if conflict.first == a else -arrival
+        return conflict.encroachment
+    return conflict.arrival_gap if conflict.first == a else -conflict.arrival_gap
 
 
 def _closing_speed(motion: Motion, a: int, b: int, conflict: Conflict | None) -> float:

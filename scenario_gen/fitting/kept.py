@@ -125,7 +125,7 @@ def _lost_conflicts(encounter: Encounter, poses: Floats) -> list[Loss]:
             )
         elif before[pair].first != after[pair].first and not before[pair].following:
             first, second = vehicles[before[pair].first].id, vehicles[before[pair].second].id
-            late = abs(after[pair].entry_second - after[pair].entry_first)
+            late = abs(after[pair].arrival_gap)
             lost.append(
                 Loss("order", (a, b), f"vehicle {first} goes before {second} in the template, {late:.1f} s after it on this road")
             )

@@ -23,20 +23,19 @@ from msg_conventions.pictures import encode_footprint, scenario_markers
 from msg_conventions.scenario_info import encode_info, INFO, request_summary, RequestSummary, scenario_entry
 from msg_conventions.scenarios import encode_scenario, messages_of
 from msg_conventions.topics import vehicle_topic
-from scenario_gen.evaluation.measures import MEASURES
+from scenario_gen.checked import sample_checked
 from scenario_gen.fitting import FittingConfig
 from scenario_gen.parameters import parameter
 from scenario_gen.recordings.provenance import parameter_texts, versions
 from scenario_gen.recordings.template import decode_template
 from scenario_gen.routing import PlanningConfig
-from scenario_gen.sampling import freed_states, sample_scenarios, SamplingConfig
-from scenario_gen.template.interaction import waits_to_keep
+from scenario_gen.sampling import SamplingConfig
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.names import tokens
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import BoundaryStates, EgoSlot, Scenario, ScenarioSet
-from scenario_gen.validity import Checker, Limits
+from scenario_gen.validity import Limits
 
 Answer = tuple[GenerationResult, RequestSummary]  # what a request came to; its scenarios are published by then
 Send = Callable[[str, bytes], None]  # of topic and CDR bytes
@@ -135,7 +134,7 @@ def answer_request(
         RefusedError: what is asked cannot be had; the message says why, and what nearby can.
     """
     template = decode_template(messages)
-    encounter, segmentation, (road, fit) = template.encounter, template.segmentation, template.placed()
+    encounter, segmentation, (road, _) = template.encounter, template.segmentation, template.placed()
 
     def advance(done: int, _total: int, candidates: int) -> None:
         progress(done, candidates, encounter.start_ns)
@@ -153,15 +152,10 @@ def answer_request(
                 *given, count=config.count, seed=config.seed, progress=advance, cancelled=cancelled, found=out.scenario
             )
     else:
-        waits = waits_to_keep(encounter, segmentation)
-        asked = freed_states(fit.asked, encounter, config.sampling, config)
-        check = Checker.of_template(encounter, road, asked, waits, config.limits, config.order).check
-        generated = sample_scenarios(
-            encounter, segmentation, road, template.routes, asked, check, config.sampling, count=config.count,
-            seed=config.seed, waits=waits, request=config, progress=advance, cancelled=cancelled, found=out.scenario,
-            measures=MEASURES,
+        made = sample_checked(
+            replace(template, seed=config.seed), config.sampling, config.limits, config,
+            count=config.count, progress=advance, cancelled=cancelled, found=out.scenario,
         )  # fmt: skip
-        made = replace(template, generated=generated, seed=config.seed)
     result = made.generated
     provenance = parameter_texts(config) | versions() | hashes
     stopped = cancelled() and len(result.scenarios) < result.requested

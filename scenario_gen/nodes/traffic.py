@@ -209,10 +209,13 @@ class Traffic(Node):  # type: ignore[misc]
     # --- steps ------------------------------------------------------------------------------------------------
 
     def _tick(self) -> None:
-        if self._loop is None or self._paused or (self._heard is None and self.config.wait_for_ego):
-            return
-        if not self._verdict:
+        if self._loop is not None and not (self._paused or self._waits_for_ego or self._verdict):
             self._advance(self._loop)
+
+    @property
+    def _waits_for_ego(self) -> bool:
+        """Whether the drive begins with the ego's first command, and none has come."""
+        return self._heard is None and (self.config.wait_for_ego or self.config.lock_step)
 
     def _advance(self, loop: ClosedLoop) -> None:
         asked, note = self._command(self._states[-1])
@@ -330,9 +333,9 @@ class Traffic(Node):  # type: ignore[misc]
             self._say(Level.WARN, f"there is no scenario yet{waiting}", "driving")
             return
         state, trial = self._states[-1], self._trials[self._at]
-        doing = self._verdict or ("paused" if self._paused else "waiting for the ego" if self._heard is None else "driving")
+        doing = self._verdict or ("paused" if self._paused else "waiting for the ego" if self._waits_for_ego else "driving")
         self._say(Level.OK, f"scenario {trial.name}, {state.time:.1f} s: {doing}", "driving")
-        if self._heard is None and not self._verdict:
+        if self._waits_for_ego and not self._verdict:
             self._tell()  # who came late has not heard where everyone is
         if not state.fault and not (self._heard and self._heard.fault):
             self.diagnostics.resolve("ego")

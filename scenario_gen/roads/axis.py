@@ -21,8 +21,6 @@ from scenario_gen.roads.shaped import bends, main_axis
 from scenario_gen.template.frenet import main_line, to_frenet
 from scenario_gen.template.tracks import Track
 
-_ROOM = 6.0  # metres straight on at both ends, as roads/shaped.py draws it
-
 
 def bent_axis(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> Curve | None:
     """The dividing line of the main road that `draw_bent` draws for a template; None if the road `name` is not drawn so."""
@@ -30,5 +28,4 @@ def bent_axis(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> Curve
         main = main_line(to_frenet(tracks), tracks)
     except RefusedError:  # a junction's template
         return None
-    run = max(config.arm_length - main.shape.length / 2.0, _ROOM) if config.arm_length else _ROOM
-    return main_axis(name, main, run) if bends(name, main) else None
+    return main_axis(name, main, config) if bends(name, main) else None

@@ -90,8 +90,7 @@ def draw_along(name: str, main: MainLine, lanes: int, config: RoadConfig) -> Roa
         RefusedError: it has more cells than are allowed.
     """
     half = lanes * config.lane_width
-    run = max(config.arm_length - main.shape.length / 2.0, _ROOM) if config.arm_length else _ROOM
-    line = main_axis(name, main, run)
+    line = main_axis(name, main, config)
     sketch = Sketch()
     sketch.strip(line, -half, half)
     arms = [_ArmPlan(line.points[k] + np.array([0.0, 0.0, np.pi if k == 0 else 0.0]), lanes, lanes) for k in (0, -1)]
@@ -113,8 +112,9 @@ def draw_along(name: str, main: MainLine, lanes: int, config: RoadConfig) -> Roa
     return _finished(name, sketch, arms, config)
 
 
-def main_axis(name: str, main: MainLine, run: float) -> Curve:
-    """The dividing line of the main road: `run` metres straight on at both ends of the main line; a curve bends."""
+def main_axis(name: str, main: MainLine, config: RoadConfig) -> Curve:
+    """The dividing line of the main road: straight on at both ends of the main line for its arms; a curve bends."""
+    run = max(config.arm_length - main.shape.length / 2.0, _ROOM) if config.arm_length else _ROOM
     own = float(main.shape.points[-1, 2] - main.shape.points[0, 2])
     extra = float(np.copysign(_BEND, own)) - own if name == "curve" and abs(own) < _BEND else 0.0
     return extended(main.shape, extra, run)

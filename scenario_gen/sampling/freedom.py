@@ -17,7 +17,8 @@
 Every vehicle has a clock of its own: the shared one, shifted by a_n, faster or slower by a share p_n, and standing longer or
 shorter by q_n in each wait. A scenario is the stretch of time in which all clocks run, so one mechanism frees where and how fast
 a vehicle starts, who arrives when, how long it waits, and where and when the scenario ends. What was asked for stays: where a
-start or an end state is asked of any vehicle, all own clocks agree with the shared one there.
+start or an end state is asked of any vehicle, shift and pace of all own clocks die away there. A wait of another length still
+moves its vehicle's end; where ends are asked, the checker refuses what that moves too far.
 """
 
 from collections.abc import Sequence
@@ -36,10 +37,8 @@ from scenario_gen.types.scenario import BoundaryStates
 CATALOGUE = ((3.60, 1.62), (4.05, 1.75), (4.25, 1.79), (4.46, 1.83), (4.63, 1.83), (4.69, 1.85), (4.77, 1.88), (4.96, 1.93))
 """Length and width [m] of cars, each as likely: our choice of typical ones, from a city car to a large saloon."""
 _CARS = 3.2, 5.4  # m: a vehicle of such a length gets the size of another car
-_RAMP, _RAMP_SHARE = (
-    6.0,
-    1.0 / 3.0,
-)  # s, and share of the duration: over which an own clock leaves the shared one where states are asked
+_RAMP = 6.0  # s, over which an own clock leaves the shared one where states are asked
+_RAMP_SHARE = 1.0 / 3.0  # of the duration, or of a way, that this takes at most
 _TAPER = 30.0  # m, over which a vehicle goes to its place in the lane
 _LEAST_STAND, _SHORTER = 1.5, 0.3  # s that are left of a wait, and share by which it is shorter at most: clocks run forward
 _LEAST_SHARE = 0.5  # of a speed, that is left while acceleration dies away
@@ -62,17 +61,17 @@ def freed_states(asked: BoundaryStates, encounter: Encounter, config: SamplingCo
     A vehicle that starts a seconds later or earlier, starts as far along its lane as it drives in that time.
     """
     if config.variety != "wide":
-        return asked
+        return replace(asked, freed=np.zeros_like(asked.freed)) if asked.freed.any() else asked
     ego = request.ego_of(encounter)
     freed = np.zeros((len(encounter.vehicles), 2, 2))
     own = [np.asarray(np.isfinite(request.rows(end, encounter)).any(axis=1)) for end in ("starts", "goals")]
     if ego is not None:
         for rows in own:
             rows[ego] = True
+    tied = [rows.any() for rows in own]
     length = encounter.duration
-    seconds = (
-        2.0 * config.freedom * (config.arrival_sigma + 0.5 * length * config.pace_sigma) + config.freedom * config.wait_sigma
-    )
+    bound = config.freedom
+    seconds = 2.0 * bound * (config.arrival_sigma + 0.5 * length * config.pace_sigma) + bound * config.wait_sigma
     seconds += config.duration_tolerance * length
     slowest = 1.0 / SHORTEST_SHARE
     steps = max(int(np.ceil(slowest * seconds / encounter.dt)), 1)
@@ -84,8 +83,8 @@ def freed_states(asked: BoundaryStates, encounter: Encounter, config: SamplingCo
                 continue
             top, there = max(float(near.max()), float(state[3])), float(state[3])
             faster = config.freedom * config.end_speed_sigma
-            along = 0.0 if own[end].any() else slowest * seconds * (top + faster)
-            off = 0.0 if own[end].any() else max(slowest * top - there, there - float(near.min()))
+            along = 0.0 if tied[end] else slowest * seconds * (top + faster)
+            off = 0.0 if tied[end] else max(slowest * top - there, there - float(near.min()))
             freed[n, end] = along + across, off + faster + _FASTEST
     return replace(asked, freed=np.ceil(1000.0 * freed) / 1000.0)
 

@@ -80,6 +80,16 @@ class Conflict:
     exit_first: float
     entry_second: float
 
+    @property
+    def encroachment(self) -> float:
+        """Post-encroachment time [s]: from the first one's exit to the second one's entry."""
+        return self.entry_second - self.exit_first
+
+    @property
+    def arrival_gap(self) -> float:
+        """From the first one's entry to the second one's [s]."""
+        return self.entry_second - self.entry_first
+
 
 @once_per_encounter
 def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
@@ -161,7 +171,7 @@ def orders_asked(conflicts: Sequence[Conflict], order: str) -> tuple[int | None,
 def closest_crossing(conflicts: Sequence[Conflict]) -> Conflict | None:
     """Return the crossing or merging conflict with the least post-encroachment time; None without one."""
     crossing = [one for one in conflicts if not one.following]
-    return min(crossing, key=lambda one: one.entry_second - one.exit_first, default=None)
+    return min(crossing, key=lambda one: one.encroachment, default=None)
 
 
 def pair_conflict(

@@ -36,9 +36,7 @@ from scenario_gen.template.tracks import Track
 _ROOM = 1.0  # metres between a footprint and the end of the road
 _FORTH = 25.0  # metres of road before and after what is driven, where it has them
 _TRIED = 40  # roads, the straightest first
-_TURN = math.radians(
-    60.0
-)  # a road may bend by this much more than the template's; less it may, as the template is laid out straight
+_TURN = math.radians(60.0)  # more than the template's that a road may bend; less it may: the template is laid out straight
 _APART = 2.2  # metres between the middles of oncoming lanes, at least
 _ASIDE = 18.0  # metres between a road's outermost lanes
 _STRAIGHT = 0.02  # rad/m: how much of the cost is the road's bending: (rad/m)² are counted against this

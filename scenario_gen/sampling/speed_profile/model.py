@@ -22,6 +22,7 @@ the metric of the process' own covariance: a quadratic programme in its standard
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import daqp
 import numpy as np
@@ -57,7 +58,7 @@ class SpeedModel:
         rows: (b, n) of what is bounded: coefficients, accelerations, jerks.
         low, high: (b,) their bounds.
         order: (b,) 1, 2, 3 for m/s, m/s², m/s³: how they change with the clock.
-        cell, share: (b,) where on the clock's grid a row lies.
+        time: (b,) when a row lies [s], on the template's clock.
     """
 
     spline: SpeedSpline
@@ -75,6 +76,11 @@ class SpeedModel:
     def size(self) -> int:
         """Standard normal numbers needed per sample."""
         return int(self.factor.shape[1])
+
+    @cached_property
+    def bounded(self) -> Floats:
+        """(b, r) what each standard normal number adds to what is bounded."""
+        return exact.matmul(self.rows, self.factor)
 
     def draw(self, z: Floats, longer: Floats, pace: Floats, ends: Floats, faster: Floats) -> tuple[Floats, Bools]:
         """Coefficients (S, n) [m/s] and whether they keep what must hold (S,).
@@ -94,11 +100,10 @@ class SpeedModel:
             scale = np.select([self.order == 1.0, self.order == 2.0], [pace, pace * pace], pace * pace * pace)
             middle, seen = exact.matmul(base, self.rows.T), exact.matmul(coefficients, self.rows.T)
             low, high = self.low * scale, self.high * scale
-            matrix = exact.matmul(self.rows, self.factor)
             sense = np.where(self.order < 3.0, 0, _SOFT).astype(np.intc)
             broken = ((seen < low - _TOLERANCE) | (seen > high + _TOLERANCE)).any(axis=1)
             for s in np.flatnonzero(broken).tolist():
-                x, _, flag, _ = daqp.solve(np.eye(self.size), -z[s], matrix, high[s] - middle[s], low[s] - middle[s], sense)
+                x, _, flag, _ = daqp.solve(np.eye(self.size), -z[s], self.bounded, high[s] - middle[s], low[s] - middle[s], sense)
                 ok[s] = flag > 0
                 if ok[s]:
                     coefficients[s] = base[s] + exact.matmul(self.factor, np.asarray(x))

@@ -1,0 +1,64 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Sampling with every candidate checked, as every request does it: what is freed, the checker, the sampler and the measures."""
+
+from dataclasses import replace
+
+from scenario_gen.evaluation.measures import MEASURES
+from scenario_gen.sampling import Cancelled, freed_states, OnValid, Progress, sample_scenarios, SamplingConfig
+from scenario_gen.template.interaction import Wait, waits_to_keep
+from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types.request import Request
+from scenario_gen.validity import Checker, Limits
+
+
+def sample_checked(
+    planned: GenerationResult,
+    sampling: SamplingConfig,
+    limits: Limits,
+    request: Request,
+    *,
+    count: int,
+    waits: tuple[Wait, ...] | None = None,
+    progress: Progress = lambda *_: None,
+    cancelled: Cancelled = lambda: False,
+    found: OnValid = lambda *_: None,
+) -> GenerationResult:
+    """Add scenarios to a template that was fitted and planned.
+
+    Args:
+        planned: with road, fit, routes and seed.
+        sampling: the sampler's parameters.
+        limits: the checker's.
+        request: what is asked for.
+        count: valid scenarios wanted.
+        waits: that are kept; the template's unless given.
+        progress: as `sample_scenarios` takes it.
+        cancelled: likewise.
+        found: likewise.
+
+    Raises:
+        InputError: road or fit are not known.
+        RefusedError: as `sample_scenarios`.
+    """
+    encounter, (road, fit) = planned.encounter, planned.placed()
+    waits = waits_to_keep(encounter, planned.segmentation) if waits is None else waits
+    fit = replace(fit, asked=freed_states(fit.asked, encounter, sampling, request))
+    check = Checker.of_template(encounter, road, fit.asked, waits, limits, request.order).check
+    generated = sample_scenarios(
+        encounter, planned.segmentation, road, planned.routes, fit.asked, check, sampling, count=count, seed=planned.seed,
+        waits=waits, request=request, progress=progress, cancelled=cancelled, found=found, measures=MEASURES,
+    )  # fmt: skip
+    return replace(planned, fit=fit, generated=generated)
