@@ -153,6 +153,7 @@ def _client(workers: int, scheduler: str) -> Iterator[Any]:
         "distributed.scheduler.allowed-failures": 10,
         "distributed.worker.daemon": True,
         "distributed.worker.profile.enabled": False,
+        "distributed.admin.tick.interval": "500ms",
         "distributed.nanny.pre-spawn-environ": THREADS,
         "logging.distributed": "critical",
     }
