@@ -106,8 +106,14 @@ def _with_node(domain: int, work: Callable[[Any, Callable[[Any], None]], Result]
     node = rclpy.create_node("drive_benchmark", context=context, start_parameter_services=False)
     executor = rclpy.executors.SingleThreadedExecutor(context=context)
     executor.add_node(node)
+
+    def spin(future: Any) -> None:
+        """Until the future is done; rclpy 7.1's spin_until_future_complete leaves a task for each time that it looked."""
+        while not future.done():
+            executor.spin_once()
+
     try:
-        return work(node, executor.spin_until_future_complete)
+        return work(node, spin)
     finally:
         node.destroy_node()
         context.try_shutdown()

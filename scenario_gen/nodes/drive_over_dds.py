@@ -149,9 +149,8 @@ def _driven(
             executor.spin_once(timeout_sec=0.05)
         task = executor.create_task(node.drive_all)
         while not task.done():
-            executor.spin_until_future_complete(task, timeout_sec=1.0)
-            if not task.done():
-                check()
+            check()
+            executor.spin_once(timeout_sec=1.0)  # spin_until_future_complete of rclpy 7.1 leaves a task for each time it looked
         task.result()
         return node.outcomes
     finally:
