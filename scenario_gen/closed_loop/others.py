@@ -428,6 +428,7 @@ def _keep_order(
     other does, for at the step's begin it was. Holding one back may hold back others, but each is stopped only once.
     """
     n = clock.shape[0]
+    wanted, wanted_rate = new_clock.copy(), new_rate.copy()
     changed = True
     while changed:
         changed = False
@@ -450,3 +451,51 @@ def _keep_order(
                 new_clock[i] = clock[i] + max(min(new_clock[i] - clock[i], room), 0.0)
                 new_rate[i] = 0.0
                 forced[i] = 2.0
+    _go_together(h, cell, order, ego, goes, clock, wanted, wanted_rate, new_clock, new_rate, forced)
+
+
+@kernel(inline=True)
+def _go_together(
+    h: float,
+    cell: float,
+    order: Floats,
+    ego: int,
+    goes: Bools,
+    clock: Floats,
+    wanted: Floats,
+    wanted_rate: Floats,
+    new_clock: Floats,
+    new_rate: Floats,
+    forced: Floats,
+) -> None:
+    """Let those with the earliest clock go on, evenly and with one clock, if the order held them back only for each other.
+
+    That is always allowed, up to the next later clock: on one clock they are certified, and nobody is behind them. Without it
+    they could stand for ever: each alone may not leave the others behind, and a whole step would take them beyond the next one.
+    """
+    n = clock.shape[0]
+    least, later = np.inf, np.inf
+    for i in range(n):
+        if i != ego and goes[i] and clock[i] < least:
+            least, later = clock[i], least
+        elif i != ego and goes[i] and least < clock[i] < later:
+            later = clock[i]
+    held = np.empty(n, dtype=np.bool_)
+    for i in range(n):
+        held[i] = i != ego and goes[i] and clock[i] == least and new_clock[i] == least and wanted[i] > least
+    changed, until = True, least
+    while changed:
+        changed, until = False, later
+        for i in range(n):
+            if held[i]:
+                until = min(until, wanted[i])
+        for i in range(n):
+            for j in range(n):
+                at_once = held[i] and not held[j] and j != ego and goes[j] and clock[j] == least
+                if at_once and until > _limit(order[i, j], cell, least):
+                    held[i], changed = False, True
+    for i in range(n):
+        if held[i]:
+            new_clock[i] = until
+            new_rate[i] = min(wanted_rate[i], (until - least) / h)
+            forced[i] = 2.0

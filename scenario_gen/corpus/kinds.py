@@ -31,6 +31,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, wrap_angle
+from scenario_gen.kernels import F1, F2, kernel, OUTB1
 from scenario_gen.logs.groups import LAG
 
 KINDS = ("following", "merging", "turning", "crossing", "opposing", "other")
@@ -40,6 +41,7 @@ TURNS, AGAINST = np.radians(45.0), np.radians(150.0)
 BEYOND = 150.0  # m by which a path goes on at both ends
 STEP = 4.0  # m between the points of a path
 MOVES = 0.5  # m/s below which a heading tells nothing new
+PARALLEL = 1e-12  # m²: of two steps of ways that meet nowhere
 MEETS = 1e-6  # of a step: ways that cross in the end of one cross, whatever is rounded
 EVERY = 0.3  # s between the samples that are compared with all others
 FINE = 15  # parts of that in which the nearest are compared once more: at 38 m/s two such samples are 11 m apart
@@ -72,18 +74,27 @@ def space_time_gap(a: Motion, b: Motion, dt: float) -> tuple[float, int, int]:
     """
     step = max(round(EVERY / dt), 1)
     one, other = a.position[::step], b.position[::step]
-    time = np.arange(len(one)) * (step * dt)
-    apart = exact.hypot(one[:, None, 0] - other[None, :, 0], one[:, None, 1] - other[None, :, 1])
-    cost = apart + LAG * np.abs(time[:, None] - time[None, :])
-    i, j = divmod(int(cost.argmin()), len(other))
+    time: Floats = np.arange(len(one), dtype=np.float64) * (step * dt)
+    i, j, _ = _least_gap(one, other, time, time)
     fine = np.arange(-FINE, FINE + 1) / FINE * (step * dt)
     when = [np.clip(time[k] + fine, 0.0, time[-1]) for k in (i, j)]
     near = [
         np.stack([np.interp(at, time, places[:, 0]), np.interp(at, time, places[:, 1])], axis=1)
         for at, places in zip(when, (one, other), strict=True)
     ]
-    apart = exact.hypot(near[0][:, None, 0] - near[1][None, :, 0], near[0][:, None, 1] - near[1][None, :, 1])
-    return float((apart + LAG * np.abs(when[0][:, None] - when[1][None, :])).min()), i * step, j * step
+    return float(_least_gap(*near, *when)[2]), i * step, j * step
+
+
+@kernel(F2, F2, F1, F1)
+def _least_gap(one: Floats, other: Floats, when: Floats, then: Floats) -> tuple[int, int, float]:
+    """The first pair of samples of places (T, 2) and (S, 2) at times (T,) and (S,) [s] whose gap is the least, and that [m]."""
+    i, j, least = 0, 0, np.inf
+    for m in range(len(one)):
+        for n in range(len(other)):
+            cost = exact.hypot(one[m, 0] - other[n, 0], one[m, 1] - other[n, 1]) + LAG * abs(when[m] - then[n])
+            if cost < least:
+                i, j, least = m, n, cost
+    return i, j, least
 
 
 def kind_of(a: Motion, b: Motion, dt: float) -> str:
@@ -107,7 +118,7 @@ def kind_of(a: Motion, b: Motion, dt: float) -> str:
         return "merging"
     if max(abs(turned(one)), abs(turned(other))) >= TURNS:
         return "turning"
-    if _intersect(one, other):
+    if _intersect(one.position, one.heading, other.position, other.heading):
         return "crossing"
     apart = exact.hypot(*(one.position - other.position).T)
     nearest = int(apart.argmin())
@@ -118,8 +129,13 @@ def kind_of(a: Motion, b: Motion, dt: float) -> str:
 
 def turned(motion: Motion) -> float:
     """Return how far a vehicle's heading turns in all [rad], left positive, while it moves."""
-    heading = np.unwrap(motion.heading[motion.speed > MOVES])
+    heading = unwrapped(motion.heading[motion.speed > MOVES])
     return float(heading[-1] - heading[0]) if len(heading) else 0.0
+
+
+def unwrapped(heading: Floats) -> Floats:
+    """Return headings (T,) [rad] without jumps, as `numpy.unwrap` does, if there are any: to look is faster."""
+    return np.unwrap(heading) if (np.abs(heading[1:] - heading[:-1]) > np.pi).any() else heading
 
 
 def path_of(motion: Motion) -> tuple[Floats, Floats]:
@@ -128,7 +144,7 @@ def path_of(motion: Motion) -> tuple[Floats, Floats]:
     places = motion.position[moved]
     driven = np.concatenate([[0.0], np.cumsum(exact.hypot(*np.diff(places, axis=0).T))])
     at = np.arange(0.0, float(driven[-1]) + STEP, STEP)
-    heading = np.unwrap(motion.heading[moved])
+    heading = unwrapped(motion.heading[moved])
     middle = np.stack([np.interp(at, driven, places[:, 0]), np.interp(at, driven, places[:, 1])], axis=1)
     facing = np.interp(at, driven, heading)
     out = np.arange(STEP, BEYOND, STEP)[:, None]
@@ -140,28 +156,46 @@ def path_of(motion: Motion) -> tuple[Floats, Floats]:
 
 def _on_path(motion: Motion, path: tuple[Floats, Floats]) -> Bools:
     """(T,) whether a vehicle is beside no path but on this one, and drives along it."""
-    points, facing = path
-    apart = motion.position[:, None, :] - points[None, :, :]
-    nearest = np.square(apart).sum(axis=2).argmin(axis=1)
-    rest, along = apart[np.arange(len(nearest)), nearest], facing[nearest]
-    beside = np.abs(rest[:, 1] * exact.cos(along) - rest[:, 0] * exact.sin(along))
-    alike = np.abs(wrap_angle(motion.heading - along)) < ALIKE
-    near = np.square(rest).sum(axis=1) < np.square(STEP + BESIDE)
-    found: Bools = (beside < BESIDE) & alike & near
+    found = np.zeros(len(motion.heading), dtype=bool)
+    _mark_on_path(motion.position, motion.heading, *path, found)
     return found
 
 
-def _intersect(a: Motion, b: Motion) -> bool:
-    """Whether the ways driven cross each other at 30° to 150°."""
-    p, q = a.position[:-1], b.position[:-1]
-    r, s = np.diff(a.position, axis=0), np.diff(b.position, axis=0)
-    between = q[None, :, :] - p[:, None, :]
-    denominator = r[:, None, 0] * s[None, :, 1] - r[:, None, 1] * s[None, :, 0]
-    parallel = np.abs(denominator) < 1e-12
-    safe = np.where(parallel, 1.0, denominator)
-    t = (between[..., 0] * s[None, :, 1] - between[..., 1] * s[None, :, 0]) / safe
-    u = (between[..., 0] * r[:, None, 1] - between[..., 1] * r[:, None, 0]) / safe
-    angle = np.abs(wrap_angle(a.heading[:-1][:, None] - b.heading[:-1][None, :]))
-    inside = (np.minimum(t, u) >= -MEETS) & (np.maximum(t, u) <= 1.0 + MEETS)
-    hit = ~parallel & inside & (angle > ALIKE) & (angle < AGAINST)
-    return bool(hit.any())
+@kernel(inline=True)
+def _wrapped(angle: float) -> float:
+    """As `wrap_angle`."""
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
+
+
+@kernel(F2, F1, F2, F1, OUTB1)
+def _mark_on_path(position: Floats, heading: Floats, points: Floats, facing: Floats, found: Bools) -> None:
+    for k in range(len(position)):
+        nearest, least = 0, np.inf
+        for n in range(len(points)):
+            x, y = position[k, 0] - points[n, 0], position[k, 1] - points[n, 1]
+            if x * x + y * y < least:
+                nearest, least = n, x * x + y * y
+        along = facing[nearest]
+        x, y = position[k, 0] - points[nearest, 0], position[k, 1] - points[nearest, 1]
+        beside = abs(y * exact.cos(along) - x * exact.sin(along)) < BESIDE
+        reach = STEP + BESIDE
+        found[k] = beside and abs(_wrapped(heading[k] - along)) < ALIKE and least < reach * reach
+
+
+@kernel(F2, F1, F2, F1)
+def _intersect(one: Floats, heading: Floats, other: Floats, others: Floats) -> bool:
+    """Whether the ways driven, (T, 2) with headings (T,) and (S, 2) with (S,), cross each other at 30° to 150°."""
+    for i in range(len(one) - 1):
+        rx, ry = one[i + 1, 0] - one[i, 0], one[i + 1, 1] - one[i, 1]
+        for j in range(len(other) - 1):
+            sx, sy = other[j + 1, 0] - other[j, 0], other[j + 1, 1] - other[j, 1]
+            denominator = rx * sy - ry * sx
+            if abs(denominator) < PARALLEL:
+                continue
+            x, y = other[j, 0] - one[i, 0], other[j, 1] - one[i, 1]
+            t, u = (x * sy - y * sx) / denominator, (x * ry - y * rx) / denominator
+            if min(t, u) >= -MEETS and max(t, u) <= 1.0 + MEETS:
+                angle = abs(_wrapped(heading[i] - others[j]))
+                if ALIKE < angle < AGAINST:
+                    return True
+    return False

@@ -31,10 +31,10 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints, runs
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
+from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap, unwrapped
 from scenario_gen.corpus.messages import database, HOUR, quoted
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.kernels import F1, I1, kernel, OUT2, OUTI1
+from scenario_gen.kernels import F, F1, I, I1, kernel, OUT2, OUTI1
 from scenario_gen.logs.groups import APART, LAG, shortest, ticks, windows
 
 BIN = 500_000  # µs
@@ -73,12 +73,11 @@ def search_hours(task: HourTask) -> None:
     Raises:
         InputError: the database fails.
     """
-    for hour, files in task.hours:
-        target = task.folder / f"hour-{hour}.parquet"
-        if target.exists():
-            continue
-        with database(task.folder.parent, task.config.memory, f"hour {hour} of {task.folder.parent}") as base:
-            _search(base, hour, files, target, task.config)
+    left = [one for one in task.hours if not (task.folder / f"hour-{one[0]}.parquet").exists()]
+    with database(task.folder.parent, task.config.memory, f"{task.name} of {task.folder.parent}") as base:
+        for hour, files in left:
+            with base.cursor() as own:  # its tables end with it
+                _search(own, hour, files, task.folder / f"hour-{hour}.parquet", task.config)
 
 
 def _search(base: Any, hour: int, files: tuple[Path, ...], target: Path, config: CorpusConfig) -> None:
@@ -89,7 +88,7 @@ def _search(base: Any, hour: int, files: tuple[Path, ...], target: Path, config:
     begin, end = hour * HOUR - edge, (hour + 1) * HOUR + edge
     names = [str(path) for path in files]
     base.execute(
-        "CREATE TEMP VIEW messages AS SELECT device, t, lat, lon, speed, heading FROM "
+        "CREATE TEMP TABLE messages AS SELECT device, t, lat, lon, speed, heading FROM "
         f"read_parquet([{quoted(names)}]) WHERE t >= {begin} AND t < {end} AND cause = 0"
     )
     shared = _bins(base)
@@ -117,12 +116,24 @@ def _search(base: Any, hour: int, files: tuple[Path, ...], target: Path, config:
 def _messages(base: Any, source: str) -> dict[str, Any]:
     """Return the messages (M,) of all candidates by column, in order of vehicle and time, one for each stamp."""
     rows = base.execute(
-        f"SELECT * FROM {source} WHERE device IN (SELECT a FROM candidates UNION SELECT b FROM candidates) "
-        "ORDER BY device, t, lat, lon, speed, heading"
+        f"SELECT * FROM {source} WHERE device IN (SELECT a FROM candidates UNION SELECT b FROM candidates)"
     ).fetchnumpy()
-    device, t = rows["device"], rows["t"]
-    new = np.concatenate([np.ones(min(len(t), 1), dtype=bool), (np.diff(t) != 0) | (np.diff(device) != 0)])
-    return {name: np.asarray(values[new]) for name, values in rows.items()}
+    order = in_order(rows)
+    device, t = rows["device"][order], rows["t"][order]
+    order = order[np.concatenate([np.ones(min(len(t), 1), dtype=bool), (np.diff(t) != 0) | (np.diff(device) != 0)])]
+    return {name: np.asarray(values[order]) for name, values in rows.items()}
+
+
+def in_order(rows: dict[str, Any]) -> Ints:
+    """(M,) the order of messages by vehicle and time; of those of one stamp by the rest, whatever order they were read in."""
+    order = np.lexsort((rows["t"], rows["device"]))
+    device, t = rows["device"][order], rows["t"][order]
+    same = np.zeros(len(t) + 1, dtype=bool)
+    same[1:-1] = (np.diff(t) == 0) & (np.diff(device) == 0)
+    tied = np.flatnonzero(same[1:] | same[:-1])
+    own = order[tied]
+    order[tied] = own[np.lexsort([rows[name][own] for name in ("heading", "speed", "lon", "lat", "t", "device")])]
+    return order
 
 
 def _excerpt(rows: dict[str, Any], found: list[dict[str, Any]]) -> Bools:
@@ -233,23 +244,42 @@ def _near_in_time(base: Any, pairs: dict[str, Ints], config: CorpusConfig) -> Bo
     own = {int(rows["device"][first]): slice(first, last) for first, last in runs_of(rows["device"])}
     steps = int(config.interaction / LAG / (BIN * 1e-6)) + 1
     reach = config.interaction + config.slack + FASTEST * BIN * 0.25e-6
+    north = rows["lat"] * NORTH
     kept = np.zeros(len(pairs["a"]), dtype=bool)
     for k, (a, b, first, last) in enumerate(zip(*(pairs[name].tolist() for name in ("a", "b", "first", "last")), strict=True)):
-        places = []
-        for device in (a, b):
-            bins = rows["bin"][own[device]]
-            low, high = np.searchsorted(bins, [first - steps, last + steps + 1])
-            dense = np.full((last - first + 1 + 2 * steps, 2), np.nan)
-            at = bins[low:high] - (first - steps)
-            for column, name in enumerate(("lat", "lon")):
-                dense[at, column] = rows[name][own[device]][low:high]
-            places.append(dense)
-        one, other = places
-        scale = np.array([NORTH, LONGITUDE * exact.cos(float(rows["lat"][own[a]][0]) * np.pi / 180.0)])
-        one, other = one * scale, np.lib.stride_tricks.sliding_window_view(other * scale, 2 * steps + 1, axis=0)
-        apart = np.square(one[steps : len(one) - steps, :, None] - other).sum(axis=1)
-        kept[k] = not np.isnan(apart).all() and float(np.nanmin(apart)) <= np.square(reach)
+        wide = LONGITUDE * exact.cos(float(rows["lat"][own[a]][0]) * np.pi / 180.0)
+        one, other = ((rows["bin"][own[n]], north[own[n]], rows["lon"][own[n]]) for n in (a, b))
+        kept[k] = _least_apart(*one, *other, wide, first, last, steps) <= reach * reach
     return kept
+
+
+@kernel(I1, F1, F1, I1, F1, F1, F, I, I, I)
+def _least_apart(
+    bins: Ints,
+    north: Floats,
+    lon: Floats,
+    others: Ints,
+    norths: Floats,
+    lons: Floats,
+    wide: float,
+    first: int,
+    last: int,
+    steps: int,
+) -> float:
+    """Square of how near [m²] one, at bins (M,) from first to last, comes to another, at bins (N,) at most `steps` away."""
+    least = np.inf
+    begin = 0
+    for m in range(len(bins)):
+        if bins[m] < first or bins[m] > last:
+            continue
+        while begin < len(others) and others[begin] < bins[m] - steps:
+            begin += 1
+        n = begin
+        while n < len(others) and others[n] <= bins[m] + steps:
+            up, right = north[m] - norths[n], lon[m] * wide - lons[n] * wide
+            least = min(least, up * up + right * right)
+            n += 1
+    return least
 
 
 @dataclass(frozen=True, eq=False)
@@ -359,7 +389,7 @@ def _at(track: Track, at: Ints, origin: tuple[float, float], config: CorpusConfi
     position = np.stack([np.interp(when, seconds, place[:, 0]), np.interp(when, seconds, place[:, 1])], axis=1)
     after = np.clip(np.searchsorted(t, at), 1, len(t) - 1)
     there: Bools = (at >= t[0]) & (at <= t[-1]) & (t[after] - t[after - 1] <= config.log.longest_gap * 1e6 + 1.0)
-    heading = np.interp(when, seconds, np.unwrap(track.heading[own]))
+    heading = np.interp(when, seconds, unwrapped(track.heading[own]))
     return Motion(position, heading, np.interp(when, seconds, track.speed[own])), there
 
 

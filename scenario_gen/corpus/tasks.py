@@ -33,6 +33,7 @@ Task = TypeVar("Task")
 Told = Callable[[int, int, str], None]
 """Told how many tasks are done, of how many, and how much time is left, in words."""
 TEMPORARY = ".partial"
+THREADS = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
 
 @contextmanager
@@ -151,6 +152,9 @@ def _client(workers: int, scheduler: str) -> Iterator[Any]:
     settings = {
         "distributed.scheduler.allowed-failures": 10,
         "distributed.worker.daemon": True,
+        "distributed.worker.profile.enabled": False,
+        "distributed.admin.tick.interval": "500ms",
+        "distributed.nanny.pre-spawn-environ": THREADS,
         "logging.distributed": "critical",
     }
     with (

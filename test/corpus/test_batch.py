@@ -110,3 +110,11 @@ def test_a_task_that_is_refused_does_not_end_the_others(workers):
     with spread(workers, "", lambda *how: told.append(how)) as go:
         assert go(refuse, ["a", "b", "c"]) == ["b: b is none"]
     assert [done for done, *_ in told] == [1, 2, 3]
+
+
+def test_a_cluster_that_runs_is_used():
+    from distributed import LocalCluster
+
+    alone = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    with LocalCluster(**alone) as cluster, spread(1, cluster.scheduler_address) as go:
+        assert go(refuse, ["a", "b"]) == ["b: b is none"]

@@ -23,7 +23,8 @@ import pytest
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.grouping import group, label, Meeting
-from scenario_gen.corpus.kinds import kind_of, Motion
+from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
+from scenario_gen.corpus.meetings import in_order
 from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.mine import mine
 from scenario_gen.corpus.synthetic import read_planted
@@ -170,6 +171,29 @@ def test_the_kind_depends_neither_on_the_direction_nor_on_the_order(turned, case
     cos, sin = np.cos(turned), np.sin(turned)
     a, b = (straight(cos * x - sin * y, sin * x + cos * y, heading + turned, 10.0) for x, y, heading in both)
     assert kind_of(a, b, 0.1) == kind == kind_of(b, a, 0.1)
+
+
+@settings(deadline=None)
+@given(start=strategies.floats(-40.0, 40.0), turned=strategies.floats(0.0, 6.0), speed=strategies.floats(3.0, 20.0))
+def test_the_gap_is_the_least_of_all_pairs_of_samples(start, turned, speed):
+    a, b = straight(0.0, 0.0, 0.0, 10.0), straight(start, 5.0, turned, speed)
+    apart = np.linalg.norm(a.position[::3, None] - b.position[None, ::3], axis=2)
+    time = 0.3 * np.arange(len(apart))
+    cost = apart + 2.0 * np.abs(time[:, None] - time)
+    gap, i, j = space_time_gap(a, b, 0.1)
+    assert cost[i // 3, j // 3] == pytest.approx(cost.min(), abs=1e-9)
+    assert cost.min() - 0.3 * (10.0 + speed) <= gap <= cost.min() + 1e-9  # the nearest are compared once more, finer
+
+
+def test_messages_are_in_the_same_order_however_they_were_read():
+    random = np.random.default_rng(4)
+    rows = {"device": random.integers(0, 3, 500), "t": random.integers(0, 90, 500)}
+    rows |= {name: random.integers(0, 2, 500).astype(float) for name in ("lat", "lon", "speed", "heading")}
+    mixed = random.permutation(500)
+    one, other = rows, {name: values[mixed] for name, values in rows.items()}
+    first, second = (np.stack([each[name][in_order(each)] for name in each]) for each in (one, other))
+    assert (first == second).all()
+    assert (np.diff(first[0] * 100 + first[1]) >= 0).all()
 
 
 def meeting(a, b, start, end, gap):
