@@ -93,41 +93,62 @@ class Recorded:
         return Pose(*self.track[k])
 
 
-def reactive_planner(trials: Sequence[Trial]) -> list[Row]:
-    """Let commonroad-reactive-planner solve the trials as planning problems, and judge its tracks among the replayed others."""
+def reactive_planner(trials: Sequence[Trial], bad: Sequence[Outcome]) -> list[Row]:
+    """Let commonroad-reactive-planner solve the trials as planning problems, and judge its tracks among the replayed others.
+
+    Args:
+        trials: what it drives.
+        bad: what constant speed came to among replayed others.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        names = {f"problem_{k:03d}.xml": trial for k, trial in enumerate(trials)}
         refused = 0
-        for k, trial in enumerate(trials):
+        for problem, trial in names.items():
             try:
-                (folder / f"problem_{k:03d}.xml").write_bytes(_problem(trial))
+                _write_problem(folder / problem, trial)
             except RefusedError:
                 refused += 1  # somebody arrives late, for which the schema has no form
         found = judged("commonroad", "commonroad_files.py", "drive", str(folder))
         if found is None:
             return []
         outcomes = []
-        for k, trial in enumerate(trials):
-            file = folder / f"problem_{k:03d}.track.json"
+        for problem, trial in names.items():
+            file = (folder / problem).with_suffix(".track.json")
             if file.is_file():
                 loop = ClosedLoop(trial.scenario, trial.ego, trial.road, ClosedLoopConfig(policy=REPLAY))
-                on = GOAL if found["outcomes"][f"problem_{k:03d}.xml"][0] == "reached" else 0.0
+                on = GOAL if found["outcomes"][problem][0] == "reached" else 0.0
                 planner = Recorded(json.loads(file.read_text()), on)
                 drive = loop.drive(planner, planner.ended)
                 outcomes.append(Outcome(trial.name, judge(loop, drive), drive))
-    said = f"2025.1, {found['problems']} problems, {refused} refused, {found['reached']} reached by its own word"
-    return [
+    late = sum(how.startswith("TimeoutError") for how, _ in found["outcomes"].values())
+    failed = found["problems"] - late - len(outcomes)
+    said = (
+        f"2025.1, {found['problems']} problems, {refused} refused, {found['reached']} reached by its own word, "
+        f"{late} beyond our limit of time, {failed} ended by its own exception"
+    )
+    good = rates(outcomes)
+    rows = [
         Row(f"reactive planner: {what}", rate.share.value, "", "lower" if what != "goals" else "higher", None, f"{rate}; {said}")
-        for what, rate in rates(outcomes).items()
+        for what, rate in good.items()
     ]
+    worst = rates(bad)["collisions"]
+    apart = worst.share.low - good["collisions"].share.high
+    name = "collisions among replayed others: constant speed's lower bound less the reactive planner's upper"
+    return [*rows, Row(name, apart, "", "higher", 0.0, f"constant speed: {worst}")]
 
 
-def _problem(trial: Trial) -> bytes:
-    """Return a trial as a CommonRoad file with a planning problem."""
+def _write_problem(path: Path, trial: Trial) -> None:
+    """Write a trial as a CommonRoad file with a planning problem, and the ego's length and width [m] beside it.
+
+    Raises:
+        RefusedError: the format has no form for it.
+    """
     scenario, export = trial.scenario, ExportConfig()
     ids = [vehicle.id for vehicle in scenario.vehicles]
     others, ego = split_off(scenario, trial.ego if isinstance(trial.ego, int) else ids.index(trial.ego))
     one = Exported(scenario.index, scenario.seed, "0" * 64, replace(others, witness=None), ego, driven=True)
     lanes = lane_map_of(trial.road, "", None, {}, [scenario], export.run_out)
-    case = Case(1, "", "road", 0, (one,), lanes)
-    return write_commonroad(case, one, export)[0]
+    path.write_bytes(write_commonroad(Case(1, "", "road", 0, (one,), lanes), one, export)[0])
+    (vehicle,) = ego.vehicles
+    path.with_suffix(".size.json").write_text(json.dumps([vehicle.length, vehicle.width]))

@@ -57,7 +57,8 @@ def run(count: int = sized(200, quick=2)) -> list[Row]:
     driven: list[Outcome] = []
     if trials:
         found, driven = planners(spread(trials, count))
-        rows += found + reactive_planner(spread(trials, max(count // 5, 1))) + witnesses(spread(trials, WITNESSES))
+        bad = run_trials(trials, BAD, ClosedLoopConfig(policy=REPLAY))
+        rows += found + reactive_planner(spread(trials, max(count // 5, 1)), bad) + witnesses(spread(trials, WITNESSES))
     found, wild = anything()
     return rows + found + collisions([*driven, *wild]) + speed() + dds(made)
 

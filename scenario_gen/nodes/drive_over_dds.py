@@ -19,9 +19,10 @@ one command. The planner is started as a command, in a ROS domain in which nobod
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 import os
 import shlex
+import signal
 import subprocess
 import tempfile
 import time
@@ -30,10 +31,13 @@ from typing import Any
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.simulation import State
 from scenario_gen.closed_loop.trials import Outcome, Trial
 from scenario_gen.errors import InputError
+from scenario_gen.interrupts import ending
 from scenario_gen.nodes.domain import free_domain, this_host_only
 from scenario_gen.nodes.traffic import Traffic
 from scenario_gen.nodes.traffic_config import Config
@@ -42,6 +46,8 @@ Progress = Callable[[int, int], None]
 START = 60.0  # seconds that a planner's node may take until it publishes commands
 SETTLE = 1.0  # seconds from its first publisher until it has found the topics that it hears
 LAST = 1.0  # seconds in which an answer to a drive's last state is waited for, that it is not taken for the next drive's first
+AGAIN = 2.0  # seconds without an answer after which a drive's first state is told again, to who has come late
+PATIENCE = 10.0  # seconds that a planner's node has to end by itself
 LINES = 8  # of what the planner wrote last, that an error shows
 
 
@@ -51,6 +57,8 @@ class TrafficOfTrials(Traffic):
     def __init__(self, trials: Sequence[Trial], config: ClosedLoopConfig, progress: Progress) -> None:
         super().__init__(config=Config(lock_step=True, follow_on=False, drive=config))
         self._trials, self._progress = list(trials), progress
+        self._told: State | None = None  # the state that was told last, when it was [s], and how many times
+        self._told_at, self._tellings = 0.0, 0
 
     @property
     def outcomes(self) -> list[Outcome]:
@@ -61,15 +69,35 @@ class TrafficOfTrials(Traffic):
         """Whether somebody publishes commands."""
         return bool(self._commanding())
 
+    def _tell(self) -> None:
+        """Tell the last state; once more only if nobody has answered for `AGAIN`, for each telling may be answered."""
+        at, state = time.monotonic(), self._states[-1]
+        if state is not self._told:
+            self._told, self._tellings = state, 0
+        elif at < self._told_at + AGAIN:
+            return
+        self._told_at, self._tellings = at, self._tellings + 1
+        super()._tell()
+
     async def drive_all(self) -> None:
         """Drive all trials."""
         for number in range(len(self._trials)):
             self._load(number)
             loop = self._loop
+            await self._answered(self._states[-1], self.config.patience)
+            if self._tellings > 1:
+                await self._silence(LAST)
             while loop is not None and not self._verdict:
                 await self._step_once(loop)
             self._progress(number + 1, len(self._trials))
             await self._answered(self._states[-1], LAST)
+
+    async def _silence(self, duration: float) -> None:
+        """Return after `duration` [s] of real time, in which commands are heard; what came last counts."""
+        until = time.monotonic() + duration
+        while time.monotonic() < until:
+            self._until, self._waiting = until, Future(executor=self.executor)
+            await self._waiting
 
 
 def drive_over_dds(trials: Sequence[Trial], command: str, config: ClosedLoopConfig, progress: Progress) -> list[Outcome]:
@@ -96,15 +124,20 @@ def drive_over_dds(trials: Sequence[Trial], command: str, config: ClosedLoopConf
             rclpy.try_shutdown()
             raise InputError(f"--planner {command}: {error}") from error
         try:
-            return _driven(trials, command, config, progress, process, said)
+            with ending(lambda: _end(process)):
+                return _driven(trials, command, config, progress, process, said)
         finally:
-            process.terminate()
-            try:
-                process.wait(10.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            _end(process)
             rclpy.try_shutdown()
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    """End a planner's process and all that it has started (`ros2 run` and `ros2 launch` start others)."""
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, number)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(PATIENCE)
 
 
 @contextmanager

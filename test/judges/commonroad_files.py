@@ -17,12 +17,15 @@
 `python commonroad_files.py check FOLDER`: the schema (lxml), commonroad-io's reading against the file's own numbers, and the
 drivability checker: collisions, who leaves the road, and whether both are found where they are planted.
 `python commonroad_files.py drive FOLDER`: commonroad-reactive-planner at each planning problem; its track is then beside it, in
-NAME.track.json. One JSON object on the last line.
+NAME.track.json. It has LIMIT for each, and plans for its own vehicle, or for the length and width [m] in NAME.size.json, for a
+planning problem has none. One JSON object on the last line.
 """
 
 import json
 from pathlib import Path
+import signal
 import sys
+import time
 import warnings
 import xml.etree.ElementTree as ET
 
@@ -40,6 +43,7 @@ import numpy as np
 SCHEMA = Path(commonroad.scenario_definition.__path__[0]) / "xml_definition_files" / "XML_commonRoad_XSD.xsd"
 AHEAD, COMFORT, SLOWEST = 30.0, 2.0, 2.5  # metres looked ahead, m/s² across, m/s
 BEYOND = 60.0  # metres of reference path beyond its end
+LIMIT = 60.0  # seconds of CPU time for one problem
 
 
 def read_error(path, scenario):
@@ -128,6 +132,8 @@ def drive(path):
     config.planning.time_steps_computation, config.planning.dt = 20, scenario.dt
     config.planning.__post_init__()
     config.update(scenario=scenario, planning_problem=problem)
+    if (size := path.with_suffix(".size.json")).is_file():
+        config.vehicle.length, config.vehicle.width = json.loads(size.read_text())
     planner = ReactivePlanner(config)
     planner.set_reference_path(coordinate_system=create_coordinate_system(reference_path(scenario, problem)))
     planner.reset(coordinate_system=planner.coordinate_system)
@@ -160,15 +166,23 @@ def drive(path):
     return "reached", len(planner.record_state_list) - 1, track_of(planner)
 
 
+def out_of_time(*_):
+    raise TimeoutError(f"no end within {LIMIT:.0f} s of CPU time")
+
+
 def drive_all(folder):
     outcomes = {}
+    signal.signal(signal.SIGPROF, out_of_time)
     for path in sorted(folder.rglob("*.xml")):
         try:
+            signal.setitimer(signal.ITIMER_PROF, LIMIT)
             *outcomes[path.name], track = drive(path)
             path.with_suffix(".track.json").write_text(json.dumps(track))
         except Exception as error:
             outcomes[path.name] = (f"{type(error).__name__}: {error}"[:160], 0)
-        print(path.name, *outcomes[path.name], file=sys.stderr, flush=True)
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+        print(path.name, *outcomes[path.name], f"{time.process_time():.0f} s", file=sys.stderr, flush=True)
     return {"problems": len(outcomes), "reached": sum(how == "reached" for how, _ in outcomes.values()), "outcomes": outcomes}
 
 

@@ -16,9 +16,14 @@
 
 `start_nodes` stands for `subprocess.Popen([sys.executable, "-m", "scenario_gen.nodes.start", …])`, or `…forked`. Tests of the
 start itself (signals while the libraries load, an empty cache, executables) start real executables instead.
+
+Nothing outlives the tests: whatever a process leaves behind ends with it, and all end with the server, which ends with the tests,
+however those end (Linux; elsewhere a test that is killed leaves its nodes).
 """
 
 import atexit
+from contextlib import suppress
+import ctypes
 from functools import cache
 import json
 import os
@@ -31,6 +36,8 @@ import sys
 import threading
 import traceback
 from typing import NoReturn
+
+PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER = 1, 36  # linux/prctl.h
 
 
 class Forked:
@@ -140,17 +147,53 @@ def _serve(requests: socket.socket) -> None:
 
 
 def _watch(asked: list, stdin: int, stdout: int, status: int) -> NoReturn:
-    """Fork the node, tell its number and, when it has ended, its exit code."""
+    """Fork the node, tell its number and, when it has ended, its exit code; end with the server."""
+    server_pid = os.getppid()
+    signal.signal(signal.SIGTERM, lambda *_: _end_with_children(1))
+    _control_process(PR_SET_CHILD_SUBREAPER, 1)  # what a node leaves behind becomes a child of this process
+    _control_process(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != server_pid:  # it has ended before it could be noticed
+        os._exit(1)
     pid = os.fork()
     if pid == 0:
+        _control_process(PR_SET_PDEATHSIG, signal.SIGKILL)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
         os.close(status)
         _become(*asked, stdin, stdout)
     os.close(stdin)
     os.close(stdout)
     os.write(status, pid.to_bytes(8, "big"))
     _, code = os.waitpid(pid, 0)
-    os.write(status, os.waitstatus_to_exitcode(code).to_bytes(8, "big", signed=True))
-    os._exit(0)
+    with suppress(BrokenPipeError):  # the tests have ended
+        os.write(status, os.waitstatus_to_exitcode(code).to_bytes(8, "big", signed=True))
+    _end_with_children(0)
+
+
+def _control_process(what: int, value: int) -> None:
+    """Call prctl(2), where there is one."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(what, value, 0, 0, 0)
+
+
+def _end_with_children(code: int) -> NoReturn:
+    """Kill the children of this process, and what becomes one by their end, then end."""
+    while children := _children():
+        for pid in children:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+            with suppress(ChildProcessError):
+                os.waitpid(pid, 0)
+    os._exit(code)
+
+
+def _children() -> list[int]:
+    """Return the children of this process, where there is a /proc."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # one that has ended meanwhile
+            if int(path.read_text().rpartition(")")[2].split()[1]) == os.getpid():
+                found.append(int(path.parent.name))
+    return found
 
 
 def _become(module: str, arguments: list[str], folder: str, environment: dict[str, str], stdin: int, stdout: int) -> NoReturn:

@@ -16,6 +16,7 @@
 
 from dataclasses import replace
 import json
+import math
 import sys
 
 from bag_examples import hand_made_run
@@ -213,7 +214,18 @@ def test_live_scenarios_are_driven_on_the_road_that_they_name(start, client):
     assert client.call(Trigger, "/traffic/next", Trigger.Request()).success
 
 
+class ByPlace:
+    """The planner: a speed that depends on where it is, so that an answer to another odometry than the last one shows."""
+
+    def reset(self, task):
+        self.step = task.step
+
+    def act(self, seen):
+        return of_twist(seen.ego, 3.0 + math.sin(seen.ego.x), 0.0, self.step)
+
+
 PLANNER = """
+import math
 import sys
 
 import rclpy
@@ -221,13 +233,13 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
 rclpy.init()
-node = rclpy.create_node("three")
+node = rclpy.create_node("by_place")
 command = node.create_publisher(Twist, "ego/cmd_vel", 10)
 
 
-def act(_):
+def act(heard):
     twist = Twist()
-    twist.linear.x = 3.0
+    twist.linear.x = 3.0 + math.sin(heard.pose.pose.position.x)
     command.publish(twist)
 
 
@@ -242,13 +254,13 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(bag,
 
     from scenario_gen.cli import app
 
-    program = tmp_path / "three.py"
+    program = tmp_path / "by_place.py"
     program.write_text(PLANNER)
     words = ["drive", str(bag), "--count", "2", "--set", "bars.goals=0.0"]
     words += [word for bar in ("collisions", "at_fault", "off_road") for word in ("--set", f"bars.{bar}=1.0")]
     for out, more in (
         ("over_dds", ["--ros", "--planner", f"{sys.executable} {program} vehicle_1/odom"]),
-        ("in_process", ["--planner", "test_traffic:Slow", "--workers", "1"]),
+        ("in_process", ["--planner", "test_traffic:ByPlace", "--workers", "1"]),
     ):
         told = CliRunner().invoke(app, [*words, "--out", str(tmp_path / out), *more])
         assert told.exit_code == 0, told.output

@@ -1,0 +1,52 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the tests themselves start."""
+
+from pathlib import Path
+import subprocess
+import sys
+import time
+
+import pytest
+
+PROGRAM = """
+import node_server
+process = node_server.start_nodes("start", "traffic", ROS_DOMAIN_ID="{domain}")
+print(process.pid, flush=True)
+process.wait()
+"""
+
+
+def runs(pid: int) -> bool:
+    """Whether there is such a process, and it has not ended."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.dds
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells a process that its parent has ended")
+def test_no_node_outlives_tests_that_are_killed(domain):
+    program = PROGRAM.format(domain=domain)
+    tests = subprocess.Popen([sys.executable, "-c", program], cwd=Path(__file__).parent, stdout=subprocess.PIPE)
+    pid = int(tests.stdout.readline())
+    assert runs(pid)
+    tests.kill()
+    tests.communicate()
+    deadline = time.monotonic() + 60.0
+    while runs(pid):
+        assert time.monotonic() < deadline, f"process {pid} has outlived what started it"
+        time.sleep(0.05)
