@@ -34,7 +34,7 @@ MOST_LINKS = 100  # of a lane to lanes that follow it, or lie beside it
 _CHUNK = 16  # edges of a middle that are looked at together
 _QUERIED = 64  # chunks whose neighbours are looked up at once
 _COMPARED = 2_000  # pairs of chunks that are compared at once
-_MOST_COMPARED = 1_000_000  # pairs of chunks
+_MOST_COMPARED = 400_000  # pairs of chunks
 
 
 @dataclass(frozen=True, eq=False)
