@@ -43,7 +43,7 @@ import numpy as np
 SCHEMA = Path(commonroad.scenario_definition.__path__[0]) / "xml_definition_files" / "XML_commonRoad_XSD.xsd"
 AHEAD, COMFORT, SLOWEST = 30.0, 2.0, 2.5  # metres looked ahead, m/s² across, m/s
 BEYOND = 60.0  # metres of reference path beyond its end
-LIMIT = 60.0  # seconds of CPU time for one problem
+LIMIT = 40.0  # seconds of CPU time for one problem
 
 
 def read_error(path, scenario):
