@@ -78,7 +78,7 @@ install: $(READY)
 $(READY): requirements.lock requirements-ros.lock setup.py
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(not (3, 11) <= v <= (3, 13) and f"Python {v[0]}.{v[1]} found; 3.11, 3.12 or 3.13 is needed: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(if $(SOURCED),--system-site-packages) .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes $(LOCKED)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --require-hashes $(LOCKED)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	$(BIN)/python -m scenario_gen.compiling
 	@$(BIN)/python -m pytest --collect-only >/dev/null || true

@@ -75,7 +75,8 @@ def of_system(error: OSError, name: object = None, advice: str = "") -> InputErr
     """Return an error of the operating system as one of ours: file (`name`, or the one it names itself), reason, advice."""
     file = error.filename if name is None else name
     place = "" if file is None else f"{file}: "
-    return InputError(f"{place}{error.strerror or error}{advice}")
+    reason = "is a folder; name a file" if isinstance(error, IsADirectoryError) else error.strerror or error
+    return InputError(f"{place}{reason}{advice}")
 
 
 def printable(text: str) -> str:

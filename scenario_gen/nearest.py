@@ -127,6 +127,18 @@ def nearest_if_impossible(
         raise ImpossibleError(str(error), () if search.cancelled() else found) from error
 
 
+def plan(
+    encounter: Encounter, segmentation: Segmentation, road: Road, config: PipelineConfig, request: Request, seed: int
+) -> GenerationResult:
+    """Fit and plan: a template on its road, with no scenarios yet.
+
+    Raises:
+        InputError, RefusedError: as the stages.
+    """
+    fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
+    return GenerationResult(encounter, segmentation, road, fit, plan_routes(road, fit, config.planning, seed), seed=seed)
+
+
 def attempt(
     encounter: Encounter,
     segmentation: Segmentation,
@@ -146,11 +158,8 @@ def attempt(
     Raises:
         InputError, RefusedError: as the stages.
     """
-    fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
-    routes = plan_routes(road, fit, config.planning, seed)
-    planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed)
     return sample_checked(
-        planned, config.sampling, config.limits, request,
+        plan(encounter, segmentation, road, config, request, seed), config.sampling, config.limits, request,
         count=count, waits=waits, progress=progress, cancelled=cancelled, found=found,
     )  # fmt: skip
 
@@ -171,6 +180,7 @@ class _Search:
     ) -> None:
         self.encounter, self.segmentation, self.road, self.config = encounter, segmentation, road, config
         self.asked, self.seed, self.wanted, self.cancelled = asked, seed, wanted, cancelled
+        self._plans: dict[tuple[str, str], GenerationResult | None] = {}
 
     @cached_property
     def base(self) -> dict[str, Floats]:
@@ -189,11 +199,25 @@ class _Search:
         config = self.config
         if stretch is not None:
             config = replace(config, sampling=replace(config.sampling, max_stretch=stretch))
+        planned = self._planned(request)
+        if planned is None:
+            return False
         try:
-            made = attempt(self.encounter, self.segmentation, self.road, config, request, count=self.wanted, seed=self.seed)
+            made = sample_checked(planned, config.sampling, config.limits, request, count=self.wanted)
         except ScenarioGenError:
             return False
         return len(made.generated.scenarios) == self.wanted
+
+    def _planned(self, request: Request) -> GenerationResult | None:
+        """The template with these states on its road; None if they have no place or no way. Its clock has no part in that."""
+        key = request.starts, request.goals
+        if key not in self._plans:
+            try:
+                given = self.encounter, self.segmentation, self.road, self.config
+                self._plans[key] = plan(*given, request, self.seed)
+            except ScenarioGenError:
+                self._plans[key] = None
+        return self._plans[key]
 
     def run(self) -> Iterator[Suggestion]:
         """Yield suggestions: the plain repair alone if it suffices, else every single change that does, else all at once."""

@@ -22,10 +22,8 @@ from scenario_gen.checked import sample_checked
 from scenario_gen.config import PipelineConfig
 from scenario_gen.errors import RefusedError
 from scenario_gen.evaluation import coverage_of, evaluate, MEASURED, replay, uniform_changepoints, without_changepoints
-from scenario_gen.fitting import fit_template
-from scenario_gen.nearest import attempt, nearest_if_impossible
+from scenario_gen.nearest import attempt, nearest_if_impossible, plan
 from scenario_gen.roads import build_road
-from scenario_gen.routing import plan_routes
 from scenario_gen.sampling import Progress
 from scenario_gen.segmentation import segment
 from scenario_gen.template.size import refuse_too_large
@@ -71,9 +69,7 @@ def generate(
         road = build_road(road, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)
     with nearest_if_impossible(encounter, segmentation, road, config, request, count=count, seed=seed):
-        fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
-        routes = plan_routes(road, fit, config.planning, seed)
-        planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed)
+        planned = plan(encounter, segmentation, road, config, request, seed)
         made = sample_checked(planned, config.sampling, config.limits, request, count=count, progress=progress)
     return with_evaluation(with_references(made, config, request), config)
 

@@ -23,6 +23,7 @@ The table of cases comes last: where it is, the part is done. So the manifest is
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 import json
@@ -117,12 +118,17 @@ def run_batch(
         told: how far it is.
 
     Raises:
-        InputError: the corpus has no encounters, or `out` is of something else.
+        InputError: the corpus has no encounters, a road is none, or `out` is of something else.
     """
     needs("corpus", "duckdb", "pyarrow")
     tables = tables_of(corpus)
     rows = [(table, k) for table in tables for k, _ in enumerate(rows_of([table], ["name"]))]
     rows = rows[: templates or None]
+    if not rows:
+        raise InputError(f"{corpus} holds no encounter")
+    for road in roads:  # a name that is none is an error, not a cause in every case
+        with suppress(RefusedError):
+            build_road(road, encounter_of(_row(*rows[0])), config.road)
     document = {
         "format": 1,
         "corpus": [sha256_of(table) for table in tables],

@@ -65,9 +65,9 @@ def find(batch: Path, condition: str = "true", limit: int = 0) -> Hits:
             "hive_types_autocast=false)"
         )
         base.execute("SET enable_external_access = false")  # a condition reads no files
-        order = "ORDER BY pet NULLS LAST, ttc, template, road, index" + (f" LIMIT {limit}" if limit else "")
-        found = base.execute(f"SELECT * FROM scenarios WHERE ({condition}) {order}")
-        names = [column[0] for column in found.description]
+        found = base.table("scenarios").filter(condition).order("pet NULLS LAST, ttc, template, road, index")  # one expression
+        names = found.columns
+        found = found.limit(limit) if limit else found
         rows = [dict(zip(names, row, strict=True)) for row in found.fetchall()]
         coverage = base.execute(
             f"SELECT kind, road, {CLASSES} AS pet, count(*) FROM scenarios GROUP BY ALL ORDER BY ALL"

@@ -119,7 +119,10 @@ def mine(
         InputError: there is nothing to read, or `out` is of another archive or other parameters.
     """
     needs("corpus", "duckdb", "pyarrow")
-    messages, logs = inventory(archives)
+    messages, logs, others = inventory(archives)
+    for archive in archives:
+        if out.resolve().is_relative_to(archive.resolve()):
+            raise InputError(f"{out} lies in {archive}, of which it would become a part; name a folder outside of it")
     out.mkdir(parents=True, exist_ok=True)
     with alone(out), spread(workers, scheduler, told) as go:
         _agree(out, messages, logs, config)
@@ -134,7 +137,7 @@ def mine(
             lost = go(parse_range, [task for task in ranged if not task.target.exists()])
             lost = lost or go(search_hours, hour_tasks(ranged, out, config))  # of all ranges, for an hour is done only once
             failed += lost or go(clean_found, clean_tasks(out, config))
-        made = summary(out, config, failed)
+        made = summary(out, config, failed, others)
         with arriving(out / PAGE) as part:
             _write_gallery(part, out, made)
         return made
@@ -162,14 +165,15 @@ def _write_gallery(path: Path, out: Path, made: Mined) -> None:
     write_page(path, "Encounters mined", first, cards, rest)
 
 
-def inventory(archives: Sequence[Path]) -> tuple[list[Path], list[list[Path]]]:
-    """Return the SPMD files, and the other logs, each with its files.
+def inventory(archives: Sequence[Path]) -> tuple[list[Path], list[list[Path]], list[Path]]:
+    """Return the SPMD files, the other logs, each with its files, and the files that are neither.
 
     Raises:
         InputError: a path does not exist, or nothing in it can be read.
     """
     messages: list[Path] = []
     logs: list[list[Path]] = []
+    others: list[Path] = []
     for archive in archives:
         if not archive.exists():
             raise InputError(f"{archive} does not exist")
@@ -188,9 +192,11 @@ def inventory(archives: Sequence[Path]) -> tuple[list[Path], list[list[Path]]]:
             logs.append(tables)
         else:
             logs += [[path] for path in (*tables, *bags, *loose)]
+        known = {*spmd, *tables, *loose}
+        others += [path for path in rest if path not in known and not any(path.is_relative_to(bag) for bag in bags)]
         if len(messages) + len(logs) == before:
             raise InputError(f"{archive} holds no log that can be read: no SPMD file, table, bag or CommonRoad scenario")
-    return messages, logs
+    return messages, logs, others
 
 
 def _agree(out: Path, messages: Sequence[Path], logs: Sequence[Sequence[Path]], config: CorpusConfig) -> None:
@@ -294,8 +300,8 @@ def grouped(out: Path, config: CorpusConfig) -> list[Found]:
     return found
 
 
-def summary(out: Path, config: CorpusConfig, failed: list[str]) -> Mined:
-    """Return what is in a corpus, by listing it."""
+def summary(out: Path, config: CorpusConfig, failed: list[str], others: Sequence[Path] = ()) -> Mined:
+    """Return what is in a corpus, by listing it; `others` are files of the archive that were not read."""
     from pyarrow import parquet
 
     files: dict[str, Counter[str]] = {}
@@ -307,6 +313,11 @@ def summary(out: Path, config: CorpusConfig, failed: list[str]) -> Mined:
         strays += sum(int(count) for count in account["hours"].values() if count < least)
         for file, causes in account["files"].items():
             files.setdefault(file, Counter()).update(causes)
+    if others:
+        first = ", ".join(path.name for path in others[:5])
+        notes.append(
+            f"{len(others)} files are of no format that is read (unpack what is compressed): {first}{' …' * (len(others) > 5)}"
+        )
     if strays:
         notes.append(
             f"{strays} rows lie in an hour of which their range of text has fewer than {least} (wrong stamps?): not searched"

@@ -258,7 +258,7 @@ def is_spmd(path: Path) -> bool:
     if path.suffix.lower() not in (".csv", ".txt"):
         return False
     with path.open(encoding="utf-8-sig", errors="replace") as file:
-        fields = file.readline().split(",")
+        fields = file.readline(1 << 16).split(",")
     try:
         return len(fields) == SPMD_FIELDS and bool([float(field.strip() or "nan") for field in fields])
     except ValueError:

@@ -30,6 +30,7 @@ from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawL
 
 LONGEST = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
 LONGEST_NUMBER = 300  # characters
+LONGEST_HEADER = 65_536  # characters
 LARGEST = 100.0  # m: what is longer is no vehicle
 EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime of SPMD counts microseconds from there
 COLUMNS = (  # of a basic safety message in the files of the Safety Pilot Model Deployment
@@ -81,7 +82,9 @@ def read_text(path: Path, before: int, config: LogConfig, **options: Any) -> pd.
     with guarded(f"{path} cannot be read as a table"):
         if not options:
             with path.open(encoding="utf-8-sig") as file:
-                header = file.readline()
+                header = file.readline(LONGEST_HEADER)
+            if len(header) == LONGEST_HEADER:
+                raise InputError(f"{path} is no table: its first line has {LONGEST_HEADER} characters or more")
             options = {"sep": max(",;\t", key=header.count)}
         frame = pd.read_csv(
             path,

@@ -69,8 +69,17 @@ def test_scenarios_are_found_by_what_they_are_and_made_again_alone(batch, tmp_pa
         find(out, "colour = 'red'")
     with pytest.raises(InputError, match="no scenario to export"):
         export_hits(out, [], tmp_path / "none")
-    with pytest.raises(InputError, match="disabled by configuration"):
-        find(out, "sha256 in (select content from read_text('/etc/hostname'))")
+    for hostile in (
+        "sha256 in (select content from read_text('/etc/hostname'))",
+        f"true); COPY scenarios TO '{tmp_path}/a.csv'; --",
+        f"true); ATTACH '{tmp_path}/a.db' AS a; --",
+        "true); DROP TABLE scenarios; --",
+        "true) UNION ALL SELECT * FROM scenarios --",
+        "",
+    ):
+        with pytest.raises(InputError, match="condition"):
+            find(out, hostile)
+    assert not list(tmp_path.glob("a.*"))
 
 
 def test_a_batch_is_gone_on_with_but_not_as_another_one(batch, corpus):
@@ -97,6 +106,12 @@ def test_a_killed_run_with_two_processes_ends_with_the_same_bytes(batch, corpus,
         os.killpg(run.pid, signal.SIGKILL)
     made = run_batch(corpus[0], ROADS, out, count=3, seed=5, templates=4, workers=2)
     assert digests(out) == digests(batch[0]) and made.lines() == batch[1].lines()
+
+
+def test_a_road_that_is_none_is_an_error_at_once(corpus, tmp_path):
+    with pytest.raises(InputError, match="nowhere"):
+        run_batch(corpus[0], ["straight", "nowhere"], tmp_path / "out", count=1, templates=1)
+    assert not (tmp_path / "out").exists()
 
 
 def test_names_and_seeds():

@@ -102,8 +102,13 @@ def test_what_is_missing_is_made_again_and_the_same(archive, corpus, tmp_path):
     assert not list(out.rglob("*.partial*"))
     with pytest.raises(InputError, match="another set of parameters"):
         mine([archive], out, CorpusConfig(interaction=5.0))
+    for inside in (archive, archive / "corpus"):
+        with pytest.raises(InputError, match="of which it would become a part"):
+            mine([archive], inside)
+    (tmp_path / "letter.txt").write_text("dear")
     with pytest.raises(InputError, match="is not empty and no corpus"):
-        mine([archive], archive)
+        mine([archive], tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["letter.txt"]
 
 
 def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive, tmp_path):
@@ -111,8 +116,11 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
     row = "1,1,7,259200000000000,0,0,0,42.3,-83.7,250,0,0,0,0,0,0,0,0,100\n"
     (tmp_path / "in" / "a.csv").write_text(row + "0,0\n" + row.replace(",7,", ",,").replace("42.3", "95.0") + row[:40])
     (tmp_path / "in" / "one.csv").write_text("t,x,y\n0,0,0\n1,1,0\n")
+    (tmp_path / "in" / "wide.csv").write_text("1," * 100_000)
+    (tmp_path / "in" / "packed.csv.gz").write_bytes(b"\x1f\x8b")
     mined = mine([tmp_path / "in"], tmp_path / "out")
-    assert mined.encounters == 0 and len(mined.failed) == 1 and "one.csv" in mined.failed[0]
+    assert mined.encounters == 0 and len(mined.failed) == 2 and "one.csv" in mined.failed[0] and "no table" in mined.failed[1]
+    assert "packed.csv.gz" in " ".join(mined.notes)
     assert (tmp_path / "out" / "found.parquet").exists()
     assert mined.account == {"rows": 4, "left out: no row of 19 fields with numbers": 2, "left out: no vehicle": 1}
 

@@ -79,6 +79,8 @@ def test_a_file_that_is_too_large_or_not_there_is_refused(tmp_path):
         read_xml(path, most_bytes=1000)
     with pytest.raises(InputError, match="absent"):
         read_xml(tmp_path / "absent.xml")
+    with pytest.raises(InputError, match="is a folder; name a file"):
+        read_scenario_file(tmp_path)
 
 
 def test_nothing_is_overwritten(tmp_path):

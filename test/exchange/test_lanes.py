@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shapely import box, Polygon, union_all
+from shapely import box, coverage_union_all, Polygon, union_all
 from small_scenarios import crossing, moving
 
 from scenario_gen.exchange.derived_lanes import derived_lanes, footprints
@@ -47,7 +47,7 @@ def test_true_lanes_lie_on_the_road_and_fill_its_arms(name, side):
     road, lanes = lanes_on(name, RoadConfig(lanes=2, traffic_side=side), 0.0)
     rows, columns = np.nonzero(road.drivable)
     low = road.origin + road.resolution * np.column_stack((columns, rows))
-    cells = union_all(box(*low.T, *(low + road.resolution).T))
+    cells = coverage_union_all(box(*low.T, *(low + road.resolution).T))
     area = area_of(lanes)
     assert area.difference(cells.buffer(2.0 * road.resolution)).area < 0.1  # m²
     arms = area_of([lane for lane in lanes if not lane.turn])
