@@ -79,7 +79,12 @@ def main() -> int:
     parser.add_argument("--pictures", help="naturalness: a folder for pictures of the first ten cases")
     parser.add_argument("--checkout", help="naturalness: the folder of another checkout to be measured")
     parser.add_argument("--variety", help="naturalness: the sampler's preset, narrow (default) or wide")
-    parser.add_argument("--full", action="store_true", default=None, help="bridges: every file before every judge")
+    parser.add_argument(
+        "--full",
+        action="store_true",
+        default=None,
+        help="bridges: all of the demo's scenarios, and every file before every judge",
+    )
     parser.add_argument("--part", help="corpus: mine, memory, recorded, batch, kills, library or peers alone")
     parser.add_argument("--quick", action="store_true", help="next to nothing of each, to see that it runs; figures say nothing")
     arguments = parser.parse_args()

@@ -142,8 +142,9 @@ class Recheck:
         """End states, and the limits of the motion."""
         one = self.limits
         for k, asked in ((0, self.asked.start), (-1, self.asked.end)):
-            far = (np.linalg.norm(s.position[:, k] - asked[:, :2], axis=1) - self.asked.freed[:, k, 0]).max()
-            other = (np.abs(s.speed[:, k] - asked[:, 3]) - self.asked.freed[:, k, 1]).max()
+            driven, gained = _unseen(s, k)
+            far = (np.linalg.norm(s.position[:, k] - asked[:, :2], axis=1) - self.asked.freed[:, k, 0] - driven).max()
+            other = (np.abs(s.speed[:, k] - asked[:, 3]) - self.asked.freed[:, k, 1] - gained).max()
             if far > one.position_tolerance or other > one.speed_tolerance:
                 account.add("boundary_state", f"{far:.3f} m, {other:.3f} m/s in scenario {s.index}")
         h, slack = np.diff(s.time), 1e-5
@@ -183,6 +184,18 @@ class Recheck:
                 if wanted and sum(int(length + 1e-6) for length in _stands(s, v, limit)) < wanted:
                     account.add("stop_not_kept", f"vehicle {v} in scenario {s.index}")
                     break
+
+
+def _unseen(s: Scenario, end: int) -> tuple[Floats, Floats]:
+    """Return metres (N,) driven and m/s (N,) gained or lost in the step in which a vehicle comes (0) or goes (-1).
+
+    It is the step between its first or last instant and the one at which it is not there; 0 where there is none.
+    """
+    at, rows = s.present[:, end], np.arange(len(s.vehicles))
+    beyond = at + (1 if end else -1)
+    there = (beyond < 0) | (beyond >= len(s.time)) | (at == 0) | (at == len(s.time) - 1)
+    step = np.where(there, 0.0, np.abs(s.time[np.where(there, at, beyond)] - s.time[at]))
+    return step * s.speed[rows, at], step * np.abs(s.acceleration[rows, at])
 
 
 def _drivable(road: Road) -> Any:

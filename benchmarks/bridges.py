@@ -15,12 +15,16 @@
 """Bridges: exported scenarios before other people's programs, and back again. The judges are installed by `make judges`."""
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from itertools import islice
 import json
 import os
 from pathlib import Path
 import subprocess
+import sys
 import tempfile
+import time
 from typing import Any
 
 import numpy as np
@@ -41,45 +45,71 @@ from scenario_gen.recordings.write import write_recording
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.scenario import Scenario
 
+BEGUN = time.monotonic()
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", ROOT.parent / "shared" / "data"))
-PER_DEMO, PER_CASE, CASES, CUTS, PROBLEMS = sized(50, 2), sized(5, 1), sized(20, 1), sized(10, 1), sized(40, 1)
 ON = ("t_intersection", "corridor", "four_way", "straight", "roundabout", "merge", "curve")
-OF_A_CASE = 10
 DRIVES = 15.0  # metres that a vehicle must drive to make an ego
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much is made and judged: scenarios of a demo's case and of a recorded one, cases, cuts, problems; files for ASAM."""
+
+    demo: int
+    recorded: int
+    cases: int
+    cuts: int
+    problems: int
+    asam: int  # scenarios of a case: a checker takes a second or two for each
+
+
+USUAL = sized(Sizes(demo=10, recorded=2, cases=20, cuts=10, problems=40, asam=2), Sizes(2, 1, 1, 1, 1, 1))
+FULL = sized(Sizes(demo=50, recorded=5, cases=20, cuts=10, problems=40, asam=50), USUAL)
 
 
 def run(full: bool | None = None) -> list[Row]:
     """Export the demo's scenarios and those of recorded encounters; let every judge that is here look at them.
 
     Args:
-        full: ASAM's checkers, which take a second per file, see all scenarios of a case, not the first `OF_A_CASE`.
+        full: all scenarios that the demo makes, and all of them before ASAM's checkers too; a quarter of an hour becomes one.
     """
-    few = None if full else OF_A_CASE
-    with tempfile.TemporaryDirectory() as scratch:
+    sizes = FULL if full else USUAL
+    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(2) as judges:
         folder = Path(scratch)
-        bags = list(_bags(folder))
+        bags = list(_bags(folder, sizes))
+        _say(f"{len(bags)} bags made")
+        problems = _problems(bags, folder / "problems", sizes.problems)
+        _say(f"{problems} problems written")
+        driven = judges.submit(_driven, folder / "problems", problems)
         rows = [Row("bridges.cases", len(bags), "cases", "higher")]
-        for target in ("commonroad", "openscenario"):
+        others = []
+        for target, judge in (("commonroad", _commonroad), ("openscenario", _asam)):
+            few = sizes.asam if target == "openscenario" else None
             for k, bag in enumerate(bags):
-                known = [one.index for case in read_cases(bag) for one in case.scenarios] if target == "openscenario" else []
-                export_bag(bag, folder / target / str(k), target, indices=known[:few])
+                known = [one.index for case in read_cases(bag) for one in case.scenarios][:few]
+                export_bag(bag, folder / target / str(k), target, indices=known)
+            others.append(judges.submit(judge, folder / target))
             rows += _round_trip(folder / target, bags, target)
-        rows += _commonroad(folder / "commonroad")
-        rows += _asam(folder / "openscenario")
-        problems = _problems(bags, folder / "problems")
-        return [*rows, *_driven(folder / "problems", problems)]
+            _say(f"exported to {target} and read back")
+        for judged_rows in (*others, driven):
+            rows += judged_rows.result()
+        return rows
 
 
-def _bags(folder: Path) -> Iterator[Path]:
-    """Yield a bag of each case: the demo's, recorded ones on `CASES` roads, and `CUTS` encounters cut out of whole recordings."""
+def _say(sentence: str) -> None:
+    print(f"{time.monotonic() - BEGUN:.0f} s: {sentence}", file=sys.stderr, flush=True)
+
+
+def _bags(folder: Path, sizes: Sizes) -> Iterator[Path]:
+    """Yield a bag of each case: the demo's, recorded ones on roads in turn, and encounters cut out of whole recordings."""
     for case, road in ROADS.items():
-        yield from _bag(folder, read_log(bundled(case)).encounters, road, PER_DEMO)
+        yield from _bag(folder, read_log(bundled(case)).encounters, road, sizes.demo)
     logs = sorted((DATA / "trajectories").glob("*/*.csv"))
     recorded = [read_log(path).encounters[0] for path in logs if path.name.startswith("encounter_")]
-    yield from islice(_turns(folder, recorded, PER_CASE), CASES)
+    yield from islice(_turns(folder, recorded, sizes.recorded), sizes.cases)
     found = [one for path in logs if path.name.endswith("_all_vehicles.csv") for one in read_log(path).encounters]
-    yield from islice(_turns(folder, [found[k] for k in np.random.default_rng(7).permutation(len(found))], 1), CUTS)
+    yield from islice(_turns(folder, [found[k] for k in np.random.default_rng(7).permutation(len(found))], 1), sizes.cuts)
 
 
 def _turns(folder: Path, encounters: Sequence[Encounter], count: int) -> Iterator[Path]:
@@ -153,22 +183,27 @@ def _asam(folder: Path) -> list[Row]:
     return rows
 
 
-def _problems(bags: Sequence[Path], folder: Path) -> int:
+def _problems(bags: Sequence[Path], folder: Path, most: int) -> int:
     """Write planning problems, one after the other from each case and each vehicle that drives; return how many."""
     folder.mkdir()
-    found: list[list[tuple[Case, Exported]]] = []
+    written = 0
+    for case, one in islice(_egos(bags), most):
+        data, _ = write_commonroad(case, one)
+        (folder / f"problem_{written:02d}.xml").write_bytes(data)
+        written += 1
+    return written
+
+
+def _egos(bags: Sequence[Path]) -> Iterator[tuple[Case, Exported]]:
+    """Yield the first scenario of each case with each vehicle as its ego, then the second of each, and so on."""
+    groups: list[list[tuple[Case, Exported]]] = []
     for bag in bags:
         for vehicle in [v.id for case in read_cases(bag) for v in case.scenarios[0].others.vehicles]:
             cases = read_cases(bag, ExportConfig(ego=vehicle))
-            found.append([(case, one) for case in cases for one in case.scenarios if _drives(one)])
-    written = 0
-    for turn in range(max(map(len, found), default=0)):
-        for group in found:
-            if turn < len(group) and written < PROBLEMS:
-                data, _ = write_commonroad(*group[turn])
-                (folder / f"problem_{written:02d}.xml").write_bytes(data)
-                written += 1
-    return written
+            groups.append([(case, one) for case in cases for one in case.scenarios if _drives(one)])
+            yield from groups[-1][:1]
+    for turn in range(1, max(map(len, groups), default=0)):
+        yield from (group[turn] for group in groups if turn < len(group))
 
 
 def _drives(one: Exported) -> bool:

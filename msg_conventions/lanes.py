@@ -105,7 +105,7 @@ def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | Non
         lanes = tuple(_lanes(document["lanes"], points, what))
         notes = tuple(str(note) for note in document["notes"])
         return frame_id, LaneNetwork(str(document["name"]), lanes, notes)
-    except (KeyError, TypeError, ValueError, RecursionError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(f"{what}: its text does not say what its lanes are: {type(error).__name__}: {error}") from None
 
 

@@ -20,8 +20,9 @@ import os
 from pathlib import Path
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.results import write_drives
+from scenario_gen.closed_loop.results import DRIVEN, JSON, JUNIT, PAGE, write_drives
 from scenario_gen.closed_loop.trials import Bars, broken_bars, Outcome, Rate, rates, read_trials, run_trials, Trial
+from scenario_gen.folders import replaced_folder
 from scenario_gen.parameters import assigned
 
 OverDds = Callable[[Sequence[Trial], str, ClosedLoopConfig, Callable[[int, int], None]], list[Outcome]]
@@ -72,19 +73,20 @@ def drive_bag(
         over_dds: drives them over DDS, one after the other, instead of in this process.
 
     Raises:
-        InputError: bag, planner or a parameter is wrong; the message names it.
+        InputError: bag, planner, folder or a parameter is wrong; the message names it.
     """
     config = DriveCommandConfig()
     for assignment in assignments:
         config = assigned(config, assignment if assignment.startswith(("bars.", "drive.")) else f"drive.{assignment}")
     trials = read_trials(bag, ego, count)
-    if over_dds is not None:
-        outcomes = over_dds(trials, planner, config.drive, progress)
-    else:
-        outcomes = run_trials(trials, planner, config.drive, workers or os.cpu_count() or 1, progress)
-    found = rates(outcomes)
-    broken = broken_bars(found, config.bars)
+    with replaced_folder(out, DRIVEN, [bag]) as folder:  # before there is work that might not be kept
+        if over_dds is not None:
+            outcomes = over_dds(trials, planner, config.drive, progress)
+        else:
+            outcomes = run_trials(trials, planner, config.drive, workers or os.cpu_count() or 1, progress)
+        found = rates(outcomes)
+        broken = broken_bars(found, config.bars)
+        write_drives(folder, outcomes, trials, planner, config.drive, broken)
     failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
     worst = sorted(failed, key=lambda outcome: outcome.verdict.severity, reverse=True)[:WORST]
-    written = write_drives(out, outcomes, trials, planner, config.drive, broken, [bag])
-    return DriveResult(found, broken, worst, tuple(written.values()))
+    return DriveResult(found, broken, worst, tuple(out / name for name in (JSON, JUNIT, PAGE)))

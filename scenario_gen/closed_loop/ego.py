@@ -26,6 +26,7 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.errors import InputError
 from scenario_gen.kernels import F, F1, kernel, OUT1
 
 
@@ -64,6 +65,7 @@ class Moved:
     fault: str = ""
 
 
+FARTHEST = 1e8  # metres, and rad and m/s: beyond that a pose given from outside is no place in any road's frame
 JUMP = 1.0  # metres beyond what the highest speed covers in one step, from which on a pose given from outside is called a jump
 
 
@@ -73,11 +75,20 @@ def move(ego: EgoState, asked: Command | Pose | None, config: ClosedLoopConfig) 
     A command is cut to the body's limits. Nothing asked, or something that is not finite, is a fault: the ego then brakes at its
     limit and keeps its curvature; one that is moved from outside stays where it is. A pose that is farther away than the highest
     speed allows is a fault, too, but is taken, for whoever gives poses answers for them.
+
+    Raises:
+        InputError: what is asked is neither a command nor a pose, or not of numbers.
     """
+    if asked is not None and not isinstance(asked, Command | Pose):
+        raise InputError(f"a planner's `act` returns Command, Pose or None; it returned {type(asked).__name__}")
+    try:
+        finite = asked is not None and np.isfinite(np.array(asked, dtype=np.float64)).all()
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"a planner's `act` returned a {type(asked).__name__} that is not of numbers: {error}") from error
     if isinstance(asked, Pose):
         return _placed(ego, asked, config)
     fault = ""
-    if asked is None or not np.isfinite(asked).all():
+    if asked is None or not finite:
         fault = "no command" if asked is None else "command is not finite"
         asked = Command(-config.ego_braking, ego.curvature)
     out = np.empty(6)
@@ -89,8 +100,10 @@ def move(ego: EgoState, asked: Command | Pose | None, config: ClosedLoopConfig) 
 
 
 def _placed(ego: EgoState, pose: Pose, config: ClosedLoopConfig) -> Moved:
-    if not np.isfinite(pose).all():
-        return Moved(EgoState(ego.x, ego.y, ego.yaw, 0.0, 0.0, -ego.speed / config.step), "pose is not finite")
+    largest = np.abs(pose).max()
+    if not largest <= FARTHEST:
+        fault = f"pose is {'out of range' if np.isfinite(largest) else 'not finite'}"
+        return Moved(EgoState(ego.x, ego.y, ego.yaw, 0.0, 0.0, -ego.speed / config.step), fault)
     way = exact.hypot(pose.x - ego.x, pose.y - ego.y)
     far = way > config.ego_speed * config.step + JUMP
     turn = (pose.yaw - ego.yaw + np.pi) % (2.0 * np.pi) - np.pi  # the yaw stays continuous

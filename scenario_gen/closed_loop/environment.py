@@ -66,13 +66,15 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
 
-    def __init__(self, trials: Sequence[Trial] | Path, config: ClosedLoopConfig = ClosedLoopConfig(), ego: str = "") -> None:
-        """Take what is driven in: trials, or a bag, of which `ego` names the vehicle in whose place the ego drives.
+    def __init__(
+        self, trials: Sequence[Trial] | Path | str, config: ClosedLoopConfig = ClosedLoopConfig(), ego: str = ""
+    ) -> None:
+        """Take what is driven in: trials, or the path of a bag, where `ego` names the vehicle whose place the ego takes.
 
         Raises:
             InputError: the bag cannot be read, or there is nothing to drive in.
         """
-        self.trials = read_trials(trials, ego) if isinstance(trials, Path) else list(trials)
+        self.trials = read_trials(Path(trials), ego) if isinstance(trials, Path | str) else list(trials)
         if not self.trials:
             raise InputError("there is no scenario to drive in")
         self.config = config

@@ -20,7 +20,7 @@ things slow it down, the strongest counts:
 - who is ahead on its path, the ego included (IDM), but only if nearer than in the certified execution at the same place;
 - the weakest of a few brakings that keeps it clear of where the ego will be if it goes on as it does, and behind what the order
   of events lets it do;
-- the order itself, without exception: see `_keep_order`.
+- the order itself, without exception: see order.py.
 """
 
 import numpy as np
@@ -28,6 +28,7 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at
+from scenario_gen.closed_loop.order import keep_order, limit
 from scenario_gen.kernels import kernel
 
 FORESEEN = 5.0  # seconds that a vehicle looks ahead
@@ -40,7 +41,6 @@ NEARER = 0.1  # metres by which a gap must be smaller than the certified one to 
 LATE = 0.05  # seconds by which the ego's clock is uncertain
 HARDER = 1.0  # m/s² by which an ego on its witness' path must brake harder than that one to be foreseen to go on so
 ENTRY = 3.0  # metres ahead of and behind its place that the ego must leave free for one who comes onto the scene
-PARTS = 4  # of a step, in each of which the order is proven
 
 
 @kernel(inline=True)
@@ -93,12 +93,6 @@ def _idm(gap: float, u: float, ahead: float, driving: Floats) -> float:
     wanted = standstill + max(0.0, u * headway + u * (u - ahead) / (2.0 * np.sqrt(a * b)))
     share = wanted / max(gap, 0.1)
     return float(min(max(a * (share * share - 1.0), 0.0), b))
-
-
-@kernel(inline=True)
-def _limit(order: Floats, cell: float, clock: float) -> float:
-    """Clock [s] that one may not pass while the other's is at `clock`; order (K,) is that of the pair."""
-    return float(max(clock, order[min(int(clock / cell), order.shape[0] - 1)]))
 
 
 @kernel(inline=True)
@@ -211,7 +205,7 @@ def react(  # noqa: PLR0912, PLR0915 - one loop after the other
             new_clock[i] = clock[i] + 0.5 * (rate[i] + new_rate[i]) * h
             if not here[i] and new_rate[i] == 0.0:
                 new_clock[i] = clock[i]
-    _keep_order(h, cell, order, ego, goes, clock, rate, new_clock, new_rate, forced)
+    keep_order(h, cell, order, ego, goes, clock, rate, new_clock, new_rate, forced)
     for i in range(n):
         if i != ego and goes[i]:
             new_clock[i] = min(new_clock[i], time[-1])
@@ -355,147 +349,12 @@ def _clear(
         fill_box(pose[0], pose[1], pose[2], half[i, 0], half[i, 1], box)
         if boxes_meet(box, future[m]) and (future[m, 0] - box[0]) * box[2] + (future[m, 1] - box[1]) * box[3] > 0.0:
             return False
-        if yields and witness[2] > 0.0 and t > _limit(order[i, ego], cell, witness[0] + witness[1] * m * h) + LATE:
+        if yields and witness[2] > 0.0 and t > limit(order[i, ego], cell, witness[0] + witness[1] * m * h) + LATE:
             return False
         if others:
             for j in range(coming.shape[0]):
-                if j not in (i, ego) and t > _limit(order[i, j], cell, coming[j, m + 1]) + 1e-09:
+                if j not in (i, ego) and t > limit(order[i, j], cell, coming[j, m + 1]) + 1e-09:
                     return False
         if braking > 0.0 and r == 0.0:
             return True
     return True
-
-
-@kernel(inline=True)
-def _part(start: float, end: float, r: float, after: float, forced: bool, h: float, part: float) -> float:
-    """Clock [s] at a share of a step; its rate changes evenly, or it moves evenly where it was forced."""
-    if forced or part == 1.0:
-        return start + part * (end - start)
-    return start + h * part * (r + 0.5 * part * (after - r))
-
-
-@kernel(inline=True)
-def _slope(start: float, end: float, r: float, after: float, forced: bool, h: float, part: float) -> float:
-    """Rate of a clock at a share of a step."""
-    return (end - start) / h if forced else r + part * (after - r)
-
-
-@kernel(inline=True)
-def _ordered(
-    h: float, cell: float, order: Floats, i: int, j: int, clock: Floats, rate: Floats, new: Floats, after: Floats, forced: Floats
-) -> bool:
-    """Whether vehicle i keeps to the order with j throughout the step, proven for each of its parts.
-
-    In a part, either the clock of i ends no farther than it may while that of j is where it begins, for that limit only grows; or
-    it stays behind the clock of j throughout: their difference is a parabola, least at an end or at its vertex.
-    """
-    a0, b0 = clock[i], clock[j]
-    for k in range(PARTS):
-        start, part = k / PARTS, (k + 1.0) / PARTS
-        a = _part(clock[i], new[i], rate[i], after[i], forced[i] > 0.0, h, part)
-        b = _part(clock[j], new[j], rate[j], after[j], forced[j] > 0.0, h, part)
-        if a > _limit(order[i, j], cell, b0):
-            if b0 < a0 or b < a:
-                return False
-            first = _slope(clock[j], new[j], rate[j], after[j], forced[j] > 0.0, h, start) - _slope(
-                clock[i], new[i], rate[i], after[i], forced[i] > 0.0, h, start
-            )
-            last = _slope(clock[j], new[j], rate[j], after[j], forced[j] > 0.0, h, part) - _slope(
-                clock[i], new[i], rate[i], after[i], forced[i] > 0.0, h, part
-            )
-            if first < 0.0 < last and b0 - a0 - 0.5 * first * first / (last - first) * h / PARTS < 0.0:
-                return False
-        a0, b0 = a, b
-    return True
-
-
-@kernel(inline=True)
-def _keep_order(
-    h: float,
-    cell: float,
-    order: Floats,
-    ego: int,
-    goes: Bools,
-    clock: Floats,
-    rate: Floats,
-    new_clock: Floats,
-    new_rate: Floats,
-    forced: Floats,
-) -> None:
-    """Hold back who would come to a place before its turn.
-
-    First at the rate of the one it waits for, then at once: where it is by then is within what the order allows, whatever the
-    other does, for at the step's begin it was. Holding one back may hold back others, but each is stopped only once.
-    """
-    n = clock.shape[0]
-    wanted, wanted_rate = new_clock.copy(), new_rate.copy()
-    changed = True
-    while changed:
-        changed = False
-        for i in range(n):
-            for j in range(n):
-                if i in (j, ego) or j == ego or not goes[i] or not goes[j] or forced[i] > 1.0:
-                    continue
-                if _ordered(h, cell, order, i, j, clock, rate, new_clock, new_rate, forced):
-                    continue
-                changed = True
-                if new_rate[i] > new_rate[j] > 0.0 and forced[i] == 0.0:
-                    new_rate[i] = new_rate[j]
-                    new_clock[i] = clock[i] + 0.5 * (rate[i] + new_rate[i]) * h
-                    if _ordered(h, cell, order, i, j, clock, rate, new_clock, new_rate, forced):
-                        continue
-                room = np.inf
-                for k in range(n):
-                    if k not in (i, ego) and goes[k]:
-                        room = min(room, _limit(order[i, k], cell, clock[k]) - clock[i])
-                new_clock[i] = clock[i] + max(min(new_clock[i] - clock[i], room), 0.0)
-                new_rate[i] = 0.0
-                forced[i] = 2.0
-    _go_together(h, cell, order, ego, goes, clock, wanted, wanted_rate, new_clock, new_rate, forced)
-
-
-@kernel(inline=True)
-def _go_together(
-    h: float,
-    cell: float,
-    order: Floats,
-    ego: int,
-    goes: Bools,
-    clock: Floats,
-    wanted: Floats,
-    wanted_rate: Floats,
-    new_clock: Floats,
-    new_rate: Floats,
-    forced: Floats,
-) -> None:
-    """Let those with the earliest clock go on, evenly and with one clock, if the order held them back only for each other.
-
-    That is always allowed, up to the next later clock: on one clock they are certified, and nobody is behind them. Without it
-    they could stand for ever: each alone may not leave the others behind, and a whole step would take them beyond the next one.
-    """
-    n = clock.shape[0]
-    least, later = np.inf, np.inf
-    for i in range(n):
-        if i != ego and goes[i] and clock[i] < least:
-            least, later = clock[i], least
-        elif i != ego and goes[i] and least < clock[i] < later:
-            later = clock[i]
-    held = np.empty(n, dtype=np.bool_)
-    for i in range(n):
-        held[i] = i != ego and goes[i] and clock[i] == least and new_clock[i] == least and wanted[i] > least
-    changed, until = True, least
-    while changed:
-        changed, until = False, later
-        for i in range(n):
-            if held[i]:
-                until = min(until, wanted[i])
-        for i in range(n):
-            for j in range(n):
-                at_once = held[i] and not held[j] and j != ego and goes[j] and clock[j] == least
-                if at_once and until > _limit(order[i, j], cell, least):
-                    held[i], changed = False, True
-    for i in range(n):
-        if held[i]:
-            new_clock[i] = until
-            new_rate[i] = min(wanted_rate[i], (until - least) / h)
-            forced[i] = 2.0

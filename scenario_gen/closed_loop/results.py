@@ -14,7 +14,7 @@
 
 """What a test of a planner leaves: JSON, JUnit's XML and a page, in one folder; the same drives give the same bytes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import json
 import math
 from pathlib import Path
@@ -25,7 +25,8 @@ import numpy as np
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.trials import Outcome, Rate, rates, Trial
-from scenario_gen.folders import replaced_folder, write_text
+from scenario_gen.errors import printable
+from scenario_gen.folders import write_text
 from scenario_gen.folders.marker import Kind
 from scenario_gen.parameters import flatten
 from scenario_gen.report.data import FRAME_PERIOD, MAX_FRAMES, pack, road_data, states
@@ -75,6 +76,9 @@ def as_junit(outcomes: Sequence[Outcome], planner: str) -> str:
         said = ElementTree.SubElement(case, "system-out")
         said.text = json.dumps(verdict.document(), ensure_ascii=False)
     ElementTree.indent(suite)
+    for element in suite.iter():  # XML has no form for control characters
+        element.attrib.update({name: printable(value) for name, value in element.attrib.items()})
+        element.text = printable(element.text) if element.text else None
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(suite, encoding="unicode") + "\n"
 
 
@@ -136,20 +140,17 @@ def write_verdicts(folder: Path, outcomes: Sequence[Outcome], planner: str, conf
 
 
 def write_drives(
-    out: Path,
+    folder: Path,
     outcomes: Sequence[Outcome],
     trials: Sequence[Trial],
     planner: str,
     config: ClosedLoopConfig,
     broken: Sequence[str] = (),
-    inputs: Sequence[Path] = (),
-) -> Mapping[str, Path]:
-    """Write JSON, JUnit's XML and the page to a folder; return their paths.
+) -> None:
+    """Write JSON, JUnit's XML and the page to a folder that is there.
 
     Raises:
-        InputError: the folder may not be replaced, or not be written.
+        OSError: the disk is full, or the folder may not be written.
     """
-    with replaced_folder(out, DRIVEN, inputs) as folder:
-        write_verdicts(folder, outcomes, planner, config)
-        write_text(folder / PAGE, as_page(outcomes, trials, planner, config, broken))
-    return {name: out / name for name in (JSON, JUNIT, PAGE)}
+    write_verdicts(folder, outcomes, planner, config)
+    write_text(folder / PAGE, as_page(outcomes, trials, planner, config, broken))

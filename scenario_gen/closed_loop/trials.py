@@ -16,12 +16,16 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
 import importlib
 import math
 import multiprocessing
+import os
 from pathlib import Path
+import signal
 import sys
+import threading
 from typing import Any
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
@@ -88,6 +92,8 @@ def find_planner(name: str) -> MakePlanner:
             found = getattr(found, part)
     except (ImportError, AttributeError) as error:
         raise InputError(f"--planner {name}: {error}") from error
+    except (Exception, SystemExit) as error:  # the module runs
+        raise InputError(f"--planner {name}: {type(error).__name__}: {error}") from error
     if not callable(found):
         raise InputError(f"--planner {name}: that is no class; a planner has reset(task) and act(observation)")
     return found  # type: ignore[no-any-return]
@@ -188,8 +194,29 @@ def run_trials(
         results: Iterator[Outcome] = map(_run, tasks)
         return _gathered(results, outcomes, len(trials), progress)
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        return _gathered(pool.map(_run, tasks, chunksize=4), outcomes, len(trials), progress)
+    workers = min(workers, max(len(tasks), 1))
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_end_with_parent) as pool:
+        try:
+            at_once = min(max(len(tasks) // workers, 1), 4)
+            return _gathered(pool.map(_run, tasks, chunksize=at_once), outcomes, len(trials), progress)
+        except BrokenProcessPool as error:
+            raise InputError(
+                f"a process that drove the planner has ended after {len(outcomes)} of {len(tasks)} drives: it crashed, called "
+                "os._exit, or was killed for want of memory; --workers 1 shows where"
+            ) from error
+
+
+def _end_with_parent() -> None:
+    """Let a worker end when the process does that started it, however that ends; a Ctrl-C is for that one."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+
+    def wait() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=wait, daemon=True, name="parent").start()
 
 
 def _gathered(
@@ -203,14 +230,19 @@ def _gathered(
 
 def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
     trial, planner, config = task
-    made = (find_planner(planner) if isinstance(planner, str) else planner)()
-    loop = ClosedLoop(trial.scenario, trial.ego, trial.road, config)
+    make = find_planner(planner) if isinstance(planner, str) else planner
+    loop, process = ClosedLoop(trial.scenario, trial.ego, trial.road, config), os.getpid()
     try:
-        drive = loop.drive(made)
+        drive = loop.drive(make())
+    except InputError as error:
+        raise InputError(f"scenario {trial.name}: {error}") from error
     except ScenarioGenError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # one that leaves would take its exit code for the result
         raise InputError(f"scenario {trial.name}: the planner failed: {type(error).__name__}: {error}") from error
+    finally:
+        if os.getpid() != process:  # the planner has forked: there is one result of this drive
+            os._exit(1)
     return Outcome(trial.name, judge(loop, drive), drive)
 
 

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from scenario_gen.documents import shown
 from scenario_gen.errors import InputError, RefusedError
 from scenario_gen.roads.builtin import BUILT_IN, draw, draw_corridor, draw_paper, junction_centre, layout_for
 from scenario_gen.roads.config import RoadConfig
@@ -76,7 +77,8 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
     if path.suffix.lower() not in (".yaml", ".yml"):
         names = ", ".join((*BUILT_IN, "corridor"))
         kinds = f"a map_server YAML file or a vector map ({', '.join(READERS)})"
-        raise InputError(f"road {name_or_path!r} is neither one of {names} nor the path of {kinds}")
+        part = "; one part behind one # can be named of a vector map alone" if "#" in name_or_path else ""
+        raise InputError(f"road {shown(name_or_path, 200)!r} is neither one of {names} nor the path of {kinds}{part}")
     return read_map(path, config)
 
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
+from scenario_gen.roads.vector.ground import along_lanes
 from scenario_gen.sampling.config import SamplingConfig
 from scenario_gen.sampling.gp import Features, Observations, Regression
 from scenario_gen.sampling.path import BasePath
@@ -161,7 +162,10 @@ def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> F
 
 
 def road_ahead(path: BasePath, vehicle: Vehicle, road: Road, most: Floats) -> Floats:
-    """Metres (2,), at most `most` (2,), for which the road is free straight on before the route and behind it."""
+    """Metres (2,), at most `most` (2,), for which the road is free straight on before the route and behind it.
+
+    Where the road has lanes, straight on must be along one of them too: before a bend it leads across those of others.
+    """
     found = np.zeros(2)
     if len(path.node) == 1:
         return found
@@ -172,6 +176,8 @@ def road_ahead(path: BasePath, vehicle: Vehicle, road: Road, most: Floats) -> Fl
         side = np.array([-0.5, 0.0, 0.5]) * (vehicle.width + 2.0 * _SIDE)
         points = np.array([x, y]) + sign * step[:, None, None] * ahead + side[:, None] * np.array([-ahead[1], ahead[0]])
         free = road.drivable_at(points).all(axis=1)
+        flat = points.reshape(-1, 2)
+        free &= along_lanes(road, np.column_stack((flat, np.full(len(flat), yaw)))).reshape(len(points), -1).all(axis=1)
         clear = float(step[-1]) if free.all() else _FLANK_STEP * int(np.argmin(free))
         found[end] = min(max(clear - 0.5 * vehicle.length - _FLANK_STEP, 0.0), most[end])
     return found

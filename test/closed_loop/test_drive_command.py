@@ -15,13 +15,19 @@
 """The command `drive`: a bag and a planner in, verdicts and an exit code out."""
 
 import json
+import os
+import sys
+from xml.etree import ElementTree
 
 from bag_examples import hand_made_run
 import pytest
 from typer.testing import CliRunner
 
 from scenario_gen.cli import app
-from scenario_gen.closed_loop.trials import read_trials
+from scenario_gen.closed_loop.command import drive_bag
+from scenario_gen.closed_loop.ego import Command, Pose
+from scenario_gen.closed_loop.results import as_junit
+from scenario_gen.closed_loop.trials import find_planner, read_trials
 from scenario_gen.errors import InputError
 from scenario_gen.recordings.write import write_recording
 
@@ -44,6 +50,94 @@ def test_a_bag_is_driven_and_the_bars_decide_the_exit_code(bag, tmp_path):
         assert told.exit_code == (0 if reached else 1) and ("bars not kept: goals" in told.output) != reached, told.output
         assert len(said["drives"]) == 2 and said["parameters"]["overtime"] == 1.0
         assert (tmp_path / "out" / "junit.xml").is_file() and (tmp_path / "out" / "drives.html").is_file()
+
+
+class Still:
+    """A planner that does nothing; the others of this file fail in their own ways."""
+
+    def reset(self, task):
+        self.task = task
+
+    def act(self, seen):
+        return None
+
+
+class Wrong(Still):
+    def act(self, seen):
+        return (0.0, 0.0)
+
+
+class OfTexts(Still):
+    def act(self, seen):
+        return Command("a", None)
+
+
+class Leaves(Still):
+    def act(self, seen):
+        sys.exit(0)
+
+
+class LeavesAtOnce(Still):
+    def act(self, seen):
+        os._exit(0)
+
+
+class NeverMade(Still):
+    def __init__(self):
+        raise RuntimeError("no model here")
+
+
+class Forks(Still):
+    def act(self, seen):
+        if seen.time == 0.0:
+            os.fork()
+
+
+class Nowhere(Still):
+    def act(self, seen):
+        return Pose(1e300, 0.0, 0.0, 1e300)
+
+
+@pytest.mark.parametrize(
+    ("planner", "workers", "said"),
+    [
+        ("Wrong", 1, r"scenario 0: a planner's `act` returns Command, Pose or None; it returned tuple"),
+        ("OfTexts", 1, r"scenario 0: a planner's `act` returned a Command that is not of numbers"),
+        ("Leaves", 1, r"scenario 0: the planner failed: SystemExit: 0"),
+        ("NeverMade", 1, r"scenario 0: the planner failed: RuntimeError: no model here"),
+        ("LeavesAtOnce", 2, r"a process that drove the planner has ended after 0 of 2 drives"),
+    ],
+)
+def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, workers, said):
+    with pytest.raises(InputError, match=said):
+        drive_bag(bag, f"{__name__}:{planner}", count=2, workers=workers, out=tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("planner", ["Forks", "Nowhere"])
+def test_a_planner_that_forks_or_leaves_every_road_is_judged_once(bag, tmp_path, planner):
+    result = drive_bag(bag, f"{__name__}:{planner}", count=1, workers=1, out=tmp_path / "out")
+    (drive,) = json.loads(result.written[0].read_text())["drives"]
+    assert drive["faults"] > 0 and not drive["passed"]
+
+
+def test_junit_is_xml_whatever_things_are_called():
+    suite = ElementTree.fromstring(as_junit([], "no\x01 name\ufffe"))
+    assert suite.get("name") == r"no\x01 name\ufffe" and suite.get("tests") == "0"
+
+
+def test_a_module_that_ends_the_process_is_no_planner(tmp_path, monkeypatch):
+    (tmp_path / "ends.py").write_text("import sys; sys.exit(0)")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(InputError, match="--planner ends:X: SystemExit: 0"):
+        find_planner("ends:X")
+
+
+def test_a_folder_of_somebodys_own_is_refused_before_anything_is_driven(bag, tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(InputError, match=r"holds mine\.txt"):
+        drive_bag(bag, f"{__name__}:NeverMade", workers=1, out=tmp_path)
 
 
 def test_an_ego_that_is_not_there_is_named(bag):

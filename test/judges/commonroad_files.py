@@ -21,6 +21,7 @@ NAME.track.json. It has LIMIT for each, and plans for its own vehicle, or for th
 planning problem has none. One JSON object on the last line.
 """
 
+from copy import deepcopy
 import json
 from pathlib import Path
 import signal
@@ -43,6 +44,8 @@ import numpy as np
 SCHEMA = Path(commonroad.scenario_definition.__path__[0]) / "xml_definition_files" / "XML_commonRoad_XSD.xsd"
 AHEAD, COMFORT, SLOWEST = 30.0, 2.0, 2.5  # metres looked ahead, m/s² across, m/s
 BEYOND = 60.0  # metres of reference path beyond its end
+SEEN, IN_LANE, ALONG = 60.0, 1.0, 1.0  # metres ahead, metres beside the reference path, rad: who is followed
+BETWEEN, HEADWAY, SETTLED = 7.0, 1.0, 2.0  # metres between rear axle and the other's centre when both stand, s, s
 LIMIT = 60.0  # seconds of CPU time for one problem
 
 
@@ -66,21 +69,25 @@ def violations(scenario, boundary):
 
 
 def planted(path, boundary):
-    """Say whether a collision is found where a vehicle drives as another does, and a departure where it drives beside."""
+    """Say whether a collision is found where a vehicle drives as another does, and a departure where it drives beside.
+
+    Every plant is a copy of the file's vehicle, moved once: commonroad-io keeps the occupancies of the first move.
+    """
     scenario, _ = CommonRoadFileReader(str(path)).open()
-    first = scenario.dynamic_obstacles[0]
-    before = violations(scenario, boundary)
+    first, *others = scenario.dynamic_obstacles
+
+    def moved(by):
+        copied = deepcopy(first)
+        copied.translate_rotate(by, 0.0)
+        return create_collision_object(copied)
+
     across = np.array([-np.sin(first.initial_state.orientation), np.cos(first.initial_state.orientation)])
-    departure = False
-    for _ in range(6):  # 5 m, 10 m, … beside: a road may be wide
-        first.translate_rotate(5.0 * across, 0.0)
-        departure = departure or violations(scenario, boundary)[1] > before[1]
-    if len(scenario.dynamic_obstacles) < 2:
+    departure = any(moved(5.0 * k * across).collide(boundary) for k in range(1, 7))  # 5 m, 10 m, … beside: a road may be wide
+    if not others:
         return None, departure
-    scenario, _ = CommonRoadFileReader(str(path)).open()
-    first, second = scenario.dynamic_obstacles[:2]
-    first.translate_rotate(second.initial_state.position - first.initial_state.position, 0.0)
-    return violations(scenario, boundary)[0] > before[0], departure
+    second = others[0]
+    onto = moved(second.initial_state.position - first.initial_state.position)
+    return onto.collide(create_collision_object(second)), departure
 
 
 def check(folder):
@@ -114,6 +121,22 @@ def desired_speed(planner, cruise):
     s, path, curvature = planner.x_0_cl[0][0], planner.coordinate_system.ref_pos, planner.coordinate_system.ref_curv
     ahead = np.abs(curvature[(path > s - 2.0) & (path < s + AHEAD)])
     return max(SLOWEST, min(cruise, float(np.sqrt(COMFORT / max(ahead.max(initial=1e-6), 1e-6)))))
+
+
+def following_speed(planner, scenario, step):
+    """Return the speed at which the planner does not run into who drives ahead in its lane; it does not look so far itself."""
+    (s, *_), now, allowed = planner.x_0_cl[0], planner.x_0, np.inf
+    for obstacle in scenario.dynamic_obstacles:
+        state = obstacle.state_at_time(step)
+        if state is None or abs(np.angle(np.exp(1j * (state.orientation - now.orientation)))) > ALONG:
+            continue
+        try:
+            ahead, beside = planner.coordinate_system.convert_to_curvilinear_coords(*state.position)
+        except Exception:  # beside the reference path, its projection has no value and raises errors of its own types
+            continue
+        if 0.0 < ahead - s < SEEN and abs(beside) < IN_LANE:
+            allowed = min(allowed, state.velocity + (ahead - s - BETWEEN - HEADWAY * now.velocity) / SETTLED)
+    return max(allowed, 0.0)
 
 
 def track_of(planner):
@@ -152,7 +175,8 @@ def drive(path):
             speed = max(
                 planner.x_0.velocity, 0.01
             )  # at 0.0 it would take the initial speed for the desired one, and stand for ever
-            planner.set_desired_velocity(desired_velocity=desired_speed(planner, cruise), current_speed=speed)
+            wanted = min(desired_speed(planner, cruise), following_speed(planner, scenario, step))
+            planner.set_desired_velocity(desired_velocity=wanted, current_speed=speed)
             planned, k = planner.plan(), 0
             if not planned:
                 return "no trajectory", step, track_of(planner)

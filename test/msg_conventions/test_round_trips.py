@@ -132,6 +132,7 @@ def test_lanes(seed, count):
         (b'"points": 3', b'"points": 9', "borders of 9 points"),
         (b'"points": 3', b'"points": 2', "belong to no lane"),
         (b'"points": 3', b'"points":[]', "TypeError"),
+        (b'"points": 3, "successors": [0], "beside": []', b'"points":3, "successors":[1e999],"beside":[]', "OverflowError"),
         (b'"successors": [0]', b'"successors": [8]', "leads to a lane that is not there"),
         (b'{"name"', b'{"nome"', "KeyError"),
         (b'{"name"', b'["name"', "does not say what its lanes are"),

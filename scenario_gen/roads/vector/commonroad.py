@@ -25,7 +25,7 @@ import numpy as np
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.markup import Element, finite, read_xml
-from scenario_gen.roads.vector.network import Draft, network_of
+from scenario_gen.roads.vector.network import Draft, network_of, refuse_too_many_lanes
 from scenario_gen.types.lanes import LaneNetwork
 
 _SKIPPED = frozenset(
@@ -47,6 +47,7 @@ def read_commonroad(path: Path) -> LaneNetwork:
     if root.tag != "commonRoad":
         raise InputError(f"{root.place}: the root of a CommonRoad file is <commonRoad>")
     lanelets = {element.get("id"): element for element in root.all("lanelet")}
+    refuse_too_many_lanes(len(lanelets), path)
     limits = _speed_signs(root)
     junctions = _junctions(root, set(lanelets))
     drafts, left_out = [], 0

@@ -112,18 +112,31 @@ def own_ground(road: Road, path: Floats, vehicle: Vehicle) -> Road:
     return part if footprint_fits(part, ends, vehicle.length, vehicle.width).all() else road
 
 
+def along_lanes(road: Road, poses: Floats) -> Bools:
+    """Return (M,) whether poses (M, 3) x, y [m], yaw [rad] lie in a lane about its way; everywhere, on a road without lanes."""
+    found = np.full(len(poses), road.lanes is None)
+    for lane in road.lanes.lanes if road.lanes is not None else ():
+        found[~found] = _along(lane, poses[~found])
+    return found
+
+
 def _uses(lane: Lane, path: Floats) -> bool:
     """Whether part of a path lies in a lane, about its way."""
     low, high = lane.outline.min(axis=0), lane.outline.max(axis=0)
-    inside = ((path[:, :2] >= low) & (path[:, :2] <= high)).all(axis=1)
-    centre = lane.centre
-    step = np.diff(centre, axis=0)
+    near = path[((path[:, :2] >= low) & (path[:, :2] <= high)).all(axis=1)]
+    return bool(_along(lane, near[::2]).any())
+
+
+def _along(lane: Lane, poses: Floats) -> Bools:
+    """Whether poses (M, 3) lie in a lane, about its way."""
+    low, high = lane.outline.min(axis=0), lane.outline.max(axis=0)
+    inside = ((poses[:, :2] >= low) & (poses[:, :2] <= high)).all(axis=1)
+    step = np.diff(lane.centre, axis=0)
     yaw = exact.arctan2(step[:, 1], step[:, 0])
-    middle = (centre[1:] + centre[:-1]) / 2.0
+    middle = (lane.centre[1:] + lane.centre[:-1]) / 2.0
     half = exact.hypot(*(lane.left - lane.right).T)[:-1] / 2.0
-    for pose in path[inside][::2]:
-        away = exact.hypot(middle[:, 0] - pose[0], middle[:, 1] - pose[1])
+    for row in np.flatnonzero(inside).tolist():
+        away = exact.hypot(middle[:, 0] - poses[row, 0], middle[:, 1] - poses[row, 1])
         k = int(np.argmin(away))
-        if away[k] <= half[k] and abs(float(wrap_angle(np.asarray(yaw[k] - pose[2])))) < _ALONG:
-            return True
-    return False
+        inside[row] = away[k] <= half[k] and abs(float(wrap_angle(np.asarray(yaw[k] - poses[row, 2])))) < _ALONG
+    return np.asarray(inside)

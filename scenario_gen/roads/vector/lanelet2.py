@@ -31,7 +31,7 @@ from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.geodesy import local_frame
 from scenario_gen.markup import Element, finite, read_xml
-from scenario_gen.roads.vector.network import Draft, network_of
+from scenario_gen.roads.vector.network import Draft, network_of, refuse_too_long, refuse_too_many_lanes
 from scenario_gen.types.lanes import LaneNetwork
 
 _FOR_CARS = ("road", "highway", "play_street", "exit")  # subtypes that cars may use, if no participant is named
@@ -98,7 +98,9 @@ def read_lanelet2(path: Path) -> LaneNetwork:
                 left_out += 1
     if not chosen:
         raise InputError(f"map {path}: none of its {left_out} lanelets is for cars")
+    refuse_too_many_lanes(len(chosen), path)
     used = {ref: ways[ref] for relation, _ in chosen for ref in _refs(relation, ways)}
+    refuse_too_long(sum(len(ways[ref].children) for relation, _ in chosen for ref in _refs(relation, ways)), path)
     positions, note = _positions({n: nodes for way in used.values() for n in _nodes(way, nodes)}, nodes, path)
     lanelets = []
     for relation, tags in chosen:

@@ -59,6 +59,11 @@ _SHIFT = 0.02  # 1/m, curvature of a change of lanes
 _FORTH = 25.0  # metres of lanes before and after what is driven
 _LOST = 6.0  # m² of a crossing beyond the recorded ends that is none on the lanes
 _SPEEDING = 0.1  # m² per (m/s)² beyond the speed limit
+_BRAKED, _PULLED = 4.0, 2.5  # m/s² with which a vehicle slows down for a bend, and speeds up after it
+_ASIDE = 3.0  # m/s² across, beyond which a bend counts against a place,
+_BENDING = 1.0  # m² per m/s² beyond, and
+_MOST_ASIDE = 10.0  # the most that counts
+_NO_GRIP = 9.0  # m/s² across that no car can drive
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,11 +90,19 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """A course for every vehicle; `cost` [m²] is how badly they resemble the template, `reason` why it cannot be had, or ""."""
+    """A course for every vehicle.
+
+    Attributes:
+        courses: one for each vehicle; () where there is none for somebody.
+        cost: m², how badly they resemble the template.
+        reason: why it cannot be had, or "".
+        aside: m/s² of lateral acceleration that the template's speeds at the ends leave no way around (`pressed_aside`).
+    """
 
     courses: tuple[Course, ...]
     cost: float
     reason: str
+    aside: float = 0.0
 
 
 class Chains:
@@ -334,7 +347,38 @@ def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], s
             cost += _LOST
             if _driven(crossing, one, two):
                 reason = reason or f"vehicles {two.vehicle.id} and {one.vehicle.id} cross in the template, and not on these lanes"
-    return Match(tuple(courses), cost + speeding(chains.network, courses, tracks), reason)
+    aside = [pressed_aside(course, track) for course, track in zip(courses, tracks, strict=True)]
+    for (_, forced), track in zip(aside, tracks, strict=True):
+        if forced > _NO_GRIP:
+            reason = reason or f"the lanes bend too sharply for the speed of vehicle {track.vehicle.id}"
+    cost += speeding(chains.network, courses, tracks) + bending(courses, tracks)
+    return Match(tuple(courses), cost, reason, max(forced for _, forced in aside))
+
+
+def pressed_aside(course: Course, track: Track) -> tuple[float, float]:
+    """Return the largest lateral acceleration [m/s²], v² times curvature, that a vehicle has on a course.
+
+    The first is that with the template's speeds; the second that with the least speeds which those at both ends allow, at
+    `_BRAKED` from the first on and `_PULLED` up to the last: a bend may be driven more slowly than the template drives there,
+    the ends may not.
+    """
+    driven = float(course.progress[-1])
+    if track.still or driven < _STEP:
+        return 0.0, 0.0
+    at = np.linspace(0.0, driven, max(math.ceil(driven), 1) + 1)
+    turned = np.abs(np.diff(course.curve.at(course.start + at)[:, 2]))
+    curvature, middle_at = turned / np.diff(at), (at[1:] + at[:-1]) / 2.0
+    speed = track.speed * (driven / float(track.progress[-1]))
+    squared = np.square(np.interp(middle_at, course.progress, speed))
+    first, last = float(np.square(speed[0])), float(np.square(speed[-1]))
+    least = np.maximum(first - 2.0 * _BRAKED * middle_at, last - 2.0 * _PULLED * (driven - middle_at)).clip(min=0.0)
+    return float((curvature * squared).max()), float((curvature * least).max())
+
+
+def bending(courses: Sequence[Course], tracks: Sequence[Track]) -> float:
+    """What it counts [m²] that bends would be driven faster than is comfortable."""
+    aside = [pressed_aside(course, track)[0] - _ASIDE for course, track in zip(courses, tracks, strict=True)]
+    return _BENDING * float(np.mean(np.clip(aside, 0.0, _MOST_ASIDE)))
 
 
 def speeding(network: LaneNetwork, courses: Sequence[Course], tracks: Sequence[Track]) -> float:

@@ -14,20 +14,27 @@
 
 """From borders to lanes: cross-sections, junctions that a map does not name, and the part of a network inside a box."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 import math
 
 import numpy as np
+import shapely
 
 from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, runs
+from scenario_gen.arrays import Bools, Floats, Ints, runs
 from scenario_gen.errors import InputError
 from scenario_gen.types.lanes import Lane, LaneNetwork
 
 _SECTION = 1.0  # metres between cross-sections at most
 _SHORTEST = 0.05  # metres of a border
 MOST_SECTIONS = 2_000_000  # of a whole map
+MOST_LANES = 50_000  # a city of some 1500 km of streets
+MOST_LINKS = 100  # of a lane to lanes that follow it, or lie beside it
+_CHUNK = 16  # edges of a middle that are looked at together
+_QUERIED = 64  # chunks whose neighbours are looked up at once
+_COMPARED = 2_000  # pairs of chunks that are compared at once
+_MOST_COMPARED = 1_000_000  # pairs of chunks
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +63,33 @@ class Draft:
     place: str
     paired: bool = False
 
+    def __post_init__(self) -> None:
+        for names, what in ((self.successors, "follow it"), (self.beside, "lie beside it")):
+            if len(names) > MOST_LINKS:
+                raise InputError(f"{self.place}: lane {self.id}: {len(names)} lanes {what}; at most {MOST_LINKS} are read")
+
+
+def refuse_too_many_lanes(count: int, name: object) -> None:
+    """Refuse a map before its lanes are made.
+
+    Raises:
+        InputError: it has more than `MOST_LANES`.
+    """
+    if count > MOST_LANES:
+        raise InputError(f"map {name}: more than {MOST_LANES} lanes; cut the map")
+
+
+def refuse_too_long(sections: int, name: object) -> None:
+    """Refuse a map before its cross-sections are made.
+
+    Raises:
+        InputError: it has more than `MOST_SECTIONS`.
+    """
+    if sections > MOST_SECTIONS:
+        raise InputError(
+            f"map {name}: lanes of more than {MOST_SECTIONS} points, about {MOST_SECTIONS * _SECTION / 1000.0:g} km; cut the map"
+        )
+
 
 def network_of(name: str, drafts: Sequence[Draft], notes: Iterable[str]) -> LaneNetwork:
     """Return the network of what a reader found; neighbours that are no lanes for cars are left out.
@@ -73,9 +107,11 @@ def network_of(name: str, drafts: Sequence[Draft], notes: Iterable[str]) -> Lane
     lanes, total = [], 0
     for draft in drafts:
         left, right = (draft.left, draft.right) if draft.paired else cross_sections(draft.left, draft.right, draft.place)
-        total += len(left)
-        if total > MOST_SECTIONS:
-            raise InputError(f"map {name}: lanes of more than {MOST_SECTIONS * _SECTION / 1000.0:g} km; cut the map")
+        longest = max(float(exact.hypot(*np.diff(border, axis=0).T).sum()) for border in (left, right))
+        if not longest <= MOST_SECTIONS * _SECTION:  # nor is it NaN
+            raise InputError(f"{draft.place}: lane {draft.id} has a border of {longest / 1000.0:.3g} km; check the coordinates")
+        total += max(len(left), math.ceil(longest / _SECTION))
+        refuse_too_long(total, name)
         after, beside = (
             tuple(dict.fromkeys(index[other] for other in names if other in index)) for names in (draft.successors, draft.beside)
         )
@@ -120,8 +156,6 @@ def with_junctions(network: LaneNetwork) -> LaneNetwork:
     They are numbered 1, 2, … in the order of their first lanes.
     """
     lanes = network.lanes
-    low = np.array([lane.centre.min(axis=0) for lane in lanes])
-    high = np.array([lane.centre.max(axis=0) for lane in lanes])
     root = list(range(len(lanes)))
 
     def find(k: int) -> int:
@@ -131,12 +165,9 @@ def with_junctions(network: LaneNetwork) -> LaneNetwork:
         return k
 
     crossing: set[int] = set()
-    for a in range(len(lanes)):
-        near = np.flatnonzero((low[a] <= high[a + 1 :]).all(axis=1) & (low[a + 1 :] <= high[a]).all(axis=1)) + a + 1
-        for b in near.tolist():
-            if _cross(lanes[a].centre, lanes[b].centre):
-                crossing |= {a, b}
-                root[find(b)] = find(a)
+    for a, b in _crossing(network):
+        crossing |= {a, b}
+        root[find(b)] = find(a)
     for before in network.lanes:  # who parts from a lane that crosses others turns at the same junction
         inner = [k for k in before.successors if k in crossing]
         for k in before.successors if inner else ():
@@ -151,17 +182,63 @@ def with_junctions(network: LaneNetwork) -> LaneNetwork:
     return replace(network, lanes=tuple(named))
 
 
-def _cross(a: Floats, b: Floats) -> bool:
-    """Whether two polylines cross between their ends."""
-    u, v = np.diff(a, axis=0), np.diff(b, axis=0)
-    w = b[None, :-1] - a[:-1, None]
-    det = u[:, None, 0] * v[None, :, 1] - u[:, None, 1] * v[None, :, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = (w[..., 0] * v[None, :, 1] - w[..., 1] * v[None, :, 0]) / det
-        q = (w[..., 0] * u[:, None, 1] - w[..., 1] * u[:, None, 0]) / det
-    hit = (t >= 0.0) & (t < 1.0) & (q >= 0.0) & (q < 1.0)
-    hit[0, 0] = hit[-1, -1] = False  # they part, or meet, there
-    return bool(hit.any())
+def _crossing(network: LaneNetwork) -> Iterator[tuple[int, int]]:
+    """Yield the pairs of lanes whose middles cross between their ends, some of them more than once.
+
+    Middles are cut into chunks of a few edges, whose boxes are looked up in a tree.
+
+    Raises:
+        InputError: too many of them lie upon each other.
+    """
+    starts, steps, owners, edges = [], [], [], []
+    for k, lane in enumerate(network.lanes):
+        count = len(lane.centre) - 1
+        index = np.arange(math.ceil(count / _CHUNK) * _CHUNK).reshape(-1, _CHUNK)
+        there = index < count
+        starts.append(np.where(there[..., None], lane.centre[np.minimum(index, count)], np.nan))
+        steps.append(np.where(there[..., None], np.diff(lane.centre, axis=0)[np.minimum(index, count - 1)], np.nan))
+        owners.append(np.full(len(index), k))
+        edges.append(np.where(index == 0, 1, 0) + np.where(index == count - 1, 2, 0))  # its first, its last, both
+    start, step, owner, edge = (np.concatenate(part) for part in (starts, steps, owners, edges))
+    ends = np.concatenate((start, start + step), axis=1)
+    boxes = shapely.box(*np.nanmin(ends, axis=1).T, *np.nanmax(ends, axis=1).T)
+    tree, compared = shapely.STRtree(boxes), 0
+    for k in range(0, len(boxes), _QUERIED):
+        one, two = tree.query(boxes[k : k + _QUERIED])
+        one = one + k
+        one, two = one[owner[one] < owner[two]], two[owner[one] < owner[two]]
+        compared += len(one)
+        if compared > _MOST_COMPARED:
+            raise InputError(
+                f"map {network.name}: its lanes lie upon each other in more than {_MOST_COMPARED} places, as at lane "
+                f"{network.lanes[owner[one[0]]].id}; check the coordinates"
+            )
+        for n in range(0, len(one), _COMPARED):
+            a, b = one[n : n + _COMPARED], two[n : n + _COMPARED]
+            hit = _cross(start[a], step[a], start[b], step[b], edge[a], edge[b])
+            yield from zip(owner[a[hit]].tolist(), owner[b[hit]].tolist(), strict=True)
+
+
+def _cross(p: Floats, u: Floats, q: Floats, v: Floats, first: Ints, second: Ints) -> Bools:
+    """Say of pairs (K,) of chunks whether edges of one cross edges of the other.
+
+    Args:
+        p: (K, C, 2) begins of the edges of one, NaN where it has fewer.
+        u: (K, C, 2) their steps.
+        q: begins of the other's.
+        v: their steps.
+        first: (K, C) of each edge of one: 1 if it is the first of its lane, 2 if it is the last, 3 if it is both.
+        second: the same of the other.
+    """
+    w = q[:, None] - p[:, :, None]
+    u, v = u[:, :, None], v[:, None]
+    det = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        t = (w[..., 0] * v[..., 1] - w[..., 1] * v[..., 0]) / det
+        s = (w[..., 0] * u[..., 1] - w[..., 1] * u[..., 0]) / det
+        hit = (t >= 0.0) & (t < 1.0) & (s >= 0.0) & (s < 1.0)
+    hit &= (first[:, :, None] & second[:, None]) == 0  # two first edges part, and two last ones meet, there
+    return np.asarray(hit.any(axis=(1, 2)))
 
 
 def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:

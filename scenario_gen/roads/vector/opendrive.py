@@ -29,7 +29,7 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
 from scenario_gen.markup import Element, read_xml
-from scenario_gen.roads.vector.network import Draft, MOST_SECTIONS, network_of
+from scenario_gen.roads.vector.network import Draft, MOST_LINKS, MOST_SECTIONS, network_of, refuse_too_long, refuse_too_many_lanes
 from scenario_gen.roads.vector.plan_view import Cubics, cubics, reference_line, ReferenceLine
 from scenario_gen.types.lanes import LaneNetwork
 
@@ -77,7 +77,7 @@ def read_opendrive(path: Path) -> LaneNetwork:
         f"OpenDRIVE {header.attributes.get('revMajor', '?')}.{header.attributes.get('revMinor', '?')}: {_projection(header)}"
     ]
     roads: dict[str, _Road] = {}
-    total = 0.0
+    total, lanes, points = 0.0, 0, 0
     for element in root.all("road"):
         name = element.get("id")
         if name in roads:
@@ -87,6 +87,10 @@ def read_opendrive(path: Path) -> LaneNetwork:
         if total > MOST_SECTIONS * _STEP:
             raise InputError(f"{element.place}: roads of more than {MOST_SECTIONS * _STEP / 1000.0:g} km; cut the map")
         roads[name] = _road(element, name, line)
+        lanes += sum(len(section.lanes) for section in roads[name].sections)
+        refuse_too_many_lanes(lanes, path)
+        points += sum(len(section.lanes) * len(section.s) for section in roads[name].sections)
+        refuse_too_long(points, path)
     if not roads:
         raise InputError(f"map {path}: no <road>")
     joints = _Joints(roads)
@@ -120,7 +124,7 @@ def _road(element: Element, name: str, line: ReferenceLine) -> _Road:
         raise InputError(f"{lanes.place} has no <laneSection>")
     begins = [min(max(section.number("s"), 0.0), line.length) for section in sections]
     for section, begin, end in zip(sections, begins, [*begins[1:], line.length], strict=True):
-        breaks = [piece for piece in line.begin.tolist() if begin < piece < end]
+        breaks = line.begin[np.searchsorted(line.begin, begin, side="right") : np.searchsorted(line.begin, end)]
         s = np.unique(
             np.concatenate((np.linspace(begin, max(end, begin + 1e-3), max(math.ceil((end - begin) / _STEP), 1) + 1), breaks))
         )
@@ -137,9 +141,12 @@ def _section(section: Element, begin: float, s: Floats, poses: Floats, offset: C
     for side, sign in (("left", 1), ("right", -1)):
         group = section.first(side)
         across = middle
-        for lane in sorted(group.all("lane") if group else [], key=lambda lane: sign * _lane_id(lane, sign)):
+        known = group.all("lane") if group else []
+        refuse_too_many_lanes(len(known), section.file.removeprefix("map "))
+        refuse_too_long(len(known) * len(s), section.file.removeprefix("map "))
+        for count, lane in enumerate(sorted(known, key=lambda lane: sign * _lane_id(lane, sign)), 1):
             name = _lane_id(lane, sign)
-            if name in lanes or name != sign * (len([k for k in lanes if k * sign > 0]) + 1):
+            if name != sign * count:
                 raise InputError(f"{lane.place}: lane {name} is there twice, or those between it and the centre are missing")
             lanes[name] = lane
             if lane.all("width"):
@@ -203,6 +210,8 @@ class _Joints:
         for one, other in ((a, b), (b, a)):
             if other not in self.of.setdefault(one, []):
                 self.of[one].append(other)
+                if len(self.of[one]) > MOST_LINKS:
+                    raise InputError(f"{place}: more than {MOST_LINKS} lanes are joined to lane {_name(one[0])}")
 
     def along(self, road: _Road) -> None:
         """Join a road's sections, and it to the roads before and after it."""

@@ -37,6 +37,7 @@ _SPOTS = 15  # placements as one piece, and
 _STREETS = 8  # stretches of road that are looked at closely
 _SCALES = (1.0, 0.9, 1.1)
 _WORST = 40.0  # m²: what resembles the template less is no place for it
+_PRESSED = 4.2  # m/s² across, a little less than scenarios may have: where more is forced, another scale is tried first
 _BESIDE = 12.0  # metres of the map around what is driven, and
 _FORTH = 20.0  # metres of the lanes before and after it
 _SHIFT = 3.0  # metres by which paths may be shifted to be clear of each other
@@ -52,6 +53,8 @@ def placements(
     network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None, scales: Sequence[float] = _SCALES
 ) -> Iterator[tuple[Match, float]]:
     """Yield the ways of laying a template on lanes, with their scales: at home first, then those that resemble it most.
+
+    Those come last whose bends cannot be driven at the template's first and last speeds: smaller, it is slower too.
 
     Args:
         network: a map or a part of it.
@@ -71,9 +74,9 @@ def placements(
             yield own, 1.0
     spots = find_spots(network, tracks, lanes)[:_SPOTS]
     streets = list(islice(along_streets(chains, tracks, lanes), _STREETS))
-    found = 0
+    pressed: list[tuple[Match, float]] = []
     for scale in scales:
-        matches = streets if scale == 1.0 else []
+        matches = list(streets) if scale == 1.0 else []
         for spot in spots:
             stop_if_cancelled()
             one = match(chains, tracks, spot, scale)
@@ -81,11 +84,15 @@ def placements(
                 reasons[one.reason or "vehicles would be too far from where they are in the template"] += 1
             else:
                 matches.append(one)
-        for one in sorted(matches, key=lambda one: round(one.cost, 3)):
-            found += 1
-            yield one, scale
+        matches.sort(key=lambda one: round(one.cost, 3))
+        pressed += [(one, scale) for one in matches if one.aside > _PRESSED]
+        found = [(one, scale) for one in matches if one.aside <= _PRESSED]
+        yield from found
         if found:
-            return
+            break
+    yield from pressed
+    if pressed or found:
+        return
     why = "; ".join(f"{reason} ({count} of {len(spots) * len(scales)} placements)" for reason, count in reasons.most_common(2))
     raise RefusedError(f"the template fits no place on map {network.name}: {why or 'it has no lanes of its directions'}")
 

@@ -28,12 +28,15 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints, wrap_angle
 from scenario_gen.cancelling import stop_if_cancelled
+from scenario_gen.errors import RefusedError
 from scenario_gen.template.path_crossing import path_crossing
 from scenario_gen.template.tracks import Track
 from scenario_gen.types.lanes import LaneNetwork
 
 _CELL = 1.0  # metres
 _MOST_CELLS = 30_000_000  # of a map: a larger one is looked at in larger cells
+_MOST_SEARCHED = 300_000  # sections, a metre of lane each, of a map that is searched as a whole
+_AT_ONCE = 20_000  # sections
 _REACH = 4.0  # metres from a lane beyond which a sample counts as off the road
 _BINS = 16  # of directions
 _ALIKE = math.radians(35.0)  # a sample may be turned from its lane by this
@@ -73,26 +76,38 @@ class _Field:
 
     def __init__(self, network: LaneNetwork) -> None:
         points, yaws = _sections(network)
+        if len(points) > _MOST_SEARCHED:
+            raise RefusedError(
+                f"map {network.name} has {len(points)} sections of lanes; at most {_MOST_SEARCHED} are searched for a place: "
+                "choose a part with #box=x0,y0,x1,y1"
+            )
         low, high = points.min(axis=0) - _REACH, points.max(axis=0) + _REACH
         self.cell = max(_CELL, math.sqrt(float(np.prod(high - low)) / _MOST_CELLS))
         self.low = low
         size = np.ceil((high - low) / self.cell).astype(np.int64) + 1
         reach = math.ceil(_REACH / self.cell)
-        at = np.floor((points - low) / self.cell).astype(np.int64)
         offsets = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)), axis=-1).reshape(-1, 2)
-        cells = np.clip(at[:, None] + offsets, 0, size - 1)
-        centres = low + (cells + 0.5) * self.cell
-        distance = exact.hypot(centres[..., 0] - points[:, None, 0], centres[..., 1] - points[:, None, 1])
-        flat = cells[..., 1] * size[0] + cells[..., 0]
-        known, own = np.unique(flat, return_inverse=True)
+
+        def around(part: slice) -> tuple[Floats, Ints]:
+            """Distances and cells (P, O) about some sections."""
+            at = np.floor((points[part] - low) / self.cell).astype(np.int64)
+            cells = np.clip(at[:, None] + offsets, 0, size - 1)
+            centres = low + (cells + 0.5) * self.cell
+            distance = exact.hypot(centres[..., 0] - points[part, None, 0], centres[..., 1] - points[part, None, 1])
+            return distance, cells[..., 1] * size[0] + cells[..., 0]
+
+        parts = [slice(k, k + _AT_ONCE) for k in range(0, len(points), _AT_ONCE)]
+        known = np.unique(np.concatenate([np.unique(around(part)[1]) for part in parts]))
         self.index = np.full(int(size[0] * size[1]), len(known), dtype=np.int32)
         self.index[known] = np.arange(len(known))
         self.size = size
         self.table = np.full((len(known) + 1, _BINS), _REACH)
-        own = own.reshape(flat.shape)
-        for k in range(_BINS):
-            near = np.abs(wrap_angle(yaws - 2.0 * np.pi * k / _BINS)) <= _ALIKE
-            np.minimum.at(self.table[:, k], own[near].ravel(), distance[near].ravel())
+        for part in parts:
+            distance, flat = around(part)
+            own = self.index[flat]
+            for k in range(_BINS):
+                near = np.abs(wrap_angle(yaws[part] - 2.0 * np.pi * k / _BINS)) <= _ALIKE
+                np.minimum.at(self.table[:, k], own[near].ravel(), distance[near].ravel())
 
     def squared(self, points: Floats, yaws: Floats) -> Floats:
         """Squared distance [m²] of poses (..., 2), (...) from the nearest lane of their direction."""

@@ -29,7 +29,7 @@ from scenario_gen.arrays import Floats, wrap_angle
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
-from scenario_gen.roads.vector.match import Chains, changed_curve, Course, Match, speeding, turned_more
+from scenario_gen.roads.vector.match import bending, Chains, changed_curve, Course, Match, pressed_aside, speeding, turned_more
 from scenario_gen.template.frenet import FrenetTracks, to_frenet
 from scenario_gen.template.tracks import Track
 
@@ -157,7 +157,8 @@ def _laid(
     ]
     if any(abs(a - b) < _APART for a in offsets[0] for b in offsets[1]):
         return None  # one lane for both directions
-    return Match(tuple(courses), bend / _STRAIGHT + speeding(chains.network, courses, tracks), "")
+    cost = bend / _STRAIGHT + speeding(chains.network, courses, tracks) + bending(courses, tracks)
+    return Match(tuple(courses), cost, "", max(pressed_aside(*pair)[1] for pair in zip(courses, tracks, strict=True)))
 
 
 def _bends_more(course: Course, track: Track) -> bool:

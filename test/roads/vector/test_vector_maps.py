@@ -22,6 +22,8 @@ import pytest
 
 from scenario_gen import geodesy
 from scenario_gen.errors import InputError, RefusedError
+from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
 from scenario_gen.markup import parse_xml
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.vector.plan_view import reference_line
@@ -133,6 +135,12 @@ def test_a_part_that_is_not_there_is_refused(tmp_path, part, said):
         build_road(f"{write(tmp_path, '.xml')}#{part}")
 
 
+@pytest.mark.parametrize("name", ["t_intersection#box=0,0,9,9", "depot.yaml#junction=1", "a.osm#box=0,0,9,9#lanelet=1"])
+def test_a_part_of_what_has_none_is_refused(name):
+    with pytest.raises(InputError, match="one part behind one # can be named of a vector map alone"):
+        build_road(name)
+
+
 def test_a_map_too_large_to_draw_is_refused(tmp_path):
     with pytest.raises(RefusedError, match=r"road\.max_cells"):
         build_road(str(write(tmp_path, ".xodr")), None, RoadConfig(max_cells=1000))
@@ -191,6 +199,68 @@ def test_too_many_elements_are_refused(monkeypatch):
     monkeypatch.setattr("scenario_gen.markup.MOST_ELEMENTS", 50)
     with pytest.raises(InputError, match="more than 50 elements"):
         parse_xml(b"<a>" + b"<b/>" * 60 + b"</a>", "map")
+
+
+STACKED = (  # a ring of one lanelet over and over: each follows all
+    '<osm><node id="1" lat="0" lon="0"/><node id="2" lat="0" lon="3e-5"/><node id="3" lat="1e-4" lon="0"/>'
+    '<node id="4" lat="1e-4" lon="3e-5"/><way id="8"><nd ref="1"/><nd ref="3"/><nd ref="1"/></way>'
+    '<way id="9"><nd ref="2"/><nd ref="4"/><nd ref="2"/></way>'
+    + "".join(
+        f'<relation id="{k}"><member type="way" role="left" ref="8"/><member type="way" role="right" ref="9"/>'
+        '<tag k="type" v="lanelet"/></relation>'
+        for k in range(150)
+    )
+    + "</osm>"
+)
+
+
+def across(count, length):
+    """Return lanes of CommonRoad through one place in many directions."""
+    text = ""
+    for k in range(count):
+        x, y = math.cos(k * math.pi / count), math.sin(k * math.pi / count)
+        bounds = (
+            f"<{tag}>"
+            + "".join(f"<point><x>{a * x - b * y}</x><y>{a * y + b * x}</y></point>" for a in (-length, length))
+            + f"</{tag}>"
+            for tag, b in (("leftBound", 1.0), ("rightBound", -1.0))
+        )
+        text += f'<lanelet id="{k}">{"".join(bounds)}</lanelet>'
+    return f'<commonRoad commonRoadVersion="2020a">{text}</commonRoad>'
+
+
+@pytest.mark.parametrize(
+    ("suffix", "text", "limit", "said"),
+    [
+        (".osm", lanelet2(), ("MOST_LANES", 10), "more than 10 lanes"),
+        (".xml", FORMATS[".xml"](), ("MOST_LANES", 10), "more than 10 lanes"),
+        (".xodr", opendrive(), ("MOST_LANES", 10), "more than 10 lanes"),
+        (".xodr", opendrive(), ("MOST_SECTIONS", 300), "lanes of more than 300 points"),
+        (".osm", lanelet2(), ("MOST_SECTIONS", 50), "lanes of more than 50 points"),
+        (".osm", STACKED, ("MOST_LINKS", 100), "lane 0: 149 lanes follow it; at most 100 are read"),
+        (".xml", across(30, 40.0), ("_MOST_COMPARED", 100), "lie upon each other in more than 100 places, as at lane 0"),
+        (".xodr", opendrive().replace('d="0"', 'd="9e7"'), None, "km; check the coordinates"),
+    ],
+    ids=("lanes", "lanes", "lanes", "points", "points", "links", "crossings", "lengths"),
+)
+def test_what_would_take_too_much_time_or_memory_is_refused(tmp_path, monkeypatch, suffix, text, limit, said):
+    if limit:
+        monkeypatch.setattr(f"scenario_gen.roads.vector.network.{limit[0]}", limit[1])
+    with pytest.raises(InputError, match=said) as error:
+        read_network(write(tmp_path, suffix, text))
+    assert "map" in str(error.value)
+
+
+def test_lanes_that_cross_are_one_junction_however_long_they_are(tmp_path):
+    network = read_network(write(tmp_path, ".xml", across(3, 5000.0)))  # of 10,000 edges each
+    assert [lane.junction for lane in network.lanes] == ["1", "1", "1"]
+
+
+def test_a_whole_map_that_is_too_long_to_be_searched_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("scenario_gen.roads.vector.search._MOST_SEARCHED", 100)
+    (encounter,) = read_log([bundled("b")]).encounters
+    with pytest.raises(RefusedError, match=r"choose a part with #box=x0,y0,x1,y1"):
+        build_road(str(write(tmp_path, ".osm")), encounter)
 
 
 def test_a_missing_map_is_named(tmp_path):

@@ -1,0 +1,166 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The order of events of the certified execution, kept without exception: nobody comes to a place before its turn.
+
+Why nobody meets and nobody waits in a circle: docs/closed_loop.md.
+"""
+
+import numpy as np
+
+from scenario_gen.arrays import Bools, Floats
+from scenario_gen.kernels import kernel
+
+PARTS = 4  # of a step, in each of which the order is proven
+
+
+@kernel(inline=True)
+def limit(order: Floats, cell: float, clock: float) -> float:
+    """Clock [s] that one may not pass while the other's is at `clock`; order (K,) is that of the pair."""
+    return float(max(clock, order[min(int(clock / cell), order.shape[0] - 1)]))
+
+
+@kernel(inline=True)
+def _part(start: float, end: float, r: float, after: float, forced: bool, h: float, part: float) -> float:
+    """Clock [s] at a share of a step; its rate changes evenly, or it moves evenly where it was forced."""
+    if forced or part == 1.0:
+        return start + part * (end - start)
+    return start + h * part * (r + 0.5 * part * (after - r))
+
+
+@kernel(inline=True)
+def _slope(start: float, end: float, r: float, after: float, forced: bool, h: float, part: float) -> float:
+    """Rate of a clock at a share of a step."""
+    return (end - start) / h if forced else r + part * (after - r)
+
+
+@kernel(inline=True)
+def _ordered(
+    h: float, cell: float, order: Floats, i: int, j: int, clock: Floats, rate: Floats, new: Floats, after: Floats, forced: Floats
+) -> bool:
+    """Whether vehicle i keeps to the order with j throughout the step, proven for each of its parts.
+
+    In a part, either the clock of i ends no farther than it may while that of j is where it begins, for that limit only grows; or
+    it stays behind the clock of j throughout: their difference is a parabola, least at an end or at its vertex.
+    """
+    a0, b0 = clock[i], clock[j]
+    for k in range(PARTS):
+        start, part = k / PARTS, (k + 1.0) / PARTS
+        a = _part(clock[i], new[i], rate[i], after[i], forced[i] > 0.0, h, part)
+        b = _part(clock[j], new[j], rate[j], after[j], forced[j] > 0.0, h, part)
+        if a > limit(order[i, j], cell, b0):
+            if b0 < a0 or b < a:
+                return False
+            first = _slope(clock[j], new[j], rate[j], after[j], forced[j] > 0.0, h, start) - _slope(
+                clock[i], new[i], rate[i], after[i], forced[i] > 0.0, h, start
+            )
+            last = _slope(clock[j], new[j], rate[j], after[j], forced[j] > 0.0, h, part) - _slope(
+                clock[i], new[i], rate[i], after[i], forced[i] > 0.0, h, part
+            )
+            if first < 0.0 < last and b0 - a0 - 0.5 * first * first / (last - first) * h / PARTS < 0.0:
+                return False
+        a0, b0 = a, b
+    return True
+
+
+@kernel(inline=True)
+def keep_order(
+    h: float,
+    cell: float,
+    order: Floats,
+    ego: int,
+    goes: Bools,
+    clock: Floats,
+    rate: Floats,
+    new_clock: Floats,
+    new_rate: Floats,
+    forced: Floats,
+) -> None:
+    """Hold back who would come to a place before its turn.
+
+    First at the rate of the one it waits for, then at once: where it is by then is within what the order allows, whatever the
+    other does, for at the step's begin it was. Holding one back may hold back others, but each is stopped only once.
+    """
+    n = clock.shape[0]
+    wanted, wanted_rate = new_clock.copy(), new_rate.copy()
+    changed = True
+    while changed:
+        changed = False
+        for i in range(n):
+            for j in range(n):
+                if i in (j, ego) or j == ego or not goes[i] or not goes[j] or forced[i] > 1.0:
+                    continue
+                if _ordered(h, cell, order, i, j, clock, rate, new_clock, new_rate, forced):
+                    continue
+                changed = True
+                if new_rate[i] > new_rate[j] > 0.0 and forced[i] == 0.0:
+                    new_rate[i] = new_rate[j]
+                    new_clock[i] = clock[i] + 0.5 * (rate[i] + new_rate[i]) * h
+                    if _ordered(h, cell, order, i, j, clock, rate, new_clock, new_rate, forced):
+                        continue
+                room = np.inf
+                for k in range(n):
+                    if k not in (i, ego) and goes[k]:
+                        room = min(room, limit(order[i, k], cell, clock[k]) - clock[i])
+                new_clock[i] = clock[i] + max(min(new_clock[i] - clock[i], room), 0.0)
+                new_rate[i] = 0.0
+                forced[i] = 2.0
+    _go_together(h, cell, order, ego, goes, clock, wanted, wanted_rate, new_clock, new_rate, forced)
+
+
+@kernel(inline=True)
+def _go_together(
+    h: float,
+    cell: float,
+    order: Floats,
+    ego: int,
+    goes: Bools,
+    clock: Floats,
+    wanted: Floats,
+    wanted_rate: Floats,
+    new_clock: Floats,
+    new_rate: Floats,
+    forced: Floats,
+) -> None:
+    """Let those with the earliest clock go on, evenly and with one clock, if the order held them back only for each other.
+
+    That is always allowed, up to the next later clock: on one clock they are certified, and nobody is behind them. Without it
+    they could stand for ever: each alone may not leave the others behind, and a whole step would take them beyond the next one.
+    """
+    n = clock.shape[0]
+    least, later = np.inf, np.inf
+    for i in range(n):
+        if i != ego and goes[i] and clock[i] < least:
+            least, later = clock[i], least
+        elif i != ego and goes[i] and least < clock[i] < later:
+            later = clock[i]
+    held = np.empty(n, dtype=np.bool_)
+    for i in range(n):
+        held[i] = i != ego and goes[i] and clock[i] == least and new_clock[i] == least and wanted[i] > least
+    changed, until = True, least
+    while changed:
+        changed, until = False, later
+        for i in range(n):
+            if held[i]:
+                until = min(until, wanted[i])
+        for i in range(n):
+            for j in range(n):
+                at_once = held[i] and not held[j] and j != ego and goes[j] and clock[j] == least
+                if at_once and until > limit(order[i, j], cell, least):
+                    held[i], changed = False, True
+    for i in range(n):
+        if held[i]:
+            new_clock[i] = until
+            new_rate[i] = min(wanted_rate[i], (until - least) / h)
+            forced[i] = 2.0

@@ -1,0 +1,112 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The readers of vector maps as targets, one per format, and the decoder of their lanes in a bag."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache, partial
+from pathlib import Path
+import random
+import re
+
+from harness import Target
+from map_builders import FORMATS
+from mutators import BYTES, NUMBERS, TEXT
+import numpy as np
+from rosbags.typesys import get_typestore, Stores
+from targets_bags import in_file, values
+
+from msg_conventions.lanes import decode_lanes, encode_lanes, MARKER_TYPE
+from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
+from scenario_gen.roads import build_road
+from scenario_gen.types.lanes import Lane, LaneNetwork
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+def written(suffix: str, _folder: Path) -> list[bytes]:
+    """A crossroads, an element a line."""
+    return [FORMATS[suffix]().replace("><", ">\n<").encode()]
+
+
+def attributes(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Change or drop numbers and attributes: one, a few, or all of one name; or exchange two values."""
+    found = list(re.finditer(rb' ([\w:]+)="([^"]*)"', data))
+    if len(found) < 2:
+        return rng.choice(BYTES)(rng, data, seeds)
+    word = rng.choice((*NUMBERS, "0", "-1", "1e7", "1e8", "99999999", "nan")).encode("utf-8", "surrogatepass").replace(b'"', b"")
+    one = rng.choice(found)
+    match rng.randrange(5):
+        case 0:
+            chosen = [one]
+        case 1:
+            chosen = rng.sample(found, min(len(found), rng.choice((2, 5, 30))))
+        case 2:
+            chosen = [each for each in found if each[1] == one[1]]
+        case 3:
+            return data[: one.start()] + data[one.end() :]
+        case _:
+            chosen, word = [one], rng.choice(found)[2]
+    for each in sorted(chosen, key=lambda each: -each.start()):
+        data = data[: each.start(2)] + word + data[each.end(2) :]
+    return data
+
+
+def texts(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Change the number between two tags."""
+    found = list(re.finditer(rb">([-\d.e]+)<", data))
+    if not found:
+        return attributes(rng, data, seeds)
+    one = rng.choice(found)
+    return data[: one.start(1)] + rng.choice(NUMBERS).encode("utf-8", "surrogatepass") + data[one.end(1) :]
+
+
+@cache
+def template() -> object:
+    """An encounter that is laid on what was read."""
+    return read_log([bundled("b")]).encounters[0]
+
+
+def place(path: Path) -> None:
+    """Read a map, and look for the template's place on it."""
+    build_road(str(path), template())
+
+
+def lanes() -> list[bytes]:
+    """Lanes as a bag has them."""
+    border = np.column_stack((np.arange(3.0), np.zeros(3)))
+    network = LaneNetwork("m", (Lane("7", border + 1.0, border, (1,)), Lane("8", border + 1.0, border, (), (0,), 13.9, "j")))
+    return [encode_lanes(network, "map", 5), encode_lanes(None, "map", 5)]
+
+
+def said(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Change what a marker's text says of its lanes, and keep its form."""
+    try:
+        marker = STORE.deserialize_cdr(data, MARKER_TYPE)
+        text = values(rng, marker.text.encode(), seeds).decode()
+        return bytes(STORE.serialize_cdr(replace(marker, text=text), MARKER_TYPE))
+    except Exception:  # what was damaged before is no marker: rosbags has errors of many kinds
+        return rng.choice(BYTES)(rng, data, seeds)
+
+
+MAP = (*TEXT, *[attributes] * 8, *[texts] * 4)
+TARGETS = (
+    *(
+        Target(f"vector_map_{suffix[1:]}", partial(written, suffix), in_file(f"a{suffix}", place), MAP)
+        for suffix in (".osm", ".xodr", ".xml")
+    ),
+    Target("message_lanes", lambda _: lanes(), lambda data, _: decode_lanes(data), (*BYTES, *[said] * 6)),
+)
