@@ -72,7 +72,7 @@ def run(full: bool | None = None) -> list[Row]:
     """Export the demo's scenarios and those of recorded encounters; let every judge that is here look at them.
 
     Args:
-        full: all scenarios that the demo makes, and all of them before ASAM's checkers too; a quarter of an hour becomes one.
+        full: all scenarios that the demo makes, and all of them before ASAM's checkers too, which takes several times as long.
     """
     sizes = FULL if full else USUAL
     with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(2) as judges:

@@ -32,6 +32,7 @@ from scenario_gen.exchange.xml import add, comment, Element, serialized
 
 ROADS, JUNCTION = 1, 1000  # ids: of the first road, and of the junction
 STRAIGHT = 1e-7  # rad by which the headings of a straight piece may differ
+GOES_ON = 1e-5  # metres by which a width or an offset may differ from its linear piece
 _GAUSS = (np.array([-0.9061798459386640, -0.5384693101056831, 0.0, 0.5384693101056831, 0.9061798459386640]) + 1.0) / 2.0
 _WEIGHTS = (
     np.array([0.2369268850561891, 0.4786286704993665, 0.5688888888888889, 0.4786286704993665, 0.2369268850561891]) / 2.0
@@ -203,10 +204,12 @@ def _merged(
 
 
 def _linear(station: Floats, values: Floats) -> Iterator[tuple[float, float, float]]:
-    """Yield station, value and slope of each piece of a piecewise linear function; equal neighbours are one piece."""
-    slopes = np.diff(values) / np.diff(station)
+    """Yield station, value and slope of each piece of a piecewise linear function; one that goes on as the last is part of it."""
     last = None
-    for s, value, slope in zip(station[:-1].tolist(), values[:-1].tolist(), slopes.tolist(), strict=True):
-        if last is None or abs(slope - last) > 1e-9:
-            yield s, value, slope
-        last = slope
+    for (s, end), (value, goal) in zip(pairwise(station.tolist()), pairwise(values.tolist()), strict=True):
+        if last is not None:
+            begin, first, slope = last
+            if all(abs(first + slope * (at - begin) - true) < GOES_ON for at, true in ((s, value), (end, goal))):
+                continue
+        last = s, value, (goal - value) / (end - s)
+        yield last

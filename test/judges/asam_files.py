@@ -55,7 +55,7 @@ def main(folder):
             found[kind] += 1
             found["rules"][kind] = min(found["rules"].get(kind, rules), rules)
             if issues:
-                found["issues"][path.name] = issues[:5]
+                found["issues"][str(path.relative_to(folder))] = issues[:5]
     print(json.dumps(found), flush=True)
 
 

@@ -21,6 +21,7 @@ to crossings and between vehicles on one lane (least squares, weighted).
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 import math
 
 import numpy as np
@@ -35,7 +36,8 @@ from scenario_gen.types.lanes import LaneNetwork
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
 _HEADING = math.radians(60.0)  # and is turned from it by this at most
-_MOST_CHAINS = 48  # of one vehicle
+_MOST_CHAINS = 48  # from one lane, and
+_MOST_TRIED = 96  # of one vehicle: on recorded maps it has 15 at most
 _STEP = 0.5  # metres between a chain's points
 _SMOOTHED = 3  # points to either side of which a point is the mean: polylines have corners
 _SAMPLES = 24  # of a path that are compared with a chain
@@ -194,12 +196,11 @@ def _course(chains: Chains, track: Track, spot: Spot, scale: float) -> Course | 
     poses = _placed(track, spot)
     driven = scale * track.travelled
     tried: dict[tuple[int, ...], tuple[float, Curve, Floats]] = {}
-    for first in chains.near(poses[0]):
-        for chain in chains.from_lane(first, driven):
-            if chain not in tried:
-                curve = _around(chains.curve(chain), poses, driven)
-                misses = _misses(curve, poses)
-                tried[chain] = (float(misses.mean()) + _turn_cost(curve, poses), curve, misses)
+    found = (chain for first in chains.near(poses[0]) for chain in chains.from_lane(first, driven))
+    for chain in dict.fromkeys(islice(found, _MOST_TRIED)):
+        curve = _around(chains.curve(chain), poses, driven)
+        misses = _misses(curve, poses)
+        tried[chain] = (float(misses.mean()) + _turn_cost(curve, poses), curve, misses)
     ranked = sorted(tried, key=lambda chain: (round(tried[chain][0], 6), chain))
     if not ranked:
         return None

@@ -29,12 +29,12 @@ from scenario_gen.types.lanes import Lane, LaneNetwork
 _SECTION = 1.0  # metres between cross-sections at most
 _SHORTEST = 0.05  # metres of a border
 MOST_SECTIONS = 2_000_000  # of a whole map
-MOST_LANES = 50_000  # a city of some 1500 km of streets
+MOST_LANES = 30_000  # a city of some 1000 km of streets
 MOST_LINKS = 100  # of a lane to lanes that follow it, or lie beside it
 _CHUNK = 16  # edges of a middle that are looked at together
 _QUERIED = 64  # chunks whose neighbours are looked up at once
 _COMPARED = 2_000  # pairs of chunks that are compared at once
-_MOST_COMPARED = 1_000_000  # pairs of chunks
+_MOST_COMPARED = 400_000  # pairs of chunks
 
 
 @dataclass(frozen=True, eq=False)

@@ -122,6 +122,7 @@ def _road(element: Element, name: str, line: ReferenceLine) -> _Road:
     sections = sorted(lanes.all("laneSection"), key=lambda section: section.number("s"))
     if not sections:
         raise InputError(f"{lanes.place} has no <laneSection>")
+    refuse_too_many_lanes(len(sections), element.file.removeprefix("map "))
     begins = [min(max(section.number("s"), 0.0), line.length) for section in sections]
     for section, begin, end in zip(sections, begins, [*begins[1:], line.length], strict=True):
         breaks = line.begin[np.searchsorted(line.begin, begin, side="right") : np.searchsorted(line.begin, end)]

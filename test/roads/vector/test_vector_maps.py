@@ -14,9 +14,10 @@
 
 """Vector maps: the same crossroads in three formats is the same network, drawn as the same grid; parts of it; what is refused."""
 
+from dataclasses import replace
 import math
 
-from map_builders import ARM, FORMATS, HALF, lanelet2, lanes, LIMIT, opendrive, WIDTH, write
+from map_builders import ARM, at, FORMATS, HALF, lanelet2, lanes, LIMIT, opendrive, WIDTH, write
 import numpy as np
 import pytest
 
@@ -26,6 +27,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.markup import parse_xml
 from scenario_gen.roads import build_road, RoadConfig
+from scenario_gen.roads.vector.ground import along_lanes
 from scenario_gen.roads.vector.plan_view import reference_line
 from scenario_gen.roads.vector.read import read_network
 
@@ -103,6 +105,14 @@ def test_a_lanelet_for_both_directions_is_two_lanes_and_others_are_left_out(tmp_
     bus = lanelet2(tags='<tag k="participant:vehicle:bus" v="yes"/>')
     with pytest.raises(InputError, match="none of its 20 lanelets is for cars"):
         read_network(write(tmp_path, ".osm", bus))
+
+
+def test_a_pose_is_along_a_lane_if_it_lies_in_one_about_its_way(tmp_path):
+    road = build_road(str(write(tmp_path, ".xodr")))
+    x, y = at("w", -30.0, 1.75)
+    poses = np.array([[x, y, 0.0], [x, y, 0.9], [x, y, math.pi / 2.0], [x, y, math.pi], [x, 3.6, math.pi]])
+    assert along_lanes(road, poses).tolist() == [True, True, False, False, False]
+    assert along_lanes(replace(road, lanes=None), poses).all()
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
