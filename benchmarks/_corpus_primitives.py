@@ -14,8 +14,6 @@
 
 """Encounters whose primitives are known: two vehicles whose accelerations are drawn from a few, segment by segment. Synthetic."""
 
-from itertools import pairwise
-
 import numpy as np
 
 from scenario_gen.arrays import Ints
@@ -68,11 +66,3 @@ def score(counts: list[tuple[int, int, int]]) -> float:
     """F1 of changepoints over many encounters."""
     matched, found, true = (sum(int(one[k]) for one in counts) for k in range(3))
     return 2.0 * matched / max(found + true, 1)
-
-
-def labels_between(points: Ints, primitives: Ints, samples: int) -> Ints:
-    """(T,) primitive of each sample."""
-    labels = np.zeros(samples, dtype=np.int64)
-    for primitive, (begin, end) in zip(primitives.tolist(), pairwise([0, *points.tolist(), samples]), strict=True):
-        labels[begin:end] = primitive
-    return labels

@@ -19,6 +19,8 @@ text to Parquet stands beside them, from the same run.
 """
 
 from collections import Counter
+from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache
 import json
 import os
@@ -32,18 +34,23 @@ import time
 import numpy as np
 
 from benchmarks._corpus_kills import killed_batch
-from benchmarks._corpus_primitives import f1, labels_between, planted_encounter, score
+from benchmarks._corpus_peers import costs, missing
+from benchmarks._corpus_primitives import f1, planted_encounter, score
 from benchmarks._size import sized
 from benchmarks.row import Row
+from scenario_gen.arrays import Ints
+from scenario_gen.corpus.batch import seed_of
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.encounters import rows_of
-from scenario_gen.corpus.library import adjusted_rand
+from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
+from scenario_gen.corpus.library import adjusted_rand, labels_of, pair_encounters, SHARED
 from scenario_gen.corpus.mine import mine
 from scenario_gen.corpus.synthetic import Planted, read_planted
+from scenario_gen.errors import RefusedError
 from scenario_gen.folders import sha256_of
 from scenario_gen.logs.tables import COLUMNS
 from scenario_gen.segmentation import segment
-from scenario_gen.segmentation.library import assign, build_library
+from scenario_gen.segmentation.library import assign, build_library, PrimitiveLibrary
+from scenario_gen.types.encounter import Encounter
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 ROWS = sized(10_000_000, quick=40_000)
@@ -55,12 +62,13 @@ CLEANED = sized(300, quick=10)
 TEMPLATES, COUNT = sized((200, 50), quick=(2, 2))
 ROADS = ("corridor", "t_intersection")
 KILLS = sized(20, quick=1)
+PEERS = sized(3, quick=1)
 LIBRARY, NEW = sized((1000, 100), quick=(8, 2))
 TRUE = 1 << 40
 
 
 def run(part: str = "all") -> list[Row]:
-    """Measure; `part` is mine, memory, recorded, batch, kills or library."""
+    """Measure; `part` is mine, memory, recorded, batch, kills, library or peers."""
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -273,37 +281,22 @@ def kills(place: Path) -> list[Row]:
 
 
 def library(place: Path) -> list[Row]:
-    """A library of encounters whose primitives are planted, and all recorded ones beside; new ones assigned."""
+    """A library of encounters whose primitives are planted, then of all recorded pairs with them; new ones assigned."""
     random = np.random.default_rng(2)
     made = [planted_encounter(random, str(k)) for k in range(LIBRARY + NEW)]
     old, new = made[:LIBRARY], made[LIBRARY:]
-    begun = time.process_time()
-    found, assignments = build_library([encounter for encounter, _, _ in old], seed=0)
-    fitted = time.process_time() - begun
-    labels = [
-        np.concatenate(
-            [
-                labels_between(a.segmentation.changepoints, a.primitives, len(e.time))
-                for a, (e, _, _) in zip(each, old, strict=True)
-            ]
-        )
-        for each in (assignments, build_library([encounter for encounter, _, _ in old], seed=1)[1])
-    ]
+    encounters = [encounter for encounter, _, _ in old]
+    found, labels, fitted = _two_seeds(encounters)
     planted = np.concatenate([own for _, _, own in old])
-    assigned = score([f1(assign(e, found).segmentation.changepoints, points) for e, points, _ in new])
+    again = [assign(e, found, SHARED) for e, _, _ in new]
+    assigned = score([f1(one.segmentation.changepoints, points) for one, (_, points, _) in zip(again, new, strict=True)])
     alone = score([f1(segment(e).changepoints, points) for e, points, _ in new])
-    again = np.concatenate(
-        [labels_between(a.segmentation.changepoints, a.primitives, len(e.time)) for e, _, _ in new for a in [assign(e, found)]]
+    told = np.concatenate(
+        [labels_of(a.segmentation.changepoints, a.primitives, e) for a, (e, _, _) in zip(again, new, strict=True)]
     )
     truth = np.concatenate([own for _, _, own in new])
-    return [
-        Row(
-            f"library of {LIBRARY} synthetic encounters ({len(found.means)} primitives, 8 planted)",
-            fitted,
-            "CPU s",
-            "lower",
-            1200.0,
-        ),
+    rows = [
+        Row(f"library of {LIBRARY} synthetic ({len(found.means)} primitives, 8 planted)", fitted, "CPU s", "lower", 1200.0),
         Row("two seeds, adjusted Rand", adjusted_rand(*labels), "", "higher", 0.8),
         Row("planted primitives, adjusted Rand", adjusted_rand(planted, labels[0]), "", "higher", 0.9),
         Row(
@@ -314,7 +307,63 @@ def library(place: Path) -> list[Row]:
             0.05,
             f"alone {alone:.3f}, assigned {assigned:.3f}",
         ),
-        Row("new ones, planted primitives, adjusted Rand", adjusted_rand(truth, again), "", "higher"),
+        Row("new ones, planted primitives, adjusted Rand", adjusted_rand(truth, told), "", "higher"),
+    ]
+    if not (DATA / "trajectories").is_dir():
+        return rows
+    if not (place / "recorded").is_dir():
+        recorded(place)
+    corpora = sorted((place / "recorded").glob("*-corpus"))
+    real = [
+        pair
+        for corpus in corpora
+        for row in rows_of(sorted((corpus / "encounters").glob("*.parquet")))
+        for pair in pair_encounters(encounter_of(row), CorpusConfig().interaction)
+    ]
+    for name, those in (
+        (f"{len(real)} recorded pairs", real),
+        (f"{len(real)} recorded and {LIBRARY} synthetic", real + encounters),
+    ):
+        found, labels, fitted = _two_seeds(those)
+        both = adjusted_rand(*(each[: sum(len(pair.time) for pair in real)] for each in labels))
+        rows += [
+            Row(f"library of {name} ({len(found.means)} primitives)", fitted, "CPU s", "lower", 1200.0),
+            Row(f"library of {name}: two seeds, adjusted Rand of the recorded ones", both, "", "higher", 0.8),
+        ]
+    return rows
+
+
+def _two_seeds(encounters: Sequence[Encounter]) -> tuple[PrimitiveLibrary, list[Ints], float]:
+    """A library, the primitive of each sample by each of two seeds, and CPU seconds of the first."""
+    begun = time.process_time()
+    found, assignments = build_library(encounters, SHARED, 0)
+    fitted = time.process_time() - begun
+    labels = [
+        np.concatenate([labels_of(a.segmentation.changepoints, a.primitives, e) for a, e in zip(each, encounters, strict=True)])
+        for each in (assignments, build_library(encounters, SHARED, 1)[1])
+    ]
+    return found, labels, fitted
+
+
+def peers(place: Path) -> list[Row]:
+    """A few templates on the roads of a batch by a chain of peers; no row where one is not installed (`make bench`)."""
+    if missing():
+        return []
+    rows = list(rows_of(tables_of(_corpus(place))))[: PEERS + 1]
+    spent: list[dict[str, float]] = []
+    for row in rows:
+        for road in ROADS:
+            with suppress(RefusedError):
+                spent.append(costs(encounter_of(row), road, COUNT, seed_of(0, row["name"], road)))
+    spent = spent[len(ROADS) :] or spent  # those of the first template load and compile
+    chain = [sum(one.values()) - one["ours"] for one in spent]
+    parts = ", ".join(f"{name} {np.median([one[name] for one in spent]):.2f}" for name in spent[0] if name != "ours")
+    times = [theirs / one["ours"] for theirs, one in zip(chain, spent, strict=True)]
+    what = f"{len(spent)} templates on roads × {COUNT}, median"
+    return [
+        Row(f"{what}: CPU of ours", float(np.median([one["ours"] for one in spent])), "s", "lower"),
+        Row(f"{what}: CPU of the chain of peers", float(np.median(chain)), "s", "lower", None, parts),
+        Row(f"{what}: chain by ours", float(np.median(times)), "×", "higher", 20.0, f"{min(times):.1f} to {max(times):.1f}"),
     ]
 
 
@@ -325,4 +374,5 @@ PARTS = {
     "batch": batch,
     "kills": kills,
     "library": library,
+    "peers": peers,
 }

@@ -194,11 +194,10 @@ def library(
     assignments: Annotated[list[str] | None, typer.Option("--set", help="a parameter of the segmentation, as name=value")] = None,
 ) -> None:
     """Segment the encounters of a corpus together: primitives that they share, with frequencies, transitions and examples."""
-    from scenario_gen.corpus.library import build
+    from scenario_gen.corpus.library import build, SHARED
     from scenario_gen.parameters import assigned
-    from scenario_gen.segmentation.segmenter import SegmentationConfig
 
-    config = SegmentationConfig()
+    config = SHARED
     for assignment in assignments or []:
         config = assigned(config, assignment)
     with telling() as told:

@@ -70,8 +70,9 @@ def arriving(target: Path) -> Iterator[Path]:
 
 def sweep(folder: Path) -> None:
     """Remove what killed tasks left behind; nobody may be writing there."""
-    for path in sorted(folder.rglob(f"*{TEMPORARY}-*")) if folder.exists() else ():
-        discard(path)
+    for pattern in (f"*{TEMPORARY}-*", ".spill-*", ".range-*"):
+        for path in sorted(folder.rglob(pattern)):
+            discard(path)
 
 
 class Spread:

@@ -97,9 +97,10 @@ def test_what_is_missing_is_made_again_and_the_same(archive, corpus, tmp_path):
     for stage in ("messages", "hours", "encounters"):
         sorted((out / stage).glob("*[0-9].parquet"))[0].unlink()
         (out / stage / "x.partial-1-2").write_text("torn")
+    (out / ".spill-a").mkdir()
     mine([archive], out)
     assert {path.relative_to(out): sha256_of(path) for path in out.rglob("*.parquet")} == before
-    assert not list(out.rglob("*.partial*"))
+    assert not list(out.rglob("*.partial*")) and not list(out.glob(".spill-*"))
     with pytest.raises(InputError, match="another set of parameters"):
         mine([archive], out, CorpusConfig(interaction=5.0))
     for inside in (archive, archive / "corpus"):
