@@ -91,6 +91,18 @@ def keep_order(
 
     First at the rate of the one it waits for, then at once: where it is by then is within what the order allows, whatever the
     other does, for at the step's begin it was. Holding one back may hold back others, but each is stopped only once.
+
+    Args:
+        h: the step [s].
+        cell: length of a cell of `Certified` [s].
+        order: (N, N, K) [s] of `Certified`.
+        ego: index of the ego, which is not held back.
+        goes: (N,) who is on the way.
+        clock: (N,) certified times at the step's begin [s].
+        rate: (N,) how fast these run then.
+        new_clock: (N,) at its end; changed.
+        new_rate: (N,) likewise.
+        forced: (N,) 1 where one brakes as hard as it can, 2 where it is stopped at once; changed.
     """
     n = clock.shape[0]
     wanted, wanted_rate = new_clock.copy(), new_rate.copy()
