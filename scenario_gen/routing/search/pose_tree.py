@@ -16,7 +16,7 @@
 
 Lengths are in cells. The tree of the goal grows backwards: its poses are kept turned by half a circle, so that a curve from a
 node onwards is one that is driven towards the goal, and one code serves both trees. They share one pool: the first tree fills it
-from the front, the second from the back.
+from the front, the second from the back. Rows of the arrays::
 
     node   (n, 10)  x, y, cost from the root, cost of the edge from the parent, yaw, the edge: word and lengths of its parts; a
                     spare column
