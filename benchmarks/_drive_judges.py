@@ -14,7 +14,7 @@
 
 """Drives before CommonRoad's programs, in the environment that `make judges` installs: its collision checker, its planner."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 import json
 import math
@@ -93,12 +93,12 @@ class Recorded:
         return Pose(*self.track[k])
 
 
-def reactive_planner(trials: Sequence[Trial], bad: Sequence[Outcome]) -> list[Row]:
+def reactive_planner(trials: Sequence[Trial], bad: Callable[[], Sequence[Outcome]]) -> list[Row]:
     """Let commonroad-reactive-planner solve the trials as planning problems, and judge its tracks among the replayed others.
 
     Args:
         trials: what it drives.
-        bad: what constant speed came to among replayed others.
+        bad: returns what constant speed comes to among replayed others; asked only where the planner is.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -132,7 +132,7 @@ def reactive_planner(trials: Sequence[Trial], bad: Sequence[Outcome]) -> list[Ro
         Row(f"reactive planner: {what}", rate.share.value, "", "lower" if what != "goals" else "higher", None, f"{rate}; {said}")
         for what, rate in good.items()
     ]
-    worst = rates(bad)["collisions"]
+    worst = rates(bad())["collisions"]
     apart = worst.share.low - good["collisions"].share.high
     name = "collisions among replayed others: constant speed's lower bound less the reactive planner's upper"
     return [*rows, Row(name, apart, "", "higher", 0.0, f"constant speed: {worst}")]

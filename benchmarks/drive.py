@@ -20,6 +20,7 @@ Counts of every row stand beside it. The judges' rows need `make judges`, the pe
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 import os
 import sys
 from time import process_time
@@ -58,7 +59,7 @@ def run(count: int = sized(200, quick=2)) -> list[Row]:
     driven: list[Outcome] = []
     if trials:
         found, driven = planners(spread(trials, count))
-        bad = run_trials(trials, BAD, ClosedLoopConfig(policy=REPLAY))
+        bad = partial(run_trials, trials, BAD, ClosedLoopConfig(policy=REPLAY))
         rows += found + reactive_planner(spread(trials, max(3 * count // 5, 1)), bad) + witnesses(spread(trials, WITNESSES))
     found, wild = anything()
     return rows + found + collisions([*driven, *wild]) + speed() + dds(made)

@@ -126,9 +126,10 @@ def run_batch(
     rows = rows[: templates or None]
     if not rows:
         raise InputError(f"{corpus} holds no encounter")
+    first = encounter_of(_row(*rows[0]))
     for road in roads:  # a name that is none is an error, not a cause in every case
         with suppress(RefusedError):
-            build_road(road, encounter_of(_row(*rows[0])), config.road)
+            build_road(road, first, config.road)
     document = {
         "format": 1,
         "corpus": [sha256_of(table) for table in tables],

@@ -24,6 +24,8 @@ from scenario_gen.errors import InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.types.encounter import Encounter
 
+LONGEST_HEADER = 65_536  # characters of a table's first line
+
 
 @dataclass(frozen=True, eq=False)
 class Observations:

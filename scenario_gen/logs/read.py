@@ -31,7 +31,7 @@ from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.encounters import Piece, pieces_of
 from scenario_gen.logs.groups import distances, find_groups, Group
 from scenario_gen.logs.quality import Dropped, EncounterQuality, find_overlaps, Quality, VehicleQuality
-from scenario_gen.logs.raw import natural, Observations, RawLog
+from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
 from scenario_gen.storage.files import files_of
 from scenario_gen.types.encounter import Encounter, Vehicle
@@ -258,7 +258,7 @@ def is_spmd(path: Path) -> bool:
     if path.suffix.lower() not in (".csv", ".txt"):
         return False
     with path.open(encoding="utf-8-sig", errors="replace") as file:
-        fields = file.readline(1 << 16).split(",")
+        fields = file.readline(LONGEST_HEADER).split(",")
     try:
         return len(fields) == SPMD_FIELDS and bool([float(field.strip() or "nan") for field in fields])
     except ValueError:

@@ -26,11 +26,10 @@ from scenario_gen.arrays import Floats, Ints
 from scenario_gen.errors import guarded, InputError, needs
 from scenario_gen.logs.columns import Column, find_columns
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
+from scenario_gen.logs.raw import check_size, check_vehicles, LONGEST_HEADER, Observations, RawLog, Segment
 
 LONGEST = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
 LONGEST_NUMBER = 300  # characters
-LONGEST_HEADER = 65_536  # characters
 LARGEST = 100.0  # m: what is longer is no vehicle
 EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime of SPMD counts microseconds from there
 COLUMNS = (  # of a basic safety message in the files of the Safety Pilot Model Deployment

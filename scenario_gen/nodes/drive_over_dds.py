@@ -31,7 +31,6 @@ from typing import Any
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
-from rclpy.task import Future
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.simulation import State
@@ -96,8 +95,7 @@ class TrafficOfTrials(Traffic):
         """Return after `duration` [s] of real time, in which commands are heard; what came last counts."""
         until = time.monotonic() + duration
         while time.monotonic() < until:
-            self._until, self._waiting = until, Future(executor=self.executor)
-            await self._waiting
+            await self._next_command(until)
 
 
 def drive_over_dds(trials: Sequence[Trial], command: str, config: ClosedLoopConfig, progress: Progress) -> list[Outcome]:

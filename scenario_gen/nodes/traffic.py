@@ -262,8 +262,11 @@ class Traffic(Node):  # type: ignore[misc]
         """Return when a command has come since this state was told, or after `patience` [s] of real time."""
         if self._heard is not None and self._heard.step >= state.step:
             return
-        self._until = monotonic() + patience
-        self._waiting = Future(executor=self.executor)
+        await self._next_command(monotonic() + patience)
+
+    async def _next_command(self, until: float) -> None:
+        """Return when a command comes, or at `until` [s] on the steady clock."""
+        self._until, self._waiting = until, Future(executor=self.executor)
         await self._waiting
 
     def _end_waiting(self) -> None:

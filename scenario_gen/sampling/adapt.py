@@ -80,9 +80,7 @@ def aim_of(encounter: Encounter, request: Request, measures: Measures | None) ->
         if closest is not None:
             names = tuple(encounter.vehicles[n].id for n in (closest.first, closest.second))
             targets = (Target("arrival_gap", -np.inf, 0.0, names), *targets)
-            beyond = min(
-                closest.exit_first - closest.entry_first, MOST_BEYOND
-            )  # what goes first must have left when the other one comes
+            beyond = min(closest.exit_first - closest.entry_first, MOST_BEYOND)  # it must have left by then
             if closest.entry_first <= STARTS_INSIDE:
                 note = f"; in the template vehicle {names[0]} is in the shared area {closest.entry_first:.1f} s after the start"
     if not targets:

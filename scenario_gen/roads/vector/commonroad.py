@@ -47,7 +47,7 @@ def read_commonroad(path: Path) -> LaneNetwork:
     if root.tag != "commonRoad":
         raise InputError(f"{root.place}: the root of a CommonRoad file is <commonRoad>")
     lanelets = {element.get("id"): element for element in root.all("lanelet")}
-    refuse_too_many_lanes(len(lanelets), path)
+    refuse_too_many_lanes(len(lanelets), root.file)
     limits = _speed_signs(root)
     junctions = _junctions(root, set(lanelets))
     drafts, left_out = [], 0

@@ -116,27 +116,31 @@ def along_lanes(road: Road, poses: Floats) -> Bools:
     """Return (M,) whether poses (M, 3) x, y [m], yaw [rad] lie in a lane about its way; everywhere, on a road without lanes."""
     found = np.full(len(poses), road.lanes is None)
     for lane in road.lanes.lanes if road.lanes is not None else ():
-        found[~found] = _along(lane, poses[~found])
+        near = ~found & _in_box(lane, poses)
+        found[near] = _along(lane, poses[near])
     return found
 
 
 def _uses(lane: Lane, path: Floats) -> bool:
     """Whether part of a path lies in a lane, about its way."""
+    return bool(_along(lane, path[_in_box(lane, path)][::2]).any())
+
+
+def _in_box(lane: Lane, poses: Floats) -> Bools:
+    """Whether poses (M, 3) lie in the box about a lane."""
     low, high = lane.outline.min(axis=0), lane.outline.max(axis=0)
-    near = path[((path[:, :2] >= low) & (path[:, :2] <= high)).all(axis=1)]
-    return bool(_along(lane, near[::2]).any())
+    return np.asarray(((poses[:, :2] >= low) & (poses[:, :2] <= high)).all(axis=1))
 
 
 def _along(lane: Lane, poses: Floats) -> Bools:
-    """Whether poses (M, 3) lie in a lane, about its way."""
-    low, high = lane.outline.min(axis=0), lane.outline.max(axis=0)
-    inside = ((poses[:, :2] >= low) & (poses[:, :2] <= high)).all(axis=1)
+    """Whether poses (M, 3) in the box about a lane lie in it, about its way."""
+    found = np.zeros(len(poses), dtype=np.bool_)
     step = np.diff(lane.centre, axis=0)
     yaw = exact.arctan2(step[:, 1], step[:, 0])
     middle = (lane.centre[1:] + lane.centre[:-1]) / 2.0
     half = exact.hypot(*(lane.left - lane.right).T)[:-1] / 2.0
-    for row in np.flatnonzero(inside).tolist():
-        away = exact.hypot(middle[:, 0] - poses[row, 0], middle[:, 1] - poses[row, 1])
+    for row, (x, y, heading) in enumerate(poses.tolist()):
+        away = exact.hypot(middle[:, 0] - x, middle[:, 1] - y)
         k = int(np.argmin(away))
-        inside[row] = away[k] <= half[k] and abs(float(wrap_angle(np.asarray(yaw[k] - poses[row, 2])))) < _ALONG
-    return np.asarray(inside)
+        found[row] = away[k] <= half[k] and abs(float(wrap_angle(np.asarray(yaw[k] - heading)))) < _ALONG
+    return found

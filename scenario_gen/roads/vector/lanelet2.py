@@ -98,9 +98,9 @@ def read_lanelet2(path: Path) -> LaneNetwork:
                 left_out += 1
     if not chosen:
         raise InputError(f"map {path}: none of its {left_out} lanelets is for cars")
-    refuse_too_many_lanes(len(chosen), path)
+    refuse_too_many_lanes(len(chosen), root.file)
     used = {ref: ways[ref] for relation, _ in chosen for ref in _refs(relation, ways)}
-    refuse_too_long(sum(len(ways[ref].children) for relation, _ in chosen for ref in _refs(relation, ways)), path)
+    refuse_too_long(sum(len(ways[ref].children) for relation, _ in chosen for ref in _refs(relation, ways)), root.file)
     positions, note = _positions({n: nodes for way in used.values() for n in _nodes(way, nodes)}, nodes, path)
     lanelets = []
     for relation, tags in chosen:

@@ -352,7 +352,7 @@ def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], s
     for (_, forced), track in zip(aside, tracks, strict=True):
         if forced > _NO_GRIP:
             reason = reason or f"the lanes bend too sharply for the speed of vehicle {track.vehicle.id}"
-    cost += speeding(chains.network, courses, tracks) + bending(courses, tracks)
+    cost += speeding(chains.network, courses, tracks) + bending([usual for usual, _ in aside])
     return Match(tuple(courses), cost, reason, max(forced for _, forced in aside))
 
 
@@ -376,10 +376,9 @@ def pressed_aside(course: Course, track: Track) -> tuple[float, float]:
     return float((curvature * squared).max()), float((curvature * least).max())
 
 
-def bending(courses: Sequence[Course], tracks: Sequence[Track]) -> float:
-    """What it counts [m²] that bends would be driven faster than is comfortable."""
-    aside = [pressed_aside(course, track)[0] - _ASIDE for course, track in zip(courses, tracks, strict=True)]
-    return _BENDING * float(np.mean(np.clip(aside, 0.0, _MOST_ASIDE)))
+def bending(aside: Sequence[float]) -> float:
+    """What it counts [m²] that bends would be driven faster than is comfortable; `aside` [m/s²] as of `pressed_aside`."""
+    return _BENDING * float(np.mean(np.clip(np.array(aside) - _ASIDE, 0.0, _MOST_ASIDE)))
 
 
 def speeding(network: LaneNetwork, courses: Sequence[Course], tracks: Sequence[Track]) -> float:

@@ -69,25 +69,25 @@ class Draft:
                 raise InputError(f"{self.place}: lane {self.id}: {len(names)} lanes {what}; at most {MOST_LINKS} are read")
 
 
-def refuse_too_many_lanes(count: int, name: object) -> None:
-    """Refuse a map before its lanes are made.
+def refuse_too_many_lanes(count: int, place: str) -> None:
+    """Refuse a map, or a part of it, before its lanes are made.
 
     Raises:
         InputError: it has more than `MOST_LANES`.
     """
     if count > MOST_LANES:
-        raise InputError(f"map {name}: more than {MOST_LANES} lanes; cut the map")
+        raise InputError(f"{place}: more than {MOST_LANES} lanes; cut the map")
 
 
-def refuse_too_long(sections: int, name: object) -> None:
-    """Refuse a map before its cross-sections are made.
+def refuse_too_long(sections: int, place: str) -> None:
+    """Refuse a map, or a part of it, before its cross-sections are made.
 
     Raises:
         InputError: it has more than `MOST_SECTIONS`.
     """
     if sections > MOST_SECTIONS:
         raise InputError(
-            f"map {name}: lanes of more than {MOST_SECTIONS} points, about {MOST_SECTIONS * _SECTION / 1000.0:g} km; cut the map"
+            f"{place}: lanes of more than {MOST_SECTIONS} points, about {MOST_SECTIONS * _SECTION / 1000.0:g} km; cut the map"
         )
 
 
@@ -111,7 +111,7 @@ def network_of(name: str, drafts: Sequence[Draft], notes: Iterable[str]) -> Lane
         if not longest <= MOST_SECTIONS * _SECTION:  # nor is it NaN
             raise InputError(f"{draft.place}: lane {draft.id} has a border of {longest / 1000.0:.3g} km; check the coordinates")
         total += max(len(left), math.ceil(longest / _SECTION))
-        refuse_too_long(total, name)
+        refuse_too_long(total, f"map {name}")
         after, beside = (
             tuple(dict.fromkeys(index[other] for other in names if other in index)) for names in (draft.successors, draft.beside)
         )

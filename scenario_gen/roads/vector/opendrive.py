@@ -88,9 +88,9 @@ def read_opendrive(path: Path) -> LaneNetwork:
             raise InputError(f"{element.place}: roads of more than {MOST_SECTIONS * _STEP / 1000.0:g} km; cut the map")
         roads[name] = _road(element, name, line)
         lanes += sum(len(section.lanes) for section in roads[name].sections)
-        refuse_too_many_lanes(lanes, path)
+        refuse_too_many_lanes(lanes, root.file)
         points += sum(len(section.lanes) * len(section.s) for section in roads[name].sections)
-        refuse_too_long(points, path)
+        refuse_too_long(points, root.file)
     if not roads:
         raise InputError(f"map {path}: no <road>")
     joints = _Joints(roads)
@@ -122,7 +122,7 @@ def _road(element: Element, name: str, line: ReferenceLine) -> _Road:
     sections = sorted(lanes.all("laneSection"), key=lambda section: section.number("s"))
     if not sections:
         raise InputError(f"{lanes.place} has no <laneSection>")
-    refuse_too_many_lanes(len(sections), element.file.removeprefix("map "))
+    refuse_too_many_lanes(len(sections), element.file)
     begins = [min(max(section.number("s"), 0.0), line.length) for section in sections]
     for section, begin, end in zip(sections, begins, [*begins[1:], line.length], strict=True):
         breaks = line.begin[np.searchsorted(line.begin, begin, side="right") : np.searchsorted(line.begin, end)]
@@ -143,8 +143,8 @@ def _section(section: Element, begin: float, s: Floats, poses: Floats, offset: C
         group = section.first(side)
         across = middle
         known = group.all("lane") if group else []
-        refuse_too_many_lanes(len(known), section.file.removeprefix("map "))
-        refuse_too_long(len(known) * len(s), section.file.removeprefix("map "))
+        refuse_too_many_lanes(len(known), section.file)
+        refuse_too_long(len(known) * len(s), section.file)
         for count, lane in enumerate(sorted(known, key=lambda lane: sign * _lane_id(lane, sign)), 1):
             name = _lane_id(lane, sign)
             if name != sign * count:

@@ -157,8 +157,9 @@ def _laid(
     ]
     if any(abs(a - b) < _APART for a in offsets[0] for b in offsets[1]):
         return None  # one lane for both directions
-    cost = bend / _STRAIGHT + speeding(chains.network, courses, tracks) + bending(courses, tracks)
-    return Match(tuple(courses), cost, "", max(pressed_aside(*pair)[1] for pair in zip(courses, tracks, strict=True)))
+    aside = [pressed_aside(course, track) for course, track in zip(courses, tracks, strict=True)]
+    cost = bend / _STRAIGHT + speeding(chains.network, courses, tracks) + bending([usual for usual, _ in aside])
+    return Match(tuple(courses), cost, "", max(forced for _, forced in aside))
 
 
 def _bends_more(course: Course, track: Track) -> bool:
