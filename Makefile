@@ -1,7 +1,6 @@
 # `make demo` and `make test` set everything up by themselves; Python 3.11 to 3.13 is all they need.
 PYTHON ?= python3
 BIN := .venv/bin
-READY := .venv/.ready
 export PYTHONDONTWRITEBYTECODE =
 
 # A sourced Jazzy keeps its own rclpy: then no ROS wheel is installed, and the environment sees the system's packages.
@@ -10,53 +9,59 @@ SOURCED := $(if $(AMENT_PREFIX_PATH),$(shell $(PYTHON) -c 'import os, rclpy, sys
 	wheel = sys.prefix != sys.base_prefix and rclpy.__file__.startswith(sys.prefix + os.sep); \
 	paths = [path for path in os.environ["AMENT_PREFIX_PATH"].split(":") if path]; \
 	print("yes" if not wheel and any(rclpy.__file__.startswith(path + os.sep) for path in paths) else "")' 2>/dev/null))
-LOCKED := -r requirements.lock $(if $(SOURCED),,-r requirements-ros.lock)
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --no-deps
+LOCKED := $(PIP) --require-hashes
 
 .PHONY: demo test soak bench judges audit licences core counts docs install tools clean
 
-demo: $(READY)
+# Three environments in one, each with what the one before it has: what the demo runs; all that a user may install; what tests need.
+RUN := .venv/.run
+READY := .venv/.ready
+TEST := .venv/.test
+
+demo: $(RUN)
 	$(BIN)/scenario-gen demo --ros --out out/demo
 
-test: $(READY) tools
+test: $(TEST) tools
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -n 3 --dist loadgroup --durations=10; tests=$$?; wait $$types && exit $$tests
 
 # Long tests: `make soak PART=kills` runs one part; a part that was stopped goes on where it was. One table at the end.
-soak: $(READY)
+soak: $(TEST)
 	$(BIN)/python test/soak $(PART)
 
 # Peers that are not on this machine give no row.
-bench: $(READY)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-bench.lock
+bench: $(TEST)
+	$(LOCKED) -r requirements/bench.lock
 	$(BIN)/python -m benchmarks all
 
 # Known vulnerabilities of all that is locked. It fails, too, where it could not look everything up.
 audit: .venv-audit/.ready
-	.venv-audit/bin/python test/packaging/audit.py requirements.lock requirements-ros.lock requirements-bench.lock requirements-audit.lock requirements-docs.lock requirements-judges-commonroad.lock requirements-judges-asam.lock
+	.venv-audit/bin/python test/packaging/audit.py requirements/*.lock
 
-.venv-audit/.ready: requirements-audit.lock
+.venv-audit/.ready: requirements/audit.lock
 	$(PYTHON) -m venv .venv-audit
-	.venv-audit/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-audit.lock
+	.venv-audit/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/audit.lock
 	@touch .venv-audit/.ready
 
 # What is exported, before other people's programs (CommonRoad's, ASAM's), each locked in an environment of its own; CommonRoad's
 # planner has wheels for Python 3.11 alone: make judges JUDGE_PYTHON=python3.11.
 JUDGE_PYTHON ?= $(PYTHON)
-judges: $(READY) .venv-judges-commonroad/.ready .venv-judges-asam/.ready
+judges: $(TEST) .venv-judges-commonroad/.ready .venv-judges-asam/.ready
 	$(BIN)/python -m benchmarks bridges
 
-.venv-judges-%/.ready: requirements-judges-%.lock
+.venv-judges-%/.ready: requirements/judges-%.lock
 	$(JUDGE_PYTHON) -m venv .venv-judges-$*
-	.venv-judges-$*/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-judges-$*.lock
+	.venv-judges-$*/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/judges-$*.lock
 	@touch .venv-judges-$*/.ready
 
 # The core without any extra, in an environment of its own.
-core: $(READY)
+core: $(TEST)
 	$(BIN)/python test/packaging/core_install.py
 
 # The counts in docs/architecture.md: before the last two reworks, and now.
-counts: $(READY)
+counts: $(TEST)
 	$(BIN)/python test/packaging/counts.py --write docs/architecture.md 665a212 8e530ca
 
 # The site, in out/docs: built from the sources, which are not imported.
@@ -64,25 +69,34 @@ docs: .venv-docs/.ready
 	.venv-docs/bin/python -m sphinx -q -W --keep-going -b html docs out/docs
 	@echo "out/docs/index.html"
 
-.venv-docs/.ready: requirements-docs.lock
+.venv-docs/.ready: requirements/docs.lock
 	$(PYTHON) -m venv .venv-docs
-	.venv-docs/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-docs.lock
+	.venv-docs/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/docs.lock
 	@touch .venv-docs/.ready
 
-licences: $(READY)
+licences: $(TEST)
 	$(BIN)/python test/packaging/licences.py
 
 install: $(READY)
 
-# The environment: locked packages, the project itself, its kernels compiled once, and the tests (pytest rewrites their asserts).
-$(READY): requirements.lock requirements-ros.lock setup.py
+# The core first: with it the kernels are compiled, once for this user, while pip installs the rest.
+$(RUN): requirements/core.lock requirements/run.lock requirements/ros.lock setup.py
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(not (3, 11) <= v <= (3, 13) and f"Python {v[0]}.{v[1]} found; 3.11, 3.12 or 3.13 is needed: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(if $(SOURCED),--system-site-packages) .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --require-hashes $(LOCKED)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	$(BIN)/python -m scenario_gen.compiling
-	@$(BIN)/python -m pytest --collect-only >/dev/null || true
+	$(LOCKED) -r requirements/core.lock
+	$(BIN)/python -m scenario_gen.compiling & kernels=$$!; \
+	$(LOCKED) -r requirements/run.lock $(if $(SOURCED),,-r requirements/ros.lock) && $(PIP) --no-build-isolation --editable .; \
+	installed=$$?; wait $$kernels && exit $$installed
+	@touch $(RUN)
+
+$(READY): $(RUN) requirements/extras.lock
+	$(LOCKED) -r requirements/extras.lock
 	@touch $(READY)
+
+$(TEST): $(READY) requirements/test.lock requirements/ros-test.lock
+	$(LOCKED) -r requirements/test.lock $(if $(SOURCED),,-r requirements/ros-test.lock)
+	$(BIN)/python -m scenario_gen.compiling
+	@touch $(TEST)
 
 # The report's tests drive Chromium, package.xml is checked by xmllint; where they are missing and cannot be installed here, those tests
 # skip with that reason.

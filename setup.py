@@ -28,7 +28,7 @@ NODES = ("segmenter", "planner", "gp_sampler", "road_server", "log_player", "eva
 def needed(name: str) -> dict[str, list[str]]:
     """Return what a list of requirements asks for at run time, by the heading above it."""
     found: dict[str, list[str]] = {}
-    for line in Path(name).read_text(encoding="utf-8").partition("# to build and to test")[0].splitlines():
+    for line in Path("requirements", name).read_text(encoding="utf-8").partition("# to build")[0].splitlines():
         if line.startswith("#"):
             heading = line.removeprefix("# ").removeprefix("extra ")
         elif line:
@@ -36,15 +36,15 @@ def needed(name: str) -> dict[str, list[str]]:
     return found
 
 
-EXTRAS = needed("requirements.in")
-CORE = EXTRAS.pop("core")
+EXTRAS = needed("run.in") | needed("extras.in")
+CORE = needed("core.in")["core"]
 EXTRAS["segmentation"] = [
     wanted for wanted in CORE if wanted.startswith(("numpy", "scipy", "numba"))
 ]  # all that it needs of the core
 EXTRAS["cli"] += [*EXTRAS["bags"], *EXTRAS["parquet"], *EXTRAS["report"]]
 EXTRAS["all"] = [*EXTRAS["cli"], *EXTRAS["planners"], *EXTRAS["gym"], *EXTRAS["corpus"]]
 EXTRAS["corpus"] += EXTRAS["cli"]  # whose commands it adds to
-EXTRAS["ros"] = [*EXTRAS["all"], *chain.from_iterable(needed("requirements-ros.in").values())]
+EXTRAS["ros"] = [*EXTRAS["all"], *chain.from_iterable(needed("ros.in").values())]
 
 setup(
     name=NAME,

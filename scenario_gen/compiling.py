@@ -22,12 +22,13 @@ from contextlib import contextmanager, suppress
 import fcntl
 import importlib
 import os
+from pathlib import Path
 import subprocess
 import sys
 from time import monotonic, sleep
 from typing import Any
 
-from scenario_gen import kernels
+from scenario_gen import kernel_cache, kernels
 
 WORKERS = max(1, min(4, os.cpu_count() or 1))
 LOCK = "compiling.lock"
@@ -49,7 +50,7 @@ def make_ready(told: Told = lambda *_: None) -> int:
         told: called now and then while something is not there.
     """
     needed, started = kernels.registered(), monotonic()
-    folder = kernels.cache_folder()
+    folder = kernel_cache.folder()
     absent = list(needed)
 
     def tell() -> list[Entry]:
@@ -89,7 +90,7 @@ def name_of(compiled: Any) -> str:
 
 def _weight(entry: Entry) -> int:
     """How long a kernel takes to be compiled, about: the bytes of its code and of what it calls."""
-    return kernels.code_size(entry[0].__wrapped__)
+    return kernel_cache.size(entry[0].__wrapped__)
 
 
 @contextmanager
@@ -146,7 +147,7 @@ def _work() -> None:
 
 def words(done: int, needed: int, seconds: float) -> str:
     """Say how far it is."""
-    often = "once per machine" if kernels.cache_folder() else "at every start: no folder to keep them, set NUMBA_CACHE_DIR to one"
+    often = "once per machine" if kernel_cache.folder() else "at every start: no folder to keep them, set NUMBA_CACHE_DIR to one"
     return f"kernels: {done} of {needed} compiled, {seconds:.0f} s; {often}"
 
 
@@ -168,6 +169,7 @@ def main() -> None:
         last = text
 
     count = make_ready(tell)
+    kernel_cache.sweep({Path(kernel_cache.keep(compiled).cache_path or "").name for compiled, _ in kernels.registered()})
     print(f"{count} kernels ready after {monotonic() - started:.1f} s", flush=True)
 
 

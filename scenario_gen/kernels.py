@@ -21,22 +21,18 @@ Inputs are `F1`, `I2`, …, read-only to the kernel; outputs are `OUT1`, `OUTI2`
 """
 
 from collections.abc import Callable
-from contextlib import suppress
 import importlib
 import operator
-import os
 from pathlib import Path
-import pkgutil
-import stat
-import tempfile
-from types import FunctionType, ModuleType
+import re
 from typing import Any, cast, TypeVar
 
-import numba
 from numba import types
 from numba.core.registry import CPUDispatcher
 from numba.np.numpy_support import as_dtype
 import numpy as np
+
+from scenario_gen.kernel_cache import keep
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -55,40 +51,9 @@ OUT1, OUT2, OUT3, OUT4 = (_array(F, n, readonly=False) for n in (1, 2, 3, 4))
 OUTI1, OUTI2, OUTI3 = (_array(I, n, readonly=False) for n in (1, 2, 3))
 OUTB1, OUTB2 = (_array(B, n, readonly=False) for n in (1, 2))
 
+OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": None, "no_cfunc_wrapper": True}
+_DECORATED = re.compile(r"^@(kernel\(|elementwise$)", re.MULTILINE)
 _registry: list[tuple[Any, tuple[Any, ...]]] = []
-
-
-def _inner(function: Callable[..., Any]) -> list[FunctionType]:
-    """The functions of ours that a compiled function calls."""
-    names = function.__code__.co_names
-    called = [function.__globals__.get(name) for name in names]
-    ours = [module for module in called if isinstance(module, ModuleType) and module.__name__.startswith("scenario_gen.")]
-    called += [getattr(module, name, None) for module in ours for name in names]
-    inner = [getattr(each, "__wrapped__", None) for each in called]  # dispatchers and ufuncs wrap what they compile
-    return [each for each in inner if isinstance(each, FunctionType) and each.__module__.startswith("scenario_gen.")]
-
-
-def _source_stamp(function: Callable[..., Any], seen: set[int]) -> tuple[Any, ...]:
-    """What tells whether a compiled function is up to date: the files of the kernels it calls, by time and size.
-
-    numba itself looks only at the file of the function, and would go on calling what a kernel in another file once was.
-    """
-    seen.add(id(function))
-    file = Path(function.__code__.co_filename).stat()
-    stamps = [_source_stamp(each, seen) for each in _inner(function) if id(each) not in seen]
-    return (file.st_mtime, file.st_size, *stamps)
-
-
-def code_size(function: Callable[..., Any]) -> int:
-    """Return the bytes of a function's code and of what it calls, a measure of how long it takes to be compiled."""
-    return len(function.__code__.co_code) + sum(map(code_size, _inner(function)))
-
-
-def _watch(dispatcher: Any, function: Callable[..., Any]) -> None:
-    """Have the dispatcher's cache compare `_source_stamp`, where this version of numba has a place for it."""
-    cache: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
-    if hasattr(cache, "_source_stamp"):
-        cache._source_stamp = _source_stamp(function, set())
 
 
 def _input(name: str, declared: types.Array) -> Callable[[Any], Any]:
@@ -131,13 +96,14 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
     """
 
     def __init__(self, function: Callable[..., Any], declared: tuple[Any, ...]) -> None:
-        super().__init__(function, targetoptions={"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": None})
+        super().__init__(function, targetoptions=OPTIONS)
         self._declared = declared
         self._arguments = tuple(_argument(function.__name__, each) for each in declared)
         self._compiled: Callable[..., Any] | None = None
 
     def compile(self, _types: Any = None) -> Any:
         """Make or load the declared form, whatever is asked for; calls from other kernels come here, too."""
+        keep(self)
         entry = super().compile(self._declared)
         self._compiled = entry
         return entry
@@ -148,47 +114,33 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         return compiled(*[take(value) for take, value in zip(self._arguments, values, strict=True)])
 
 
+class Helper(CPUDispatcher):  # type: ignore[misc]
+    """A function that kernels alone call: nothing is compiled for calls from Python, which takes a quarter of the time off."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function, targetoptions=OPTIONS | {"no_cpython_wrapper": True})
+
+    def __call__(self, *_: Any) -> Any:
+        """Refuse."""
+        raise TypeError(f"{self.__name__} is called by kernels alone; its Python form is {self.__name__}.py_func")
+
+
 def kernel(*argument_types: Any, inline: bool = False) -> Callable[[Function], Function]:
     """Compile a function with numba: cached, without the GIL, IEEE arithmetic (no fastmath: same bytes everywhere).
 
     Args:
         argument_types: numba types of the positional arguments, e.g. `kernel(F2, I, OUT1)`.
-        inline: a small helper called only from other kernels; it takes its types from them and is not pre-compiled.
+        inline: a small helper called only from other kernels; it takes its types from them and is compiled, and kept, with them.
     """
 
     def decorate(function: Function) -> Function:
-        dispatcher = numba.njit(nogil=True, error_model="numpy")(function) if inline else Kernel(function, argument_types)
-        keep(dispatcher, function)
-        if not inline:
-            register(dispatcher, argument_types)
+        if inline:
+            return cast("Function", Helper(function))
+        dispatcher = Kernel(function, argument_types)
+        register(dispatcher, argument_types)
         return cast("Function", dispatcher)
 
     return decorate
-
-
-def keep(compiled: Any, function: Callable[..., Any]) -> None:
-    """Have numba keep what it compiles: beside the source, in the user's cache, or else in a temporary folder of the user's."""
-    with suppress(RuntimeError):  # no folder can be written to
-        try:
-            compiled.enable_caching()
-        except RuntimeError:
-            if numba.config.CACHE_DIR or not (folder := _last_resort()):
-                raise
-            numba.config.CACHE_DIR = folder
-            compiled.enable_caching()
-        _watch(compiled, function)
-
-
-def _last_resort() -> str | None:
-    """Return a folder for temporary files that is this user's alone: what is kept there is run."""
-    folder = Path(tempfile.gettempdir()) / f"scenario_gen_kernels_{os.getuid()}"
-    try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        found = folder.lstat()
-    except OSError:
-        return None
-    own = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022
-    return str(folder) if own else None
 
 
 def register(compiled: Any, argument_types: Any) -> None:
@@ -202,29 +154,23 @@ def registered() -> list[tuple[Any, Any]]:
 
 
 def import_all() -> None:
-    """Import every module that may have kernels; one whose extra is not installed cannot be called."""
-    import scenario_gen
-
-    for module in pkgutil.walk_packages(scenario_gen.__path__, "scenario_gen."):
-        if ".nodes" not in module.name and not module.name.endswith("__main__"):
+    """Import every module that has kernels; one whose extra is not installed cannot be called."""
+    root = Path(__file__).parent
+    for file in sorted(root.rglob("*.py")):
+        if _DECORATED.search(file.read_text(encoding="utf-8")):
+            name = ".".join(file.relative_to(root.parent).with_suffix("").parts)
             try:
-                importlib.import_module(module.name)
-            except ModuleNotFoundError as error:
+                importlib.import_module(name)
+            except ImportError as error:
                 if (error.name or "scenario_gen").startswith("scenario_gen"):
                     raise
-
-
-def cache_folder() -> Path | None:
-    """Return the folder of the first kernel's cache; None if nothing can be kept."""
-    path = getattr(_registry[0][0]._cache, "cache_path", None) if _registry else None
-    return Path(path) if path else None
 
 
 def is_cached(compiled: Any, argument_types: Any) -> bool:
     """Say whether a kernel is in the cache; only the cache's index is read. numba has no public question for it."""
     if getattr(compiled, "overloads", None):
         return True  # in this process, too
-    cache = compiled._cache
+    cache = keep(compiled)
     if not hasattr(cache, "_cache_file"):
         return False
     return cache._index_key(argument_types, compiled.targetctx.codegen()) in cache._cache_file._load_index()

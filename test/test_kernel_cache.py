@@ -12,29 +12,33 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A kernel has one compiled form, which is made again when a kernel that it calls, in another file, has changed."""
+"""A kernel has one compiled form, kept by what it is compiled from: its sources, those of what it calls, and their constants."""
 
+import os
 from pathlib import Path
+import shutil
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
+from scenario_gen import kernel_cache
 from scenario_gen.kernels import F, F2, I, kernel, OUT1
 
 HELPER = """
 from scenario_gen.kernels import kernel
+OFFSET = {offset}
 @kernel(inline=True)
 def half(x):
     return {value} * x
 """
 CALLER = """
 from scenario_gen.kernels import F, kernel
-from scenario_gen.helper_of_a_test import half
+from scenario_gen.helper_of_a_test import half, OFFSET
 @kernel(F)
 def quarter(x):
-    return half(half(x))
+    return half(half(x)) + OFFSET
 """
 RUN = """
 import sys, importlib.util
@@ -49,19 +53,68 @@ print(load("scenario_gen.caller_of_a_test", sys.argv[1] + "/caller.py").quarter(
 """
 
 
-def result(folder: Path) -> float:
+def result(folder: Path, cache: Path) -> float:
     """What the caller gives in a fresh process."""
-    done = subprocess.run([sys.executable, "-c", RUN, str(folder)], capture_output=True, text=True, check=True)
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(cache)}
+    done = subprocess.run([sys.executable, "-c", RUN, str(folder)], capture_output=True, text=True, check=True, env=environment)
     return float(done.stdout)
 
 
-def test_a_cached_kernel_follows_the_kernels_it_calls(tmp_path):
-    (tmp_path / "caller.py").write_text(CALLER)
-    (tmp_path / "helper.py").write_text(HELPER.format(value="0.5"))
-    assert result(tmp_path) == 2.0
-    assert list(tmp_path.rglob("*.nbi")), "nothing was cached, so nothing is tested"
-    (tmp_path / "helper.py").write_text(HELPER.format(value="0.25"))
-    assert result(tmp_path) == 0.5
+def compiled(cache: Path) -> int:
+    """How many kernels are kept."""
+    return len(list(cache.rglob("*.nbc")))
+
+
+def test_a_cached_kernel_follows_what_it_is_compiled_from_and_not_where_that_lies(tmp_path):
+    here, cache = tmp_path / "here", tmp_path / "cache"
+    here.mkdir()
+    (here / "caller.py").write_text(CALLER)
+    (here / "helper.py").write_text(HELPER.format(value="0.5", offset=0.0))
+    assert result(here, cache) == 2.0
+    assert compiled(cache) == 1, "nothing was cached, so nothing is tested"
+    copy = shutil.copytree(here, tmp_path / "elsewhere")  # as colcon and a clone do: other times, another place
+    assert result(copy, cache) == 2.0 and compiled(cache) == 1
+    (here / "helper.py").write_text(HELPER.format(value="0.25", offset=0.0))
+    assert result(here, cache) == 0.5 and compiled(cache) == 2
+    assert result(copy, cache) == 2.0 and compiled(cache) == 2
+    (here / "helper.py").write_text(HELPER.format(value="0.25", offset=1.0))
+    assert result(here, cache) == 1.5 and compiled(cache) == 3
+
+
+def test_a_helper_is_called_by_kernels_alone():
+    with pytest.raises(TypeError, match="called by kernels alone"):
+        twice_the_sum(np.ones(2))
+
+
+def test_what_no_version_needs_is_swept_after_a_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(kernel_cache, "folder", lambda: tmp_path)
+    names = [digit * kernel_cache.DIGITS for digit in "abc"]
+    for name in [*names, "of somebody else"]:
+        (tmp_path / name).mkdir()
+    for name in names[:2]:
+        os.utime(tmp_path / name, (0.0, 0.0))
+    assert kernel_cache.sweep({names[0]}) == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([names[0], names[2], "of somebody else"])
+
+
+def test_the_folder_is_the_users_own(tmp_path, monkeypatch):
+    monkeypatch.setattr(kernel_cache.numba.config, "CACHE_DIR", "")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    monkeypatch.setattr(kernel_cache.tempfile, "gettempdir", lambda: str(tmp_path))
+    find = kernel_cache.folder.__wrapped__
+    home, last = tmp_path / "home" / "scenario_gen" / "kernels", tmp_path / f"scenario_gen_kernels_{os.getuid()}"
+    assert find() == home and home.stat().st_mode & 0o777 == 0o700
+    home.chmod(0o777)  # somebody else may write what this user would run
+    assert find() == last and last.stat().st_mode & 0o777 == 0o700
+    last.rmdir()
+    last.symlink_to("/")
+    assert find() is None
+
+
+@kernel(inline=True)
+def twice_the_sum(values: np.ndarray) -> float:
+    """Serve the test above."""
+    return 2.0 * values.sum()
 
 
 @kernel(F2, F, I, OUT1)

@@ -28,7 +28,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenario_gen.arrays import Floats, Ints
-from scenario_gen.kernels import B, F2, F3, kernel, OUT1, OUT2, OUT3, OUTI1
+from scenario_gen.kernels import B, F1, F2, F3, kernel, OUT1, OUT2, OUT3, OUTI1
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicHermiteSpline
@@ -39,7 +39,7 @@ EPSILON = 2.220446049250313e-16
 
 
 @kernel(inline=True)
-def dot(a: Floats, b: Floats) -> float:
+def _dot(a: Floats, b: Floats) -> float:
     """Return the inner product of two rows (n,): four running sums, then ((0 + 1) + (2 + 3)), then what is left over."""
     n = len(a) // 4 * 4
     s0 = s1 = s2 = s3 = 0.0
@@ -52,6 +52,12 @@ def dot(a: Floats, b: Floats) -> float:
     for k in range(n, len(a)):
         total += a[k] * b[k]
     return total
+
+
+@kernel(F1, F1)
+def dot(a: Floats, b: Floats) -> float:
+    """Return the inner product of two rows (n,)."""
+    return _dot(a, b)
 
 
 @kernel(F3, F3, OUT3)
@@ -77,7 +83,7 @@ def _matmul_by_rows(a: Floats, b: Floats, out: Floats) -> None:
     for s in range(a.shape[0]):
         for i in range(a.shape[1]):
             for j in range(b.shape[1]):
-                out[s, i, j] = dot(a[s, i], b[s, j])
+                out[s, i, j] = _dot(a[s, i], b[s, j])
 
 
 def matmul(a: Numbers, b: Numbers) -> Floats:
@@ -117,7 +123,7 @@ def _householder(columns: Floats, reflectors: Floats, scale: Floats, order: Ints
         if pivot:
             best, longest = k, -1.0
             for j in range(k, n):
-                size = dot(columns[j, k:], columns[j, k:])
+                size = _dot(columns[j, k:], columns[j, k:])
                 if size > longest * (1.0 + 1e-12):  # of two that are as long as each other to rounding, the first
                     best, longest = j, size
             if best != k:
@@ -126,12 +132,12 @@ def _householder(columns: Floats, reflectors: Floats, scale: Floats, order: Ints
                 order[k], order[best] = order[best], order[k]
         v = reflectors[k]
         v[k:] = columns[k, k:]
-        length = np.sqrt(dot(v[k:], v[k:]))
+        length = np.sqrt(_dot(v[k:], v[k:]))
         v[k] += length if v[k] >= 0.0 else -length
-        square = dot(v[k:], v[k:])
+        square = _dot(v[k:], v[k:])
         scale[k] = 2.0 / square if square > 0.0 else 0.0
         for j in range(k, n):
-            factor = scale[k] * dot(v[k:], columns[j, k:])
+            factor = scale[k] * _dot(v[k:], columns[j, k:])
             for i in range(k, m):
                 columns[j, i] -= factor * v[i]
 
@@ -142,7 +148,7 @@ def _reflect(reflectors: Floats, scale: Floats, columns: Floats) -> None:
     for k in range(len(scale) - 1, -1, -1):
         v = reflectors[k]
         for j in range(len(columns)):
-            factor = scale[k] * dot(v[k:], columns[j, k:])
+            factor = scale[k] * _dot(v[k:], columns[j, k:])
             for i in range(k, columns.shape[1]):
                 columns[j, i] -= factor * v[i]
 
@@ -214,7 +220,7 @@ def _cholesky(a: Floats) -> int:
     n: int = a.shape[0]
     for i in range(n):
         for j in range(i + 1):
-            rest = a[i, j] - dot(a[i, :j], a[j, :j])
+            rest = a[i, j] - _dot(a[i, :j], a[j, :j])
             if i != j:
                 a[i, j] = rest / a[j, j]
             elif rest > 0.0:

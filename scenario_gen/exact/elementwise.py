@@ -30,7 +30,8 @@ from numba.np.ufunc import _internal  # type: ignore[attr-defined,unused-ignore]
 import numpy as np
 
 from scenario_gen.arrays import Floats
-from scenario_gen.kernels import F, I, keep, kernel, register
+from scenario_gen.kernel_cache import keep
+from scenario_gen.kernels import F, I, kernel, register
 
 ADDRESSES = types.CPointer(I)
 LOOP = types.void(ADDRESSES, ADDRESSES, ADDRESSES, I)  # of the arrays, the number of elements, the strides [B], and nothing
@@ -110,10 +111,13 @@ class Elementwise:
         exec(compile(source, function.__code__.co_filename, "exec"), around)  # numba keeps what has a file
         options = {"nopython": True, "error_model": "numpy"}
         loop: Any = CFunc(around[f"{function.__name__}_loop"], (LOOP.args, LOOP.return_type), {}, options)
-        keep(loop, function)
         self._loop = loop
-        self._cache, self.targetctx = self._loop._cache, self._loop._targetdescr.target_context
+        self.targetctx = loop._targetdescr.target_context
         register(self, LOOP)
+
+    @property
+    def _cache(self) -> Any:
+        return keep(self._loop)
 
     @property
     def _numba_type_(self) -> Any:
@@ -122,6 +126,7 @@ class Elementwise:
     def compile(self, _signature: Any = None) -> None:
         """Make the ufunc, of a loop that is in the cache or of one that is compiled."""
         if self._ufunc is None:
+            keep(self._loop)
             self._loop.compile()
             kinds = [np.dtype(float).num] * (self._arguments + 1)
             made = (self.__name__, self.__doc__, [self._loop.address], [kinds], self._arguments, 1, [None], [self._loop])

@@ -61,7 +61,7 @@ def examine(environment: Mapping[str, str] | None = None) -> Iterator[Finding]:
     """Yield the findings, quick ones first; variables are those of `environment`, this process's if None."""
     environment = os.environ if environment is None else environment
     yield python(sys.version_info[:2])
-    yield packages("packages", MODULES, "install requirements.lock (`make install`)")
+    yield packages("packages", MODULES, "`make install`")
     yield _kernels()
     if importlib.util.find_spec("rclpy") is None:
         message = "not here: everything works but the nodes and `demo --ros`. Source a Jazzy installation, or `make install`"

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Judge OpenSCENARIO and OpenDRIVE files by ASAM's checkers, in the environment of requirements-judges-asam.lock.
+"""Judge OpenSCENARIO and OpenDRIVE files by ASAM's checkers, in the environment of requirements/judges-asam.lock.
 
 `python asam_files.py FOLDER`; one JSON object on the last line: files, rules that were run, issues by file.
 """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Judge CommonRoad files by other people's programs, in the environment of requirements-judges-commonroad.lock.
+"""Judge CommonRoad files by other people's programs, in the environment of requirements/judges-commonroad.lock.
 
 `python commonroad_files.py check FOLDER`: the schema (lxml), commonroad-io's reading against the file's own numbers, and the
 drivability checker: collisions, who leaves the road, and whether both are found where they are planted.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Judge drives in closed loop by commonroad-drivability-checker, in the environment of requirements-judges-commonroad.lock.
+"""Judge drives in closed loop by commonroad-drivability-checker, in the environment of requirements/judges-commonroad.lock.
 
 `python driven.py FILE`: a line of JSON for each drive, a list of vehicles with the ego first; each has `size`, length and width
 [m], and `poses`, x, y [m], yaw [rad] at each instant, null where it is not on the scene. One JSON object on the last line: the

@@ -25,7 +25,7 @@ import subprocess
 import sys
 import tempfile
 
-from licences import extras, installed, needed_at_run_time, ROOT
+from licences import extras, installed, needed_at_run_time, REQUIREMENTS, ROOT
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from test_library_alone import EXTRA_MODULES, write_csv
@@ -35,9 +35,9 @@ SEGMENTATION = ("numpy", "scipy", "numba")  # the extra's
 
 
 def lock_of(wanted: Sequence[Requirement]) -> str:
-    """Return the part of requirements.lock that is needed, hashes included."""
+    """Return the part of core.lock that is needed, hashes included."""
     needed = needed_at_run_time(installed(), wanted)
-    blocks = re.split(r"^(?=\w)", (ROOT / "requirements.lock").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    blocks = re.split(r"^(?=\w)", (REQUIREMENTS / "core.lock").read_text(encoding="utf-8"), flags=re.MULTILINE)
     return "".join(block for block in blocks if canonicalize_name(re.split(r"[=\s]", block)[0]) in needed)
 
 

@@ -24,7 +24,8 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[2]
-LOCKS = (ROOT / "requirements.lock", ROOT / "requirements-ros.lock")
+REQUIREMENTS = ROOT / "requirements"
+LOCKS = tuple(REQUIREMENTS / f"{name}.lock" for name in ("core", "run", "extras", "test", "ros", "ros-test"))
 PAGE = ROOT / "docs" / "licences.md"
 TOLD = {  # what metadata does not say, or says only on Windows; looked up in the projects themselves
     "colorama": "BSD-3-Clause",
@@ -59,13 +60,13 @@ COPYLEFT = re.compile(r"\bA?GPL")
 INTRO = """# Licences
 
 The project itself is under Apache-2.0. It ships no other's code but one: the HTML pages that it writes contain plotly.js (MIT).
-What it needs is installed from wheels; this table lists every package of `requirements.lock` and of `requirements-ros.lock` with
+What it needs is installed from wheels; this table lists every package of the locks in `requirements/` that `make demo`, `make install` and `make test` install, with
 the licence that its metadata states (`make licences` writes it; a test holds it against the locks). *Run time* is what `setup.py`
 asks for, all extras included, and all that follows from it; the rest builds and tests. Under the GPL are two linters and one
 file of docutils, which no user needs; nothing is under the AGPL.
 
-Not in the table: the peers of `requirements-bench.lock` and the tools of `requirements-audit.lock` and `requirements-docs.lock`,
-which `make bench`, `make audit` and `make docs` alone install, and of which nothing is shipped.
+Not in the table: the peers of `bench.lock`, the judges of `judges-*.lock` and the tools of `audit.lock` and `docs.lock`,
+which `make bench`, `make judges`, `make audit` and `make docs` alone install, and of which nothing is shipped.
 
 | package | version | licence | needed |
 |---|---|---|---|
@@ -78,7 +79,7 @@ def locked() -> dict[str, str]:
     text = "".join(lock.read_text(encoding="utf-8") for lock in LOCKS)
     for name, version in re.findall(r"^([\w.\-]+)==([^\s;\\]+)", text, re.MULTILINE):
         found.setdefault(canonicalize_name(name), []).append(version)
-    return {name: ", ".join(versions) for name, versions in sorted(found.items())}
+    return {name: ", ".join(dict.fromkeys(versions)) for name, versions in sorted(found.items())}
 
 
 def installed() -> dict[str, Distribution]:
@@ -109,9 +110,10 @@ def _of_manifests(found: Distribution) -> Iterator[str]:
 
 
 def extras() -> dict[str, list[Requirement]]:
-    """Return what requirements.in asks for at run time, by the extra that it is for, or "core"."""
+    """Return what core.in, run.in and extras.in ask for at run time, by the extra that it is for, or "core"."""
     found: dict[str, list[Requirement]] = {}
-    for line in (ROOT / "requirements.in").read_text(encoding="utf-8").partition("# to build and to test")[0].splitlines():
+    texts = [(REQUIREMENTS / f"{name}.in").read_text(encoding="utf-8") for name in ("core", "run", "extras")]
+    for line in "".join(text.partition("# to build")[0] for text in texts).splitlines():
         if line.startswith("#"):
             heading = line.removeprefix("# ").removeprefix("extra ")
         else:
@@ -121,7 +123,7 @@ def extras() -> dict[str, list[Requirement]]:
 
 def run_time() -> list[Requirement]:
     """Return what setup.py asks for, all extras included."""
-    ros = (ROOT / "requirements-ros.in").read_text(encoding="utf-8").partition("# to build and to test")[0].splitlines()
+    ros = (REQUIREMENTS / "ros.in").read_text(encoding="utf-8").splitlines()
     return [*chain.from_iterable(extras().values()), *(Requirement(line) for line in ros if not line.startswith("#"))]
 
 

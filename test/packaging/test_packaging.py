@@ -47,7 +47,7 @@ def test_every_ros_package_that_is_imported_is_declared():
     assert imported <= declared, imported - declared
 
 
-KEYS = {  # rosdep's, of what requirements.in names; looked up in rosdistro for Ubuntu 24.04 (docs/dependencies.md)
+KEYS = {  # rosdep's, of what the lists in requirements/ name; looked up in rosdistro for Ubuntu 24.04 (docs/dependencies.md)
     "numpy": "python3-numpy",
     "scipy": "python3-scipy",
     "numba": "python3-numba",
@@ -63,7 +63,7 @@ KEYS = {  # rosdep's, of what requirements.in names; looked up in rosdistro for 
 }
 
 
-def test_package_xml_and_requirements_in_name_the_same_packages():
+def test_package_xml_and_the_lists_of_requirements_name_the_same_packages():
     """Each by its rosdep key or, where it has none, by its name in the comment on pip; and none that is not needed."""
     text = (ROOT / "package.xml").read_text()
     needed = {wanted.name for wanted in run_time() if not wanted.name.startswith("ros-")}
@@ -87,8 +87,8 @@ def test_make_leaves_a_sourced_jazzy_its_rclpy(tmp_path, sourced):
         environment |= {"AMENT_PREFIX_PATH": sys.prefix}
     command = ["make", "--dry-run", "--always-make", "install", f"PYTHON={sys.executable}"]
     said = subprocess.run(command, cwd=ROOT, env=environment, check=True, capture_output=True, text=True).stdout
-    assert "-r requirements.lock" in said
-    assert ("-r requirements-ros.lock" in said) is not sourced
+    assert "-r requirements/core.lock" in said
+    assert ("-r requirements/ros.lock" in said) is not sourced
     assert ("--system-site-packages" in said) is sourced
 
 

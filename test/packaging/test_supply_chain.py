@@ -19,21 +19,13 @@ import subprocess
 import sys
 
 from audit import CLEAN, judge, NOT_MADE, VULNERABLE
-from licences import COPYLEFT, extras, installed, licence, locked, needed_at_run_time, PAGE, run_time
+from licences import COPYLEFT, extras, installed, licence, locked, LOCKS, needed_at_run_time, PAGE, REQUIREMENTS, run_time
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 import pytest
 from source_files import ROOT
 
-LOCKS = (
-    "requirements.lock",
-    "requirements-ros.lock",
-    "requirements-bench.lock",
-    "requirements-audit.lock",
-    "requirements-docs.lock",
-    "requirements-judges-commonroad.lock",
-    "requirements-judges-asam.lock",
-)
+EVERY_LOCK = sorted(path.name for path in REQUIREMENTS.glob("*.lock"))
 
 
 @pytest.mark.parametrize("wanted", run_time(), ids=str)
@@ -46,7 +38,7 @@ def test_what_is_needed_at_run_time_has_a_lower_bound_that_the_lock_meets(wanted
 def test_setup_py_asks_for_the_same(tmp_path):
     setup = (ROOT / "setup.py").read_text()
     assert 'python_requires=">=3.11,<3.14"' in setup
-    assert 'needed("requirements.in")' in setup and 'needed("requirements-ros.in")' in setup
+    assert all(f'needed("{name}.in")' in setup for name in ("core", "run", "extras", "ros"))
     out = subprocess.run([sys.executable, "setup.py", "--quiet", "egg_info", "--egg-base", tmp_path], cwd=ROOT, check=False)
     assert out.returncode == 0
     asked = {"core": set()}
@@ -62,17 +54,30 @@ def test_setup_py_asks_for_the_same(tmp_path):
     assert asked["ros"] - everything == {"ros-jazzy-rclpy", "ros-jazzy-common-interfaces"}
 
 
+def pins(name):
+    """What a lock pins, with the versions."""
+    return set(re.findall(r"^([^\s;]+)==([^\s;]+)", (REQUIREMENTS / f"{name}.lock").read_text(), re.MULTILINE))
+
+
 def test_what_a_sourced_jazzy_has_itself_is_locked_apart():
-    """`make` installs requirements-ros.lock only where no Jazzy is sourced, and both in one call: no package stands in both."""
-    pins = [set(re.findall(r"^(\S+)==", (ROOT / name).read_text(), re.MULTILINE)) for name in LOCKS[:2]]
-    assert not pins[0] & pins[1]
-    assert not [name for name in pins[0] if name.startswith("ros-")]
-    assert "ros-rclpy" in pins[1] and "numpy" in pins[0]
+    """`make` installs ros.lock and ros-test.lock only where no Jazzy is sourced."""
+    for name in ("core", "run", "extras", "test"):
+        assert not [package for package, _ in pins(name) if package.startswith("ros-")]
+    assert "ros-rclpy" in dict(pins("ros")) and "numpy" in dict(pins("core"))
 
 
-@pytest.mark.parametrize("name", LOCKS)
+def test_what_two_locks_pin_has_one_version_in_both():
+    """They are installed one after the other into one environment."""
+    versions = {}
+    for lock in LOCKS:
+        for package in {package for package, _ in pins(lock.stem)}:
+            versions.setdefault(package, set()).add(frozenset(version for name, version in pins(lock.stem) if name == package))
+    assert not [package for package, found in versions.items() if len(found) > 1]
+
+
+@pytest.mark.parametrize("name", EVERY_LOCK)
 def test_a_lock_has_hashes_and_names_no_place(name):
-    text = (ROOT / name).read_text()
+    text = (REQUIREMENTS / name).read_text()
     pinned = re.findall(r"^\S+==.*$", text, re.MULTILINE)
     assert pinned and all(line.endswith("\\") for line in pinned), "each pin is followed by its hashes"
     assert "://" not in text
@@ -115,5 +120,5 @@ KNOWN = {"name": "c", "version": "2", "vulns": [{"id": "CVE-1", "fix_versions": 
     ],
 )
 def test_an_audit_that_did_not_look_is_no_success(code, out, err, expected, said):
-    found, sentence = judge("requirements.lock", code, out, err)
+    found, sentence = judge("core.lock", code, out, err)
     assert found == expected and said in sentence and len(sentence) <= 500

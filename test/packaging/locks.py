@@ -1,0 +1,69 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Write the locks that `make` installs, with uv, onto those that are there, whose pins stay: python test/packaging/locks.py.
+
+Each lock holds what its list asks for beyond the locks that are installed before it. Then `make licences`.
+"""
+
+from pathlib import Path
+import re
+import subprocess
+import tempfile
+
+from licences import REQUIREMENTS
+
+BEFORE = {  # what is installed before each; ROS's wheels may come from a sourced Jazzy instead
+    "core": (),
+    "run": ("core",),
+    "ros": ("core", "run"),
+    "extras": ("core", "run"),
+    "test": ("core", "run", "extras"),
+    "ros-test": ("core", "run", "ros", "extras", "test"),
+}
+COMMAND = [
+    "uv",
+    "pip",
+    "compile",
+    "--quiet",
+    "--universal",
+    "--python-version",
+    "3.11",
+    "--generate-hashes",
+    "--no-header",
+    "--no-annotate",
+]
+
+
+def pins(text: str) -> dict[str, str]:
+    """Return the pins of a lock with their hashes, by their first lines."""
+    return {block.partition("\n")[0]: block for block in re.split(r"^(?=\w)", text, flags=re.MULTILINE) if "==" in block}
+
+
+def main() -> None:
+    """Write all of them."""
+    known = "".join((REQUIREMENTS / f"{name}.lock").read_text(encoding="utf-8") for name in BEFORE)
+    whole: dict[str, dict[str, str]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "whole.lock"
+        for name, before in BEFORE.items():
+            out.write_text(known, encoding="utf-8")
+            lists = [str(REQUIREMENTS / f"{each}.in") for each in (*before, name)]
+            subprocess.run([*COMMAND, *lists, "--output-file", str(out)], check=True, stdout=subprocess.DEVNULL)
+            whole[name] = pins(out.read_text(encoding="utf-8"))
+            new = [block for first, block in whole[name].items() if not any(first in whole[each] for each in before)]
+            (REQUIREMENTS / f"{name}.lock").write_text("".join(new), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
