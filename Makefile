@@ -79,23 +79,24 @@ licences: $(TEST)
 
 install: $(READY)
 
-# The core first: with it the kernels are compiled, once for this user, while pip installs the rest.
+# The core first: with it the kernels of the stages are compiled, once for this user, while pip installs the rest.
+STAGES := exact template segmentation roads fitting routing sampling validity evaluation
 $(RUN): requirements/core.lock requirements/run.lock requirements/ros.lock setup.py
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(not (3, 11) <= v <= (3, 13) and f"Python {v[0]}.{v[1]} found; 3.11, 3.12 or 3.13 is needed: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(if $(SOURCED),--system-site-packages) .venv
 	$(LOCKED) -r requirements/core.lock
-	$(BIN)/python -m scenario_gen.compiling & kernels=$$!; \
+	$(BIN)/python -m scenario_gen.compiling $(STAGES) & kernels=$$!; \
 	$(LOCKED) -r requirements/run.lock $(if $(SOURCED),,-r requirements/ros.lock) && $(PIP) --no-build-isolation --editable .; \
 	installed=$$?; wait $$kernels && exit $$installed
 	@touch $(RUN)
 
 $(READY): $(RUN) requirements/extras.lock
 	$(LOCKED) -r requirements/extras.lock
+	$(BIN)/python -m scenario_gen.compiling
 	@touch $(READY)
 
 $(TEST): $(READY) requirements/test.lock requirements/ros-test.lock
 	$(LOCKED) -r requirements/test.lock $(if $(SOURCED),,-r requirements/ros-test.lock)
-	$(BIN)/python -m scenario_gen.compiling
 	@touch $(TEST)
 
 # The report's tests drive Chromium, package.xml is checked by xmllint; where they are missing and cannot be installed here, those tests

@@ -14,7 +14,7 @@
 
 """Kernels that are not in numba's cache are compiled once: by processes of their own, under a lock, while who needs them waits.
 
-`python -m scenario_gen.compiling` compiles all of the project and says how far it is.
+`python -m scenario_gen.compiling` compiles all of the project, or those of the packages that are named, and says how far it is.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -152,12 +152,12 @@ def words(done: int, needed: int, seconds: float) -> str:
 
 
 def main() -> None:
-    """Compile all kernels of the project."""
+    """Compile the kernels of the packages that are named, or all."""
     if "--worker" in sys.argv:
         _work()
         return
     started = monotonic()
-    kernels.import_all()
+    kernels.import_all(sys.argv[1:])
     end = "\r" if sys.stdout.isatty() else "\n"
     last = ""
 

@@ -43,7 +43,7 @@ _described: dict[FunctionType, frozenset[str]] = {}
 
 @cache
 def folder() -> Path | None:
-    """Return the folder of all kernels: `NUMBA_CACHE_DIR`, the user's cache, or else one for temporary files; None if nothing can be kept."""
+    """Return the folder of all kernels: `NUMBA_CACHE_DIR`, the user's cache, or a temporary one; None if there is none."""
     if numba.config.CACHE_DIR:
         places = [Path(numba.config.CACHE_DIR)]
     else:

@@ -20,7 +20,7 @@ missing see to it (`scenario_gen/compiling.py`).
 Inputs are `F1`, `I2`, …, read-only to the kernel; outputs are `OUT1`, `OUTI2`, ….
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import importlib
 import operator
 from pathlib import Path
@@ -153,10 +153,10 @@ def registered() -> list[tuple[Any, Any]]:
     return list(_registry)
 
 
-def import_all() -> None:
-    """Import every module that has kernels; one whose extra is not installed cannot be called."""
+def import_all(packages: Sequence[str] = ()) -> None:
+    """Import every module that has kernels, or those of some packages; one whose extra is not installed cannot be called."""
     root = Path(__file__).parent
-    for file in sorted(root.rglob("*.py")):
+    for file in sorted(file for package in packages or ("",) for file in (root / package).rglob("*.py")):
         if _DECORATED.search(file.read_text(encoding="utf-8")):
             name = ".".join(file.relative_to(root.parent).with_suffix("").parts)
             try:

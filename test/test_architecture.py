@@ -38,6 +38,7 @@ ORDER = (
         "interrupts",
         "folders",
         "kernels",
+        "kernel_cache",
         "compiling",
         "parameters",
         "terminal",

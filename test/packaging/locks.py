@@ -31,18 +31,7 @@ BEFORE = {  # what is installed before each; ROS's wheels may come from a source
     "test": ("core", "run", "extras"),
     "ros-test": ("core", "run", "ros", "extras", "test"),
 }
-COMMAND = [
-    "uv",
-    "pip",
-    "compile",
-    "--quiet",
-    "--universal",
-    "--python-version",
-    "3.11",
-    "--generate-hashes",
-    "--no-header",
-    "--no-annotate",
-]
+OPTIONS = ("--universal", "--python-version", "3.11", "--generate-hashes", "--no-header", "--no-annotate")
 
 
 def pins(text: str) -> dict[str, str]:
@@ -59,7 +48,11 @@ def main() -> None:
         for name, before in BEFORE.items():
             out.write_text(known, encoding="utf-8")
             lists = [str(REQUIREMENTS / f"{each}.in") for each in (*before, name)]
-            subprocess.run([*COMMAND, *lists, "--output-file", str(out)], check=True, stdout=subprocess.DEVNULL)
+            subprocess.run(
+                ["uv", "pip", "compile", "--quiet", *OPTIONS, *lists, "--output-file", str(out)],
+                check=True,
+                stdout=subprocess.DEVNULL,
+            )
             whole[name] = pins(out.read_text(encoding="utf-8"))
             new = [block for first, block in whole[name].items() if not any(first in whole[each] for each in before)]
             (REQUIREMENTS / f"{name}.lock").write_text("".join(new), encoding="utf-8")
