@@ -34,6 +34,7 @@ from scenario_gen.validity import containment as inside
 from scenario_gen.validity import dynamics
 from scenario_gen.validity.dynamics import control_points, is_motion
 from scenario_gen.validity.limits import Limits
+from scenario_gen.validity.presence import driven_on
 
 
 class Checker:
@@ -200,28 +201,52 @@ class Checker:
 
     def _overlaps(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
         n, limits = len(half), self.limits
-        out = np.zeros((n * (n - 1) // 2, 3))
+        out = np.full((n * (n - 1) // 2, 3), np.nan)  # NaN is no proof: a pair that nothing looks at is refused
         bounds = (limits.clearance, limits.time_resolution)
         if scenario.all_present:
             apart.first_contacts(scenario.time, control, scenario.heading, half, *bounds, out)
-        else:  # who is not there meets nobody
-            for k, (a, b) in enumerate(combinations(range(n), 2)):
-                at, two = together(scenario.present, a, b), [a, b]
-                if at.stop - at.start >= 2:
-                    curves = np.ascontiguousarray(control[two, at.start : at.stop - 1])
-                    heading = np.ascontiguousarray(scenario.heading[two, at])
-                    apart.first_contacts(scenario.time[at], curves, heading, half[two], *bounds, out[k : k + 1])
-        if not out[:, 0].any():
+        else:
+            self._contacts_of_those_there(scenario, half, out)
+        if (out[:, 0] == apart.PROVEN).all():
             return
         for pair, (status, time, gap) in zip(combinations(range(n), 2), out.tolist(), strict=True):
             if status != apart.PROVEN:
-                if status == apart.UNPROVEN:
+                beyond = self._beyond_presence(scenario, pair, time)
+                if status not in {apart.FOUND, apart.UNPROVEN}:
+                    what = "were not compared"
+                elif status == apart.UNPROVEN:
                     what = f"cannot be proven more than {limits.clearance:g} m apart (gap {gap:.6f} m)"
                 elif gap <= 0.0:
                     what = f"overlap by {-gap:.3f} m"
                 else:
                     what = f"come within {gap:.3f} m; {limits.clearance:g} m must be exceeded"
-                yield Violation(Cause.OVERLAP, time, pair, f"vehicles {pair[0]} and {pair[1]}: footprints {what} at {time:.3f} s")
+                message = f"vehicles {pair[0]} and {pair[1]}: footprints {what} at {time:.3f} s{beyond}"
+                yield Violation(Cause.OVERLAP, float(np.nan_to_num(time)), pair, message)
+
+    def _contacts_of_those_there(self, scenario: Scenario, half: Floats, out: Floats) -> None:
+        """Fill `out` as `first_contacts` does, of vehicles that come and go; each is there a little longer than it is shown."""
+        time, bounds = scenario.time, (self.limits.clearance, self.limits.time_resolution)
+        position, heading, speed, present = driven_on(scenario, self.limits.presence_margin)
+        control = np.empty((len(half), len(time) - 1, 4, 2))
+        control_points(time, position, heading, speed, control)
+        for k, (a, b) in enumerate(combinations(range(len(half)), 2)):
+            at, two, row = together(present, a, b), [a, b], out[k : k + 1]
+            if at.stop - at.start >= 2:
+                curves = np.ascontiguousarray(control[two, at.start : at.stop - 1])
+                apart.first_contacts(time[at], curves, np.ascontiguousarray(heading[two, at]), half[two], *bounds, row)
+            elif at.stop - at.start == 1:  # one instant: both stand still for a second
+                still = np.repeat(position[two, at], 4, axis=1)[:, None]
+                apart.first_contacts(np.array([0.0, 1.0]), still, np.repeat(heading[two, at], 2, axis=1), half[two], *bounds, row)
+                row[0, 1] = time[at.start]
+            else:  # never there together
+                row[0, 0] = apart.PROVEN
+
+    def _beyond_presence(self, scenario: Scenario, pair: tuple[int, int], time: float) -> str:
+        """Say so where a vehicle of a pair is not shown at the time of a contact."""
+        first, last = scenario.time[scenario.present[list(pair)]].T
+        if np.isnan(time) or ((time >= first) & (time <= last)).all():
+            return ""
+        return f"; who comes or goes is there for {self.limits.presence_margin:g} s more than it is shown"
 
     def _exits(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
         if self.road is None:

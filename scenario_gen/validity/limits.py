@@ -57,6 +57,14 @@ class Limits(Parameters):
         unit="m/s²",
         low=0.0,
     )
+    presence_margin: float = parameter(
+        1.0,
+        "a vehicle drives on for this long before it comes and after it goes, at the speed and rate of turn that it has there; "
+        "nobody may be where it then is",
+        unit="s",
+        low=0.0,
+        high=10.0,
+    )
     time_resolution: float = parameter(
         1e-6, "what cannot be proven over an interval this short is refused", unit="s", low=1e-9, high=1.0
     )

@@ -106,12 +106,13 @@ def oracle_violations(
 
 
 def _while_there(scenario, road, asked, conflicts, waits, limits, dt):
-    """Each vehicle, and each pair while both are there, as a scenario of its own; orders only of who is there throughout."""
+    """Each vehicle, and each pair that is there throughout, as a scenario of its own; gaps of pairs beyond their presence."""
+    yield from _overlaps_of_those_there(scenario, limits, dt)
     always = [i for i, (first, last) in enumerate(scenario.present) if (first, last) == (0, len(scenario.time) - 1)]
     for rows in [[i] for i in range(len(scenario.vehicles))] + [list(p) for p in combinations(range(len(scenario.vehicles)), 2)]:
-        first, last = scenario.present[rows, 0].max(), scenario.present[rows, 1].min()
-        if last <= first:
+        if len(rows) == 2 and not set(rows) <= set(always):
             continue
+        first, last = scenario.present[rows[0]]
         own = slice(first, last + 1)
         values = (getattr(scenario, name)[rows, own] for name in ("position", "heading", "speed", "acceleration"))
         part = Scenario(tuple(scenario.vehicles[i] for i in rows), scenario.time[own], *values)
@@ -121,7 +122,8 @@ def _while_there(scenario, road, asked, conflicts, waits, limits, dt):
                 for c in conflicts
                 if {c.first, c.second} == set(rows)
             ]
-            yield from oracle_violations(part, None, None, both if set(rows) <= set(always) else None, None, limits, dt)
+            without_gaps = (found for found in oracle_violations(part, None, None, both, None, limits, dt) if found[:4] != "over")
+            yield from without_gaps
             continue
         states = None if asked is None else BoundaryStates(asked.start[rows], asked.end[rows], asked.freed[rows])
         wide = limits
@@ -137,6 +139,40 @@ def _while_there(scenario, road, asked, conflicts, waits, limits, dt):
             if wait.vehicle == rows[0]
         ]
         yield from oracle_violations(part, road, states, None, alone, wide, dt)
+
+
+def _overlaps_of_those_there(scenario, limits, dt):
+    """Pairs while both are there, each for `presence_margin` more than it is shown, as far as the scenario has instants."""
+    time, wide = scenario.time, []
+    for first, last in scenario.present:
+        shown = np.flatnonzero((time >= time[first] - limits.presence_margin) & (time <= time[last] + limits.presence_margin))
+        wide.append((time[shown[0]], time[shown[-1]]))
+    for i, j in combinations(range(len(scenario.vehicles)), 2):
+        begin, end = max(wide[i][0], wide[j][0]), min(wide[i][1], wide[j][1])
+        if end < begin:
+            continue
+        grid = time[(time >= begin) & (time <= end)]
+        instants = np.union1d(np.linspace(begin, end, int(np.ceil((end - begin) / dt)) + 1), grid)
+        boxes = [boxes_beyond(scenario, n, instants) for n in (i, j)]
+        for sentence in _overlaps(instants, boxes, limits):
+            yield sentence.replace("vehicles 0 and 1", f"vehicles {i} and {j}")
+
+
+def boxes_beyond(scenario, n, instants):
+    """Footprints of a vehicle, which drives on along a circle before and after it is shown."""
+    first, last = scenario.present[n]
+    time, heading, speed = (values[first : last + 1] for values in (scenario.time, scenario.heading[n], scenario.speed[n]))
+    direction = np.stack((np.cos(heading), np.sin(heading)), axis=-1)
+    spline = CubicHermiteSpline(time, scenario.position[n, first : last + 1], speed[:, None] * direction)
+    place, yaw = spline(np.clip(instants, time[0], time[-1])), np.interp(instants, time, heading)
+    for end, inner, beyond in ((0, 1, instants < time[0]), (-1, -2, instants > time[-1])):
+        rate = (heading[end] - heading[inner]) / (time[end] - time[inner])
+        for k in np.flatnonzero(beyond):
+            fine = np.linspace(time[end], instants[k], 401)
+            turned = heading[end] + rate * (fine - time[end])
+            place[k] += speed[end] * np.trapezoid(np.stack((np.cos(turned), np.sin(turned))), fine)
+            yaw[k] = turned[-1]
+    return footprints(place, yaw, scenario.vehicles[n].length, scenario.vehicles[n].width)
 
 
 def _overlaps(instants, boxes, limits):
