@@ -158,6 +158,23 @@ def test_colcon_builds_what_ros2_run_needs(colcon):
     assert ran.returncode == 0 and "sampling.lateral_sigma" in ran.stdout, ran.stderr
 
 
+def test_what_colcon_installs_finds_the_kernels_that_are_compiled_already(colcon):
+    base, _, _ = colcon
+    (packages,) = (base / "install" / "scenario_gen").glob("lib/python3*/site-packages")
+    look = (
+        "from scenario_gen import compiling, kernels\nkernels.import_all()\nneeded = kernels.registered()\n"
+        "print(kernels.__file__, len(needed), len(compiling.missing(needed)))"
+    )
+    said = []
+    for place in (ROOT, packages):
+        environment = os.environ | {"PYTHONPATH": str(place)}
+        ran = subprocess.run([sys.executable, "-c", look], cwd=base, env=environment, check=True, capture_output=True, text=True)
+        file, *counts = ran.stdout.split()
+        assert file == str(place / "scenario_gen" / "kernels.py")
+        said.append(counts)
+    assert said[0] == said[1] and int(said[0][0]) > 50
+
+
 def test_colcon_test_runs_pytest_and_reports(colcon):
     """A real colcon test, of what is quick: `colcon test` itself runs the whole suite, this test among it."""
     base, places, run = colcon
