@@ -32,12 +32,13 @@ from typing import Any
 
 from scenario_gen.config import PipelineConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
-from scenario_gen.corpus.tasks import arriving, spread, sweep, Told
+from scenario_gen.corpus.tasks import arriving, check_out, spread, Told
 from scenario_gen.errors import InputError, needs, RefusedError
 from scenario_gen.evaluation.criticality import criticality
 from scenario_gen.evaluation.motion import at_period
 from scenario_gen.folders import sha256_of, write_text
 from scenario_gen.folders.claim import alone
+from scenario_gen.folders.scratch import sweep_tree
 from scenario_gen.nearest import attempt
 from scenario_gen.recordings.provenance import parameter_texts, versions
 from scenario_gen.recordings.write import add_results, scenario_bytes
@@ -121,6 +122,7 @@ def run_batch(
         InputError: the corpus has no encounters, a road is none, or `out` is of something else.
     """
     needs("corpus", "duckdb", "pyarrow")
+    check_out(out, [corpus])
     tables = tables_of(corpus)
     rows = [(table, k) for table in tables for k, _ in enumerate(rows_of([table], ["name"]))]
     rows = rows[: templates or None]
@@ -142,7 +144,7 @@ def run_batch(
     out.mkdir(parents=True, exist_ok=True)
     with alone(out), spread(workers, scheduler, told) as go:
         _agree(out, document)
-        sweep(out)
+        sweep_tree(out)
         return summary(
             out, go(make_part, [t for t in parts(rows, roads, out, config, count, seed) if not t.place("cases").exists()])
         )

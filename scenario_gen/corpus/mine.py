@@ -46,10 +46,11 @@ from scenario_gen.corpus.kinds import KINDS
 from scenario_gen.corpus.meetings import HourTask, overlap, search_hours
 from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
 from scenario_gen.corpus.page import sketch, write_page
-from scenario_gen.corpus.tasks import arriving, spread, sweep, Told
+from scenario_gen.corpus.tasks import arriving, check_out, spread, Told
 from scenario_gen.errors import InputError, needs
 from scenario_gen.folders import write_text
 from scenario_gen.folders.claim import alone
+from scenario_gen.folders.scratch import sweep_tree
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.read import is_bag, is_spmd, is_table
 from scenario_gen.parameters import flatten
@@ -120,13 +121,11 @@ def mine(
     """
     needs("corpus", "duckdb", "pyarrow")
     messages, logs, others = inventory(archives)
-    for archive in archives:
-        if out.resolve().is_relative_to(archive.resolve()):
-            raise InputError(f"{out} lies in {archive}, of which it would become a part; name a folder outside of it")
+    check_out(out, archives)
     out.mkdir(parents=True, exist_ok=True)
     with alone(out), spread(workers, scheduler, told) as go:
         _agree(out, messages, logs, config)
-        sweep(out)
+        sweep_tree(out)
         log_tasks = [
             LogTask(paths[0].stem, tuple(paths), out / "encounters" / f"log-{k:05}.parquet", config)
             for k, paths in enumerate(logs)

@@ -42,7 +42,7 @@ import tomllib
 import traceback
 import warnings
 
-from scenario_gen.errors import LONGEST, ScenarioGenError
+from scenario_gen.errors import LONGEST, ScenarioGenError, UnforeseenError
 
 HERE = Path(__file__).resolve().parent
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", HERE.parents[2] / "shared" / "data"))
@@ -141,6 +141,8 @@ def execute(target: Target, data: bytes, folder: Path, most: int = MEMORY) -> tu
     signal.setitimer(signal.ITIMER_PROF, SECONDS)
     try:
         target.run(data, folder)
+    except UnforeseenError as error:  # what a user gets instead of a traceback is a finding all the same
+        return signature(error.__cause__ or error), str(error)
     except ScenarioGenError as error:
         said = str(error)
         if not 0 < len(said) <= LONGEST:
