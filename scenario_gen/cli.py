@@ -24,7 +24,6 @@ import typer
 
 from scenario_gen.cli_corpus import commands as corpus_commands
 from scenario_gen.errors import InputError, of_system, presentable, printable, RefusedError, ScenarioGenError
-from scenario_gen.folders.scratch import sweep_beside
 
 if TYPE_CHECKING:
     from scenario_gen.closed_loop.command import OverDds
@@ -467,7 +466,6 @@ def main() -> None:
     try:
         try:
             refuse_undecodable(sys.argv[1:])
-            sweep_beside(sys.argv[1:])
             app()
         finally:
             sys.stdout.flush()

@@ -216,6 +216,8 @@ def _track(place: Place, vehicle: str, size: tuple[float, float], rows: Floats, 
         raise place.error("times must ascend, and be two at least")
     if np.isnan(rows[:, 3]).any():
         rows[:, 3] = _speeds(rows, speed)
+    if not np.isfinite(rows).all():
+        raise place.error("its times, places or speeds are beyond all numbers")
     if any(not c.isprintable() or c in ',"' for c in vehicle) or not vehicle:
         raise place.error(f"the id {vehicle[:40]!r} cannot stand in a table; rename it")
     return Track(vehicle, *size, rows)

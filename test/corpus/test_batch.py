@@ -108,7 +108,9 @@ def test_a_killed_run_with_two_processes_ends_with_the_same_bytes(batch, corpus,
     assert digests(out) == digests(batch[0]) and made.lines() == batch[1].lines()
 
 
-@pytest.mark.parametrize(("inside", "said"), [("", "of which it would"), ("batch", "of which it would"), ("archive.json", "is a file")])
+@pytest.mark.parametrize(
+    ("inside", "said"), [("", "of which it would"), ("batch", "of which it would"), ("archive.json", "is a file")]
+)
 def test_a_batch_is_written_beside_its_corpus(corpus, inside, said):
     before = sorted(corpus[0].rglob("*"))
     with pytest.raises(InputError, match=said):
@@ -124,7 +126,8 @@ def test_a_find_that_is_ended_leaves_nothing(batch, number):
     """Ctrl-C leaves nothing; after SIGKILL any other command on the batch takes away what was left."""
     out = batch[0]
     words = [sys.executable, "-m", "scenario_gen", "find", str(out)]
-    with subprocess.Popen([*words, FOREVER], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=interruptible) as run:
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen([*words, FOREVER], preexec_fn=interruptible, **quiet) as run:  # noqa: PLW1509 - one thread
         while run.poll() is None and not list(out.glob(".scenario_gen-*/new/scratch")):
             time.sleep(0.01)
         assert run.poll() is None, "it ended before it could be stopped"

@@ -291,7 +291,7 @@ def tree(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     if not pairs:
         return rng.choice(BYTES)(rng, data, seeds)
     for _ in range(rng.choice((1, 1, 2, 5))):
-        (parent, child), (above, other) = rng.choice(pairs), rng.choice(pairs)
+        (parent, child), (_, other) = rng.choice(pairs), rng.choice(pairs)
         copied = copy.deepcopy(other)  # so that no element comes to lie in itself
         match rng.randrange(8):
             case 0:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Public recordings, scenario files and the tables of a corpus as targets; inputs of several files are one, with names between."""
+"""Public recordings, scenario files and the tables of a corpus as targets; several files are one input, with names between."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,6 +21,7 @@ import re
 
 from harness import Mutator, Target
 from mutators import header, TEXT, tree
+import pandas as pd
 from small_scenarios import crossing
 from targets_bags import JSON
 from targets_logs import PARQUET, safety_messages, SHORT
@@ -28,6 +29,7 @@ from targets_maps import MAP
 from test_adapters import argoverse2, commonroad, highd, ind, interaction
 from test_commonroad import case_of
 
+from scenario_gen.corpus.batch import CASE_COLUMNS, SCENARIO_COLUMNS
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import account_of, encounter_of, row_of, rows_of, tables_of, write_encounters
 from scenario_gen.corpus.find import coverage_lines, find
@@ -100,7 +102,9 @@ def scenario_file(suffix: str) -> Callable[[Path], object]:
     """Return what writes a scenario as a file of others."""
 
     def write(folder: Path) -> object:
-        data = write_commonroad(*case_of(crossing()))[0] if suffix == ".xml" else write_openscenario(*case_of(crossing()), "r.xodr")
+        data = (
+            write_commonroad(*case_of(crossing()))[0] if suffix == ".xml" else write_openscenario(*case_of(crossing()), "r.xodr")
+        )
         return (folder / f"one{suffix}").write_bytes(data)
 
     return write
@@ -124,7 +128,7 @@ def read_corpus(folder: Path) -> None:
     for table in tables_of(folder):
         account_of(table)
         for row in rows_of([table]):
-            encounter_of(row)
+            encounter_of(row, table)
 
 
 def archive(folder: Path) -> None:
@@ -138,7 +142,22 @@ def parse_archive(folder: Path) -> None:
         parse_range(task)
 
 
+def batch_tables(folder: Path) -> None:
+    """Write the two tables of a part of a batch."""
+    kinds = {"string": ["a", "b"], "int64": [1, 2], "double": [1.5, None]}
+    for name, columns in (("scenarios", SCENARIO_COLUMNS), ("cases", CASE_COLUMNS)):
+        place = folder / name / "road=straight" / "part-00000.parquet"
+        place.parent.mkdir(parents=True)
+        pd.DataFrame({column: kinds[kind] for column, kind in columns.items()}).to_parquet(place)
+
+
+def find_all(folder: Path) -> None:
+    """Find every scenario of a batch, and show its coverage."""
+    coverage_lines(find(folder), folder)
+
+
 TARGETS = (
+    files_target("batch", batch_tables, find_all),
     files_target("argoverse2", argoverse2, read_all),
     files_target("interaction", interaction, read_all),
     files_target("ind", ind, read_all),

@@ -18,10 +18,12 @@ import math
 
 import numpy as np
 import pandas as pd
+from pyarrow import parquet
 import pytest
 
-from scenario_gen.errors import InputError
+from scenario_gen.errors import InputError, UnforeseenError
 from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs.adapters import tracks
 from scenario_gen.logs.adapters.formats import FORMATS
 
 SIZES = {"7": (4.5, 1.8), "8": (12.0, 2.5)}
@@ -226,6 +228,23 @@ def test_what_is_missing_is_named(tmp_path):
         read_log(path)
     with pytest.raises(InputError, match=r"lacks columns of INTERACTION: agent_type"):
         read_log(path, LogConfig(format="interaction"))
+
+
+@pytest.mark.parametrize("column", ["position_x", "object_category"])
+def test_a_repeated_column_is_named(tmp_path, column):
+    path, _ = argoverse2(tmp_path)
+    table = parquet.read_table(path)
+    parquet.write_table(table.append_column(column, table.column(column)), path)
+    with pytest.raises(InputError, match=rf"scenario_s1\.parquet has more than one column '{column}'"):
+        read_log(path)
+
+
+def test_what_nobody_foresaw_names_the_file(tmp_path, monkeypatch):
+    """A reader that fails in a way of its own is an error of ours all the same, which the fuzzing counts as a finding."""
+    path, _ = argoverse2(tmp_path)
+    monkeypatch.setattr(tracks, "nanoseconds", lambda *_: {}["gone"])
+    with pytest.raises(UnforeseenError, match=r"scenario_s1\.parquet cannot be read: KeyError 'gone'"):
+        read_log(path)
 
 
 def test_two_recordings_are_refused(tmp_path):
