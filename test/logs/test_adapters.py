@@ -239,6 +239,14 @@ def test_a_repeated_column_is_named(tmp_path, column):
         read_log(path)
 
 
+def test_pedestrians_of_no_known_kind_are_counted_too(tmp_path):
+    folder, _ = interaction(tmp_path)
+    with (folder / "pedestrian_tracks_000.csv").open("a") as file:
+        file.write("P2,1,100,,0,0,0,1,,,\nP3,1,100,1.5,0,0,0,1,,,\n")
+    (note,) = [note for note in read_log(folder).quality.notes if "left out" in note]
+    assert "1 × 1.5, 1 × nan, 1 × pedestrian/bicycle" in note
+
+
 def test_what_nobody_foresaw_names_the_file(tmp_path, monkeypatch):
     """A reader that fails in a way of its own is an error of ours all the same, which the fuzzing counts as a finding."""
     path, _ = argoverse2(tmp_path)
