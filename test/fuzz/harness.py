@@ -180,6 +180,7 @@ def over_time(_signal: int, _frame: object) -> None:
 def child(target: Target, seeds: Sequence[bytes], first: int, last: int, progress: mmap.mmap, pipe: int) -> None:
     """Execute inputs `first` to before `last`; write the number of each before it runs, and failures to the pipe."""
     warnings.simplefilter("ignore")
+    os.fsync = lambda _: None  # slow, and nothing here outlives the machine
     gc.freeze()  # to look for garbage in what the parent has loaded would copy all of it
     faulthandler.disable()  # pytest's: the parent says what happened
     signal.signal(signal.SIGPROF, over_time)
