@@ -231,7 +231,7 @@ def encounter_of(row: Mapping[str, Any], table: object = "an encounter's row") -
         InputError: the row lacks a value, or its bytes are damaged.
     """
     for name, kind in ROW.items():
-        if not isinstance(row.get(name), kind):
+        if name not in row or not isinstance(row[name], kind):
             raise InputError(f"{table}: column {name} holds {shown(row.get(name))}; `mine` writes it anew")
     origin = None if row["lat"] is None or row["lon"] is None else (row["lat"], row["lon"])
     try:
