@@ -29,9 +29,11 @@ def main() -> None:
     try:
         needs("cli", "rich", "typer")
         from scenario_gen.cli import main as run
+        from scenario_gen.folders.scratch import sweep_beside
     except MissingExtraError as error:
         sys.exit(f"error: {error}")
 
+    sweep_beside(sys.argv[1:])  # what killed commands left
     run()
 
 

@@ -39,6 +39,10 @@ class InputError(ScenarioGenError):
         super().__init__(presentable(message))
 
 
+class UnforeseenError(InputError):
+    """A reader failed on a file in a way that nobody foresaw; the failure is its cause, and a fault to be mended."""
+
+
 class MissingExtraError(ScenarioGenError, ImportError):
     """A library is not installed that only some uses need; the message names the extra that brings it."""
 
@@ -111,6 +115,23 @@ def guarded(where: str, *kinds: type[Exception], remedy: str = "") -> Iterator[N
         raise
     except turned as error:
         raise InputError(f"{where}: {said(error)}" + (f"; {remedy}" if remedy else "")) from error
+
+
+@contextmanager
+def reading(path: object) -> Iterator[None]:
+    """Turn whatever a reader did not foresee in a damaged file into an InputError that names the file; once around each reader.
+
+    Unlike `guarded` there is code of ours in the block, so the error has a kind of its own, which the fuzzing takes as a finding.
+
+    Raises:
+        UnforeseenError: the reader failed with none of our errors, and none of the system's.
+    """
+    try:
+        yield
+    except (ScenarioGenError, OSError, MemoryError):
+        raise
+    except Exception as error:
+        raise UnforeseenError(f"{path} cannot be read: {said(error)}; it is damaged, or of a kind that is not known") from error
 
 
 def said(error: Exception) -> str:

@@ -16,16 +16,39 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+import ctypes
+import multiprocessing
 import os
 import signal
+import sys
 import threading
 
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _held = 0
 _pending: int | None = None
 _endings: list[Callable[[], None]] = []
 _orderly: Callable[[], None] | None = None
 _hearing = 0  # the process that has a thread for it; a fork has none
+
+
+def end_with_parent() -> None:
+    """Let a worker process end when the one does that started it, however that ends; a Ctrl-C is for that one.
+
+    It is of this module, which loads next to nothing: so it holds before a worker loads what its tasks need.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+    if sys.platform == "linux":  # at once, in compiled code too
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+
+    def wait() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True, name="parent").start()
 
 
 def hear() -> None:

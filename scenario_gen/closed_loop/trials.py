@@ -23,9 +23,7 @@ import math
 import multiprocessing
 import os
 from pathlib import Path
-import signal
 import sys
-import threading
 from typing import Any
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
@@ -33,6 +31,7 @@ from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.evaluation.bootstrap import wilson
+from scenario_gen.interrupts import end_with_parent
 from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.recordings.read import INFO, read_recording, ScenarioEntry, SCENARIOS, WITNESS
 from scenario_gen.storage.bag import within
@@ -195,7 +194,7 @@ def run_trials(
         return _gathered(results, outcomes, len(trials), progress)
     context = multiprocessing.get_context("spawn")
     workers = min(workers, max(len(tasks), 1))
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_end_with_parent) as pool:
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent) as pool:
         try:
             at_once = min(max(len(tasks) // workers, 1), 4)
             return _gathered(pool.map(_run, tasks, chunksize=at_once), outcomes, len(trials), progress)
@@ -204,19 +203,6 @@ def run_trials(
                 f"a process that drove the planner has ended after {len(outcomes)} of {len(tasks)} drives: it crashed, called "
                 "os._exit, or was killed for want of memory; --workers 1 shows where"
             ) from error
-
-
-def _end_with_parent() -> None:
-    """Let a worker end when the process does that started it, however that ends; a Ctrl-C is for that one."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-
-    def wait() -> None:
-        if parent is not None:
-            parent.join()
-            os._exit(1)
-
-    threading.Thread(target=wait, daemon=True, name="parent").start()
 
 
 def _gathered(

@@ -26,18 +26,21 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
+from itertools import islice
 import json
 from pathlib import Path
 from typing import Any
 
 from scenario_gen.config import PipelineConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
-from scenario_gen.corpus.tasks import arriving, spread, sweep, Told
+from scenario_gen.corpus.tasks import arriving, check_out, spread, Told
+from scenario_gen.documents import read_json
 from scenario_gen.errors import InputError, needs, RefusedError
 from scenario_gen.evaluation.criticality import criticality
 from scenario_gen.evaluation.motion import at_period
 from scenario_gen.folders import sha256_of, write_text
 from scenario_gen.folders.claim import alone
+from scenario_gen.folders.scratch import sweep_tree
 from scenario_gen.nearest import attempt
 from scenario_gen.recordings.provenance import parameter_texts, versions
 from scenario_gen.recordings.write import add_results, scenario_bytes
@@ -121,12 +124,13 @@ def run_batch(
         InputError: the corpus has no encounters, a road is none, or `out` is of something else.
     """
     needs("corpus", "duckdb", "pyarrow")
+    check_out(out, [corpus])
     tables = tables_of(corpus)
     rows = [(table, k) for table in tables for k, _ in enumerate(rows_of([table], ["name"]))]
     rows = rows[: templates or None]
     if not rows:
         raise InputError(f"{corpus} holds no encounter")
-    first = encounter_of(_row(*rows[0]))
+    first = encounter_of(_row(*rows[0]), rows[0][0])
     for road in roads:  # a name that is none is an error, not a cause in every case
         with suppress(RefusedError):
             build_road(road, first, config.road)
@@ -142,7 +146,7 @@ def run_batch(
     out.mkdir(parents=True, exist_ok=True)
     with alone(out), spread(workers, scheduler, told) as go:
         _agree(out, document)
-        sweep(out)
+        sweep_tree(out)
         return summary(
             out, go(make_part, [t for t in parts(rows, roads, out, config, count, seed) if not t.place("cases").exists()])
         )
@@ -189,7 +193,7 @@ def _agree(out: Path, document: Mapping[str, Any]) -> None:
     """
     place = out / BATCH
     if place.exists():
-        before = json.loads(place.read_text(encoding="utf-8"))
+        before = read_json(place, {"type": "object"})
         other = [key for key in document if before.get(key) != document[key]]
         if other:
             raise InputError(f"{out} is a batch of other {', '.join(other)}; name another folder, or remove this one")
@@ -210,7 +214,7 @@ def make_part(task: PartTask) -> None:
         return
     cases, made = [], dict[str, GenerationResult]()
     for k, (table, row) in enumerate(task.templates):
-        case, result = _case(_row(table, row), f"/case_{k}", task)
+        case, result = _case(_row(table, row), table, f"/case_{k}", task)
         cases.append(case)
         if result is not None and len(result.generated.scenarios):
             made[f"/case_{k}"] = result
@@ -224,13 +228,10 @@ def make_part(task: PartTask) -> None:
 
 def _row(table: Path, row: int) -> dict[str, Any]:
     """One row of a table of encounters."""
-    from pyarrow import parquet
-
-    found: dict[str, Any] = parquet.read_table(table).slice(row, 1).to_pylist()[0]
-    return found
+    return next(islice(rows_of([table]), row, None))
 
 
-def _case(row: Mapping[str, Any], namespace: str, task: PartTask) -> tuple[dict[str, Any], GenerationResult | None]:
+def _case(row: Mapping[str, Any], table: Path, namespace: str, task: PartTask) -> tuple[dict[str, Any], GenerationResult | None]:
     """Generate one template's scenarios; a refusal is a case without any, with the reason."""
     seed = seed_of(task.seed, row["name"], task.road)
     case = {
@@ -239,7 +240,7 @@ def _case(row: Mapping[str, Any], namespace: str, task: PartTask) -> tuple[dict[
         "changepoints": 0,
     }  # fmt: skip
     try:
-        encounter = encounter_of(row)
+        encounter = encounter_of(row, table)
         refuse_too_large(encounter)
         road = build_road(task.road, encounter, task.config.road)
         segmentation = segment(encounter, task.config.segmentation, seed)

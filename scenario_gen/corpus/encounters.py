@@ -30,7 +30,8 @@ from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import Found, label
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.errors import InputError, needs
+from scenario_gen.documents import parse_json, shown
+from scenario_gen.errors import guarded, InputError, needs
 from scenario_gen.logs import read_log
 from scenario_gen.logs.raw import Observations, RawLog, Segment
 from scenario_gen.logs.read import encounters_of
@@ -38,6 +39,12 @@ from scenario_gen.logs.tables import EPOCH_NS
 from scenario_gen.recordings.tracks import tracks_bytes, tracks_of
 from scenario_gen.types.encounter import Encounter
 
+ROW = {  # what is read of a row, and of which kinds it is
+    **dict.fromkeys(("name", "kind"), str),
+    "count": int,
+    "tracks": bytes,
+    **dict.fromkeys(("lat", "lon"), float | None),
+}
 MARGIN = 2_000_000  # µs of messages before and after an encounter, for smoothing
 
 
@@ -184,26 +191,50 @@ def tables_of(corpus: Path) -> list[Path]:
 
 
 def account_of(table: Path) -> dict[str, Any]:
-    """Return what a table says of the encounters that are not in it, and of its log's quality."""
+    """Return what a table says of the encounters that are not in it, and of its log's quality.
+
+    Raises:
+        InputError: the table is damaged.
+    """
     from pyarrow import parquet
 
-    account: dict[str, Any] = json.loads((parquet.read_schema(table).metadata or {}).get(b"account", b"{}"))
+    with guarded(f"{table} cannot be read as a table"):
+        text = (parquet.read_schema(table).metadata or {}).get(b"account", b"{}").decode()
+    account: dict[str, Any] = parse_json(text, f"{table}: account", {"type": "object"})
     return account
 
 
 def rows_of(tables: Sequence[Path], columns: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
-    """Yield the rows of tables, in their order."""
+    """Yield the rows of tables, in their order.
+
+    Raises:
+        InputError: a table is damaged, or lacks a column.
+    """
     from pyarrow import parquet
 
     for path in tables:
-        yield from parquet.read_table(path, columns=list(columns) if columns else None).to_pylist()
+        with guarded(f"{path} cannot be read as a table"):
+            rows = parquet.read_table(path, columns=list(columns) if columns else None).to_pylist()
+        if rows and (lacking := set(columns or ()) - rows[0].keys()):
+            raise InputError(f"{path} lacks the columns {', '.join(sorted(lacking))}")
+        yield from rows
 
 
-def encounter_of(row: Mapping[str, Any]) -> Encounter:
+def encounter_of(row: Mapping[str, Any], table: object = "an encounter's row") -> Encounter:
     """Return a row's encounter.
 
+    Args:
+        row: of a table that `mine` wrote.
+        table: names it in messages.
+
     Raises:
-        InputError: its bytes are damaged.
+        InputError: the row lacks a value, or its bytes are damaged.
     """
-    origin = None if row["lat"] is None else (row["lat"], row["lon"])
-    return replace(tracks_of(row["tracks"], row["name"], origin), name=row["name"])
+    for name, kind in ROW.items():
+        if name not in row or not isinstance(row[name], kind):
+            raise InputError(f"{table}: column {name} holds {shown(row.get(name))}; `mine` writes it anew")
+    origin = None if row["lat"] is None or row["lon"] is None else (row["lat"], row["lon"])
+    try:
+        return replace(tracks_of(row["tracks"], row["name"], origin), name=row["name"])
+    except InputError as error:
+        raise InputError(f"{table}: {error}") from error

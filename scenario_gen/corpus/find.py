@@ -59,7 +59,7 @@ def find(batch: Path, condition: str = "true", limit: int = 0) -> Hits:
     if not tables:
         raise InputError(f"{batch} holds no scenarios; write them with `scenario-gen batch DIR --roads … --out {batch}`")
     columns = f"the columns are {', '.join(COLUMNS)}, seed, sha256"
-    with database(batch, MEMORY, f"condition {condition!r}", columns) as base:
+    with database(batch, MEMORY, f"{batch}: condition {condition!r}", columns) as base:
         base.execute(
             f"CREATE TABLE scenarios AS SELECT * FROM read_parquet([{quoted(tables)}], hive_partitioning=true, "
             "hive_types_autocast=false)"

@@ -147,7 +147,8 @@ def build(
         InputError: the corpus has no pairs, or its encounters have several sampling periods.
     """
     tables = tables_of(corpus)
-    pairs = [pair for row in rows_of(tables) for pair in pair_encounters(encounter_of(row), CorpusConfig().interaction)]
+    encounters = (encounter_of(row, table) for table in tables for row in rows_of([table]))
+    pairs = [pair for encounter in encounters for pair in pair_encounters(encounter, CorpusConfig().interaction)]
     pairs.sort(key=lambda pair: sha256(pair.name.encode()).digest())
     sample = pairs[:most]
     if not sample:
@@ -207,7 +208,7 @@ def assign_table(task: AssignTask) -> None:
     library = PrimitiveLibrary.load(task.library)
     rows = []
     for row in rows_of([task.table]):
-        for pair in pair_encounters(encounter_of(row), CorpusConfig().interaction):
+        for pair in pair_encounters(encounter_of(row, task.table), CorpusConfig().interaction):
             found = assign(pair, library, task.config)
             rows.append({
                 "encounter": row["name"], "kind": row["kind"], "pair": pair.name, "seconds": pair.duration,

@@ -24,12 +24,11 @@ from dataclasses import dataclass
 import json
 from pathlib import Path
 import re
-import tempfile
 from typing import Any
 
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.errors import guarded, needs
-from scenario_gen.folders import write_text
+from scenario_gen.folders import scratch, write_text
 from scenario_gen.logs.tables import COLUMNS
 
 HOUR = 3_600_000_000  # µs
@@ -99,10 +98,10 @@ def database(folder: Path, memory: int, what: str, remedy: str = SMALLER) -> Ite
     import duckdb
 
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder, prefix=".spill-") as spill, duckdb.connect() as connection:
+    with scratch(folder) as spill, duckdb.connect() as connection:
         connection.execute("SET threads = 1")
         connection.execute(f"SET memory_limit = '{memory}MiB'")
-        connection.execute("SET temp_directory = ?", [spill])
+        connection.execute("SET temp_directory = ?", [str(spill)])
         connection.execute("SET enable_progress_bar = false")
         with guarded(what, duckdb.Error, remedy=remedy):
             yield connection
@@ -120,14 +119,14 @@ def parse_range(task: RangeTask) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     files = ", ".join(str(path) for path, _, _ in task.pieces)
     with (
-        tempfile.TemporaryDirectory(dir=folder.parent, prefix=".range-") as place,
+        scratch(folder.parent) as place,
         database(folder.parent, task.memory, f"{task.name}: {files}") as base,
     ):
         names = {}
         for k, (path, begin, end) in enumerate(task.pieces):
             whole = begin == 0 and end == path.stat().st_size
-            names[str(path if whole else _extract(path, begin, end, Path(place) / f"{k}.csv"))] = str(path)
-        first = Path(place) / "parsed.parquet"
+            names[str(path if whole else _extract(path, begin, end, place / f"{k}.csv"))] = str(path)
+        first = place / "parsed.parquet"
         account = _parse(base, names, first)
         with arriving(task.target.with_suffix(".json")) as part:
             write_text(part, json.dumps(account, indent=1) + "\n")

@@ -46,15 +46,26 @@ from scenario_gen.corpus.kinds import KINDS
 from scenario_gen.corpus.meetings import HourTask, overlap, search_hours
 from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
 from scenario_gen.corpus.page import sketch, write_page
-from scenario_gen.corpus.tasks import arriving, spread, sweep, Told
+from scenario_gen.corpus.tasks import arriving, check_out, spread, Told
+from scenario_gen.documents import COUNT, read_json
 from scenario_gen.errors import InputError, needs
 from scenario_gen.folders import write_text
 from scenario_gen.folders.claim import alone
+from scenario_gen.folders.scratch import sweep_tree
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.read import is_bag, is_spmd, is_table
 from scenario_gen.parameters import flatten
 
 ARCHIVE, PAGE = "archive.json", "encounters.html"
+ACCOUNT = {  # of a range of text: what was left out, by file; rows by hour
+    "type": "object",
+    "required": ["files", "hours", "notes"],
+    "properties": {
+        "files": {"type": "object", "additionalProperties": {"type": "object", "additionalProperties": COUNT}},
+        "hours": {"type": "object", "propertyNames": {"pattern": "^-?[0-9]{1,18}$"}, "additionalProperties": COUNT},
+        "notes": {"type": "array", "items": {"type": "string"}},
+    },
+}
 MOST_DRAWN = 120  # encounters on the page
 MOST_SHOWN = 20  # failures and files that are named; the corpus holds all
 
@@ -120,13 +131,11 @@ def mine(
     """
     needs("corpus", "duckdb", "pyarrow")
     messages, logs, others = inventory(archives)
-    for archive in archives:
-        if out.resolve().is_relative_to(archive.resolve()):
-            raise InputError(f"{out} lies in {archive}, of which it would become a part; name a folder outside of it")
+    check_out(out, archives)
     out.mkdir(parents=True, exist_ok=True)
     with alone(out), spread(workers, scheduler, told) as go:
         _agree(out, messages, logs, config)
-        sweep(out)
+        sweep_tree(out)
         log_tasks = [
             LogTask(paths[0].stem, tuple(paths), out / "encounters" / f"log-{k:05}.parquet", config)
             for k, paths in enumerate(logs)
@@ -213,7 +222,7 @@ def _agree(out: Path, messages: Sequence[Path], logs: Sequence[Sequence[Path]], 
     }
     place = out / ARCHIVE
     if place.exists():
-        before = json.loads(place.read_text(encoding="utf-8"))
+        before = read_json(place, {"type": "object"})
         for key, what in (("files", "archive, whose files were other ones"), ("parameters", "set of parameters")):
             if before.get(key) != document[key]:
                 raise InputError(f"{out} is a corpus of another {what}; name another folder, or remove this one")
@@ -231,7 +240,7 @@ def hour_tasks(ranged: Sequence[RangeTask], out: Path, config: CorpusConfig) -> 
     files: dict[int, list[Path]] = {}
     for task in ranged:
         if task.target.exists():
-            for hour, count in json.loads(task.target.with_suffix(".json").read_text(encoding="utf-8"))["hours"].items():
+            for hour, count in read_json(task.target.with_suffix(".json"), ACCOUNT)["hours"].items():
                 seen.add(int(hour))
                 if count >= least_rows(config):  # else every range is asked for the hours of its wrong stamps
                     rows[int(hour)] += count
@@ -308,7 +317,7 @@ def summary(out: Path, config: CorpusConfig, failed: list[str], others: Sequence
     notes: list[str] = []
     strays, least = 0, least_rows(config)
     for path in sorted((out / "messages").glob("*.json")):
-        account = json.loads(path.read_text(encoding="utf-8"))
+        account = read_json(path, ACCOUNT)
         notes += account["notes"]
         strays += sum(int(count) for count in account["hours"].values() if count < least)
         for file, causes in account["files"].items():

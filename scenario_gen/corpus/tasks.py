@@ -25,15 +25,15 @@ import os
 from pathlib import Path
 import shutil
 import time
+import traceback
 from typing import Any, TypeVar
 
-from scenario_gen.errors import needs
-from scenario_gen.folders.disk import discard, naming, sync
+from scenario_gen.errors import InputError, needs
+from scenario_gen.folders import naming, scratch, sync
 
 Task = TypeVar("Task")
 Told = Callable[[int, int, str], None]
 """Told how many tasks are done, of how many, and how much time is left, in words."""
-TEMPORARY = ".partial"
 WORKERS = {  # their environment: one thread each; Dask's own has them return every freed array to the system, a fifth of all CPU
     **dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
     "DASK_LOGGING__DISTRIBUTED": "critical",
@@ -48,10 +48,8 @@ def arriving(target: Path) -> Iterator[Path]:
         OSError: the disk is full, or fails; it names the file.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
-    place = target.with_name(f"{target.name}{TEMPORARY}-{os.getpid()}-{time.monotonic_ns()}")
-    temporary = place / target.name  # for a bag's files are called as its folder is
-    try:
-        place.mkdir()
+    with scratch(target.parent) as place:
+        temporary = place / target.name  # for a bag's files are called as its folder is
         yield temporary
         if temporary.is_dir():
             for path in sorted(temporary.rglob("*"), reverse=True):
@@ -61,18 +59,20 @@ def arriving(target: Path) -> Iterator[Path]:
             if target.is_dir():  # of a task that was killed before its last file
                 shutil.rmtree(target)
             temporary.replace(target)
-        place.rmdir()
         sync(target.parent)
-    except BaseException:
-        discard(place)
-        raise
 
 
-def sweep(folder: Path) -> None:
-    """Remove what killed tasks left behind; nobody may be writing there."""
-    for pattern in (f"*{TEMPORARY}-*", ".spill-*", ".range-*"):
-        for path in sorted(folder.rglob(pattern)):
-            discard(path)
+def check_out(out: Path, read: Sequence[Path]) -> None:
+    """Refuse a file as the folder of results, and a folder in what is read.
+
+    Raises:
+        InputError: it is one.
+    """
+    if out.exists() and not out.is_dir():
+        raise InputError(f"--out {out} is a file; name a folder")
+    for source in read:
+        if out.resolve().is_relative_to(source.resolve()):
+            raise InputError(f"{out} lies in {source}, of which it would become a part; name a folder outside of it")
 
 
 class Spread:
@@ -141,6 +141,10 @@ def _guarded(function: Callable[[Any], Any], task: Any) -> str:
         function(task)
     except (ScenarioGenError, OSError, MemoryError) as error:
         return f"{getattr(task, 'name', task)}: {said(error)}"
+    except Exception as error:  # a fault of ours, or of a library: of this case, and its place is said for who mends it
+        *_, (frame, line) = traceback.walk_tb(error.__traceback__)
+        place = f"{Path(frame.f_code.co_filename).name}:{line}"
+        return f"{getattr(task, 'name', task)}: {type(error).__name__} at {place}: {said(error)}"
     return ""
 
 

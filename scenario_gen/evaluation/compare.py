@@ -20,7 +20,7 @@ import math
 from pathlib import Path
 
 from scenario_gen.documents import read_json
-from scenario_gen.errors import InputError
+from scenario_gen.errors import InputError, reading
 from scenario_gen.types.evaluation import as_markdown, Evaluation, formatted, Interval, Metric, SCHEMA
 from scenario_gen.types.generation import WITH
 
@@ -123,4 +123,5 @@ def read_evaluations(path: Path) -> tuple[Evaluation, ...]:
     """
     file = path / "evaluation.json" if path.is_dir() else path
     document = read_json(file, FILE_SCHEMA, f"{file} is no evaluation")
-    return tuple(Evaluation.from_document(case) for case in document.get("cases", [document]))
+    with reading(file):
+        return tuple(Evaluation.from_document(case) for case in document.get("cases", [document]))

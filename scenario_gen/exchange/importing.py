@@ -28,7 +28,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen
-from scenario_gen.errors import InputError, of_system
+from scenario_gen.errors import InputError, of_system, reading
 from scenario_gen.exchange.openscenario import SPEEDS
 from scenario_gen.exchange.xml import number, Place, read_xml
 
@@ -66,14 +66,15 @@ def read_scenario_file(path: Path) -> Imported:
     Raises:
         InputError: it cannot be read, is neither, or holds no trajectory with times; file and place are named.
     """
-    root = read_xml(path)
-    place = Place(path, root, root.tag)
-    if root.tag == "commonRoad":
-        made = _commonroad(place)
-    elif root.tag == "OpenSCENARIO":
-        made = _openscenario(place)
-    else:
-        raise InputError(f"{path}: its root is {root.tag[:40]!r}; commonRoad and OpenSCENARIO are read")
+    with reading(path):
+        root = read_xml(path)
+        place = Place(path, root, root.tag)
+        if root.tag == "commonRoad":
+            made = _commonroad(place)
+        elif root.tag == "OpenSCENARIO":
+            made = _openscenario(place)
+        else:
+            raise InputError(f"{path}: its root is {root.tag[:40]!r}; commonRoad and OpenSCENARIO are read")
     if not made.tracks:
         raise InputError(f"{path}: no vehicle with a trajectory in it" + "".join(f"; {note}" for note in made.notes))
     return made
@@ -215,6 +216,8 @@ def _track(place: Place, vehicle: str, size: tuple[float, float], rows: Floats, 
         raise place.error("times must ascend, and be two at least")
     if np.isnan(rows[:, 3]).any():
         rows[:, 3] = _speeds(rows, speed)
+    if not np.isfinite(rows).all():
+        raise place.error("its times, places or speeds are beyond all numbers")
     if any(not c.isprintable() or c in ',"' for c in vehicle) or not vehicle:
         raise place.error(f"the id {vehicle[:40]!r} cannot stand in a table; rename it")
     return Track(vehicle, *size, rows)

@@ -17,5 +17,6 @@
 from scenario_gen.folders.disk import naming, sync, write_text
 from scenario_gen.folders.marker import Kind, MARKER, sha256_of
 from scenario_gen.folders.replace import replaced_folder
+from scenario_gen.folders.scratch import scratch
 
-__all__ = ["MARKER", "Kind", "naming", "replaced_folder", "sha256_of", "sync", "write_text"]
+__all__ = ["MARKER", "Kind", "naming", "replaced_folder", "scratch", "sha256_of", "sync", "write_text"]

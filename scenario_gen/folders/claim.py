@@ -107,15 +107,19 @@ def _locked(path: Path) -> int:
 
 
 @contextmanager
-def alone(parent: Path) -> Iterator[None]:
+def alone(parent: Path, patience: float = PATIENCE) -> Iterator[None]:
     """Let no other process of ours look through `parent`, or make a claim in it, meanwhile.
+
+    Args:
+        parent: the folder.
+        patience: seconds to wait for others.
 
     Raises:
         InputError: a file of another's has the lock's name, or a process that was stopped holds it.
         OSError: the folder cannot be written.
     """
     path = parent / GUARD
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + patience
     while (descriptor := _locked(path)) < 0:
         if time.monotonic() > deadline:
             raise InputError(f"{path} is held by another process; wait for it, or name another folder")

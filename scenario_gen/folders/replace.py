@@ -16,6 +16,7 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, ExitStack, suppress
+import errno
 import os
 from pathlib import Path
 import stat
@@ -25,6 +26,8 @@ from scenario_gen.folders.claim import alone, Claim, claim, GUARD, PREFIX, settl
 from scenario_gen.folders.disk import exchange, is_gone, sync
 from scenario_gen.folders.marker import finish, Kind, objection
 from scenario_gen.interrupts import ending, uninterrupted
+
+FORBIDDEN = {errno.EACCES, errno.EPERM, errno.EROFS}  # no right to write, or a file system that is read-only
 
 
 @contextmanager
@@ -172,7 +175,9 @@ def _system_errors(target: Path, folder: Path) -> Iterator[None]:
 
 def _failed(target: Path, error: Exception) -> InputError:
     """Return an error of the system as one of ours, with a file in the making named as if it were in the target already."""
-    advice = "; what was there is untouched; make room, or name another folder"
+    forbidden = isinstance(error, OSError) and error.errno in FORBIDDEN
+    remedy = "it cannot be written to: name another folder" if forbidden else "make room, or name another folder"
+    advice = f"; what was there is untouched; {remedy}"
     if not isinstance(error, OSError):
         return InputError(f"{target}: {error}{advice}")
     path = target if error.filename is None else Path(os.fsdecode(error.filename))

@@ -17,6 +17,7 @@
 What pandas leaves in a file about its own types is not needed and not believed.
 """
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -44,13 +45,8 @@ def read_columns(path: Path, before: int, config: LogConfig) -> tuple[pd.DataFra
     Raises:
         InputError: the file is damaged or too large, or a column is of no kind that its quantity can have.
     """
-    with guarded(f"{path} cannot be read as a Parquet table"):
-        schema = parquet.read_schema(path)
-        names = list(schema.names)
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"{path} has more than one column {name!r}; rename all but one")
-    columns = find_columns(names, path, config.columns)
+    schema = read_schema(path)
+    columns = find_columns(list(schema.names), path, config.columns)
     batches = read_batches(path, schema, sorted({column.name for column in columns.values()}), before, config)
     frame, found = {}, {}
     for quantity, column in columns.items():
@@ -64,14 +60,28 @@ def read_columns(path: Path, before: int, config: LogConfig) -> tuple[pd.DataFra
     return pd.DataFrame(frame), found
 
 
+def read_schema(path: Path) -> pa.Schema:
+    """Return the names and types of the columns, each of another name.
+
+    Raises:
+        InputError: the file is damaged, or two columns have one name.
+    """
+    with guarded(f"{path} cannot be read as a Parquet table"):
+        schema = parquet.read_schema(path)
+        names = list(schema.names)
+    for name, count in Counter(names).items():
+        if count > 1:
+            raise InputError(f"{path} has more than one column {name!r}; rename all but one")
+    return schema
+
+
 def read_table(path: Path, names: list[str], before: int, config: LogConfig) -> pd.DataFrame:
     """Read some columns as they stand; `before` rows were read from other files; a column that is missing is left out.
 
     Raises:
         InputError: the file is damaged or too large.
     """
-    with guarded(f"{path} cannot be read as a Parquet table"):
-        schema = parquet.read_schema(path)
+    schema = read_schema(path)
     there = [name for name in names if name in schema.names]
     batches = read_batches(path, schema, there, before, config)
     frame = {}

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenario_gen.errors import guarded, InputError, needs
+from scenario_gen.errors import guarded, InputError, needs, reading
 from scenario_gen.logs.adapters import commonroad
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.cleaning import clean, Drops
@@ -322,7 +322,8 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
             f"{paths[0]} is none of the known logs: {', '.join(TABLES)} tables and SPMD files, "
             "CommonRoad scenarios, rosbag2 folders, .mcap, .db3; set the parameter format if its name misleads"
         )
-    return reader(name)(files, config)
+    with reading(files[0]):
+        return reader(name)(files, config)
 
 
 def present(path: Path) -> list[Path]:

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from scenario_gen.documents import shown
-from scenario_gen.errors import InputError, RefusedError
+from scenario_gen.errors import InputError, reading, RefusedError
 from scenario_gen.roads.builtin import BUILT_IN, draw, draw_corridor, draw_paper, junction_centre, layout_for
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.nav2 import read_map
@@ -79,7 +79,8 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
         kinds = f"a map_server YAML file or a vector map ({', '.join(READERS)})"
         part = "; one part behind one # can be named of a vector map alone" if "#" in name_or_path else ""
         raise InputError(f"road {shown(name_or_path, 200)!r} is neither one of {names} nor the path of {kinds}{part}")
-    return read_map(path, config)
+    with reading(path):
+        return read_map(path, config)
 
 
 def _built_in(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -> Road:

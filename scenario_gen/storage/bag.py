@@ -27,6 +27,7 @@ import zstandard
 
 from scenario_gen.documents import shown
 from scenario_gen.errors import guarded, InputError
+from scenario_gen.folders import scratch
 from scenario_gen.storage.config import Allowance, BagConfig
 from scenario_gen.storage.files import files_of, METADATA
 from scenario_gen.storage.mcap import McapFile, open_mcap
@@ -221,7 +222,7 @@ def _unpacked(file: Path, stack: ExitStack, allowance: Allowance) -> Path:
     Raises:
         InputError: it is damaged, or too large.
     """
-    target = Path(stack.enter_context(tempfile.TemporaryDirectory())) / file.stem
+    target = stack.enter_context(scratch(Path(tempfile.gettempdir()))) / file.stem
     with file.open("rb") as packed, target.open("wb") as whole:
         with guarded(f"{file}: cannot be decompressed", remedy="copy it again"):
             reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)

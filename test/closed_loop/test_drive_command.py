@@ -16,7 +16,10 @@
 
 import json
 import os
+from pathlib import Path
+import subprocess
 import sys
+import time
 from xml.etree import ElementTree
 
 from bag_examples import hand_made_run
@@ -143,3 +146,28 @@ def test_a_folder_of_somebodys_own_is_refused_before_anything_is_driven(bag, tmp
 def test_an_ego_that_is_not_there_is_named(bag):
     with pytest.raises(InputError, match=r"no vehicle 'nobody' to be the ego; it has "):
         read_trials(bag, "nobody")
+
+
+BUSY = """
+import os, pathlib
+class Busy:
+    def reset(self, task):
+        pathlib.Path(f"{os.getpid()}.busy").touch()
+    def act(self, seen):
+        sum(range(10**15))  # compiled, and no other thread comes in between
+"""
+
+
+def test_processes_of_a_killed_drive_end_with_it_whatever_they_are_at(bag, tmp_path):
+    (tmp_path / "busy.py").write_text(BUSY)
+    words = [sys.executable, "-m", "scenario_gen", "drive", str(bag), "--planner", "busy:Busy", "--workers", "2", "--out", "out"]
+    with subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as drive:
+        while drive.poll() is None and not list(tmp_path.glob("*.busy")):
+            time.sleep(0.01)
+        assert drive.poll() is None, "it ended before it could be killed"
+        drive.kill()
+    patience = time.monotonic() + 60.0  # else they would be at it for months
+    workers = [Path("/proc") / path.stem / "exe" for path in tmp_path.glob("*.busy")]
+    while any(os.path.lexists(worker) for worker in workers) and time.monotonic() < patience:
+        time.sleep(0.01)
+    assert workers and not any(os.path.lexists(worker) for worker in workers)

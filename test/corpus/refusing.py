@@ -20,3 +20,5 @@ from scenario_gen.errors import InputError
 def refuse(name):
     if name == "b":
         raise InputError(f"{name} is none")
+    if name == "c":
+        raise KeyError(name)

@@ -108,6 +108,41 @@ def test_a_killed_run_with_two_processes_ends_with_the_same_bytes(batch, corpus,
     assert digests(out) == digests(batch[0]) and made.lines() == batch[1].lines()
 
 
+@pytest.mark.parametrize(
+    ("inside", "said"), [("", "of which it would"), ("batch", "of which it would"), ("archive.json", "is a file")]
+)
+def test_a_batch_is_written_beside_its_corpus(corpus, inside, said):
+    before = sorted(corpus[0].rglob("*"))
+    with pytest.raises(InputError, match=said):
+        run_batch(corpus[0], ["straight"], corpus[0] / inside)
+    assert sorted(corpus[0].rglob("*")) == before
+
+
+FOREVER = "(SELECT count(*) FROM range(100000000) a, range(100000000) b WHERE a.range * b.range % 7 = 3) > pet"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_find_that_is_ended_leaves_nothing(batch, number):
+    """Ctrl-C leaves nothing; after SIGKILL any other command on the batch takes away what was left."""
+    out = batch[0]
+    words = [sys.executable, "-m", "scenario_gen", "find", str(out)]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen([*words, FOREVER], preexec_fn=interruptible, **quiet) as run:  # noqa: PLW1509 - one thread
+        while run.poll() is None and not list(out.glob(".scenario_gen-*/new/scratch")):
+            time.sleep(0.01)
+        assert run.poll() is None, "it ended before it could be stopped"
+        run.send_signal(number)
+    assert len(list(out.glob(".scenario_gen*"))) == (number == signal.SIGKILL)
+    if number == signal.SIGKILL:
+        subprocess.run([*words[:3], "validate", str(out)], capture_output=True, check=False)
+    assert not list(out.glob(".scenario_gen*"))
+
+
+def interruptible():
+    """Take SIGINT as in a terminal: where a shell runs the tests in the background, it has them ignore it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def test_a_road_that_is_none_is_an_error_at_once(corpus, tmp_path):
     with pytest.raises(InputError, match="nowhere"):
         run_batch(corpus[0], ["straight", "nowhere"], tmp_path / "out", count=1, templates=1)
@@ -123,7 +158,8 @@ def test_names_and_seeds():
 def test_a_task_that_is_refused_does_not_end_the_others(workers):
     told = []
     with spread(workers, "", lambda *how: told.append(how)) as go:
-        assert go(refuse, ["a", "b", "c"]) == ["b: b is none"]
+        b, c = go(refuse, ["a", "b", "c"])
+        assert b == "b: b is none" and c.startswith("c: KeyError at refusing.py:") and c.endswith(": KeyError 'c'")
     assert [done for done, *_ in told] == [1, 2, 3]
 
 

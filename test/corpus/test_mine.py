@@ -15,6 +15,7 @@
 """Mining: planted encounters are found and no others, rows left out are counted, the work can be cut off anywhere."""
 
 import json
+import os
 
 from hypothesis import given, settings, strategies
 import numpy as np
@@ -31,6 +32,7 @@ from scenario_gen.corpus.synthetic import read_planted
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.errors import InputError
 from scenario_gen.folders import sha256_of
+from scenario_gen.folders.claim import claim
 from scenario_gen.logs.config import LogConfig
 
 pytestmark = pytest.mark.xdist_group("corpus")  # one archive for all
@@ -90,23 +92,32 @@ def test_ranges_and_whole_files_give_the_same_rows(archive, tmp_path):
     assert (seen[0][0] == seen[1][0]).all() and seen[0][1] == seen[1][1]
 
 
+def killed_while_writing(folder):
+    """What a process leaves that is killed: its scratch folder, whose lock the kernel has let go of."""
+    left = claim(folder / "scratch")
+    (left.new / "torn.parquet").write_text("torn")
+    os.close(left.lock)
+
+
 def test_what_is_missing_is_made_again_and_the_same(archive, corpus, tmp_path):
     """As after a kill: of each stage a file is gone, and a torn one lies there."""
     out, _ = corpus
     before = {path.relative_to(out): sha256_of(path) for path in out.rglob("*.parquet")}
     for stage in ("messages", "hours", "encounters"):
         sorted((out / stage).glob("*[0-9].parquet"))[0].unlink()
-        (out / stage / "x.partial-1-2").write_text("torn")
-    (out / ".spill-a").mkdir()
+        killed_while_writing(out / stage)
+    killed_while_writing(out)
     mine([archive], out)
     assert {path.relative_to(out): sha256_of(path) for path in out.rglob("*.parquet")} == before
-    assert not list(out.rglob("*.partial*")) and not list(out.glob(".spill-*"))
+    assert not list(out.rglob(".scenario_gen-*"))
     with pytest.raises(InputError, match="another set of parameters"):
         mine([archive], out, CorpusConfig(interaction=5.0))
     for inside in (archive, archive / "corpus"):
         with pytest.raises(InputError, match="of which it would become a part"):
             mine([archive], inside)
     (tmp_path / "letter.txt").write_text("dear")
+    with pytest.raises(InputError, match=r"letter\.txt is a file; name a folder"):
+        mine([archive], tmp_path / "letter.txt")
     with pytest.raises(InputError, match="is not empty and no corpus"):
         mine([archive], tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["letter.txt"]

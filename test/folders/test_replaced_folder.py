@@ -15,6 +15,7 @@
 """What a result may replace, and what it never touches."""
 
 from contextlib import suppress
+import errno
 import json
 import os
 from pathlib import Path
@@ -25,7 +26,7 @@ from failing_disk import content, KIND, write_nothing, write_texts
 import pytest
 
 from scenario_gen.errors import InputError
-from scenario_gen.folders import Kind, MARKER, replaced_folder
+from scenario_gen.folders import Kind, MARKER, replace, replaced_folder
 from scenario_gen.folders.claim import GUARD, OWNER, PREFIX
 
 
@@ -355,3 +356,20 @@ def test_a_mount_point_and_a_read_only_file_system_are_refused(tmp_path):
         assert (disk / "out" / "one.txt").read_text() == "one.txt" * 2
     finally:
         subprocess.run(["umount", str(disk)], check=True)
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [
+        *((forbidden, "it cannot be written to: name another folder") for forbidden in (errno.EACCES, errno.EPERM, errno.EROFS)),
+        (errno.ENOSPC, "make room, or name another folder"),
+    ],
+)
+def test_a_place_that_cannot_be_written_to_is_told_from_a_full_one(tmp_path, monkeypatch, number, said):
+    def refuse(place):
+        raise OSError(number, os.strerror(number), str(place))
+
+    monkeypatch.setattr(replace, "claim", refuse)
+    with pytest.raises(InputError, match=f"{os.strerror(number)}; what was there is untouched; {said}$"):
+        write_texts(tmp_path / "out", 1)
+    assert list(tmp_path.iterdir()) == []

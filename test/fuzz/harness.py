@@ -42,7 +42,7 @@ import tomllib
 import traceback
 import warnings
 
-from scenario_gen.errors import LONGEST, ScenarioGenError
+from scenario_gen.errors import LONGEST, ScenarioGenError, UnforeseenError
 
 HERE = Path(__file__).resolve().parent
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", HERE.parents[2] / "shared" / "data"))
@@ -141,6 +141,8 @@ def execute(target: Target, data: bytes, folder: Path, most: int = MEMORY) -> tu
     signal.setitimer(signal.ITIMER_PROF, SECONDS)
     try:
         target.run(data, folder)
+    except UnforeseenError as error:  # what a user gets instead of a traceback is a finding all the same
+        return signature(error.__cause__ or error), str(error)
     except ScenarioGenError as error:
         said = str(error)
         if not 0 < len(said) <= LONGEST:
@@ -178,6 +180,7 @@ def over_time(_signal: int, _frame: object) -> None:
 def child(target: Target, seeds: Sequence[bytes], first: int, last: int, progress: mmap.mmap, pipe: int) -> None:
     """Execute inputs `first` to before `last`; write the number of each before it runs, and failures to the pipe."""
     warnings.simplefilter("ignore")
+    os.fsync = lambda _: None  # slow, and nothing here outlives the machine
     gc.freeze()  # to look for garbage in what the parent has loaded would copy all of it
     faulthandler.disable()  # pytest's: the parent says what happened
     signal.signal(signal.SIGPROF, over_time)

@@ -16,6 +16,9 @@
 
 from collections.abc import Callable, Sequence
 import contextlib
+import copy
+import dataclasses
+from dataclasses import is_dataclass
 import io
 import math
 import random
@@ -23,9 +26,16 @@ import re
 import sqlite3
 import struct
 import tempfile
+from typing import Any
+from xml.etree import ElementTree
 
+import numpy as np
 import pyarrow as pa
 from pyarrow import parquet as pq
+from rosbags.typesys import get_typestore, Stores
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+Mutator = Callable[[random.Random, bytes, Sequence[bytes]], bytes]
 
 TEXTS = """nan NaN inf -inf 1e308 -1e308 1e-320 -0 0 1 -1 None null NA True false 9223372036854775807 9223372036854775808
     -9223372036854775809 18446744073709551616 1e400 0x10 1_000 1,5 12:30:05 2024-02-30 9999-12-31 0001-01-01T00:00:00Z
@@ -182,7 +192,9 @@ def changed(rng: random.Random, table: pa.Table) -> pa.Table:
     """Return an Arrow table with one thing wrong."""
     at = rng.randrange(table.num_columns)
     name, values = table.column_names[at], table.column(at)
-    match rng.randrange(8):
+    match rng.randrange(9):
+        case 8:
+            return table.append_column(name, table.column(rng.randrange(table.num_columns)))
         case 0:
             return table.set_column(at, name, values.cast(rng.choice(TYPES), safe=False))
         case 1:
@@ -245,3 +257,99 @@ def sentence(rng: random.Random, base: sqlite3.Connection) -> tuple[str, tuple[o
             (f'insert into "{table}" select * from "{table}" limit 3', ()),
         )
     )
+
+
+def header(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Drop, repeat, exchange or rename whole columns of a table in text."""
+    table = [line.split(b",") for line in data.split(b"\n")]
+    width = len(table[0])
+    one, other = rng.randrange(width), rng.randrange(width)
+    how = rng.randrange(5)
+    if how == 4:
+        table[0][one] = rng.choice((*table[0], b"", b"x", b" " + table[0][one], table[0][one].upper()))
+    for row in table if how < 4 else ():
+        if len(row) != width:
+            continue
+        if how == 0:
+            del row[one]
+        elif how == 1:
+            row.insert(other, row[one])
+        elif how == 2:
+            row[one], row[other] = row[other], row[one]
+        else:
+            row[one] = row[other]
+    return b"\n".join(b",".join(row) for row in table)
+
+
+def tree(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Move, repeat, drop, empty, rename or exchange elements of an XML tree; move or drop attributes."""
+    try:
+        root = ElementTree.fromstring(data)
+    except (ElementTree.ParseError, ValueError, LookupError):
+        return rng.choice(BYTES)(rng, data, seeds)
+    pairs = [(parent, child) for parent in root.iter() for child in parent]
+    if not pairs:
+        return rng.choice(BYTES)(rng, data, seeds)
+    for _ in range(rng.choice((1, 1, 2, 5))):
+        (parent, child), (_, other) = rng.choice(pairs), rng.choice(pairs)
+        copied = copy.deepcopy(other)  # so that no element comes to lie in itself
+        match rng.randrange(8):
+            case 0:
+                parent.insert(rng.randrange(len(parent) + 1), copied)
+            case 1:
+                parent[:] = [each for each in parent if each is not child]
+            case 2:
+                child[:] = list(copied)
+            case 3:
+                child.tag = rng.choice((other.tag, "x"))
+            case 4:
+                child.attrib = dict(copied.attrib)
+            case 5:
+                child.text = rng.choice((copied.text, None, "", "1", "nan", "-1e9"))
+            case 6:
+                parent.extend(copy.deepcopy(child) for _ in range(rng.choice((1, 3, 20))))
+            case _:
+                for name in rng.sample(list(child.attrib), min(len(child.attrib), 1)):
+                    child.attrib[rng.choice((name, "id", "ref", "x"))] = child.attrib.pop(name)
+    return ElementTree.tostring(root)
+
+
+def fields(kind: str) -> Mutator:
+    """Return what changes values of a message's fields and keeps its form: numbers, texts, lengths of lists."""
+
+    def change(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+        try:
+            message = STORE.deserialize_cdr(data, kind)
+            for _ in range(rng.choice((1, 1, 2, 5))):
+                message = other_value(rng, message)
+            return bytes(STORE.serialize_cdr(message, kind))
+        except Exception:  # what was damaged before is no message; a value that its field cannot hold
+            return rng.choice(BYTES)(rng, data, seeds)
+
+    return change
+
+
+def other_value(rng: random.Random, value: Any) -> Any:
+    """Return a value of the same kind with one thing changed, at any depth."""
+    if is_dataclass(value):
+        name = rng.choice([field.name for field in dataclasses.fields(value) if not field.name.startswith("__")])
+        return dataclasses.replace(value, **{name: other_value(rng, getattr(value, name))})
+    if isinstance(value, np.ndarray):
+        if not len(value) or rng.random() < 0.3:
+            return np.resize(value, rng.choice((0, 1, len(value) + 1, 3 * len(value)))) if len(value) else value
+        out = value.copy()
+        few = (math.nan, math.inf, -1e308, 1e-320, 0.0, -1.0) if out.dtype.kind == "f" else (0, 1, np.iinfo(out.dtype).max)
+        out[rng.randrange(len(out))] = rng.choice(few)
+        return out
+    if isinstance(value, list):
+        if not value or rng.random() < 0.3:
+            return value * rng.choice((0, 2, 5)) if rng.random() < 0.7 else value[:-1]
+        at = rng.randrange(len(value))
+        return [*value[:at], other_value(rng, value[at]), *value[at + 1 :]]
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, int):
+        return rng.choice((0, 1, 2, 127, 255, 2**31 - 1, -(2**31), 2**32 - 1, value + 1))
+    if isinstance(value, float):
+        return rng.choice((math.nan, math.inf, -math.inf, 0.0, -0.0, -1.0, 1e308, 5e-324, value * 1e9, -value))
+    return rng.choice((*NUMBERS, value + value, value[:-1]))

@@ -23,7 +23,7 @@ import re
 
 from harness import Target
 from map_builders import FORMATS
-from mutators import BYTES, NUMBERS, TEXT
+from mutators import BYTES, NUMBERS, TEXT, tree
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 from targets_bags import in_file, values
@@ -102,7 +102,7 @@ def said(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
         return rng.choice(BYTES)(rng, data, seeds)
 
 
-MAP = (*TEXT, *[attributes] * 8, *[texts] * 4)
+MAP = (*TEXT, *[attributes] * 8, *[texts] * 4, *[tree] * 6)
 TARGETS = (
     *(
         Target(f"vector_map_{suffix[1:]}", partial(written, suffix), in_file(f"a{suffix}", place), MAP)

@@ -21,7 +21,7 @@ from pathlib import Path
 from bag_examples import hand_made_run
 from harness import Target
 from message_examples import encounter, route, scenario, segmentation
-from mutators import BYTES
+from mutators import BYTES, fields
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
@@ -96,7 +96,7 @@ def template(messages: dict[str, bytes], topic: str, data: bytes) -> None:
 
 def decoder(name: str, kind: str, examples: Callable[[], Sequence[bytes]], decode: Callable[[bytes], object]) -> Target:
     """Return the target of a decoder."""
-    return Target(name, partial(seeds, kind, examples), lambda data, _folder: decode(data), BYTES)
+    return Target(name, partial(seeds, kind, examples), lambda data, _folder: decode(data), (*BYTES, *[fields(kind)] * 5))
 
 
 def template_targets() -> tuple[Target, ...]:

@@ -18,10 +18,12 @@ import math
 
 import numpy as np
 import pandas as pd
+from pyarrow import parquet
 import pytest
 
-from scenario_gen.errors import InputError
+from scenario_gen.errors import InputError, UnforeseenError
 from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs.adapters import tracks
 from scenario_gen.logs.adapters.formats import FORMATS
 
 SIZES = {"7": (4.5, 1.8), "8": (12.0, 2.5)}
@@ -226,6 +228,32 @@ def test_what_is_missing_is_named(tmp_path):
         read_log(path)
     with pytest.raises(InputError, match=r"lacks columns of INTERACTION: agent_type"):
         read_log(path, LogConfig(format="interaction"))
+
+
+@pytest.mark.parametrize("column", ["position_x", "object_category"])
+def test_a_repeated_column_is_named(tmp_path, column):
+    path, _ = argoverse2(tmp_path)
+    table = parquet.read_table(path)
+    parquet.write_table(table.append_column(column, table.column(column)), path)
+    with pytest.raises(InputError, match=rf"scenario_s1\.parquet has more than one column '{column}'"):
+        read_log(path)
+
+
+def test_pedestrians_of_no_known_kind_are_counted_too(tmp_path):
+    folder, _ = interaction(tmp_path)
+    walkers, tracks_file = folder / "pedestrian_tracks_000.csv", folder / "vehicle_tracks_000.csv"
+    walkers.write_text(walkers.read_text().replace("pedestrian/bicycle", "1.5"))
+    tracks_file.write_text(tracks_file.read_text() + "99,1,100,tram,0,0,0,1,0,30,2.5\n")
+    (note,) = [note for note in read_log(folder).quality.notes if "left out" in note]
+    assert note.endswith("1 × 1.5, 1 × tram")
+
+
+def test_what_nobody_foresaw_names_the_file(tmp_path, monkeypatch):
+    """A reader that fails in a way of its own is an error of ours all the same, which the fuzzing counts as a finding."""
+    path, _ = argoverse2(tmp_path)
+    monkeypatch.setattr(tracks, "nanoseconds", lambda *_: {}["gone"])
+    with pytest.raises(UnforeseenError, match=r"scenario_s1\.parquet cannot be read: KeyError 'gone'"):
+        read_log(path)
 
 
 def test_two_recordings_are_refused(tmp_path):

@@ -12,11 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A million damaged inputs, or ten minutes, for every reader and every type of message: errors of ours, or nothing, come out."""
+"""A hundred thousand damaged inputs for every reader and every type of message: errors of ours, or nothing, come out."""
 
 from collections.abc import Iterator
 from importlib.util import find_spec
 import json
+import math
 from pathlib import Path
 import subprocess
 import sys
@@ -24,18 +25,19 @@ import sys
 from figures import Figure
 from harness import fuzz, HERE, MEMORY, SECONDS, targets
 
-EXECUTIONS, MINUTES = 1_000_000, 10.0
+EXECUTIONS = 100_000
+MINUTES = 10.0  # of a target guided by coverage
 
 
 def run(state: Path) -> Iterator[Figure]:
-    """Fuzz one target after the other; those that are done are not begun again. With atheris, each as long guided by coverage."""
+    """Fuzz one target after the other; those that are done are not begun again. With atheris, each goes on guided by coverage."""
     for name, target in targets().items():
-        record = fuzz(target, state, EXECUTIONS, 60.0 * MINUTES)
+        record = fuzz(target, state, EXECUTIONS, math.inf)
         found = [f"{failure.count} × {failure.signature}" for failure in record.failures.values()]
         found += guided(name, state / "guided")
         yield Figure(
             promise=f"{name}: damaged inputs end in errors of ours",
-            asked=f"{EXECUTIONS} or {MINUTES:g} min; each ≤ {SECONDS:g} s of CPU and ≤ {MEMORY >> 30} GiB",
+            asked=f"{EXECUTIONS}; each ≤ {SECONDS:g} s of CPU and ≤ {MEMORY >> 30} GiB",
             seen=f"{record.executions} in {record.seconds / 60.0:.1f} min: {'; '.join(found) or 'nothing else'}",
             met=not found,
         )

@@ -55,7 +55,8 @@ def read(paths: Sequence[Path], config: LogConfig, *, name: str) -> RawLog:
     for path in tracks:
         table = _table(path, known, row, config)
         if len(table) and path not in main:  # pedestrians have files of their own
-            left_out.update(dict(table.groupby("kind")["vehicle"].nunique()) if "kind" in table else {"pedestrian": 1})
+            walkers = table.groupby(table["kind"].astype(str))["vehicle"].nunique() if "kind" in table else {"pedestrian": 1}
+            left_out.update({str(kind): int(count) for kind, count in walkers.items()})
             continue
         kinds = _kinds(path, known, table)
         keep = kinds.isin(known.kinds).to_numpy()

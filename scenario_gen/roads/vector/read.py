@@ -21,7 +21,7 @@ import numpy as np
 
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.documents import shown
-from scenario_gen.errors import InputError, of_system
+from scenario_gen.errors import InputError, of_system, reading
 from scenario_gen.markup import finite
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.vector.commonroad import read_commonroad
@@ -70,7 +70,8 @@ def read_network(path: Path) -> LaneNetwork:
 
 @lru_cache(maxsize=2)
 def _read(path: Path, _changed: int, _size: int) -> LaneNetwork:
-    return READERS[path.suffix.lower()](path)
+    with reading(path):
+        return READERS[path.suffix.lower()](path)
 
 
 def chosen_lanes(network: LaneNetwork, part: str) -> tuple[int, ...]:

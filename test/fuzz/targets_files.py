@@ -1,0 +1,170 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Public recordings, scenario files and the tables of a corpus as targets; several files are one input, with names between."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+import random
+import re
+
+from harness import Mutator, Target
+from mutators import header, TEXT, tree
+import pandas as pd
+from small_scenarios import crossing
+from targets_bags import JSON
+from targets_logs import PARQUET, safety_messages, SHORT
+from targets_maps import MAP
+from test_adapters import argoverse2, commonroad, highd, ind, interaction
+from test_commonroad import case_of
+
+from scenario_gen.corpus.batch import CASE_COLUMNS, SCENARIO_COLUMNS
+from scenario_gen.corpus.config import CorpusConfig
+from scenario_gen.corpus.encounters import account_of, encounter_of, row_of, rows_of, tables_of, write_encounters
+from scenario_gen.corpus.find import coverage_lines, find
+from scenario_gen.corpus.messages import parse_range, ranges
+from scenario_gen.exchange.commonroad import write_commonroad
+from scenario_gen.exchange.importing import import_file
+from scenario_gen.exchange.openscenario import write_openscenario
+from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
+
+FILE = re.compile(rb"\n\x00FILE ([\w./=-]+)\x00\n")  # begins a file of an input of several
+WAYS: dict[str, Sequence[Mutator]] = {
+    ".csv": (*TEXT, *[header] * 6),
+    ".parquet": PARQUET,
+    ".xml": MAP,
+    ".xosc": (*MAP, *[tree] * 6),
+    ".json": JSON,
+}
+
+
+def packed(folder: Path) -> bytes:
+    """Return the files below a folder as one input."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return b"".join(b"\n\x00FILE %s\x00\n%s" % (str(path.relative_to(folder)).encode(), path.read_bytes()) for path in files)
+
+
+def one_file(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
+    """Damage one file of an input in a way of its kind; seldom leave one out, or empty."""
+    _, *parts = FILE.split(data)
+    files = dict(zip(parts[::2], parts[1::2], strict=True))
+    if not files:
+        return rng.choice(seeds)
+    name = rng.choice(list(files))
+    if rng.random() < 0.02:
+        files[name] = b""
+    elif rng.random() < 0.02:
+        del files[name]
+    else:
+        files[name] = rng.choice(WAYS[Path(name.decode()).suffix])(rng, files[name], [files[name]])
+    return b"".join(b"\n\x00FILE %s\x00\n%s" % (key, content) for key, content in files.items())
+
+
+def files_target(name: str, seeds: Callable[[Path], object], read: Callable[[Path], object], named: str = "input") -> Target:
+    """Return a target whose input is a folder of files; messages name the folder, or what is in it."""
+
+    def make(folder: Path) -> list[bytes]:
+        (folder / "input").mkdir()
+        seeds(folder / "input")
+        return [packed(folder / "input")]
+
+    def run(data: bytes, folder: Path) -> None:
+        _, *parts = FILE.split(data)
+        (folder / "input").mkdir()
+        for key, content in zip(parts[::2], parts[1::2], strict=True):
+            path = folder / "input" / key.decode()
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+        read(folder / "input")
+
+    return Target(name, make, run, (one_file,), named=named)
+
+
+def read_all(folder: Path) -> None:
+    """Read a folder of tables, or its only file, as a log."""
+    main = [path for path in sorted(folder.iterdir()) if path.suffix in (".parquet", ".xml")]
+    read_log(main[0] if main else folder, SHORT)
+
+
+def scenario_file(suffix: str) -> Callable[[Path], object]:
+    """Return what writes a scenario as a file of others."""
+
+    def write(folder: Path) -> object:
+        data = (
+            write_commonroad(*case_of(crossing()))[0] if suffix == ".xml" else write_openscenario(*case_of(crossing()), "r.xodr")
+        )
+        return (folder / f"one{suffix}").write_bytes(data)
+
+    return write
+
+
+def import_all(folder: Path) -> None:
+    """Import every file as a table, and read that."""
+    for path in sorted(folder.iterdir()):
+        import_file(path, folder / f"{path.stem}.csv")
+        read_log(folder / f"{path.stem}.csv", SHORT)
+
+
+def corpus_tables(folder: Path) -> None:
+    """Write a table of two encounters as a corpus has it."""
+    rows = [row_of(read_log([bundled(case)]).encounters[0], "log", CorpusConfig()) for case in "bc"]
+    write_encounters(folder / "encounters" / "log-0.parquet", rows, {"refused": [], "quality": []})
+
+
+def read_corpus(folder: Path) -> None:
+    """Read all encounters of a corpus."""
+    for table in tables_of(folder):
+        account_of(table)
+        for row in rows_of([table]):
+            encounter_of(row, table)
+
+
+def archive(folder: Path) -> None:
+    """Write an archive of safety messages."""
+    (folder / "one.csv").write_bytes(safety_messages(folder)[0])
+
+
+def parse_archive(folder: Path) -> None:
+    """Parse an archive with the database."""
+    for task in ranges(sorted(folder.glob("*.csv")), folder.parent / "messages", 1 << 20, 400):
+        parse_range(task)
+
+
+def batch_tables(folder: Path) -> None:
+    """Write the two tables of a part of a batch."""
+    kinds = {"string": ["a", "b"], "int64": [1, 2], "double": [1.5, None]}
+    for name, columns in (("scenarios", SCENARIO_COLUMNS), ("cases", CASE_COLUMNS)):
+        place = folder / name / "road=straight" / "part-00000.parquet"
+        place.parent.mkdir(parents=True)
+        pd.DataFrame({column: kinds[kind] for column, kind in columns.items()}).to_parquet(place)
+
+
+def find_all(folder: Path) -> None:
+    """Find every scenario of a batch, and show its coverage."""
+    coverage_lines(find(folder), folder)
+
+
+TARGETS = (
+    files_target("batch", batch_tables, find_all),
+    files_target("argoverse2", argoverse2, read_all),
+    files_target("interaction", interaction, read_all),
+    files_target("ind", ind, read_all),
+    files_target("highd", highd, read_all),
+    files_target("commonroad_log", commonroad, read_all),
+    files_target("import_commonroad", scenario_file(".xml"), import_all),
+    files_target("import_openscenario", scenario_file(".xosc"), import_all),
+    files_target("corpus", corpus_tables, read_corpus),
+    files_target("archive", archive, parse_archive),
+)

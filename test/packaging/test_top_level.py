@@ -1,0 +1,44 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What stands at the top of the source tree has its reason; nothing strays there."""
+
+from fnmatch import fnmatch
+from pathlib import Path
+import subprocess
+
+TOP = Path(__file__).resolve().parents[2]
+ALLOWED = {
+    *("package.xml", "setup.py", "setup.cfg", "pyproject.toml", "MANIFEST.in", "Makefile", ".gitignore", ".ci", "requirements*"),
+    *("README.md", "CHANGELOG.rst", "CONTRIBUTING.md", "LICENSE", "config", "docs", "examples", "launch", "resource"),
+    *("scenario_gen", "msg_conventions", "test", "benchmarks"),
+}
+MADE = (".git", ".venv", ".venv-*", ".*_cache", ".hypothesis", "PKG-INFO", ".coverage*")  # beside what .gitignore names
+
+
+def tracked() -> set[str]:
+    """Return the names at the top that git knows; without git all that are there and that no tool makes."""
+    if (TOP / ".git").exists():
+        listed = subprocess.run(["git", "-C", str(TOP), "ls-files", "-z"], capture_output=True, text=True, check=False)
+        if listed.returncode == 0:  # there is a git, and the folder is its user's
+            return {name.partition("/")[0] for name in listed.stdout.split("\0") if name}
+    ignored = [line.strip("/") for line in (TOP / ".gitignore").read_text().splitlines()] if (TOP / ".gitignore").exists() else []
+    made = [*ignored, *MADE]
+    return {path.name for path in TOP.iterdir() if not any(fnmatch(path.name, pattern) for pattern in made)}
+
+
+def test_nothing_strays_at_the_top():
+    found = tracked()
+    assert {"scenario_gen", "setup.py"} <= found
+    assert not {name for name in found if not any(fnmatch(name, pattern) for pattern in ALLOWED)}
