@@ -22,16 +22,14 @@ Source of the factorisations: Golub & Van Loan, Matrix Computations, 4th ed., al
 """
 
 import math
-from typing import Any, Literal, TYPE_CHECKING
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from scenario_gen.arrays import Floats, Ints
+from scenario_gen.exact.splines import CubicSpline
 from scenario_gen.kernels import B, F2, F3, kernel, OUT1, OUT2, OUT3, OUTI1
-
-if TYPE_CHECKING:
-    from scipy.interpolate import CubicHermiteSpline
 
 Numbers = npt.NDArray[Any]  # floats or whole numbers; they become floats
 
@@ -356,7 +354,7 @@ def _solve_tridiagonal(below: Floats, diagonal: Floats, above: Floats, x: Floats
 
 def cubic_spline(
     x: Floats, y: Floats, ends: tuple[Floats, Floats] | Literal["not-a-knot"] = "not-a-knot"
-) -> "CubicHermiteSpline":
+) -> CubicSpline:
     """Return the C2 cubic spline through y (n, d) or (n,) at x (n,), as scipy's CubicSpline, whose solver is LAPACK's.
 
     Args:
@@ -364,8 +362,6 @@ def cubic_spline(
         y: values.
         ends: the slopes (d,) at both ends, or "not-a-knot" (with three points the parabola, with two the line).
     """
-    from scipy.interpolate import CubicHermiteSpline  # slow to import, and segmentation needs none
-
     values = np.asarray(y, dtype=np.float64).reshape(len(x), -1)
     step = np.diff(x)
     chord = np.diff(values, axis=0) / step[:, None]
@@ -390,4 +386,4 @@ def cubic_spline(
         diagonal[-1], below[-1] = step[-2], last
         slope[-1] = (step[-1] ** 2 * chord[-2] + (2.0 * last + step[-1]) * step[-2] * chord[-1]) / last
     _solve_tridiagonal(below, diagonal, above, slope)
-    return CubicHermiteSpline(x, values.reshape(y.shape), slope.reshape(y.shape))
+    return CubicSpline.through(x, values.reshape(y.shape), slope.reshape(y.shape))

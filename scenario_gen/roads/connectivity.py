@@ -24,7 +24,6 @@ import math
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.ndimage import label
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen_ints, Ints
@@ -39,6 +38,8 @@ def components(road: Road, radius: float) -> Ints:
     """Connected components for a disc of `radius` [m]: (H, W), 0 where its centre cannot be, else 1, 2, …; read-only, cached."""
     known = _labels.setdefault(road, {})
     if radius not in known:
+        from scipy.ndimage import label  # slow to import
+
         known[radius] = frozen_ints(label(clearance_in_cells(road) > radius / road.resolution)[0])
     return known[radius]
 
