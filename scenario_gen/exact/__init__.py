@@ -24,6 +24,7 @@ from scenario_gen.exact.algebra import (
     compact,
     cubic_spline,
     dot,
+    gram,
     lstsq,
     matmul,
     qr,
@@ -38,6 +39,6 @@ from scenario_gen.exact.splines import BSpline, bspline_basis, CubicSpline, movi
 
 __all__ = [
     "BSpline", "CubicSpline", "arctan", "arctan2", "bspline_basis", "cholesky", "compact", "cos", "cubic_spline", "dot", "exp",
-    "hypot", "lgamma", "log", "lstsq", "matmul", "moving_max", "moving_mean", "moving_min", "ndtr", "ndtri", "power", "qr", "root",
-    "sin", "solve_banded", "solve_positive", "solve_triangular", "standard_normal", "tan", "tanh",
+    "gram", "hypot", "lgamma", "log", "lstsq", "matmul", "moving_max", "moving_mean", "moving_min", "ndtr", "ndtri", "power",
+    "qr", "root", "sin", "solve_banded", "solve_positive", "solve_triangular", "standard_normal", "tan", "tanh",
 ]  # fmt: skip

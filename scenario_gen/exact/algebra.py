@@ -52,20 +52,21 @@ def dot(a: Floats, b: Floats) -> float:
     return total
 
 
-@kernel(F3, F3, OUT3)
-def _matmul(a: Floats, b: Floats, out: Floats) -> None:
+@kernel(F3, F3, OUT3, B)
+def _matmul(a: Floats, b: Floats, out: Floats, symmetric: bool) -> None:
+    """The product a b; of a symmetric one only the upper half."""
     inner = a.shape[2]
     whole = inner // 4 * 4
     for s in range(a.shape[0]):
         for i in range(a.shape[1]):
-            row = out[s, i]
+            row, start = out[s, i], i if symmetric else 0
             for k in range(0, whole, 4):  # four terms a pass, added in the order of k
                 a0, a1, a2, a3 = a[s, i, k], a[s, i, k + 1], a[s, i, k + 2], a[s, i, k + 3]
                 b0, b1, b2, b3 = b[s, k], b[s, k + 1], b[s, k + 2], b[s, k + 3]
-                for j in range(b.shape[2]):
+                for j in range(start, b.shape[2]):
                     row[j] = (((row[j] + a0 * b0[j]) + a1 * b1[j]) + a2 * b2[j]) + a3 * b3[j]
             for k in range(whole, inner):
-                for j in range(b.shape[2]):
+                for j in range(start, b.shape[2]):
                     row[j] += a[s, i, k] * b[s, k, j]
 
 
@@ -102,9 +103,18 @@ def matmul(a: Numbers, b: Numbers) -> Floats:
     if q.shape[2] < 4:
         _matmul_by_rows(p, np.ascontiguousarray(q.transpose(0, 2, 1), dtype=np.float64), out)
     else:
-        _matmul(p, np.ascontiguousarray(q, dtype=np.float64), out)
+        _matmul(p, np.ascontiguousarray(q, dtype=np.float64), out, False)
     shape = stack + (() if left else (p.shape[1],)) + (() if right else (q.shape[2],))
     return out.reshape(shape)
+
+
+def gram(rows: Floats) -> Floats:
+    """Return rows rowsᵀ (n, n) of rows (n, k), as `matmul` does, in half the time."""
+    if len(rows) < 4:
+        return matmul(rows, rows.T)
+    out = np.zeros((1, len(rows), len(rows)))
+    _matmul(np.ascontiguousarray(rows)[None], np.ascontiguousarray(rows.T)[None], out, True)
+    return np.asarray(np.triu(out[0]) + np.triu(out[0], 1).T)
 
 
 @kernel(OUT2, OUT2, OUT1, OUTI1, B)
@@ -352,9 +362,7 @@ def _solve_tridiagonal(below: Floats, diagonal: Floats, above: Floats, x: Floats
             x[i, m] = (x[i, m] - above[i] * x[i + 1, m]) / diagonal[i]
 
 
-def cubic_spline(
-    x: Floats, y: Floats, ends: tuple[Floats, Floats] | Literal["not-a-knot"] = "not-a-knot"
-) -> CubicSpline:
+def cubic_spline(x: Floats, y: Floats, ends: tuple[Floats, Floats] | Literal["not-a-knot"] = "not-a-knot") -> CubicSpline:
     """Return the C2 cubic spline through y (n, d) or (n,) at x (n,), as scipy's CubicSpline, whose solver is LAPACK's.
 
     Args:

@@ -55,7 +55,7 @@ class BSpline:
 
 
 def bspline_basis(knots: Floats, degree: int, at: Floats, derivative: int = 0) -> tuple[Ints, Floats]:
-    """Return at each of `at` (q,) the first (q,) of the `degree` + 1 functions that are not zero, and their values (q, degree + 1).
+    """Return at each of `at` (q,) the first (q,) of the functions that are not zero, and the values (q, degree + 1) of these.
 
     Cox's and de Boor's recursion (de Boor, A Practical Guide to Splines, 2001); a derivative has differences of the values of a
     lower degree.

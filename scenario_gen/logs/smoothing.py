@@ -74,7 +74,7 @@ class Motion:
         self.constraints = Columns.of_entries(np.concatenate(rows), np.concatenate(columns), entries, (above[-1], self.size))
 
     def _merged(self, tick: Ints, weights: Floats) -> tuple[Ints, Floats]:
-        """Rows (F, E) over coefficients from `tick` (F,) on as the first variable (F,) and rows (F, E) over variables from there."""
+        """Rows (F, E) over the coefficients from `tick` (F,) on, as the first variable (F,) and rows (F, E) from there."""
         out = np.zeros(weights.shape)
         column = self.variable[tick[:, None] + np.arange(weights.shape[1])] - self.variable[tick][:, None]
         np.add.at(out, (np.arange(len(tick))[:, None], column), weights)
