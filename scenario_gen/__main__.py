@@ -14,8 +14,12 @@
 
 """The executable `scenario-gen`. It sets the signals first, so that Ctrl-C and SIGTERM end it without a traceback at any time."""
 
+import atexit
+from contextlib import suppress
+import os
 import signal
 import sys
+import threading
 
 from scenario_gen.errors import MissingExtraError, needs
 from scenario_gen.interrupts import leave, SIGNALS
@@ -32,7 +36,24 @@ def main() -> None:
     except MissingExtraError as error:
         sys.exit(f"error: {error}")
 
-    run()
+    try:
+        run()
+    except SystemExit as end:
+        if not isinstance(end.code, int | None):
+            raise
+        _end(end.code or 0)
+    _end(0)
+
+
+def _end(code: int) -> None:
+    """End the process after what was registered for it: to take Python and the compiler down costs a quarter of a second."""
+    if threading.active_count() > 1:  # whose work is not done
+        sys.exit(code)
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(code)
 
 
 if __name__ == "__main__":
