@@ -25,8 +25,8 @@ from scenario_gen.errors import MissingExtraError, needs
 from scenario_gen.interrupts import leave, SIGNALS
 
 
-def main() -> None:
-    """Run the command line."""
+def command() -> None:
+    """Run the command line in a process that goes on."""
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # as for nohup, or a job in the background
             signal.signal(number, leave)
@@ -36,8 +36,13 @@ def main() -> None:
     except MissingExtraError as error:
         sys.exit(f"error: {error}")
 
+    run()
+
+
+def main() -> None:
+    """Run the command line, and end the process."""
     try:
-        run()
+        command()
     except SystemExit as end:
         if not isinstance(end.code, int | None):
             raise
