@@ -33,6 +33,7 @@ from typing import Any
 
 import numba
 from numba.core.caching import _CacheLocator, CompileResultCacheImpl, FunctionCache, NullCache
+from numba.core.runtime.nrt import rtsys
 import numpy as np
 
 DIGITS = 24  # of the name of a kernel's folder
@@ -115,6 +116,15 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
     """numba's cache of a function, in a folder named after all that the function is compiled from."""
 
     _impl_class = _Files
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """Load what is kept with numba's run time alone.
+
+        numba would import all that its compiler needs first, a quarter of a second; what is compiled imports it then.
+        """
+        rtsys.initialize(context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(signature, context)
 
 
 def description(function: FunctionType) -> frozenset[str]:

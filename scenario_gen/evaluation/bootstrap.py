@@ -37,12 +37,12 @@ class Bootstrap:
     Attributes:
         weights: (B, S) how often each sample was drawn in each resample.
         level: confidence level.
-        units: number of samples, or groups of them, that are independent.
+        unit: (S,) the number, from 0, of the group of each sample; groups are independent.
     """
 
     weights: Floats
     level: float
-    units: int
+    unit: Ints
 
     @classmethod
     def draw(cls, unit: Ints, resamples: int, level: float, seed: int) -> "Bootstrap":
@@ -59,7 +59,12 @@ class Bootstrap:
         drawn = generator.integers(len(units), size=(resamples, len(units))) if len(units) else np.zeros((resamples, 0), np.int64)
         times = np.zeros((resamples, len(units)))
         np.add.at(times, (np.arange(resamples)[:, None], drawn), 1.0)
-        return cls(times[:, member], level, len(units))
+        return cls(times[:, member], level, member)
+
+    def of_units(self) -> "Bootstrap":
+        """Return the same draws for samples that are pooled by unit: what all of a unit enter alike is computed once for each."""
+        units, first = np.unique(self.unit, return_index=True)
+        return Bootstrap(self.weights[:, first], self.level, units)
 
     def interval(self, statistic: Statistic) -> Interval:
         """Return the statistic of the whole set with its percentile bounds (Efron 1979), widened to hold the value.
@@ -72,7 +77,7 @@ class Bootstrap:
         """
         samples = self.weights.shape[1]
         value = float(statistic(np.ones((1, samples)))[0])
-        if self.units < 2 or not np.isfinite(value):
+        if not self.unit.size or self.unit.max() < 1 or not np.isfinite(value):
             return Interval(value)
         values = statistic(self.weights)
         values = values[np.isfinite(values)]

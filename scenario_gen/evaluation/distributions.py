@@ -108,8 +108,10 @@ class Comparison:
     def wasserstein_near(self, weights: Floats) -> Floats:
         """Return Wasserstein distances (B,) under weights (B, S), integrated over the grid (for intervals)."""
         with np.errstate(invalid="ignore"):
-            cdf = (exact.matmul(weights, self.sample_cdf)) / (exact.matmul(weights, self.sizes))[:, None]
-        return np.asarray(exact.matmul(np.abs(cdf[:, :-1] - self.template_cdf[:-1]), np.diff(self.grid)))
+            apart = exact.matmul(weights, self.sample_cdf[:, :-1])
+            apart /= exact.matmul(weights, self.sizes)[:, None]  # in place: new arrays of this size cost more than their numbers
+        apart -= self.template_cdf[:-1]
+        return exact.matmul(np.abs(apart, out=apart), np.diff(self.grid))
 
     def coverage(self, weights: Floats) -> Floats:
         """Return the share (B,) of the template's values that lie in a bin which the set visits too."""
@@ -153,7 +155,7 @@ def compare(quantity: Quantity, template: Floats, samples: Sequence[Floats], poi
     span = (everything.max() - everything.min()) / quantity.bin_width
     if not span * (len(samples) + 1) < MOST_COUNTS:
         raise InputError(
-            f"{quantity.label} from {everything.min():g} to {everything.max():g} {quantity.unit} in {len(samples)} scenarios: no "
+            f"{quantity.label} from {everything.min():g} to {everything.max():g} {quantity.unit}: no "
             "vehicles move so; check the units"
         )
     first, last = (int(bin_of(np.array(bound))) for bound in (everything.min(), everything.max()))

@@ -316,18 +316,20 @@ def _turn_kept(template: Floats, samples: Floats) -> Floats:
 def _distributions(reference: _Reference, motions: Sequence[Motion], bootstrap: Bootstrap) -> dict[str, Interval]:
     samples = [values_of(motion) for motion in motions]
     result: dict[str, Interval] = {}
+    units, drawn = [np.flatnonzero(bootstrap.unit == k) for k in range(bootstrap.unit.max() + 1)], bootstrap.of_units()
     covered = []
     for quantity in QUANTITIES:
-        compared = compare(quantity, reference.values[quantity.id], [values[quantity.id] for values in samples])
-        result[f"js_{quantity.id}"] = bootstrap.interval(compared.jensen_shannon)
-        near = bootstrap.interval(compared.wasserstein_near)
+        pooled = [np.concatenate([samples[k][quantity.id] for k in unit]) for unit in units]
+        compared = compare(quantity, reference.values[quantity.id], pooled)
+        result[f"js_{quantity.id}"] = drawn.interval(compared.jensen_shannon)
+        near = drawn.interval(compared.wasserstein_near)
         exact = compared.wasserstein
         result[f"wasserstein_{quantity.id}"] = Interval(
             exact, float(np.minimum(exact, near.low)), float(np.maximum(exact, near.high))
         )
         if reference.values[quantity.id].size:
             covered.append(compared)
-    result["coverage"] = bootstrap.interval(lambda weights: np.mean([one.coverage(weights) for one in covered], axis=0))
+    result["coverage"] = drawn.interval(lambda weights: np.mean([one.coverage(weights) for one in covered], axis=0))
     return result
 
 

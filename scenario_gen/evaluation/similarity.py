@@ -89,7 +89,7 @@ def pair_similarity(
         target = feature_rows(left, right, own, rows, distance)[0]
         difference = feature_rows(a, b, extents, rows, distance)
         difference -= target
-        gram += exact.matmul(difference, difference.T)
+        gram += exact.gram(difference)
         cross += exact.matmul(difference, target)
         total += difference.sum(axis=1)
         first += float(target.sum())

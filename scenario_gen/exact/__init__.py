@@ -24,6 +24,7 @@ from scenario_gen.exact.algebra import (
     compact,
     cubic_spline,
     dot,
+    gram,
     lstsq,
     matmul,
     qr,
@@ -34,9 +35,10 @@ from scenario_gen.exact.algebra import (
 )
 from scenario_gen.exact.functions import arctan, arctan2, cos, exp, hypot, lgamma, log, ndtr, ndtri, power, sin, tan, tanh
 from scenario_gen.exact.random import standard_normal
+from scenario_gen.exact.splines import BSpline, bspline_basis, CubicSpline, moving_max, moving_mean, moving_min
 
 __all__ = [
-    "arctan", "arctan2", "cholesky", "compact", "cos", "cubic_spline", "dot", "exp", "hypot", "lgamma", "log", "lstsq", "matmul",
-    "ndtr", "ndtri", "power", "qr", "root", "sin", "solve_banded", "solve_positive", "solve_triangular", "standard_normal", "tan",
-    "tanh",
+    "BSpline", "CubicSpline", "arctan", "arctan2", "bspline_basis", "cholesky", "compact", "cos", "cubic_spline", "dot", "exp",
+    "gram", "hypot", "lgamma", "log", "lstsq", "matmul", "moving_max", "moving_mean", "moving_min", "ndtr", "ndtri", "power",
+    "qr", "root", "sin", "solve_banded", "solve_positive", "solve_triangular", "standard_normal", "tan", "tanh",
 ]  # fmt: skip

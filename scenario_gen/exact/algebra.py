@@ -22,16 +22,14 @@ Source of the factorisations: Golub & Van Loan, Matrix Computations, 4th ed., al
 """
 
 import math
-from typing import Any, Literal, TYPE_CHECKING
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from scenario_gen.arrays import Floats, Ints
+from scenario_gen.exact.splines import CubicSpline
 from scenario_gen.kernels import B, F1, F2, F3, kernel, OUT1, OUT2, OUT3, OUTI1
-
-if TYPE_CHECKING:
-    from scipy.interpolate import CubicHermiteSpline
 
 Numbers = npt.NDArray[Any]  # floats or whole numbers; they become floats
 
@@ -60,20 +58,21 @@ def dot(a: Floats, b: Floats) -> float:
     return _dot(a, b)
 
 
-@kernel(F3, F3, OUT3)
-def _matmul(a: Floats, b: Floats, out: Floats) -> None:
+@kernel(F3, F3, OUT3, B)
+def _matmul(a: Floats, b: Floats, out: Floats, symmetric: bool) -> None:
+    """The product a b; of a symmetric one only the upper half."""
     inner = a.shape[2]
     whole = inner // 4 * 4
     for s in range(a.shape[0]):
         for i in range(a.shape[1]):
-            row = out[s, i]
+            row, start = out[s, i], i if symmetric else 0
             for k in range(0, whole, 4):  # four terms a pass, added in the order of k
                 a0, a1, a2, a3 = a[s, i, k], a[s, i, k + 1], a[s, i, k + 2], a[s, i, k + 3]
                 b0, b1, b2, b3 = b[s, k], b[s, k + 1], b[s, k + 2], b[s, k + 3]
-                for j in range(b.shape[2]):
+                for j in range(start, b.shape[2]):
                     row[j] = (((row[j] + a0 * b0[j]) + a1 * b1[j]) + a2 * b2[j]) + a3 * b3[j]
             for k in range(whole, inner):
-                for j in range(b.shape[2]):
+                for j in range(start, b.shape[2]):
                     row[j] += a[s, i, k] * b[s, k, j]
 
 
@@ -110,9 +109,18 @@ def matmul(a: Numbers, b: Numbers) -> Floats:
     if q.shape[2] < 4:
         _matmul_by_rows(p, np.ascontiguousarray(q.transpose(0, 2, 1), dtype=np.float64), out)
     else:
-        _matmul(p, np.ascontiguousarray(q, dtype=np.float64), out)
+        _matmul(p, np.ascontiguousarray(q, dtype=np.float64), out, False)
     shape = stack + (() if left else (p.shape[1],)) + (() if right else (q.shape[2],))
     return out.reshape(shape)
+
+
+def gram(rows: Floats) -> Floats:
+    """Return rows rowsᵀ (n, n) of rows (n, k), as `matmul` does, in half the time."""
+    if len(rows) < 4:
+        return matmul(rows, rows.T)
+    out = np.zeros((1, len(rows), len(rows)))
+    _matmul(np.ascontiguousarray(rows)[None], np.ascontiguousarray(rows.T)[None], out, True)
+    return np.asarray(np.triu(out[0]) + np.triu(out[0], 1).T)
 
 
 @kernel(OUT2, OUT2, OUT1, OUTI1, B)
@@ -360,9 +368,7 @@ def _solve_tridiagonal(below: Floats, diagonal: Floats, above: Floats, x: Floats
             x[i, m] = (x[i, m] - above[i] * x[i + 1, m]) / diagonal[i]
 
 
-def cubic_spline(
-    x: Floats, y: Floats, ends: tuple[Floats, Floats] | Literal["not-a-knot"] = "not-a-knot"
-) -> "CubicHermiteSpline":
+def cubic_spline(x: Floats, y: Floats, ends: tuple[Floats, Floats] | Literal["not-a-knot"] = "not-a-knot") -> CubicSpline:
     """Return the C2 cubic spline through y (n, d) or (n,) at x (n,), as scipy's CubicSpline, whose solver is LAPACK's.
 
     Args:
@@ -370,8 +376,6 @@ def cubic_spline(
         y: values.
         ends: the slopes (d,) at both ends, or "not-a-knot" (with three points the parabola, with two the line).
     """
-    from scipy.interpolate import CubicHermiteSpline  # slow to import, and segmentation needs none
-
     values = np.asarray(y, dtype=np.float64).reshape(len(x), -1)
     step = np.diff(x)
     chord = np.diff(values, axis=0) / step[:, None]
@@ -396,4 +400,4 @@ def cubic_spline(
         diagonal[-1], below[-1] = step[-2], last
         slope[-1] = (step[-1] ** 2 * chord[-2] + (2.0 * last + step[-1]) * step[-2] * chord[-1]) / last
     _solve_tridiagonal(below, diagonal, above, slope)
-    return CubicHermiteSpline(x, values.reshape(y.shape), slope.reshape(y.shape))
+    return CubicSpline.through(x, values.reshape(y.shape), slope.reshape(y.shape))

@@ -137,13 +137,11 @@ def _penalty(clearance: Floats, need: float) -> Floats:
 
 def _coarse(discs: Floats, road: Road, need: float, scale: float) -> list[_Motion]:
     """The best translation of each rotation."""
-    from scipy.signal import fftconvolve  # slow to import, and most roads need no search
-
     every = max(round(_CELL / road.resolution), 1)
     cell = every * road.resolution
     field = _penalty(clearance_field(road)[every // 2 :: every, every // 2 :: every], need)
     field = field - float(_penalty(np.zeros(1), need)[0])  # outside the map counts as blocked: make that the zero of the sum
-    whole = np.round(field * _WHOLE)
+    whole = np.fft.rfft2(np.round(field * _WHOLE))
     best = []
     for yaw in np.arange(_TURNS) * 2.0 * np.pi / _TURNS:
         points = scale * _turned(discs, float(yaw))
@@ -154,7 +152,8 @@ def _coarse(discs: Floats, road: Road, need: float, scale: float) -> list[_Motio
         kernel = np.zeros((size[1], size[0]))
         np.add.at(kernel, (index[:, 1] - low[1], index[:, 0] - low[0]), 1.0)
         # Of whole numbers: the transform's rounding, which depends on the CPU, is rounded away.
-        total = np.round(fftconvolve(whole, kernel[::-1, ::-1], mode="valid"))
+        product = np.fft.irfft2(whole * np.fft.rfft2(kernel[::-1, ::-1], field.shape), field.shape)
+        total = np.round(product[size[1] - 1 :, size[0] - 1 :])
         cost = total / (_WHOLE * len(points))
         row, column = np.unravel_index(int(np.argmin(total)), total.shape)
         grid = np.array([column - low[0], row - low[1]]) * cell + (every // 2 + 0.5) * road.resolution

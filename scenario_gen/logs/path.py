@@ -21,16 +21,12 @@ track, says how far the path may be from either.
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints, wrap_angle
-
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline  # slow to import
 
 KNOT = 1.0  # m between knots
 MARGIN = 5.0  # m of path beyond both ends, for fixes that lie there
@@ -60,7 +56,7 @@ class Path:
         length: (K,) the arc length [m] there.
     """
 
-    curve: "BSpline"
+    curve: exact.BSpline
     parameter: Floats
     length: Floats
 
@@ -115,8 +111,6 @@ def fit_path(
         speed: (F,) [m/s].
         headings: what the log says of them.
     """
-    from scipy.interpolate import BSpline
-
     low, high = place.min() - MARGIN, place.max() + MARGIN
     spans = max(int(np.ceil((high - low) / KNOT)), 4)
     step = (high - low) / spans
@@ -127,16 +121,15 @@ def fit_path(
     band = np.zeros((8, 2 * count))  # x and y of each coefficient in turn
     right = np.zeros(2 * count)
     inside = np.clip(place, low, high - 1e-9)
-    rows = BSpline.design_matrix(inside, knots, 3).tocsr()
-    start = 2 * rows.indices.reshape(-1, 4)[:, 0]
-    values = np.asarray(rows.data).reshape(-1, 4)
+    first, values = exact.bspline_basis(knots, 3, inside)
+    start = 2 * first
     for axis in (0, 1):
         observe(band, right, start + axis, values, 2, weight, points[:, axis])
     if headings is not None:
-        lower = BSpline.design_matrix(inside, knots[1:-1], 2).tocsr()
+        _, lower = exact.bspline_basis(knots[1:-1], 2, inside)
         slope = np.zeros((len(place), 4))  # of a cubic basis: differences of the quadratic one, which begins at the same span
-        slope[:, 1:] += np.asarray(lower.data).reshape(-1, 3) / step
-        slope[:, :-1] -= np.asarray(lower.data).reshape(-1, 3) / step
+        slope[:, 1:] += lower / step
+        slope[:, :-1] -= lower / step
         across = np.column_stack((-exact.sin(headings.value), exact.cos(headings.value)))
         entries = (slope[:, :, None] * across[:, None, :]).reshape(-1, 8)
         shared = np.clip(spread / SAME_HEADING, STANDING_HEADING, 1.0)
@@ -145,7 +138,7 @@ def fit_path(
         centre = low + step * (np.arange(count - order) + (order - 2) / 2.0)
         v = np.interp(centre, place, speed)
         penalise(band, order, exact.power(step, 1 - 2 * order) * (1.0 / floor + exact.power(v, power) / moving))
-    return tabulate(BSpline(knots, exact.solve_banded(band, right[:, None]).reshape(-1, 2), 3), low, high)
+    return tabulate(exact.BSpline(knots, exact.solve_banded(band, right[:, None]).reshape(-1, 2), 3), low, high)
 
 
 def observe(band: Floats, right: Floats, start: Ints, entries: Floats, stride: int, weight: Floats, target: Floats) -> None:
@@ -177,15 +170,13 @@ def penalise(band: Floats, order: int, weight: Floats) -> None:
 
 def straight_path(point: Floats, heading: float, low: float, high: float) -> Path:
     """Return a straight line through `point` (2,) [m] where the distance driven is (low + high) / 2."""
-    from scipy.interpolate import BSpline
-
     direction = np.array([exact.cos(heading), exact.sin(heading)])
     ends = np.array([low - MARGIN, high + MARGIN])
     where = point + (ends - (low + high) / 2.0)[:, None] * direction
-    return tabulate(BSpline(np.repeat(ends, 2), where, 1), ends[0], ends[1])
+    return tabulate(exact.BSpline(np.repeat(ends, 2), where, 1), ends[0], ends[1])
 
 
-def tabulate(curve: "BSpline", low: float, high: float) -> Path:
+def tabulate(curve: exact.BSpline, low: float, high: float) -> Path:
     """Measure the curve's arc length."""
     u = np.linspace(low, high, int(np.ceil((high - low) / STEP)) + 1)
     rate = exact.hypot(*curve(u, 1).T)

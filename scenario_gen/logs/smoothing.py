@@ -23,7 +23,6 @@ direction, held while standing.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
@@ -32,12 +31,10 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, Ints, runs, wrap_angle
 from scenario_gen.errors import InputError
+from scenario_gen.exact.sparse import Columns
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.path import fit_path, Headings, headings_of, MOVES, Path, straight_path
 from scenario_gen.logs.raw import Observations
-
-if TYPE_CHECKING:
-    from scipy import sparse  # slow to import
 
 STANDS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
 STILL = 0.1  # m/s: below this it is not on its way to or from standing
@@ -61,29 +58,42 @@ class Motion:
 
     def __init__(self, stands: Bools, config: LogConfig) -> None:
         """Set the program up; `stands` (T,) tells at which ticks the speed is zero."""
-        from scipy import sparse
-
         dt = config.period
-        count = len(stands) + 1
-        group = np.concatenate([[0], np.cumsum(~stands)])  # v_i = 0 makes c_{i+1} the variable of c_i
         self.dt, self.ticks = dt, len(stands)
-        self.merge = sparse.csr_array((np.ones(count), (np.arange(count), group)))
-        first = self._differences(1) / dt
-        second = self._differences(2) / np.square(dt)
-        third = self._differences(3) * (np.sqrt(dt) / (config.jerk * exact.power(dt, 3)))
-        self.prior = (third.T @ third).tocsc()
-        self.constraints = sparse.vstack([-first, second, -second], format="csc")
-        rows = second.shape[0]
-        self.bounds = np.concatenate(
-            [np.zeros(first.shape[0]), np.full(rows, config.acceleration_limit), np.full(rows, config.braking_limit)]
-        )
+        self.variable = np.concatenate([[0], np.cumsum(~stands)])  # v_i = 0 makes c_{i+1} the variable of c_i
+        self.size = int(self.variable[-1]) + 1
+        first, second, third = (self._differences(order) for order in (1, 2, 3))
+        speed, change = (first[0], first[1] * (1.0 / dt)), (second[0], second[1] * (1.0 / np.square(dt)))
+        self.prior = self._squared(third[0], third[1] * (np.sqrt(dt) / (config.jerk * exact.power(dt, 3))))
+        blocks = (speed[0], -speed[1]), change, (change[0], -change[1])
+        self.bounds = np.repeat([0.0, config.acceleration_limit, config.braking_limit], [len(block[0]) for block in blocks])
+        above = np.cumsum([0, *(len(block[0]) for block in blocks)])
+        rows = [np.repeat(top + np.arange(len(at)), values.shape[1]) for top, (at, values) in zip(above, blocks, strict=False)]
+        columns = [(at[:, None] + np.arange(values.shape[1])).ravel() for at, values in blocks]
+        entries = np.concatenate([values.ravel() for _, values in blocks])
+        self.constraints = Columns.of_entries(np.concatenate(rows), np.concatenate(columns), entries, (above[-1], self.size))
 
-    def _differences(self, order: int) -> "sparse.csr_array":
-        """Differences of the coefficients, over the merged variables."""
-        matrix = self.merge
-        for _ in range(order):
-            matrix = matrix[1:] - matrix[:-1]
-        return matrix
+    def _merged(self, tick: Ints, weights: Floats) -> tuple[Ints, Floats]:
+        """Rows (F, E) over the coefficients from `tick` (F,) on, as the first variable (F,) and rows (F, E) from there."""
+        out = np.zeros(weights.shape)
+        column = self.variable[tick[:, None] + np.arange(weights.shape[1])] - self.variable[tick][:, None]
+        np.add.at(out, (np.arange(len(tick))[:, None], column), weights)
+        return self.variable[tick], out
+
+    def _differences(self, order: int) -> tuple[Ints, Floats]:
+        """Differences of the coefficients, over the merged variables, as `_merged` gives rows."""
+        stencil = {1: [-1.0, 1.0], 2: [1.0, -2.0, 1.0], 3: [-1.0, 3.0, -3.0, 1.0]}[order]
+        tick = np.arange(len(self.variable) - order)
+        return self._merged(tick, np.tile(stencil, (len(tick), 1)))
+
+    def _squared(self, first: Ints, rows: Floats, weight: Floats | float = 1.0) -> Floats:
+        """Σ weight · row rowᵀ: its diagonal and the three above it, (4, n), by row."""
+        band = np.zeros((4, self.size + 3))
+        weighted = (rows.T * weight).T
+        for above in range(rows.shape[1]):
+            at = first[:, None] + np.arange(rows.shape[1] - above)
+            np.add.at(band[above], at, weighted[:, : at.shape[1]] * rows[:, above:])
+        return band
 
     def _weights(self, seconds: Floats, *, speed: bool = False) -> tuple[Ints, tuple[Floats, Floats, Floats]]:
         """The first of the three coefficients that count at any times (F,), and the weights (F,) of each: place or speed."""
@@ -92,15 +102,6 @@ class Motion:
         if speed:
             return tick, ((u - 1.0) / self.dt, (1.0 - 2.0 * u) / self.dt, u / self.dt)
         return tick, (np.square(1.0 - u) / 2.0, 0.5 + u - np.square(u), np.square(u) / 2.0)
-
-    def _basis(self, seconds: Floats, *, speed: bool) -> "sparse.csr_array":
-        """Rows that evaluate the place or the speed at any time, over the merged variables."""
-        from scipy import sparse
-
-        tick, weights = self._weights(seconds, speed=speed)
-        column = np.concatenate([tick, tick + 1, tick + 2])
-        entries = (np.concatenate(weights), (np.tile(np.arange(len(seconds)), 3), column))
-        return sparse.csr_array(entries, shape=(len(seconds), self.ticks + 1)) @ self.merge
 
     def solve(self, observed: Sequence[tuple[Floats, Floats, Floats, bool]]) -> Floats:
         """Return the coefficients (T+1,) that fit best.
@@ -111,25 +112,27 @@ class Motion:
         Raises:
             InputError: the solver finds no solution.
         """
-        from scipy import sparse
-
-        quadratic, linear = self.prior, np.zeros(self.merge.shape[1])
+        quadratic, linear = self.prior, np.zeros(self.size + 3)
         for seconds, values, deviation, speed in observed:
-            rows = self._basis(seconds, speed=speed)
-            weighted = rows.T * (1.0 / np.square(deviation))
-            quadratic = quadratic + weighted @ rows
-            linear = linear - weighted @ values
+            tick, weights = self._weights(seconds, speed=speed)
+            first, rows = self._merged(tick, np.column_stack(weights))
+            weight = 1.0 / np.square(deviation)
+            quadratic = quadratic + self._squared(first, rows, weight)
+            pull = np.zeros(len(linear))
+            np.add.at(pull, first[:, None] + np.arange(3), (rows.T * weight * values).T)
+            linear = linear - pull
+        place = np.tile(np.arange(self.size), 4)
+        column = place + np.repeat(np.arange(4), self.size)
+        upper = Columns.of_entries(place, column, quadratic[:, : self.size].ravel(), (self.size, self.size))
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
         cones = [clarabel.NonnegativeConeT(len(self.bounds))]
-        upper = sparse.triu(quadratic, format="csc")
-        solution = clarabel.DefaultSolver(upper, linear, self.constraints, self.bounds, cones, settings).solve()
+        solution = clarabel.DefaultSolver(upper, linear[: self.size], self.constraints, self.bounds, cones, settings).solve()
         if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
             raise InputError(f"speeds and positions cannot be reconciled ({solution.status}); check their units")
         merged = np.maximum.accumulate(np.asarray(solution.x))  # the solver's tolerance must not drive backwards
-        coefficients: Floats = self.merge @ merged
-        return coefficients
+        return np.asarray(merged[self.variable])
 
     def place(self, coefficients: Floats, seconds: Floats) -> Floats:
         """Return the distances driven (F,) [m] at any times (F,) [s], of coefficients (T+1,)."""

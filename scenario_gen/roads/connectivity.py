@@ -24,11 +24,11 @@ import math
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.ndimage import label
 
 from scenario_gen import exact
 from scenario_gen.arrays import Floats, frozen_ints, Ints
 from scenario_gen.roads.clearance import clearance_in_cells, segment_free, segments_free, to_metres
+from scenario_gen.roads.labels import labelled
 from scenario_gen.types.road import Road
 
 _labels: "WeakKeyDictionary[Road, dict[float, Ints]]" = WeakKeyDictionary()
@@ -39,7 +39,7 @@ def components(road: Road, radius: float) -> Ints:
     """Connected components for a disc of `radius` [m]: (H, W), 0 where its centre cannot be, else 1, 2, …; read-only, cached."""
     known = _labels.setdefault(road, {})
     if radius not in known:
-        known[radius] = frozen_ints(label(clearance_in_cells(road) > radius / road.resolution)[0])
+        known[radius] = frozen_ints(labelled(clearance_in_cells(road) > radius / road.resolution))
     return known[radius]
 
 

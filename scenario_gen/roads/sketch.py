@@ -23,6 +23,7 @@ from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.curve import Curve
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
+from scenario_gen.roads.labels import labelled
 from scenario_gen.types.road import Road
 
 _BORDER = 2.0  # metres of wall around the grid
@@ -93,9 +94,7 @@ def _without_slivers(drivable: Bools, most: int, islands: list[Floats]) -> Bools
     """Fill holes of at most so many cells: what strips and sweeps left between them; islands that were drawn stay."""
     if islands:
         return drivable
-    from scipy.ndimage import label  # slow to import
-
-    holes, _ = label(~drivable)
+    holes = labelled(~drivable)
     size = np.bincount(holes.ravel())
     return np.asarray(drivable | ((size <= most)[holes] & (holes > 0)))
 

@@ -21,7 +21,6 @@ cubic spline through the band is clamped to the asked headings at both ends, and
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,9 +33,6 @@ from scenario_gen.routing.search.planner import path_length
 from scenario_gen.routing.search.sweep import sweep_is_free
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.road import Road
-
-if TYPE_CHECKING:
-    from scipy.interpolate import CubicHermiteSpline  # slow to import
 
 ROUNDS, STEPS = 40, 8  # the band is resampled between rounds
 BEND = exact.power(4.0, 4)  # [m^4] with hold = 1 a kink spreads over about 4 m
@@ -66,7 +62,7 @@ class Targets:
 class Curve:
     """A verified or failed curve: the spline over `knots` (G,) [m], and what is wrong with it."""
 
-    spline: "CubicHermiteSpline"
+    spline: exact.CubicSpline
     end: float
     curvature: float
     sharpest: Floats  # (2,) where that is

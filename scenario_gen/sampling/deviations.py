@@ -77,8 +77,6 @@ class Steering:
             speed: (T,) m/s.
             length: metres of the route; the drive is scaled to it.
         """
-        from scipy.ndimage import uniform_filter1d  # slow to import
-
         dt = float(time[1] - time[0])
         at_least = np.sqrt(np.square(speed) + np.square(_SLOW))
         driven = np.concatenate([[0.0], np.cumsum(0.5 * dt * (speed[1:] + speed[:-1]))])
@@ -87,7 +85,7 @@ class Steering:
         width = 2 * round(0.5 * _COURSE / dt) + 1
         course = yaw
         for _ in range(2):
-            course = uniform_filter1d(course, width, mode="nearest")
+            course = exact.moving_mean(course, width)
         inside = np.flatnonzero(speed[width : len(yaw) - width] > _MOVES) + width
         if len(inside) < width:
             return cls(0.0, 1.0, driven, passed)
@@ -143,8 +141,6 @@ def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> F
     Both flanks of the footprint are moved outwards step by step until a point of them leaves drivable space; what lies
     ahead and behind, such as the edge of the map where a vehicle enters, does not count.
     """
-    from scipy.ndimage import minimum_filter1d, uniform_filter1d  # slow to import
-
     flank = np.linspace(-0.5, 0.5, int(np.ceil(vehicle.length / _FLANK_STEP)) + 1) * vehicle.length
     ahead = np.stack([exact.cos(path.node[:, 2]), exact.sin(path.node[:, 2])], axis=-1)[:, None, :]
     left = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
@@ -155,10 +151,10 @@ def lateral_room(path: BasePath, vehicle: Vehicle, road: Road, most: float) -> F
             free &= road.drivable_at(axis + side * left).all(axis=1)
         room[free] = min(step, most)
     reach = int(np.ceil(_SMOOTHING / max(path.spacing, 1e-9))) if len(room) > 1 else 0
-    smooth = minimum_filter1d(room, 4 * reach + 1, mode="nearest")
+    smooth = exact.moving_min(room, 4 * reach + 1)
     for _ in range(2):
-        smooth = uniform_filter1d(smooth, 2 * reach + 1, mode="nearest")
-    return np.asarray(smooth)
+        smooth = exact.moving_mean(smooth, 2 * reach + 1)
+    return smooth
 
 
 def road_ahead(path: BasePath, vehicle: Vehicle, road: Road, most: Floats) -> Floats:

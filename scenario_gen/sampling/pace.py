@@ -22,6 +22,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.sampling.time_warp import Clock
 from scenario_gen.types.encounter import Encounter
@@ -44,14 +45,12 @@ def slowed_clock(grid: Floats, needs: Sequence[Floats], most: float) -> Clock:
         needs: (G,) per vehicle, by how much the clock must be slowed there; 1 where it need not.
         most: duration over the template's, at most; needs beyond it are met in part.
     """
-    from scipy.ndimage import maximum_filter1d, uniform_filter1d  # slow to import
-
     need = np.maximum(np.max(needs, axis=0), 1.0)
     step = float(grid[1] - grid[0])
     width = 2 * max(round(REACH / step / 3.0), 1) + 1
-    rate = maximum_filter1d(need, 3 * (width - 1) + 1, mode="nearest")
+    rate = exact.moving_max(need, 3 * (width - 1) + 1)
     for _ in range(3):
-        rate = uniform_filter1d(rate, width, mode="nearest")
+        rate = exact.moving_mean(rate, width)
     extra = rate - 1.0
     longer = 0.5 * step * float((extra[1:] + extra[:-1]).sum())
     room = (most - 1.0) * float(grid[-1] - grid[0])

@@ -168,12 +168,10 @@ class _Drive:
 
     def _bend_speed(self, s: Floats, limit: float) -> Floats:
         """Speed [m/s] that the route's bends allow at arc lengths (q,) [m]."""
-        from scipy.ndimage import maximum_filter1d, uniform_filter1d  # slow to import
-
         if len(self.path.node) == 1:
             return np.full(len(s), np.inf)
         reach = 2 * int(np.ceil(_CURVE_REACH / self.path.spacing)) + 1
-        bend = maximum_filter1d(uniform_filter1d(np.abs(self.path.curvature), 3, mode="nearest"), reach, mode="nearest")
+        bend = exact.moving_max(exact.moving_mean(np.abs(self.path.curvature), 3), reach)
         return np.asarray(np.sqrt(limit / np.maximum(np.interp(s, self.path.arc, bend), 1e-6)))
 
 
@@ -325,16 +323,11 @@ def _largest_jerk(speed: Floats, dt: float) -> float:
 
 def _largest_sideways(encounter: Encounter, n: int) -> float:
     """Largest lateral acceleration [m/s²] of the template's vehicle n, over half a second."""
-    from scipy.ndimage import uniform_filter1d  # slow to import
-
     first, last = encounter.present[n].tolist()
     yaw = clean_tracks(encounter)[n].poses[first : last + 1, 2]
     width = 2 * round(0.5 * _SMOOTH / encounter.dt) + 1
-    return float(
-        np.abs(
-            uniform_filter1d(np.gradient(yaw, encounter.dt) * encounter.speed[n, first : last + 1], width, mode="nearest")
-        ).max()
-    )
+    sideways = np.gradient(yaw, encounter.dt) * encounter.speed[n, first : last + 1]
+    return float(np.abs(exact.moving_mean(sideways, width)).max())
 
 
 def _model(

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scenario_gen.arrays import Bools, Floats, frozen, frozen_ints, Ints
+from scenario_gen.segmentation.assignment import best_partners
 
 MOST_SAMPLES = 400  # labels of more sweeps than these are thinned evenly; traces are not
 
@@ -166,10 +167,8 @@ def in_order(labels: Ints) -> Ints:
 
 def matched_labels(samples: Ints, reference: Ints, size: int) -> Ints:
     """Rename each row's labels (S, T), below `size`, to agree with `reference` (T,) in as many samples as possible."""
-    from scipy.optimize import linear_sum_assignment  # slow to import
-
     overlaps = [np.bincount(row * size + reference, minlength=size * size).reshape(size, size) for row in samples]
-    partners = [linear_sum_assignment(overlap, maximize=True)[1] for overlap in overlaps]
+    partners = [np.array(best_partners(overlap)) for overlap in overlaps]
     return np.stack([partner[row] for partner, row in zip(partners, samples, strict=True)]).astype(np.int64)
 
 

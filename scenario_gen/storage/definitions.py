@@ -12,22 +12,28 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Definitions and hashes of types: Jazzy's from rosbags, Autoware's by definition, others from an installed package."""
+"""Definitions and hashes of types: Jazzy's from rosbags, Autoware's by definition, others from an installed package.
+
+Those of our own bags are kept in `resources/definitions.json`, as rosbags gives them: it reads seven releases of ROS for them.
+"""
 
 from functools import cache
+import json
 import os
 from pathlib import Path
 from typing import Any
 
-from rosbags.typesys import get_types_from_msg, get_typestore, Stores
-
 from scenario_gen.errors import InputError
 from scenario_gen.storage.autoware import DEFINITIONS
+
+KEPT = Path(__file__).resolve().parents[1] / "resources" / "definitions.json"
 
 
 @cache
 def type_store() -> Any:
     """Return rosbags' store of Jazzy's types and Autoware's, which decodes messages of them."""
+    from rosbags.typesys import get_types_from_msg, get_typestore, Stores  # slow to import
+
     store = get_typestore(Stores.ROS2_JAZZY)
     for kind, text in DEFINITIONS.items():
         store.register(get_types_from_msg(text, kind))
@@ -44,6 +50,8 @@ def _register_installed(kind: str) -> None:
         raise InputError(
             f"message type {kind} is unknown: no {package}/msg/{name}.msg on AMENT_PREFIX_PATH; source its workspace"
         )
+    from rosbags.typesys import get_types_from_msg
+
     store = type_store()
     types = get_types_from_msg(found.read_text(encoding="utf-8"), kind)
     for _constants, fields in types.values():
@@ -55,12 +63,21 @@ def _register_installed(kind: str) -> None:
 
 
 @cache
+def kept() -> dict[str, tuple[str, str]]:
+    """Return what `definition` returns of the types that `resources/definitions.json` has."""
+    document = json.loads(KEPT.read_text(encoding="utf-8"))
+    return {kind: (entry["text"], entry["hash"]) for kind, entry in document.items()}
+
+
+@cache
 def definition(kind: str) -> tuple[str, str]:
     """Return the full ros2msg definition text of a type, nested types included, and its RIHS01 hash (REP 2011).
 
     Raises:
         InputError: the type is neither a standard one nor installed.
     """
+    if kind in kept():
+        return kept()[kind]
     store = type_store()
     if kind not in store.fielddefs:
         _register_installed(kind)

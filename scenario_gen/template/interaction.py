@@ -97,10 +97,8 @@ def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
 
     The speed is smoothed by a centred moving mean over 0.5 s (an odd number of samples; the end samples are repeated).
     """
-    from scipy.ndimage import uniform_filter1d  # slow to import
-
     width = 2 * round(0.5 * WAIT_SMOOTHING / encounter.dt) + 1
-    smooth = uniform_filter1d(encounter.speed, width, axis=1, mode="nearest")  # outside of its presence a speed is held
+    smooth = exact.moving_mean(encounter.speed, width)  # outside of its presence a speed is held
     time = encounter.time
     return tuple(
         Wait(vehicle, float(time[a]), float(time[b - 1]), _creeps(encounter.speed[vehicle, a:b], time[a:b]))

@@ -36,14 +36,6 @@ DRAWS = """
     binomial poisson standard_t
 """  # they call the C library's logarithm
 FORBIDDEN = {"np": set(NUMPY.split()), "math": set(MATH.split())}
-SCIPY = {  # that only add, multiply and compare
-    "scipy.interpolate": {"BSpline", "CubicHermiteSpline"},
-    "scipy.ndimage": {"uniform_filter1d", "minimum_filter1d", "maximum_filter1d", "label"},  # label: of cells, no numbers
-    "scipy.optimize": {"linear_sum_assignment"},  # of whole numbers, whose sums are exact
-    "scipy.signal": {"fftconvolve"},  # of whole numbers, rounded to whole numbers
-    "scipy": {"sparse"},
-}
-SPARSE = {"scenario_gen/logs/smoothing.py": "Motion"}  # @ of sparse matrices is a plain loop; the class that uses it
 COUNTS = {  # sum() of whole numbers
     "scenario_gen/review/evaluation.py",
     "scenario_gen/storage/reindex.py",
@@ -80,9 +72,9 @@ def compiled_lines(tree: ast.Module) -> set[int]:
 
 
 def imports(node: ast.AST) -> Iterator[str]:
-    """What the statement takes of scipy that is not known to be safe."""
+    """What the statement takes of scipy, whose solvers are LAPACK's."""
     if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "scipy":
-        yield from (f"{node.module}.{a.name}" for a in node.names if a.name not in SCIPY.get(node.module or "", set()))
+        yield from (f"{node.module}.{a.name}" for a in node.names)
     elif isinstance(node, ast.Import):
         yield from (a.name for a in node.names if a.name.split(".")[0] == "scipy")
 
@@ -95,15 +87,9 @@ def attribute(node: ast.AST) -> Iterator[str]:
             yield f"{name}.{node.attr}"
 
 
-def sparse_lines(tree: ast.Module, name: str) -> set[int]:
-    """The lines of the class of a file that multiplies sparse matrices."""
-    classes = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == SPARSE.get(name))
-    return {line for node in classes for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)}
-
-
-def operator(node: ast.AST, name: str, compiled: set[int], sparse: set[int]) -> Iterator[str]:
+def operator(node: ast.AST, name: str, compiled: set[int]) -> Iterator[str]:
     """A product of matrices, a power, or a sum whose order the interpreter chooses."""
-    if isinstance(node, ast.BinOp | ast.AugAssign) and isinstance(node.op, ast.MatMult) and node.lineno not in sparse:
+    if isinstance(node, ast.BinOp | ast.AugAssign) and isinstance(node.op, ast.MatMult):
         yield "@, use exact.matmul"
     elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
         if not (is_whole(node) or (node.lineno in compiled and is_whole(node.right))):
@@ -115,11 +101,11 @@ def operator(node: ast.AST, name: str, compiled: set[int], sparse: set[int]) -> 
 def faults(name: str, text: str) -> list[str]:
     """Where a file uses what depends on the CPU."""
     tree = ast.parse(text)
-    compiled, sparse = compiled_lines(tree), sparse_lines(tree, name)
+    compiled = compiled_lines(tree)
     return [
         f"{name}, line {getattr(node, 'lineno', 0)}: {fault}"
         for node in ast.walk(tree)
-        for fault in (*imports(node), *attribute(node), *operator(node, name, compiled, sparse))
+        for fault in (*imports(node), *attribute(node), *operator(node, name, compiled))
     ]
 
 

@@ -35,7 +35,7 @@ import time
 
 from figures import Figure
 
-from scenario_gen.__main__ import main
+from scenario_gen.__main__ import command as main
 from scenario_gen.folders import replaced_folder
 from scenario_gen.folders.claim import PREFIX
 from scenario_gen.logs.synthetic import bundled

@@ -25,10 +25,10 @@ from dataclasses import dataclass
 
 import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
-from scipy import sparse
 
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
+from scenario_gen.exact.sparse import Columns
 from scenario_gen.sampling.speed_profile.knots import SpeedKnots
 from scenario_gen.sampling.speed_profile.spline import SpeedSpline
 
@@ -175,9 +175,9 @@ def mean_speed(spline: SpeedSpline, target: Target, motion: Motion, bounds: Boun
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
-    upper = sparse.csc_matrix(np.triu(quadratic))
+    upper = Columns.of_dense(np.triu(quadratic))
     solver = clarabel.DefaultSolver(
-        upper, np.concatenate([-2.0 * linear, price]), sparse.csc_matrix(constraints), right, cones, settings
+        upper, np.concatenate([-2.0 * linear, price]), Columns.of_dense(constraints), right, cones, settings
     )
     solution = solver.solve()
     if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):

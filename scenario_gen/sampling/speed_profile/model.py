@@ -180,8 +180,6 @@ def kernel_root(time: Floats, amplitude: Floats, length: float) -> Floats:
 
 def _process(spline: SpeedSpline, mean: Floats, time: Floats, speed: Floats, sigma: float, length: float) -> Floats:
     """Square root (n, r) of the covariance of the coefficients, without conditions."""
-    from scipy.ndimage import uniform_filter1d  # slow to import
-
     at = spline.middle
     inside = (time >= spline.breaks[0]) & (time <= spline.breaks[-1])
     rest = speed[inside] - exact.matmul(spline.design(time[inside]), mean)
@@ -194,7 +192,7 @@ def _process(spline: SpeedSpline, mean: Floats, time: Floats, speed: Floats, sig
         width = 2 * round(0.5 * WINDOW / dt) + 1
         local = np.square(rest)
         for _ in range(PASSES):
-            local = np.maximum(uniform_filter1d(local, width, mode="nearest"), 0.0)
+            local = np.maximum(exact.moving_mean(local, width), 0.0)
         local = np.sqrt(local)
         parts.append(kernel_root(at, SHARE * np.interp(at, time[inside], local), scale))
     if not parts:
