@@ -12,8 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Files that once broke a reader, as parameters of tests; where they are missing the test skips and says so."""
+"""Files that break a reader, as parameters of tests: those that are made, and those that were found, where they are."""
 
+from fnmatch import fnmatch
+from pathlib import Path
+
+import broken
 from harness import CRASHES
 import pytest
 
