@@ -36,6 +36,7 @@ from scenario_gen.types.encounter import Vehicle
 EAST, NORTH, WEST, SOUTH = 0.0, np.pi / 2.0, np.pi, -np.pi / 2.0
 SIDE = LANE / 2.0
 ORIGIN = (48.2, 11.6)  # degrees
+AUTOWARE = (0.666, -0.559)  # degrees, where the map of Autoware's dialect lies
 STILL = Phase(600.0)
 VIDEO = "t_s,vehicle_id,type,x_m,y_m,speed_mps,heading_rad,length_m,width_m".split(",")
 RADIO = "t_s,clock_s,vehicle_id,lat_deg,lon_deg,elev_raw,speed_mps,heading_rad".split(",")
@@ -163,7 +164,7 @@ def waits_at_a_side_road() -> list[Drive]:
 def turns_left() -> list[Drive]:
     """One stands in the junction until an oncoming one has passed, then turns left."""
     waits = drive(
-        "2839", (-11.0, -SIDE, EAST), 0.0, Phase(3.4), Phase(4.6, 1.6), legs=[Leg(1.0), quarter(11.5, 1)], length=3.81, width=1.9812
+        "2839", (-11.0, -SIDE, EAST), 0.0, Phase(3.4), Phase(2.5, 1.6), legs=[Leg(1.0), quarter(11.5, 1)], length=3.81, width=1.9812
     )
     oncoming = drive("21019", (32.0, SIDE, WEST), 7.0, Phase(4.0, 0.9), Phase(4.0), length=3.3528, width=1.8898)
     return [waits, oncoming]
@@ -172,7 +173,7 @@ def turns_left() -> list[Drive]:
 def two_turn_left() -> list[Drive]:
     """The same with a second one behind, which follows."""
     ahead, oncoming = turns_left()
-    behind = drive("2829", (-19.0, -SIDE, EAST), 0.2, Phase(4.2), Phase(4.0, 1.3), legs=[Leg(9.0), quarter(11.5, 1)], **CAR)
+    behind = drive("2829", (-19.0, -SIDE, EAST), 0.2, Phase(4.0), Phase(3.0, 1.2), legs=[Leg(9.0), quarter(11.5, 1)], **CAR)
     return [behind, ahead, oncoming]
 
 
@@ -197,8 +198,8 @@ def opposite(first: str, second: str, begin: float = 0.0) -> list[Drive]:
     """Two come towards each other and pass; they slow down and speed up again."""
     phases = (Phase(begin), Phase(6.0, 0.3), Phase(8.0, -0.35), Phase(6.0), Phase(10.0, 0.25))
     return [
-        drive(first, (-90.0, -SIDE, EAST), 5.5, *phases),
-        drive(second, (95.0, SIDE, WEST), 6.5, Phase(begin), Phase(10.0, -0.25), Phase(8.0), Phase(12.0, 0.2)),
+        drive(first, (-90.0 - 5.5 * begin, -SIDE, EAST), 5.5, *phases),
+        drive(second, (95.0 + 6.5 * begin, SIDE, WEST), 6.5, Phase(begin), Phase(10.0, -0.25), Phase(8.0), Phase(12.0, 0.2)),
     ]
 
 
@@ -307,13 +308,17 @@ def maps(folder: Path) -> None:
     grid(folder / "occupancy_grids", "USA_Lanker-2_13_T-1", crossing)
     grid(folder / "occupancy_grids", "USA_Peach-4_2_T-1", [(-9.0, -120.0, 9.0, 120.0), (-120.0, 20.0, 120.0, 30.0)])
     grid(folder / "nav2", "warehouse", [(-30.0, -20.0, 30.0, 20.0)])
+    crossroads = map_builders.opendrive()
     texts = {
         "commonroad/USA_Lanker-2_13_T-1.xml": map_builders.commonroad(),
         "commonroad/USA_Peach-4_2_T-1.xml": map_builders.commonroad(offset=(1000.0, -500.0)),
-        "lanelet2/simple_cross_map.osm": map_builders.lanelet2(),
+        "lanelet2/simple_cross_map.osm": map_builders.lanelet2(tagged),
         "lanelet2/kashiwanoha.osm": two_lanes(),
         "lanelet2/mapping_example.osm": map_builders.lanelet2(degrees),
-        "opendrive/simple_4way_intersection.xodr": map_builders.opendrive(),
+        "opendrive/simple_4way_intersection.xodr": crossroads,
+        "opendrive/fabriksgatan.xodr": crossroads.replace('a="3.5"', 'a="3.0"'),
+        "opendrive/multi_lane_3way_intersection.xodr": map_builders.opendrive("+proj=tmerc +lat_0=48.2 +lon_0=11.6 +datum=WGS84"),
+        "opendrive/jolengatan.xodr": crossroads.replace('b="0"', 'b="0.004"'),
     }
     for name, text in texts.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -326,13 +331,19 @@ def degrees(x: float, y: float) -> str:
     return f'lat="{float(latitude[0])!r}" lon="{float(longitude[0])!r}">'
 
 
+def tagged(x: float, y: float) -> str:
+    """The same in metres, too, as Autoware's dialect has it."""
+    latitude, longitude = geodetic(np.array([[x, y]]), AUTOWARE)
+    node = f'lat="{float(latitude[0])!r}" lon="{float(longitude[0])!r}">'
+    return f'{node}<tag k="local_x" v="{x!r}"/><tag k="local_y" v="{y!r}"/>'
+
+
 def two_lanes() -> str:
     """A road of two lanes with a dashed line between them that both share, each in two parts, in Lanelet2."""
     nodes, ways, relations = [], [], []
     for row in range(3):
         for column, x in enumerate((-60.0, 0.0, 60.0)):
-            tags = f'<tag k="local_x" v="{x}"/><tag k="local_y" v="{LANE * row}"/>'
-            nodes.append(f'<node id="{1 + 3 * row + column}" lat="0.0" lon="0.0">{tags}</node>')
+            nodes.append(f'<node id="{1 + 3 * row + column}" {tagged(x, LANE * row)}</node>')
         for part in range(2):
             refs = "".join(f'<nd ref="{1 + 3 * row + part + k}"/>' for k in range(2))
             kind = "dashed" if row == 1 else "solid"
