@@ -20,10 +20,10 @@ import gc
 import os
 from pathlib import Path
 
+from hypothesis import settings
 from lengths import DATA, LONG
 import pytest
 from skips import MAY_SKIP, NO_RECORDS
-
 
 JUDGES = ("made", pytest.param("recorded", marks=pytest.mark.recorded))
 """By what a test is run: what the tests make themselves, always; what was recorded, where `-m recorded` asks for it."""
@@ -69,6 +69,13 @@ def file(request: pytest.FixtureRequest) -> Path:
     """One of them, of `crash_files`: made here if its path is relative."""
     path: Path = request.param
     return path if path.is_absolute() else request.getfixturevalue("made_crashes") / path
+
+
+settings.register_profile("same", derandomize=True, database=None, deadline=None)
+settings.register_profile("new", database=None, deadline=None, print_blob=True)
+settings.load_profile(
+    os.environ.get("SCENARIO_GEN_EXAMPLES", "same")
+)  # the same examples every time, unless new ones are asked for
 
 
 @pytest.fixture(scope="session")
@@ -139,7 +146,12 @@ def pytest_sessionfinish() -> None:
 def _not_in_ci(report: pytest.TestReport | pytest.CollectReport) -> None:
     """In CI what is skipped has failed."""
     reason = report.longrepr[-1] if isinstance(report.longrepr, tuple) else report.longrepr
-    if report.skipped and os.environ.get("CI") and not hasattr(report, "wasxfail") and not any(one in str(reason) for one in MAY_SKIP):
+    if (
+        report.skipped
+        and os.environ.get("CI")
+        and not hasattr(report, "wasxfail")
+        and not any(one in str(reason) for one in MAY_SKIP)
+    ):
         report.outcome = "failed"
         report.longrepr = f"skipped in CI: {reason}"
 

@@ -174,7 +174,9 @@ def test_existence_and_entry_agree_with_shapely(seed):
 
     samples = [boxes_of(vehicles[i], poses(i, time), -DEPTH) for i in range(2)]
     sweeps = [shapely.union_all(one) for one in samples]
-    latest = [next((t for t, one in zip(time, samples[i], strict=True) if one.intersects(sweeps[1 - i])), np.inf) for i in range(2)]
+    latest = [
+        next((t for t, one in zip(time, samples[i], strict=True) if one.intersects(sweeps[1 - i])), np.inf) for i in range(2)
+    ]
     if not found:
         assert latest == [np.inf, np.inf]
         return

@@ -60,7 +60,7 @@ def test_footprints_overlap_only_while_both_are_there(present, meets):
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20)
 def test_a_presence_is_checked_as_its_own_cut_out_scenarios_are(seed):
     """Every vehicle alone, and every pair while both are there, cut out and checked as scenarios of their own."""
     rng = np.random.Generator(np.random.PCG64(seed))

@@ -314,7 +314,9 @@ TABLES: dict[str, Make] = {
         lambda rows: rows.set_column(0, "t_s", pa.array([*rows["t_s"].to_pylist()[:-1], 3e8]))
     ),
     "parquet/stamps_that_are_no_numbers.parquet": stamps(pa.array([float("nan")] * 3 + NO_NUMBER[3:], from_pandas=False)),
-    "parquet/an_index_that_is_not_there.parquet": described({"columns": [], "index_columns": ["t_s", "no"], "column_indexes": []}),
+    "parquet/an_index_that_is_not_there.parquet": described(
+        {"columns": [], "index_columns": ["t_s", "no"], "column_indexes": []}
+    ),
     "parquet/columns_that_are_not_told.parquet": described({"index_columns": []}),
     "parquet/words_that_are_a_list.parquet": described([1]),
     "parquet/a_type_that_is_none.parquet": described(
@@ -359,7 +361,7 @@ MAPS: dict[str, Make] = {
     "bomb400M.yaml": lambda: nav2("b2.png"),
     "deep.yaml": lambda: b"a: " + b"[" * 20_000,
     "map_alias_bomb.yaml": lambda: ALIASES.encode() + nav2("m.png", origin="*a7"),
-    "params_alias_bomb.yaml": lambda: ("/**:\n  ros__parameters:\n    " + ALIASES.replace("\n", "\n    ")).encode(),
+    "params_alias_bomb.yaml": ("/**:\n  ros__parameters:\n    " + ALIASES.replace("\n", "\n    ")).encode,
 }
 FILES: dict[str, Make] = {
     **TABLES,

@@ -38,13 +38,15 @@ SIDE = LANE / 2.0
 ORIGIN = (48.2, 11.6)  # degrees
 AUTOWARE = (0.666, -0.559)  # degrees, where the map of Autoware's dialect lies
 STILL = Phase(600.0)
-VIDEO = "t_s,vehicle_id,type,x_m,y_m,speed_mps,heading_rad,length_m,width_m".split(",")
-RADIO = "t_s,clock_s,vehicle_id,lat_deg,lon_deg,elev_raw,speed_mps,heading_rad".split(",")
-GPS = "t_s,utc_s,vehicle_id,lat_deg,lon_deg,speed_mps,heading_rad,gga_fix_quality".split(",")
-DOPPLER = "t_s,time_s,vehicle_pos,vehicle_name,lat_deg,lon_deg,alt_m,e_m,n_m,speed_mps".split(",")
+VIDEO = ["t_s", "vehicle_id", "type", "x_m", "y_m", "speed_mps", "heading_rad", "length_m", "width_m"]
+RADIO = ["t_s", "clock_s", "vehicle_id", "lat_deg", "lon_deg", "elev_raw", "speed_mps", "heading_rad"]
+GPS = ["t_s", "utc_s", "vehicle_id", "lat_deg", "lon_deg", "speed_mps", "heading_rad", "gga_fix_quality"]
+DOPPLER = ["t_s", "time_s", "vehicle_pos", "vehicle_name", "lat_deg", "lon_deg", "alt_m", "e_m", "n_m", "speed_mps"]
 
 
-def drive(name: str, pose: tuple[float, float, float], speed: float, *phases: Phase, legs: Sequence[Leg] = (), **size: float) -> Drive:
+def drive(
+    name: str, pose: tuple[float, float, float], speed: float, *phases: Phase, legs: Sequence[Leg] = (), **size: float
+) -> Drive:
     """A vehicle's true motion from time 0; after the last phase it goes on as it is, after the last leg straight on."""
     return Drive(Vehicle(name, **size), pose, speed, (*legs, Leg(1.0)), (*phases, STILL))
 
@@ -111,7 +113,7 @@ class Writing:
                 gap = at[0] + (k + 0.5 + 0.3 * number) * (at[-1] - at[0]) / (len(gaps) + 1)
                 lost |= (at > gap) & (at < gap + seconds)
             lost[[0, -1]] = False
-            repeated = rows[rng.random(at.size) < 0.03]
+            repeated = rows[~lost & (rng.random(at.size) < 0.03)]
             tables.append(pd.concat([rows[~lost], repeated]).assign(vehicle_id=one.vehicle.id, elev_raw=3300))
         whole = pd.concat(tables).sort_values(["t_s", "vehicle_id"], kind="stable")
         whole["clock_s"] = (whole["t_s"] + 2322.1).round(2)
@@ -164,7 +166,14 @@ def waits_at_a_side_road() -> list[Drive]:
 def turns_left() -> list[Drive]:
     """One stands in the junction until an oncoming one has passed, then turns left."""
     waits = drive(
-        "2839", (-11.0, -SIDE, EAST), 0.0, Phase(3.4), Phase(2.5, 1.6), legs=[Leg(1.0), quarter(11.5, 1)], length=3.81, width=1.9812
+        "2839",
+        (-11.0, -SIDE, EAST),
+        0.0,
+        Phase(3.4),
+        Phase(2.5, 1.88),
+        legs=[Leg(1.0), quarter(11.5, 1)],
+        length=3.81,
+        width=1.9812,
     )
     oncoming = drive("21019", (32.0, SIDE, WEST), 7.0, Phase(4.0, 0.9), Phase(4.0), length=3.3528, width=1.8898)
     return [waits, oncoming]
@@ -179,15 +188,21 @@ def two_turn_left() -> list[Drive]:
 
 def stop_and_go() -> list[Drive]:
     """Opposite directions on a street, a lane between; both stop and go."""
-    south = drive("134", (-SIDE - LANE, 30.0, SOUTH), 0.0, Phase(2.0), Phase(5.0, 1.4), Phase(5.0, -1.1), length=4.8768, width=2.1336)
-    north = drive("334", (SIDE + LANE, -60.0, NORTH), 0.0, Phase(3.5), Phase(6.0, 1.2), Phase(4.0, -0.9), length=5.6388, width=2.1336)
+    south = drive(
+        "134", (-SIDE - LANE, 30.0, SOUTH), 0.0, Phase(2.0), Phase(5.0, 1.4), Phase(5.0, -1.1), length=4.8768, width=2.1336
+    )
+    north = drive(
+        "334", (SIDE + LANE, -60.0, NORTH), 0.0, Phase(3.5), Phase(6.0, 1.2), Phase(4.0, -0.9), length=5.6388, width=2.1336
+    )
     return [south, north]
 
 
 def changes_lanes() -> list[Drive]:
     """Four on two lanes; one changes to the other one's lane, where its GPS puts it on top of that."""
     west = np.pi
-    first = drive("1", (0.0, 0.0, west), 2.2, Phase(12.0), Phase(16.0, 0.05), Phase(12.0, -0.02), legs=[Leg(20.0), *lane_change(1)])
+    first = drive(
+        "1", (0.0, 0.0, west), 2.2, Phase(12.0), Phase(16.0, 0.05), Phase(12.0, -0.02), legs=[Leg(20.0), *lane_change(1)]
+    )
     second = drive("2", (3.0, -3.2, west), 2.2, Phase(12.0), Phase(16.0, 0.05), Phase(12.0, -0.02))
     third = drive("3", (16.0, -3.2, west), 2.1, Phase(10.0), Phase(18.0, 0.05), Phase(12.0, -0.02))
     fourth = drive("4", (34.0, 0.0, west), 2.0, Phase(14.0), Phase(12.0, 0.06), Phase(14.0))
@@ -219,7 +234,17 @@ def follows() -> list[Drive]:
     return [ahead, behind]
 
 
-MODELS = ("TESLA_MODELX", "TESLA_MODEL3", "TESLA_MODELS", "BMW_I3", "MINI_COOPER", "TOYOTA_RAV4", "JAGUAR_I_PACE", "MERCEDES_GLE", "AUDI_A4")
+MODELS = (
+    "TESLA_MODELX",
+    "TESLA_MODEL3",
+    "TESLA_MODELS",
+    "BMW_I3",
+    "MINI_COOPER",
+    "TOYOTA_RAV4",
+    "JAGUAR_I_PACE",
+    "MERCEDES_GLE",
+    "AUDI_A4",
+)
 
 
 def platoon(count: int) -> list[Drive]:
@@ -236,7 +261,12 @@ def there_and_back() -> list[Drive]:
     found = []
     for name, x, side, speed in (("2a3c600d", -60.0, -SIDE, 9.0), ("2a3c603c", 70.0, SIDE, 8.4)):
         heading = EAST if side < 0.0 else WEST
-        round_trip = (Leg(220.0), Leg(2.0 * SIDE * np.pi * 3.0, 1.0 / (6.0 * SIDE)), Leg(220.0), Leg(2.0 * SIDE * np.pi * 3.0, 1.0 / (6.0 * SIDE)))
+        round_trip = (
+            Leg(220.0),
+            Leg(2.0 * SIDE * np.pi * 3.0, 1.0 / (6.0 * SIDE)),
+            Leg(220.0),
+            Leg(2.0 * SIDE * np.pi * 3.0, 1.0 / (6.0 * SIDE)),
+        )
         changes = (Phase(12.0), Phase(6.0, -0.6), Phase(6.0, 0.6)) * 12
         found.append(drive(name, (x, side * 6.0, heading), speed, *changes, legs=round_trip * 6))
     return found
@@ -269,16 +299,24 @@ def tables() -> dict[str, pd.DataFrame]:
     over = {"1": (0.0, 1.2), "2": (0.0, -0.4)}
     cuts = {
         "ngsim_commonroad/encounter_3plus_two_left_turners_one_opposite_Lanker-2_13": Writing(1, 0.0, 8.0).video(two_turn_left()),
-        "ngsim_commonroad/encounter_a_cross_one_stops_Lanker-2_15_21202_21260": Writing(2, 0.0, 8.0).video(waits_at_a_side_road()),
+        "ngsim_commonroad/encounter_a_cross_one_stops_Lanker-2_15_21202_21260": Writing(2, 0.0, 8.0).video(
+            waits_at_a_side_road()
+        ),
         "ngsim_commonroad/encounter_b_left_turn_vs_opposite_Lanker-2_13_2839_21019": Writing(3, 0.0, 8.0).video(turns_left()),
         "ngsim_commonroad/encounter_c_opposite_stop_go_Peach-4_2_134_334": Writing(4, 0.0, 11.5).video(stop_and_go()),
         "ngsim_commonroad/USA_Peach-4_2_T-1_all_vehicles": street(),
-        "psu_2obu/encounter_c_opposite_approach_then_stop_meet_300-340s": Writing(5, 0.0, 36.0, -300.0).radio(meets_then_stands()),
+        "psu_2obu/encounter_c_opposite_approach_then_stop_meet_300-340s": Writing(5, 0.0, 36.0, -300.0).radio(
+            meets_then_stands()
+        ),
         "psu_2obu/encounter_following_follow_230-270s": Writing(6, 0.0, 40.0, -230.0).radio(follows()),
-        "psu_2obu/psu_meet_full": Writing(7, 0.0, 360.0).radio(there_and_back(), gaps=(0.4, 0.8, 5.0, 0.9, 2.0, 12.0, 3.0, 0.7, 1.5, 4.0, 2.5, 6.0)),
+        "psu_2obu/psu_meet_full": Writing(7, 0.0, 360.0).radio(
+            there_and_back(), gaps=(0.4, 0.8, 5.0, 0.9, 2.0, 12.0, 3.0, 0.7, 1.5, 4.0, 2.5, 6.0)
+        ),
         "cats_av_lane_change/encounter_3plus_lane_change_four_vehicles_utc36110": Writing(8, 0.0, 40.0, shift=over).gps(lanes),
         "cats_av_lane_change/encounter_c_opposite_v2_v4_utc35195": Writing(9, 8.0, 38.0).gps(pass_by),
-        "openacc_zalazone/encounter_3plus_platoon4_openacc_no_ACC_handling_part22_60-100s": Writing(11, 60.0, 100.0).doppler(platoon(4)),
+        "openacc_zalazone/encounter_3plus_platoon4_openacc_no_ACC_handling_part22_60-100s": Writing(11, 60.0, 100.0).doppler(
+            platoon(4)
+        ),
         "openacc_zalazone/openacc_no_ACC_handling_part22_first150s": Writing(12, 0.0, 150.0).doppler(platoon(9)),
     }
     for k, one in enumerate(opposite("2", "4", 40.0)):
@@ -347,11 +385,14 @@ def two_lanes() -> str:
         for part in range(2):
             refs = "".join(f'<nd ref="{1 + 3 * row + part + k}"/>' for k in range(2))
             kind = "dashed" if row == 1 else "solid"
-            ways.append(f'<way id="{100 + 2 * row + part}">{refs}<tag k="type" v="line_thin"/><tag k="subtype" v="{kind}"/></way>')
+            ways.append(
+                f'<way id="{100 + 2 * row + part}">{refs}<tag k="type" v="line_thin"/><tag k="subtype" v="{kind}"/></way>'
+            )
     for lane in range(2):
         for part in range(2):
             members = "".join(
-                f'<member type="way" ref="{100 + 2 * (lane + up) + part}" role="{role}"/>' for up, role in ((1, "left"), (0, "right"))
+                f'<member type="way" ref="{100 + 2 * (lane + up) + part}" role="{role}"/>'
+                for up, role in ((1, "left"), (0, "right"))
             )
             facts = {"type": "lanelet", "subtype": "road", "location": "urban", "one_way": "yes", "speed_limit": "50"}
             tags = "".join(f'<tag k="{key}" v="{value}"/>' for key, value in facts.items())
@@ -376,7 +417,7 @@ def bags(folder: Path) -> None:
             with Writer(folder / storage / name, version=9, storage_plugin=plugin) as bag:
                 for topic, (kind, count) in topics.items():
                     given = {} if kind in STORES.types else {"msgdef": "int32 data\n", "rihs01": "RIHS01_" + "0" * 64}
-                    connection = bag.add_connection(topic, kind, **({"typestore": STORES} if not given else given))
+                    connection = bag.add_connection(topic, kind, **(given if given else {"typestore": STORES}))
                     for k in range(count):
                         data = STORES.serialize_cdr(string(data=f"Hello {k}"), "std_msgs/msg/String")
                         bag.write(connection, 10**9 + 10**7 * k, bytes(data))
