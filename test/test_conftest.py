@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What conftest.py does to items holds for those of other plugins, too, which are no functions: launch_testing's, ament's linters."""
+"""What conftest.py does to items it does to those of other plugins, too: launch_testing's, ament's linters'."""
 
 import os
 from pathlib import Path

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The main job on encounters recorded, or made as hard: valid new scenarios on at least two roads, re-checked by independent means.
+"""The main job on hard encounters, made or recorded: valid new scenarios on at least two roads, re-checked by independent means.
 
 The short form takes three encounters and few scenarios; the long one, `make soak PART=tests`, all of both.
 """

@@ -118,7 +118,7 @@ def targets() -> dict[str, Target]:
 
 
 def corpus(target: Target, *, found: bool = True) -> list[bytes]:
-    """Return the valid inputs of a target, files made with faults that once broke it, and those files themselves, if asked for."""
+    """Return the valid inputs of a target, files made with faults that once broke it, and if asked for those found."""
     import broken
 
     with tempfile.TemporaryDirectory() as folder:

@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def run_file(state: Path, name: str, *words: str, **variables: str) -> tuple[str, bool, float]:
-    """Run one test file, with more words for pytest; its output stays in `state`. Return its name, whether it passes, and the seconds of CPU it took."""
+    """Run one test file, its output into `state`; return its name, whether it passes, and the seconds of CPU it took."""
     with (state / f"{name.replace('/', '.')}.log").open("w") as log:
         environment = os.environ | {"SCENARIO_GEN_TESTS": "long"} | variables
         command = [sys.executable, "-m", "pytest", name, *words]

@@ -153,8 +153,9 @@ def boxes_of(vehicle, poses, grow=0.0):
 @example(seed=120182612)
 @settings(max_examples=150)
 def test_existence_and_entry_agree_with_shapely(seed):
-    """Sweeps of the samples alone lie in ours, ours in one of 8 poses a step; so no entry is later than into the first, none before
-    the last is met. What lies between depends on how a slow one grazes a corner, and has no bound.
+    """An entry is no later than into the samples' sweep, which lies in ours, and meets a finer one, in which ours lies.
+
+    How far these two are apart depends on how slowly one grazes a corner of the other's sweep, and has no bound.
     """
     rng = np.random.default_rng(seed)
     time = np.arange(41) * 0.1

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A folder laid out as the recorded data is, made from a seed: a test that reads the one reads the other. Nothing in it was recorded.
+"""A folder laid out as the recorded data is, made from seeds: a test reads either. Nothing in it was recorded.
 
 Files have the recorded ones' names and columns, and their faults: GPS noise and slow drift, uneven clocks, losses, repeated rows,
-stamps of reception, speeds by differences, steps of video tracking, vehicles whose id changes, two cars whose GPS puts them on top
-of each other. What is driven: waits, turns, lane changes, stop and go, oncoming cars, queues of two to nine.
+stamps of reception, speeds by differences, steps of video tracking, vehicles whose id changes, two cars whose GPS puts them on
+top of each other. What is driven: waits, turns, lane changes, stop and go, oncoming cars, queues of two to nine.
 """
 
 from collections.abc import Sequence

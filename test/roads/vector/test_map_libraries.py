@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The formats' own libraries as judges, on small maps and recorded ones: the grid against their polygons, lanes against their routing."""
+"""The formats' own libraries as judges, on made maps and real ones: the grid against their polygons, lanes against routing."""
 
 import re
 
