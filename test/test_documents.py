@@ -64,8 +64,7 @@ TEXTS += [
 ]
 
 
-@pytest.mark.data
-@pytest.mark.parametrize("file", crash_files("params/*", "params_*", "deep.yaml", "map_alias*"))
+@pytest.mark.parametrize("file", crash_files("params/*", "params_*", "deep.yaml", "map_alias*"), indirect=True)
 def test_a_broken_parameter_file_is_named(file):
     is_refused(lambda: loaded(PipelineConfig(), file), str(file))
 

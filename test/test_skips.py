@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""In CI a skipped test has failed, but for the one named exception: what needs `launch`."""
+"""In CI a skipped test has failed, but for the named exceptions: what needs `launch`, what needs recorded data."""
 
 import os
 from pathlib import Path
@@ -23,13 +23,14 @@ import pytest
 
 CASES = {
     "test_exception.py": "import pytest\nfrom skips import NO_LAUNCH\npytest.importorskip('no_launch', reason=NO_LAUNCH)\n",
+    "test_records.py": "import pytest\nfrom skips import NO_RECORDS\ndef test_it():\n    pytest.skip(NO_RECORDS)\n",
     "test_one.py": "import pytest\ndef test_it():\n    pytest.skip('no disk')\n",
     "test_module.py": "import pytest\npytest.skip('no reason', allow_module_level=True)\n",
 }
 
 
-@pytest.mark.parametrize(("ci", "said"), [(True, "1 failed, 1 skipped, 1 error"), (False, "3 skipped")])
-def test_only_what_needs_launch_may_be_skipped_in_ci(tmp_path, ci, said):
+@pytest.mark.parametrize(("ci", "said"), [(True, "1 failed, 2 skipped, 1 error"), (False, "4 skipped")])
+def test_only_what_needs_launch_or_records_may_be_skipped_in_ci(tmp_path, ci, said):
     own = {name: Path(__file__).with_name(name).read_text() for name in ("conftest.py", "lengths.py", "skips.py")}
     for name, text in (own | CASES).items():
         (tmp_path / name).write_text(text)

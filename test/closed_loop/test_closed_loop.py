@@ -42,7 +42,7 @@ def prepared(seed, **config):
     return scenario, ego, ClosedLoop(scenario, ego, config=ClosedLoopConfig(**config))
 
 
-@settings(max_examples=EXAMPLES, deadline=None)
+@settings(max_examples=EXAMPLES)
 @given(st.integers(0, 10**9))
 @example(1092)  # two with the earliest clock may leave neither each other behind nor the next one
 @example(7114)
@@ -64,7 +64,7 @@ def test_others_never_meet_and_come_to_their_ends_whatever_the_ego_does(seed):
     raise AssertionError(f"clocks {state.clock} stand still at rates {state.rate}")
 
 
-@settings(max_examples=EXAMPLES, deadline=None)
+@settings(max_examples=EXAMPLES)
 @given(st.integers(0, 10**9), st.sampled_from(["replay", "reactive"]))
 def test_with_the_witness_as_ego_everyone_drives_as_certified(seed, policy):
     scenario, ego, loop = prepared(seed, policy=policy)
@@ -74,7 +74,7 @@ def test_with_the_witness_as_ego_everyone_drives_as_certified(seed, policy):
     assert verdict.collision is None and verdict.among_others == 0
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.floats(2.0, 20.0), st.floats(0.0, 9.0), st.floats(0.02, 40.0), st.sampled_from([0.05, 0.1]))
 def test_a_follower_stops_for_the_ego_where_braking_at_the_limit_suffices(speed, braking, spare, step):
     """The ego ahead brakes to a stand; the gap holds what the follower needs, less what the ego still drives, and 2 cm more."""
@@ -189,7 +189,7 @@ def test_an_unknown_ego_is_refused_with_those_there_are():
         certified(scenario, 5)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 10**6))
 def test_the_order_never_holds_back_who_is_last_and_only_ever_opens(seed):
     known = certified(draw_scenario(seed), 0)

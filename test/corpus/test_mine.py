@@ -17,7 +17,7 @@
 import json
 import os
 
-from hypothesis import given, settings, strategies
+from hypothesis import given, strategies
 import numpy as np
 import pytest
 
@@ -174,7 +174,6 @@ def straight(x, y, heading, speed, seconds=12.0):
     return Motion(place, np.full(len(time), heading), np.full(len(time), speed))
 
 
-@settings(deadline=None)
 @given(
     turned=strategies.floats(-3.0, 3.0),
     case=strategies.sampled_from(
@@ -193,7 +192,6 @@ def test_the_kind_depends_neither_on_the_direction_nor_on_the_order(turned, case
     assert kind_of(a, b, 0.1) == kind == kind_of(b, a, 0.1)
 
 
-@settings(deadline=None)
 @given(start=strategies.floats(-40.0, 40.0), turned=strategies.floats(0.0, 6.0), speed=strategies.floats(3.0, 20.0))
 def test_the_gap_is_the_least_of_all_pairs_of_samples(start, turned, speed):
     a, b = straight(0.0, 0.0, 0.0, 10.0), straight(start, 5.0, turned, speed)

@@ -21,8 +21,7 @@ from scenario_gen.errors import InputError
 from scenario_gen.evaluation import read_evaluations
 
 
-@pytest.mark.data
-@pytest.mark.parametrize("file", crash_files("result/*"))
+@pytest.mark.parametrize("file", crash_files("result/*"), indirect=True)
 def test_broken_figures_are_named(file):
     assert is_refused(lambda: read_evaluations(file), str(file))
 

@@ -52,7 +52,7 @@ def test_by_hand():
     assert dtw_distance([[0.0, 0.0]], [[3.0, 4.0]], "manhattan") == 7.0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(series(2), series(2), st.sampled_from(["euclidean", "manhattan"]), st.one_of(st.none(), st.integers(0, 5)))
 def test_distance_path_and_matrix_agree_with_a_naive_transcription(a, b, distance, band):
     expected = naive(a, b, {"manhattan": "cityblock"}.get(distance, distance), band)
@@ -86,7 +86,7 @@ def test_feature_matrix_by_hand_and_against_scipy():
         np.testing.assert_allclose(feature_matrix(a, b, ours), (cost - cost.min()) / np.ptp(cost), atol=1e-14)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(series(1), series(1))
 def test_headings_differ_by_the_wrapped_angle(a, b):
     away = np.abs(np.angle(np.exp(1j * (a - b.T))))

@@ -52,7 +52,7 @@ def test_footprint_distance_by_hand():
     )  # a cross, no corner inside
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(st.floats(-8, 8), min_size=2, max_size=2), st.floats(-4, 4), st.floats(-4, 4))
 def test_footprint_distance_equals_shapely(xy, yaw_a, yaw_b):
     motion = still([(0, 0), xy], (yaw_a, yaw_b), ((5, 2), (4, 1.7)))
@@ -75,7 +75,7 @@ def test_time_to_collision_by_hand():
     assert time_to_collision(still([(0, 0), (1, 0)], (0, 0)), 0, 1) == 0.0  # they overlap now
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(*[st.tuples(st.floats(-b, b), st.floats(-b, b)) for b in (20, 3)], st.tuples(st.floats(0.5, 12), st.floats(0.5, 12)))
 def test_footprints_touch_at_the_time_to_collision(place, yaws, speeds):
     motion = still([(0, 0), place], yaws, speed=speeds)

@@ -35,7 +35,7 @@ def cost_of(series, places):
     return total
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 10_000), st.integers(1, 2))
 def test_no_other_pieces_fit_better(seed, count):
     series = np.random.default_rng(seed).normal(size=(2, 16)).cumsum(axis=1)

@@ -83,7 +83,7 @@ def relative(pose, other):
 @pytest.fixture(scope="module")
 def recorded(data):
     assert len(SOME_ENCOUNTERS) >= 3
-    return {path.stem: read_log(path).encounters[0] for path in SOME_ENCOUNTERS}
+    return {name: read_log(data / "trajectories" / name).encounters[0] for name in SOME_ENCOUNTERS}
 
 
 @pytest.mark.data

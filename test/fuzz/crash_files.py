@@ -12,8 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Files that once broke a reader, as parameters of tests; where they are missing the test skips and says so."""
+"""Files that break a reader, as parameters of tests: those that are made, and those that were found, where they are."""
 
+from fnmatch import fnmatch
+from pathlib import Path
+
+import broken
 from harness import CRASHES
 import pytest
 
@@ -21,10 +25,14 @@ from scenario_gen.errors import InputError, LONGEST
 
 
 def crash_files(*patterns: str) -> list:
-    """Return one parameter per file; one that skips where there is none."""
+    """Return one parameter of the fixture `file` for each file that is made, and for each that was found, marked `recorded`."""
+    made = [Path(name) for name in broken.FILES if any(fnmatch(name, pattern) for pattern in patterns)]
     found = sorted(file for pattern in patterns for file in CRASHES.glob(pattern) if file.is_file())
-    missing = pytest.mark.skip(reason=f"no files that broke a reader at {CRASHES}: {', '.join(patterns)}")
-    return [pytest.param(file, id=file.name) for file in found] or [pytest.param(None, marks=missing)]
+    assert made, patterns
+    return [
+        *(pytest.param(file, id=f"made {file}") for file in made),
+        *(pytest.param(file, id=file.name, marks=pytest.mark.recorded) for file in found),
+    ]
 
 
 def is_refused(read, *said: str) -> bool:

@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 import contextlib
 from dataclasses import asdict, dataclass, field
 import faulthandler
+from fnmatch import fnmatch
 import gc
 import importlib
 import json
@@ -116,12 +117,20 @@ def targets() -> dict[str, Target]:
     return {target.name: target for module in modules for target in module.TARGETS}
 
 
-def corpus(target: Target) -> list[bytes]:
-    """Return the valid inputs of a target and the files that once broke it."""
+def corpus(target: Target, *, found: bool = True) -> list[bytes]:
+    """Return the valid inputs of a target, files made with faults that once broke it, and if asked for those found."""
+    import broken
+
     with tempfile.TemporaryDirectory() as folder:
         seeds = list(target.seeds(Path(folder)))
+    seeds += [make() for name, make in broken.FILES.items() if any(fnmatch(name, pattern) for pattern in target.crashes)]
+    return seeds + (found_crashes(target) if found else [])
+
+
+def found_crashes(target: Target) -> list[bytes]:
+    """Return the files that once broke a target, where they are."""
     files = sorted(file for pattern in target.crashes for file in CRASHES.glob(pattern) if file.is_file())
-    return seeds + [file.read_bytes() for file in files]
+    return [file.read_bytes() for file in files]
 
 
 def damaged(target: Target, seeds: Sequence[bytes], number: int) -> bytes:

@@ -17,10 +17,11 @@
 from pathlib import Path
 import sys
 
-from harness import corpus, execute, fuzz, targets
+from harness import corpus, CRASHES, execute, found_crashes, fuzz, targets
 from lengths import LONG
 import pytest
 from readers import OF_TARGETS, OWN, PACKAGES, parsing_modules
+from skips import NO_RECORDS
 
 from scenario_gen.logs.read import ACCEPTS
 
@@ -31,7 +32,7 @@ DAMAGED = 400 if LONG else 4
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_nothing_but_errors_of_ours_comes_out(name, tmp_path):
-    seeds = corpus(TARGETS[name])
+    seeds = corpus(TARGETS[name], found=False)
     executions = len(seeds) + DAMAGED
     record = fuzz(TARGETS[name], tmp_path, executions, seconds=600.0, seeds=seeds)
     assert record.executions == executions
@@ -66,3 +67,14 @@ def test_every_module_that_parses_a_file_is_reached_by_a_target():
 def test_every_format_of_logs_has_a_target():
     named = {"bag": "mcap_log", "commonroad": "commonroad_log"}
     assert {named.get(name, name) for name in ACCEPTS} <= set(TARGETS)
+
+
+@pytest.mark.recorded
+@pytest.mark.parametrize("name", [name for name, target in TARGETS.items() if target.crashes])
+def test_what_once_broke_a_reader_does_so_no_more(name, tmp_path):
+    seeds = found_crashes(TARGETS[name])
+    if not seeds:
+        pytest.skip(f"{NO_RECORDS}: {CRASHES}")
+    record = fuzz(TARGETS[name], tmp_path, len(seeds), seconds=600.0, seeds=seeds)
+    assert record.executions == len(seeds)
+    assert not record.failures, "\n".join(f"{f.signature}: {f.message}" for f in record.failures.values())

@@ -179,7 +179,7 @@ def test_strict_refuses_to_repair(tmp_path):
     repeated=st.floats(0.0, 0.3),
     outliers=st.integers(0, 10),
 )
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], derandomize=True)
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_whatever_the_damage_no_nan_leaves(tmp_path, seed, noise, lost, repeated, outliers):
     """Noise, losses, repeats, jitter, outliers and disorder: finite encounters near the truth, or a refusal."""
     rng = np.random.Generator(np.random.PCG64(seed))
@@ -194,7 +194,9 @@ def test_whatever_the_damage_no_nan_leaves(tmp_path, seed, noise, lost, repeated
     try:
         result = read_log(save(rows, tmp_path))
     except InputError:
-        assert lost > 0.3  # a gap above a second
+        good = rows.drop(rows.index[where])
+        longest = max(np.diff(np.sort(own)).max() for _, own in good.groupby("vehicle_id")["t_s"])
+        assert longest > 0.8  # a gap above a second is cut; beside it a noisy fix on either side may go, 0.1 s each
         return
     for encounter in result.encounters:
         assert np.isfinite(encounter.position).all() and (encounter.speed >= 0.0).all()

@@ -69,7 +69,7 @@ def test_between_samples_the_acceleration_is_constant():
 
 
 @given(seed=st.integers(0, 10_000), radius=st.floats(8.0, 200.0), noise=st.floats(0.0, 0.4))
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 def test_a_path_through_noisy_points_of_an_arc(seed, radius, noise):
     rng = np.random.Generator(np.random.PCG64(seed))
     along = np.linspace(0.0, min(60.0, 4.0 * radius), 120)

@@ -12,25 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Every recorded file reads without options, and what comes out is a drive that a car can do."""
+"""Every file, recorded or made as hard, reads without options, and what comes out is a drive that a car can do."""
 
+from lengths import VEHICLES
 import numpy as np
+import pandas as pd
 import pytest
 
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.template.interaction import find_waits
-
-VEHICLES = {
-    "cats_av_lane_change/encounter_3plus_lane_change_four_vehicles_utc36110.csv": 4,
-    "cats_av_lane_change/encounter_c_opposite_v2_v4_utc35195.csv": 2,
-    "ngsim_commonroad/encounter_3plus_two_left_turners_one_opposite_Lanker-2_13.csv": 3,
-    "ngsim_commonroad/encounter_a_cross_one_stops_Lanker-2_15_21202_21260.csv": 2,
-    "ngsim_commonroad/encounter_b_left_turn_vs_opposite_Lanker-2_13_2839_21019.csv": 2,
-    "ngsim_commonroad/encounter_c_opposite_stop_go_Peach-4_2_134_334.csv": 2,
-    "openacc_zalazone/encounter_3plus_platoon4_openacc_no_ACC_handling_part22_60-100s.csv": 4,
-    "psu_2obu/encounter_c_opposite_approach_then_stop_meet_300-340s.csv": 2,
-    "psu_2obu/encounter_following_follow_230-270s.csv": 2,
-}
 
 
 def test_the_list_is_complete(data):
@@ -38,7 +28,7 @@ def test_the_list_is_complete(data):
     assert found == set(VEHICLES)
 
 
-@pytest.fixture(params=VEHICLES, ids=lambda name: name.partition("/")[2][:30])
+@pytest.fixture(scope="module", params=VEHICLES, ids=lambda name: name.partition("/")[2][:30])
 def one(request, data):
     return request.param, read_log(data / "trajectories" / request.param)
 
@@ -108,10 +98,12 @@ def test_who_waits_in_the_record_waits_in_the_encounter(data):
 
 def test_sizes_and_frame_of_ngsim_are_kept(data):
     name = next(name for name in VEHICLES if "left_turn_vs" in name)
-    encounter = read_log(data / "trajectories" / name).encounters[0]
+    path = data / "trajectories" / name
+    encounter = read_log(path).encounters[0]
+    first = pd.read_csv(path).query("vehicle_id == 2839").iloc[0]
     assert (encounter.vehicles[0].length, encounter.vehicles[0].width) == (3.81, 1.9812)
     assert encounter.origin is None
-    assert np.linalg.norm(encounter.position[0, 0] - [11.0857, -4.9679]) < 0.3
+    assert np.linalg.norm(encounter.position[0, 0] - first[["x_m", "y_m"]].astype(float)) < 0.3
 
 
 def test_jittering_vehicles_have_steady_headings(data):

@@ -17,7 +17,7 @@
 from dataclasses import replace
 import json
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -50,7 +50,6 @@ def presences(draw):
 
 
 @given(presences())
-@settings(deadline=None)
 def test_a_scenario_comes_back_from_its_messages(present):
     before = scenario(present)
     _, after = decode_scenario(encode_scenario(before, 5), seed=4, index=7)
@@ -61,7 +60,6 @@ def test_a_scenario_comes_back_from_its_messages(present):
 
 
 @given(presences())
-@settings(deadline=None)
 def test_who_takes_every_message_for_itself_sees_each_vehicle_where_it_is_and_nobody_else(present):
     """A consumer that knows the standard type and nothing of presence."""
     made = scenario(present)
@@ -123,7 +121,6 @@ def test_the_entry_says_who_is_there_when_and_which_messages_are_the_scenario():
 
 
 @given(st.permutations(range(4)))
-@settings(deadline=None)
 def test_a_scenario_is_whole_in_whatever_order_its_messages_and_its_entry_come(order):
     made = scenario([(0, 40), (5, 30), (0, 12)])
     data = encode_scenario(made, 5)

@@ -52,14 +52,14 @@ from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario
 
 
 @given(seeds, st.integers(2, 5), st.integers(2, 60))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_tracks(seed, n, t):
     sent = encounter(seed, n, t)
     assert_same(sent, tracks.decode_tracks(tracks.encode_tracks(sent)), *(f for f in sent.__dataclass_fields__))
 
 
 @given(seeds, st.integers(1, 5), st.integers(2, 60))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_scenario(seed, n, t):
     sent = scenario(seed, n, t)
     stamp, got = scenarios.decode_scenario(scenarios.encode_scenario(sent, 12_345_678_901), seed=sent.seed, index=sent.index)
@@ -68,7 +68,7 @@ def test_scenario(seed, n, t):
 
 
 @given(st.floats(-40.0, 40.0))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_every_canonical_heading_survives(angle):
     for value in (angle, *NASTY_HEADINGS):
         for turns in (0, 1, -3):
@@ -80,7 +80,7 @@ def test_every_canonical_heading_survives(angle):
 
 
 @given(seeds, st.integers(0, 3))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_changepoints_and_posterior(seed, k):
     template, sent = encounter(seed), segmentation(seed, k=k)
     got = changepoints.decode_changepoints(changepoints.encode_changepoints(template, sent), template)
@@ -91,7 +91,7 @@ def test_changepoints_and_posterior(seed, k):
 
 
 @given(seeds, st.integers(1, 30), st.integers(1, 30), st.integers(0, 4))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_road(seed, height, width, ways):
     rng = generator(seed)
     drivable = rng.random((height, width)) < 0.5
@@ -107,7 +107,7 @@ def test_road(seed, height, width, ways):
 
 
 @given(seeds, st.integers(1, 4))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_lanes(seed, count):
     rng = generator(seed)
     own = []
@@ -154,7 +154,7 @@ def test_unknown_cells_are_not_drivable():
 
 
 @given(seeds, st.sampled_from(["map", "m", "longer_frame"]))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_route(seed, frame):
     sent = route(seed)
     anchors = [5_000_000_000, 6_100_000_000, 7_000_000_000, 7_000_000_001, 9_000_000_000]
@@ -316,7 +316,7 @@ def test_a_bare_joint_name_is_a_default_car():
 
 
 @given(st.data())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_damaged_messages_are_refused_with_a_reason(data):
     """Cut off or overwritten anywhere, a message is decoded or refused by name; it never crashes."""
     template, parts = encounter(4, 2, 9), segmentation(4, 9, 2)

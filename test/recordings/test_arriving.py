@@ -14,7 +14,7 @@
 
 """Live scenarios are whole in whatever order their messages come, and only then."""
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from message_examples import scenario
 import numpy as np
@@ -50,7 +50,6 @@ def set_of(count):
 MADE, MESSAGES = set_of(2)
 
 
-@settings(deadline=None)  # the first call decodes what later ones find decoded
 @given(st.permutations(range(len(MESSAGES))))
 def test_whatever_comes_first(order):
     arriving = ArrivingScenarios()

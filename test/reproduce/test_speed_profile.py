@@ -48,7 +48,7 @@ def test_own_lengths_give_the_template_back_where_changepoints_sit_at_its_bends(
     assert np.abs(profile.state(TIME)[1] - dip()).max() < 0.8
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.floats(0.85, 1.15), min_size=4, max_size=4), st.floats(0.0, 9.0), st.floats(8.0, 11.0))
 def test_lengths_ends_and_limits_hold(factors, depth, first):
     template, config = dip(depth), SamplingConfig()

@@ -22,8 +22,7 @@ import pytest
 from scenario_gen.roads import build_road
 
 
-@pytest.mark.data
-@pytest.mark.parametrize("file", crash_files("map/*.yaml", "*.yaml"))
+@pytest.mark.parametrize("file", crash_files("map/*.yaml", "*.yaml"), indirect=True)
 def test_a_broken_map_is_named(file, tmp_path):
     shutil.copy(file, tmp_path / file.name)
     for image in (*file.parent.glob(f"{file.stem}__*"), *file.parent.glob("b?.png")):

@@ -174,7 +174,7 @@ def test_the_common_component_is_one_that_both_ends_reach():
     assert common_component(narrow, np.array([1.5, 0.5]), np.array([7.5, 0.5]), 0.6) is None
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1), yaw=st.floats(-3.2, 3.2))
 def test_repair_finds_the_nearest_pose(seed, yaw):
     rng = np.random.default_rng(seed)

@@ -39,7 +39,7 @@ def test_bad_text_is_refused_by_name(text):
         RoadConfig(obstacles=text)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     x=st.floats(0, 20), y=st.floats(0, 10), yaw=st.floats(-7, 7), length=st.floats(0.3, 8), width=st.floats(0.3, 3)
 )  # fmt: skip

@@ -27,7 +27,7 @@ def anywhere(_):
     return True
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     turn=st.floats(0.2, 2.6).flatmap(lambda t: st.sampled_from((t, -t))),
     before=st.floats(60.0, 120.0),

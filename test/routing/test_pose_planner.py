@@ -79,7 +79,6 @@ def footprint(at, size=CAR):
     return affinity.translate(shape, at[0], at[1])
 
 
-@settings(deadline=None)
 @given(pose, pose, st.floats(0.3, 5.0))
 def test_a_dubins_curve_ends_where_it_should(start, end, radius):
     out = np.empty(7)
@@ -98,7 +97,7 @@ def test_a_dubins_curve_is_as_long_driven_backwards():
         np.testing.assert_allclose(back[1:4].sum(), there[1:4].sum(), atol=1e-6)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1))
 def test_what_is_swept_is_free_exactly(seed):
     rng = np.random.default_rng(seed)
@@ -202,7 +201,6 @@ def test_where_smoothing_fails_a_gentler_way_is_searched_for(monkeypatch):
         route_on(case.road, *ends)
 
 
-@settings(deadline=None)
 @given(st.lists(point, min_size=1, max_size=6), st.lists(point, min_size=2, max_size=6))
 def test_distances_to_a_line_are_those_of_shapely(points, line):
     found = distances_to_line(np.array(points), np.array(line))

@@ -159,7 +159,7 @@ def test_anchors_too_close_or_behind_make_no_loops():
     assert np.abs(np.diff(route.points[:, 2])).sum() < 0.5
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_noisy_anchors_give_a_drivable_route_or_a_reason(seed):
     rng = np.random.default_rng(seed)

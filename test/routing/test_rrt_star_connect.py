@@ -75,7 +75,7 @@ def test_the_rasteriser_sees_what_enters():
     assert enters_blocked(drivable, np.array([[3.5, 3.5], [4.5, 3.5]]))  # leaves the grid
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(seed=st.integers(0, 2**32 - 1), density=st.floats(0.02, 0.35))
 def test_cost_is_near_the_optimum_and_never_below(seed, density):
     rng = np.random.default_rng(seed)

@@ -77,7 +77,7 @@ def test_each_freedom_has_its_monotone_effect(name, measure):
     assert found[0] == pytest.approx(0.0, abs=1e-9)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3),
     st.booleans(),
@@ -146,7 +146,7 @@ def test_sizes_are_those_of_the_catalogue():
     }
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(2.0, 20.0), st.floats(-5.0, 4.0), st.floats(-0.15, 0.15), st.sampled_from([-1.0, 1.0]))
 def test_who_drives_on_does_so_smoothly(speed, acceleration, bend, sign):
     state = np.array([[3.0, -2.0, 0.7, speed, acceleration]])

@@ -63,7 +63,7 @@ def test_agrees_with_dense_reference(n, m):
     assert np.abs(posterior.covariance - cov).max() < 1e-10
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(n=st.integers(6, 20), ratio=st.floats(0.5, 20.0), noise=st.floats(0.05, 2.0), degree=st.integers(-1, 3))
 def test_agrees_with_dense_reference_everywhere(n, ratio, noise, degree):
     x, y = data(n, 100.0, n)

@@ -168,7 +168,7 @@ def test_the_kernel_is_that_of_a_derivative():
     assert root @ root.T == pytest.approx(0.09 * (1.0 - (d / 1.2) ** 2) * np.exp(-0.5 * (d / 1.2) ** 2), abs=1e-6)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(1.0, 1.8), st.floats(2.0, 17.0), st.floats(0.3, 3.0))
 def test_the_clock_is_slow_where_it_must_be_and_known_before(need, at, width):
     grid = np.linspace(0.0, 20.0, 201)

@@ -24,8 +24,7 @@ from scenario_gen.errors import InputError
 from scenario_gen.segmentation import PrimitiveLibrary
 
 
-@pytest.mark.data
-@pytest.mark.parametrize("file", crash_files("library/*"))
+@pytest.mark.parametrize("file", crash_files("library/*"), indirect=True)
 def test_a_broken_library_is_named(file):
     assert is_refused(lambda: PrimitiveLibrary.load(file), str(file))
 

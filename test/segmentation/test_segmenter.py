@@ -68,7 +68,7 @@ def test_too_short(encounter_of):
         segment(encounter_of(np.ones((2, 3))))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(10, 120), st.integers(2, 4), st.integers(0, 10_000), st.sampled_from([0.1, 0.5, 2.0]))
 def test_rules_of_the_result(encounter_of, samples, vehicles, seed, rate):
     rng = np.random.default_rng(seed)

@@ -98,7 +98,7 @@ def test_refuses_what_it_cannot_use(bad):
         segment_series(bad)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(4, 40), st.integers(1, 8), st.integers(0, 1000), st.sampled_from(["gaussian", "autoregressive"]))
 def test_never_nan_and_always_consistent(samples, dimensions, seed, emission):
     rng = np.random.default_rng(seed)

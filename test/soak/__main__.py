@@ -31,7 +31,7 @@ from figures import Figure
 from rich.console import Console
 from rich.table import Table
 
-PARTS = ("cpu", "cuts", "fuzz", "kills", "long", "ros", "tests")
+PARTS = ("cpu", "cuts", "fuzz", "kills", "long", "properties", "recorded", "ros", "tests")
 OUT = Path("out/soak")
 
 

@@ -27,11 +27,12 @@ from figures import Figure
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def run_file(state: Path, name: str) -> tuple[str, bool, float]:
-    """Run one test file; its output stays in `state`. Return its name, whether it passes, and the seconds of CPU it took."""
+def run_file(state: Path, name: str, *words: str, **variables: str) -> tuple[str, bool, float]:
+    """Run one test file, its output into `state`; return its name, whether it passes, and the seconds of CPU it took."""
     with (state / f"{name.replace('/', '.')}.log").open("w") as log:
-        environment = os.environ | {"SCENARIO_GEN_TESTS": "long"}
-        process = subprocess.Popen([sys.executable, "-m", "pytest", name], cwd=ROOT, env=environment, stdout=log, stderr=log)
+        environment = os.environ | {"SCENARIO_GEN_TESTS": "long"} | variables
+        command = [sys.executable, "-m", "pytest", name, *words]
+        process = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=log, stderr=log)
         _, status, used = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
     # 5: nothing of it can run here, as test/launch without `launch`

@@ -40,8 +40,7 @@ from scenario_gen.storage.writer import BagWriter
 MCAP = ("mcap_reader/*", "validate/*", "reindex/*", "reindex_*", "mcap_zstd*", "reindex_truncated_struct_error/*")
 
 
-@pytest.mark.data
-@pytest.mark.parametrize("file", crash_files(*MCAP))
+@pytest.mark.parametrize("file", crash_files(*MCAP), indirect=True)
 @pytest.mark.parametrize(
     "read", [bag_topics, lambda path: list(read_messages(path)), validate_bag], ids=["topics", "messages", "validate"]
 )
@@ -49,14 +48,12 @@ def test_a_broken_mcap_file_is_named(file, read):
     is_refused(lambda: read(file), str(file))
 
 
-@pytest.mark.data
-@pytest.mark.parametrize("file", crash_files("sqlite/*"))
+@pytest.mark.parametrize("file", crash_files("sqlite/*"), indirect=True)
 def test_a_broken_sqlite_file_is_named(file):
     is_refused(lambda: list(read_messages(file)), str(file))
 
 
-@pytest.mark.data
-@pytest.mark.parametrize("file", crash_files(*MCAP))
+@pytest.mark.parametrize("file", crash_files(*MCAP), indirect=True)
 def test_reindex_saves_what_is_whole(file, tmp_path):
     if is_refused(lambda: reindex(file, tmp_path / "saved"), str(file)):
         assert not (tmp_path / "saved").exists()
@@ -65,8 +62,7 @@ def test_reindex_saves_what_is_whole(file, tmp_path):
         assert stamps and stamps == sorted(stamps)
 
 
-@pytest.mark.data
-@pytest.mark.parametrize("file", crash_files("meta/*"))
+@pytest.mark.parametrize("file", crash_files("meta/*"), indirect=True)
 def test_damaged_metadata_points_to_reindex(file, tmp_path):
     bag = write_recording(tmp_path / "bag", hand_made_run())
     for name in ("streams_b_0.mcap", "synthetic_b.mcap"):

@@ -47,7 +47,7 @@ def arc(x0, y0, yaw, radius, speed, t=100):
     return np.column_stack((x0 + radius * (np.sin(a) - np.sin(yaw)), y0 - radius * (np.cos(a) - np.cos(yaw)), a))
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.floats(6.0, 200.0), st.sampled_from([-1.0, 1.0]), st.floats(-3.0, 3.0), st.floats(2.0, 60.0), st.floats(-4.0, 4.0))
 def test_projection_undoes_placing_beside_a_curve(radius, sign, yaw, length, offset):
     s = np.linspace(0.0, min(length, 4.0 * radius), 400)
@@ -149,7 +149,7 @@ def test_turns_and_crossings_are_not_along_a_road():
         to_frenet(clean_tracks(encounter_of(line(0.0, 0.0, 0.0, 8.0), line(30.0, -30.0, np.pi / 2.0, 5.0))))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0), st.floats(-3.14, 3.14), st.floats(-3.14, 3.14))
 def test_footprint_gap_has_the_sign_of_shapely(x, y, yaw_a, yaw_b):
     shapely = pytest.importorskip("shapely")

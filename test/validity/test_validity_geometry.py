@@ -178,7 +178,7 @@ def compare(seed):
     return answer.valid
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_checker_and_oracle_agree_on_random_scenarios(seed):
     compare(seed)
@@ -189,7 +189,7 @@ def test_the_random_scenarios_are_neither_all_valid_nor_all_refused():
     assert 6 <= valid <= 54
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_standing_footprint_is_compared_with_the_cells_exactly(seed):
     rng = np.random.default_rng(seed)
@@ -208,7 +208,7 @@ def test_a_standing_footprint_is_compared_with_the_cells_exactly(seed):
         assert area.covers(smaller)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_two_turning_cars_agree_with_the_oracle_near_contact(seed):
     """Arcs that graze each other: the pair is shifted until the smallest gap the oracle sees is a centimetre."""

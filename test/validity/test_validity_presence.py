@@ -127,7 +127,7 @@ def overlaps(scenario, limits):
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=1000 if LONG else 40, deadline=None)
+@settings(max_examples=1000 if LONG else 40)
 def test_checker_and_oracle_agree_on_who_comes_and_goes(seed):
     compare(seed)
 
@@ -139,7 +139,7 @@ def test_the_random_cases_are_of_every_kind():
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_each_vehicle_is_checked_as_if_cut_out(seed):
     """Road and dynamics of every vehicle are those of a scenario of its own."""
     rng = np.random.Generator(np.random.PCG64(seed))

@@ -1,0 +1,49 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The tests marked `recorded`: what the tests check on data that they make themselves, on data that was recorded."""
+
+from collections.abc import Iterator
+from pathlib import Path
+import subprocess
+import sys
+
+from figures import Figure
+from lengths import DATA
+from tests import ROOT, run_file
+
+
+def files() -> list[str]:
+    """Return the test files that have such tests."""
+    command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-m", "recorded"]
+    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    return sorted({line.partition("::")[0].partition(": ")[0] for line in said.splitlines() if line.startswith("test/")})
+
+
+def run(state: Path) -> Iterator[Figure]:
+    """Run them file by file; those that have passed are not run again."""
+    if not DATA.is_dir():
+        yield Figure("recorded data: every test marked `recorded`", "recorded data", f"none at {DATA}", met=False)
+        return
+    failed = []
+    chosen = files()
+    for name in chosen:
+        passed = state / f"{name.replace('/', '.')}.passed"
+        if not passed.exists():
+            if run_file(state, name, "-m", "recorded")[1]:
+                passed.touch()
+            else:
+                failed.append(name)
+    seen = f"{len(chosen) - len(failed)} of {len(chosen)}" + (f"; not {', '.join(failed)}" if failed else "")
+    yield Figure("recorded data: every test marked `recorded`", f"{len(chosen)} files", seen, not failed)

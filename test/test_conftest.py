@@ -1,0 +1,78 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What conftest.py does to items it does to those of other plugins, too: launch_testing's, ament's linters'."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+STAND_IN = """
+import pytest
+
+
+class Item(pytest.Item):
+    def runtest(self):
+        self.add_marker("launch_test")
+
+
+class Module(pytest.File):
+    def collect(self):
+        yield Item.from_parent(self, name=self.path.stem)
+
+
+class Linter(pytest.Item):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        self.add_marker("linter")
+
+    def runtest(self):
+        pass
+
+
+class Linted(pytest.File):
+    def collect(self):
+        yield Linter.from_parent(self, name="lint")
+
+
+def pytest_pycollect_makemodule(module_path, parent):
+    if "launch" in module_path.name:
+        return Module.from_parent(parent, path=module_path)
+
+
+def pytest_collect_file(file_path, parent):
+    if file_path.suffix == ".xml":
+        return Linted.from_parent(parent, path=file_path)
+"""
+
+
+@pytest.mark.parametrize("words", [(), ("-n", "2", "--dist", "loadgroup")], ids=["alone", "two workers"])
+def test_items_of_other_plugins_need_no_fixture_names(tmp_path, words):
+    for name in ("conftest.py", "lengths.py", "skips.py"):
+        (tmp_path / name).write_text(Path(__file__).with_name(name).read_text())
+    (tmp_path / "stand_in.py").write_text(STAND_IN)
+    (tmp_path / "test_launch.py").write_text("def generate_test_description(): ...\n")
+    (tmp_path / "package.xml").write_text("<package/>\n")
+    (tmp_path / "test_plain.py").write_text("def test_it(tmp_path): ...\n")
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n  launch_test\n  linter\n  recorded\n  spread\n  long\n")
+    command = [sys.executable, "-m", "pytest", "-p", "stand_in", "-p", "no:cacheprovider", *words, str(tmp_path)]
+    variables = {name: value for name, value in os.environ.items() if name != "PYTEST_ADDOPTS"}
+    path = os.pathsep.join([str(tmp_path), variables.get("PYTHONPATH", "")])
+    run = subprocess.run(
+        command, cwd=tmp_path, env=variables | {"PYTHONPATH": path, "CI": "true"}, capture_output=True, text=True, check=False
+    )
+    assert "3 passed" in run.stdout and run.returncode == 0, run.stdout + run.stderr

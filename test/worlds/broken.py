@@ -1,0 +1,397 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Files with the faults that once broke a reader, each made here from a small good one; laid out as the folder of those found.
+
+A name says by whose reader it is read (its folder) and what is wrong; none of them is what was found.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from io import BytesIO
+import json
+from pathlib import Path
+import sqlite3
+import struct
+import tempfile
+import zlib
+
+from bag_examples import hand_made_run
+from cut_bags import small_bag
+from log_builders import crossing, geographic
+from mcap.writer import CompressionType, Writer
+import numpy as np
+import pandas as pd
+from PIL import Image
+import pyarrow as pa
+from pyarrow import parquet
+
+from scenario_gen.recordings.write import write_recording
+from scenario_gen.segmentation import PrimitiveLibrary
+
+Make = Callable[[], bytes]
+LONG = "a" * 20_000
+NUMBER = "9" * 5000
+"""More digits than Python turns into a number."""
+
+
+def at(document: object, path: str, value: object) -> bytes:
+    """JSON with one value changed; `path` has keys and indices with dots between."""
+    changed = json.loads(json.dumps(document))
+    *way, last = [int(key) if key.isdigit() else key for key in path.split(".")]
+    inner = changed
+    for key in way:
+        inner = inner[key]
+    inner[last] = value
+    return json.dumps(changed).encode()
+
+
+@cache
+def library() -> dict[str, object]:
+    """The document of a small library of primitives."""
+    eyes, half = np.stack([np.eye(6)] * 2), np.full((2, 2), 0.5)
+    made = PrimitiveLibrary(2, np.zeros((2, 6)), eyes, half, [0.5, 0.5], [3, 4], [1.0, 2.0], 0.5, [1, 2, 0.2, 0.4], ("a", "b"))
+    with tempfile.TemporaryDirectory() as folder:
+        made.save(Path(folder) / "library.json")
+        return json.loads((Path(folder) / "library.json").read_text())
+
+
+LIBRARY = {
+    "a_window_is_missing": ("windows", [1, 2, 0.2]),
+    "windows_are_none": ("windows", [float("nan")] * 4),
+    "a_window_is_endless": ("windows.0", float("inf")),
+    "a_window_is_no_number": ("windows.1", float("nan")),
+    "a_mean_is_text": ("means.0.0", "1"),
+    "means_are_empty": ("means", []),
+    "means_of_one_number": ("means", [[1.0, 2.0], [3.0, 4.0]]),
+    "a_mean_of_too_many_digits": ("means.0.0", 10**400),
+    "covariances_of_another_size": ("covariances", [[[1.0]], [[1.0]]]),
+    "a_covariance_is_a_number": ("covariances.0", 1.0),
+    "not_positive_definite": ("covariances.0.0.0", -1.0),
+    "transition_of_one": ("transition", [[1.0, 0.0]]),
+    "transition_is_a_number": ("transition", 3),
+    "initial_of_three": ("initial", [0.2, 0.3, 0.5]),
+    "segments_beyond_64_bits": ("segments.0", 2**70),
+    "a_weight_in_a_list": ("weight", [0.5]),
+    "vehicles_are_text": ("vehicles", "2"),
+    "a_description_is_missing": ("descriptions", ["a"]),
+}
+CASE = {"name": "n", "road": "r", "rows": [{"name": "with", "figures": {"e_speed": [0.1, 0.0, 0.2]}}]}
+RESULT = {
+    "cases_is_no_number": b'{"cases": NaN}',
+    "cases_is_a_number": b'{"cases": 1.5}',
+    "a_case_is_a_number": b'{"cases": [7]}',
+    "rows_are_a_number": at({"cases": [CASE]}, "cases.0.rows", 3),
+    "a_name_is_a_list": at({"cases": [CASE]}, "cases.0.name", []),
+    "a_figure_is_an_object": at({"cases": [CASE]}, "cases.0.rows.0.figures.e_speed", {"x": 1}),
+    "a_figure_is_text": at({"cases": [CASE]}, "cases.0.rows.0.figures.e_speed", "x"),
+    "a_figure_of_too_many_digits": at({"cases": [CASE]}, "cases.0.rows.0.figures.e_speed", 10**400),
+    "figures_are_a_number": at({"cases": [CASE]}, "cases.0.rows.0.figures", 1),
+    "too_deep": b"[" * 100_000,
+}
+YAML = {
+    "an_integer_of_nothing": '!!int ""',
+    "a_number_of_nothing": '!!float ""',
+    "a_number_of_letters": "!!float x",
+    "a_truth_of_letters": "!!bool x",
+    "no_month": "2026-13-45",
+    "a_time_of_letters": "!!timestamp x",
+    "too_many_digits": NUMBER,
+    "a_long_word": LONG,
+}
+"""Values that a reader of YAML stumbles over."""
+
+
+def image(kind: str, size: tuple[int, int] = (40, 40)) -> bytes:
+    """A picture, all free."""
+    out = BytesIO()
+    Image.new("L", size, 254).save(out, kind)
+    return out.getvalue()
+
+
+def bomb(width: int, height: int) -> bytes:
+    """A PNG of a few bytes that says it is so large, of one bit each."""
+
+    def chunk(name: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+    head = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 1, 0, 0, 0, 0))
+    return b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", zlib.compress(b"\0" * 1000)) + chunk(b"IEND", b"")
+
+
+def nav2(picture: str, **facts: str) -> bytes:
+    """A map's facts."""
+    given = {"image": picture, "resolution": "0.2", "origin": "[0, 0, 0]", "negate": "0", "occupied_thresh": "0.65"}
+    return "".join(f"{key}: {value}\n" for key, value in (given | {"free_thresh": "0.25"} | facts).items()).encode()
+
+
+ALIASES = "a0: &a0 [1,1,1,1,1,1,1,1,1]\n" + "".join(f"a{k}: &a{k} [{','.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 8))
+IMAGES = {
+    "a_cut_png": ("m.png", lambda: image("png")[:-30]),
+    "a_png_of_wrong_chunks": ("m.png", lambda: image("png").replace(b"IDAT", b"\0\0IE")),
+    "a_huge_png": ("m.png", lambda: bomb(600_000, 500_000)),
+    "a_dds_of_no_format": ("m.dds", lambda: b"DDS " + struct.pack("<7I", 124, 0x1007, 4, 4, 0, 0, 0) + bytes(96)),
+    "a_qoi_of_nothing": ("m.qoi", lambda: b"qoif" + struct.pack(">IIBB", 500_000, 500_000, 3, 0)),
+    "a_cut_pgm": ("m.pgm", lambda: b"P5 40 40 255\n" + bytes(100)),
+    "a_pgm_of_letters": ("m.pgm", lambda: b"P2 4 x 255\n"),
+    "text": ("m.png", lambda: b"no picture at all"),
+    "an_empty_file": ("m.webp", bytes),
+}
+
+
+def mcap(compression: CompressionType = CompressionType.NONE) -> bytes:
+    """A small bag of several chunks by the mcap library."""
+    out = BytesIO()
+    writer = Writer(out, chunk_size=300, compression=compression)
+    writer.start("ros2")
+    schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+    channel = writer.register_channel("/a", "cdr", schema)
+    for k in range(40):
+        writer.add_message(channel, 1000 + k, b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00" + bytes([k]), 1000 + k)
+    writer.finish()
+    return out.getvalue()
+
+
+def at_record(data: bytes, opcode: int, offset: int, value: bytes) -> bytes:
+    """The same bytes with others at an offset from the beginning of the first record of a kind."""
+    place = 8
+    while data[place] != opcode:
+        place += 9 + int.from_bytes(data[place + 1 : place + 9], "little")
+    return data[: place + offset] + value + data[place + offset + len(value) :]
+
+
+HUGE, BEYOND = (2**40).to_bytes(8, "little"), (2**64 - 1).to_bytes(8, "little")
+ZSTD, LZ4, PLAIN = CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE
+CHUNK, INDEX, SCHEMA, STATISTICS = 0x06, 0x08, 0x03, 0x0B
+MCAP: dict[str, Make] = {
+    "a_chunk_of_a_terabyte": lambda: at_record(mcap(), CHUNK, 1, HUGE),
+    "a_chunk_beyond_64_bits": lambda: at_record(mcap(), CHUNK, 1, BEYOND),
+    "records_of_a_terabyte": lambda: at_record(mcap(), CHUNK, 9 + 16, HUGE),
+    "an_index_of_a_terabyte": lambda: at_record(mcap(), INDEX, 1, HUGE),
+    "an_index_that_points_beyond": lambda: at_record(mcap(), INDEX, 9 + 16, BEYOND),
+    "an_index_that_points_elsewhere": lambda: at_record(mcap(), INDEX, 9 + 16, (77).to_bytes(8, "little")),
+    "a_schema_of_a_terabyte": lambda: at_record(mcap(), SCHEMA, 1, HUGE),
+    "a_schema_of_another_number": lambda: at_record(mcap(), SCHEMA, 9, b"\xcb\x00"),
+    "statistics_of_nothing": lambda: at_record(mcap(), STATISTICS, 1, bytes(8)),
+    "zstd_of_no_frame": lambda: mcap(ZSTD).replace(b"\x28\xb5\x2f\xfd", b"\x28\xb5\x2f\x00"),
+    "zstd_damaged": lambda: flipped(mcap(ZSTD), b"\x28\xb5\x2f\xfd", 9),
+    "lz4_of_no_frame": lambda: mcap(LZ4).replace(b"\x04\x22\x4d\x18", b"\x04\x22\x4d\x00"),
+    "lz4_damaged": lambda: flipped(mcap(LZ4), b"\x04\x22\x4d\x18", 16),
+    "cut_in_a_chunk": lambda: mcap()[:700],
+    "cut_in_the_index": lambda: mcap()[:-100],
+    "cut_in_the_footer": lambda: mcap()[:-12],
+    "only_magic": lambda: mcap()[:8],
+    "half_of_magic": lambda: mcap()[:4],
+    "seven_chunks_and_a_half": lambda: small(compress=True)[:900],
+}
+
+
+def flipped(data: bytes, mark: bytes, offset: int) -> bytes:
+    """The same bytes with a few turned over after every mark."""
+    out = bytearray(data)
+    place = out.find(mark)
+    while place >= 0:
+        for k in range(place + offset, min(place + offset + 6, len(out))):
+            out[k] ^= 0xA5
+        place = out.find(mark, place + 1)
+    return bytes(out)
+
+
+def small(*, compress: bool) -> bytes:
+    """A bag as the project writes it."""
+    with tempfile.TemporaryDirectory() as folder:
+        return small_bag(Path(folder) / "bag", compress=compress).read_bytes()
+
+
+@cache
+def metadata() -> str:
+    """The metadata of a bag as the project writes it."""
+    with tempfile.TemporaryDirectory() as folder:
+        return (write_recording(Path(folder) / "bag", hand_made_run()) / "metadata.yaml").read_text()
+
+
+def sqlite(*changes: str, cut: int | None = None) -> bytes:
+    """A bag in SQLite with three vehicles' messages, changed by statements, or cut."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bag.db3"
+        with sqlite3.connect(path) as bag:
+            bag.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT)")
+            bag.execute("ALTER TABLE topics ADD offered_qos_profiles TEXT DEFAULT ''")
+            bag.execute("CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)")
+            for k in range(3):
+                row = (k + 1, f"/vehicle_{k}/fix", "sensor_msgs/msg/NavSatFix", "cdr")
+                bag.execute("INSERT INTO topics(id, name, type, serialization_format) VALUES(?, ?, ?, ?)", row)
+            rows = [(1 + k % 3, 10**8 * k, bytes(4) + bytes(120)) for k in range(90)]
+            bag.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)", rows)
+            for statement in changes:
+                bag.execute(statement)
+        bag.close()
+        return path.read_bytes()[:cut]
+
+
+SQLITE: dict[str, Make] = {
+    "cut": lambda: sqlite(cut=6000),
+    "no_data": lambda: sqlite("ALTER TABLE messages RENAME COLUMN data TO bytes"),
+    "a_name_of_bytes": lambda: sqlite("UPDATE topics SET name = x'ff00' WHERE id = 2"),
+    "a_type_of_bytes": lambda: sqlite("UPDATE topics SET type = x'ff00' WHERE id = 2"),
+    "a_type_of_none": lambda: sqlite("UPDATE topics SET type = NULL WHERE id = 1"),
+    "messages_of_text": lambda: sqlite("UPDATE messages SET data = 'text'"),
+    "a_stamp_of_text": lambda: sqlite("UPDATE messages SET timestamp = 'soon' WHERE id = 5"),
+    "a_topic_of_none": lambda: sqlite("UPDATE messages SET topic_id = NULL"),
+    "no_messages": lambda: sqlite("DROP TABLE messages"),
+}
+
+
+def csv(rows: pd.DataFrame) -> bytes:
+    return rows.to_csv(index=False).encode()
+
+
+def table(row: int, column: str, value: object, start: float = 1000.0) -> pd.DataFrame:
+    """The crossing with one value changed."""
+    rows = crossing(start=start).astype({column: object})
+    rows.loc[row, column] = value
+    return rows
+
+
+def spmd(stamp: str) -> bytes:
+    """Two cars' basic safety messages as the Safety Pilot kept them, one stamp replaced."""
+    lines = [
+        f"1,1,{car},{300_000_000_000_000 + 100_000 * k},{k},{k % 128},{100 * k % 60_000},{42.28 + 1e-4 * car},"
+        f"{-83.74 + 1.21e-5 * k},250.1,10.0,90.0,0.1,0.0,9.8,0.01,3,0.0,100"
+        for k in range(120)
+        for car in (17, 18)
+    ]
+    fields = lines[101].split(",")
+    lines[101] = ",".join([*fields[:3], stamp, *fields[4:]])
+    return "\n".join(lines).encode()
+
+
+def arrow(change: Callable[[pa.Table], pa.Table]) -> bytes:
+    """The crossing in Parquet, changed."""
+    out = BytesIO()
+    parquet.write_table(change(pa.Table.from_pandas(crossing(), preserve_index=False)), out)
+    return out.getvalue()
+
+
+def stamps(values: pa.Array) -> Make:
+    """The crossing in Parquet with other stamps."""
+    return lambda: arrow(lambda rows: rows.set_column(0, "t_s", values))
+
+
+def described(said: object) -> Make:
+    """The crossing in Parquet with other words of pandas about it."""
+    return lambda: arrow(lambda rows: rows.replace_schema_metadata({b"pandas": json.dumps(said).encode()}))
+
+
+ROWS = len(crossing())
+NO_NUMBER = [None if k == 60 else k * 0.1 for k in range(ROWS)]
+TABLES: dict[str, Make] = {
+    "table/a_name_is_missing.csv": lambda: csv(crossing()).replace(b"vehicle_id", b"", 1),
+    "table/lines_without_ends.csv": lambda: b"\xef\xbb\xbf" + csv(crossing()).replace(b"\n", b""),
+    "table/stamps_of_ages.csv": lambda: csv(crossing().assign(t_s=crossing()["t_s"] * 2.3e302)),
+    "table/a_stamp_of_the_year_9999.csv": lambda: csv(table(50, "t_s", "9999-12-31")),
+    "table/a_long_name.csv": lambda: csv(crossing()).replace(b"t_s", LONG.encode(), 1),
+    "table/a_stamp_far_away.csv": lambda: csv(table(50, "t_s", 3e8)),
+    "table/a_place_far_away.csv": lambda: csv(table(50, "x_m", 1e300)),
+    "table/letters_for_places.csv": lambda: csv(geographic(crossing()).assign(lat_deg="1;2")),
+    "table_time_none.csv": lambda: csv(table(0, "vehicle_id", "%s%n").assign(t_s="none")),
+    "table_ms_as_s_slow.csv": lambda: csv(crossing(start=0.0).assign(t_s=(crossing(start=0.0)["t_s"] * 1000.0).round())),
+    "spmd/a_stamp_of_another_age.csv": lambda: spmd("599999769000000000"),
+    "spmd/a_long_stamp.csv": lambda: spmd("9" * 4000),
+    "spmd_grid_memoryerror_22GiB.csv": lambda: spmd("599999769000000"),
+    "table_grid_memoryerror_596GiB.parquet": lambda: arrow(
+        lambda rows: rows.set_column(0, "t_s", pa.array([*rows["t_s"].to_pylist()[:-1], 3e8]))
+    ),
+    "parquet/stamps_that_are_no_numbers.parquet": stamps(pa.array([float("nan")] * 3 + NO_NUMBER[3:], from_pandas=False)),
+    "parquet/an_index_that_is_not_there.parquet": described(
+        {"columns": [], "index_columns": ["t_s", "no"], "column_indexes": []}
+    ),
+    "parquet/columns_that_are_not_told.parquet": described({"index_columns": []}),
+    "parquet/words_that_are_a_list.parquet": described([1]),
+    "parquet/a_type_that_is_none.parquet": described(
+        {"columns": [{"name": "x_m", "field_name": "x_m", "pandas_type": "int64", "numpy_type": "]nt64", "metadata": None}]}
+    ),
+    "parquet/a_stamp_far_away.parquet": stamps(pa.array([k * 0.1 for k in range(ROWS - 1)] + [3e8])),
+    "parquet/a_date_of_the_year_9999.parquet": stamps(pa.array([253402214400] * ROWS).cast(pa.timestamp("s"))),
+    "parquet/microseconds_beyond.parquet": stamps(pa.array([2**62] * ROWS).cast(pa.timestamp("us"))),
+    "parquet/a_time_zone.parquet": stamps(pa.array([2**62] * ROWS).cast(pa.timestamp("us", "Europe/Berlin"))),
+    "parquet/truth_for_stamps.parquet": stamps(pa.array([True, None] * (ROWS // 2))),
+    "parquet/integers_that_miss.parquet": stamps(pa.array([None if k == 60 else k for k in range(ROWS)])),
+    "parquet_nullable_boolean_time.parquet": stamps(pa.array([True] * ROWS)),
+    "parquet_an_index_of_pandas.parquet": lambda: arrow(lambda _: pa.Table.from_pandas(crossing().set_index("t_s"))),
+}
+
+
+def zstd_bomb() -> bytes:
+    """A bag of a few kilobytes whose only chunk holds a hundred megabytes, and says more."""
+    out = BytesIO()
+    writer = Writer(out, chunk_size=1 << 30, compression=ZSTD)
+    writer.start("ros2")
+    channel = writer.register_channel("/a", "cdr", writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data"))
+    for k in range(10):
+        writer.add_message(channel, k, bytes(10_000_000), k)
+    writer.finish()
+    return at_record(out.getvalue(), CHUNK, 9 + 16, (2_500_000_000).to_bytes(8, "little"))
+
+
+PARAMETERS = "/**:\n  ros__parameters:\n    log:\n      start: {}\n"
+MAPS: dict[str, Make] = {
+    **{f"map/{name}.yaml": lambda value=value: nav2("m.png", resolution=value) for name, value in YAML.items()},
+    **{f"map/{name}.yaml": lambda picture=picture: nav2(picture) for name, (picture, _) in IMAGES.items()},
+    **{f"map/{name}__{picture}": make for name, (picture, make) in IMAGES.items()},
+    **{f"map/{name}__m.png": lambda: image("png") for name in YAML},
+    "map/an_endless_cell.yaml": lambda: nav2("m.png", resolution=".inf"),
+    "map/an_endless_cell__m.png": lambda: image("png"),
+    "map/cells_of_kilometres.yaml": lambda: nav2("m.png", resolution="1.0e+9"),
+    "map/cells_of_kilometres__m.png": lambda: image("png"),
+    "b1.png": lambda: bomb(13_300, 13_300),
+    "b2.png": lambda: bomb(20_000, 20_000),
+    "bomb1bit.yaml": lambda: nav2("b1.png"),
+    "bomb400M.yaml": lambda: nav2("b2.png"),
+    "deep.yaml": lambda: b"a: " + b"[" * 20_000,
+    "map_alias_bomb.yaml": lambda: ALIASES.encode() + nav2("m.png", origin="*a7"),
+    "params_alias_bomb.yaml": ("/**:\n  ros__parameters:\n    " + ALIASES.replace("\n", "\n    ")).encode,
+}
+FILES: dict[str, Make] = {
+    **TABLES,
+    **MAPS,
+    **{f"library/{name}.json": lambda change=change: at(library(), *change) for name, change in LIBRARY.items()},
+    "library/too_deep.json": lambda: b'{"format": ' + b"[" * 100_000,
+    **{f"result/{name}.json": lambda text=text: text for name, text in RESULT.items()},
+    **{
+        f"meta/{name}.yaml": lambda value=value: metadata().replace("version: 9", f"version: {value}").encode()
+        for name, value in YAML.items()
+    },
+    "meta/a_long_file_name.yaml": lambda: metadata().replace("bag_0.mcap", "b" * 400 + ".mcap").encode(),
+    **{f"params/{name}.yaml": lambda value=value: PARAMETERS.format(value).encode() for name, value in YAML.items()},
+    "params/a_part_of_none.yaml": lambda: b"/**:\n  ros__parameters:\n    log:\n    log:\n      start: 0.0\n  ros__parameters:\n",
+    "params/a_part_in_itself.yaml": lambda: b"/**:\n  ros__parameters:\n    a: &a {b: *a}\n",
+    **{f"mcap_reader/{name}.mcap": make for name, make in MCAP.items()},
+    **{f"sqlite/{name}.db3": make for name, make in SQLITE.items()},
+    "validate/damaged_all_over.mcap": lambda: flipped(mcap(), b"/a", 1),
+    "reindex/a_name_twice.mcap": lambda: mcap()[:-8] + mcap()[8:],
+    "reindex/quality_of_service_too_deep.mcap": lambda: mcap().replace(b"string data", b"[[[[[[[[[[["),
+    "reindex_huge_chunk.mcap": lambda: at_record(mcap(), CHUNK, 1, BEYOND)[:-60],
+    "reindex_truncated_struct_error/a.mcap": lambda: b"\x89",
+    "mcap_zstd_bomb.mcap": zstd_bomb,
+}
+"""Each file's name below the folder, and how it is made."""
+
+
+def write(folder: Path) -> Path:
+    """Write them all into a folder; return it."""
+    for name, make in FILES.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(make())
+    return folder
