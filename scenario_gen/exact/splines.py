@@ -130,7 +130,7 @@ def moving_max(values: Floats, width: int) -> Floats:
 
 
 def moving_min(values: Floats, width: int) -> Floats:
-    """Return the least, likewise."""
+    """Return the least of `width` (odd) samples around each of `values` (T,); the end samples are repeated."""
     return -moving_max(-values, width)
 
 

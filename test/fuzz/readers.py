@@ -63,6 +63,8 @@ OWN = {  # modules that parse, but no file that a user is given by others, and w
     "exchange/export.py": "bytes for a digest",
     "folders/claim.py": "what is none is no claim: test/folders",
     "folders/marker.py": "what is none is no marker: test/folders",
+    "kernel_cache.py": "source files of the package, for a digest",
+    "kernels.py": "source files of the package, to see which have kernels",
     "report/html.py": "assets of the package",
     "reproduce/page.py": "whether a folder is an earlier result: anything else is none",
     "results.py": "whether a folder is an earlier result: anything else is none",

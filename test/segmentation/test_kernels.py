@@ -16,20 +16,31 @@
 
 from itertools import permutations
 
+import numba
 import numpy as np
 import pytest
 from scipy.special import gammainccinv, gammaln
 from scipy.stats import kstest, multivariate_normal, norm
 
-from scenario_gen.segmentation.hdp_hmm.chain import update_outer
+from scenario_gen.segmentation.hdp_hmm import chain, emission, observed, random
 from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
-from scenario_gen.segmentation.hdp_hmm.emission import accumulate, BLOCK, block_likelihood, block_log_likelihood, log_gammas
-from scenario_gen.segmentation.hdp_hmm.observed import observed_log_likelihood
+from scenario_gen.segmentation.hdp_hmm.emission import BLOCK
 from scenario_gen.segmentation.hdp_hmm.problem import moving_mean, new_top, Place, Prior, Problem, unexplained
-from scenario_gen.segmentation.hdp_hmm.random import beyond, normal, TAIL
+from scenario_gen.segmentation.hdp_hmm.random import TAIL
 from scenario_gen.segmentation.hdp_hmm.start import kmeans
 from scenario_gen.segmentation.posterior import matched_labels
 from scenario_gen.segmentation.trends import chi2_above
+
+
+def from_python(helper):
+    """A helper of kernels, compiled for calls from Python."""
+    return numba.njit(helper.py_func)
+
+
+block_log_likelihood, block_likelihood = from_python(emission.block_log_likelihood), from_python(emission.block_likelihood)
+accumulate, log_gammas = from_python(emission.accumulate), from_python(emission.log_gammas)
+observed_log_likelihood, update_outer = from_python(observed.observed_log_likelihood), from_python(chain.update_outer)
+normal, beyond = from_python(random.normal), from_python(random.beyond)
 
 
 def test_matching_is_the_best_one():
