@@ -115,7 +115,7 @@ def sample_scenarios(
         RefusedError: states or a target were asked for, and not one candidate that meets them is valid.
     """
     ego = request.ego_of(encounter)
-    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config)
+    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config, request.order)
     slot = None if ego is None else EgoSlot(encounter.vehicles[ego], asked.start[ego], asked.end[ego])
     if prepared.model is None:
         made = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot)
@@ -159,7 +159,7 @@ def regenerate(
     Raises:
         InputError: no candidate has this index, or nothing is said of the target.
     """
-    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config)
+    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config, request.order)
     if prepared.model is None:
         return None
     ego, aim = request.ego_of(encounter), aim_of(encounter, request, measures)
