@@ -16,7 +16,8 @@
 
 Encounters cut at random from the full recordings and by people (see `_naturalness_cuts.py`), where they are present, and the
 bundled ones. `--cases 10` takes the first ten, `--held-out` the third that is kept apart, `--count` so many scenarios of
-each (30), `--details FILE` writes a line of JSON per case, `--variety` takes another preset. Intervals: 95 %, bootstrap over encounters.
+each (30), `--details FILE` writes a line of JSON per case, `--variety` takes another preset.
+Intervals: 95 %, bootstrap over encounters.
 """
 
 from collections.abc import Callable, Sequence

@@ -14,8 +14,8 @@
 
 """What a request aims at, and the proposal that gets there, found stage by stage."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -46,25 +46,33 @@ class Judge:
         check: the validity checker.
         absent: conflicts of the template that the undisturbed drive leaves out; where clocks are free none may lose more.
         enough: share of valid candidates from which on a level of standard deviations is good enough.
+        lost: reactions of the template, by their vehicles, that the undisturbed drive does not keep on this road, with what is
+            said of each; no candidate is refused for them.
     """
 
     check: Check
     absent: int
     enough: float
+    lost: Mapping[tuple[int, ...], str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, sampler: Sampler, check: Check, enough: float) -> "Judge":
         """Look what the drive without deviations loses."""
         undisturbed = sampler.undisturbed()
-        return cls(check, ANY if undisturbed is None else check([undisturbed])[0].not_applicable, enough)
+        if undisturbed is None:
+            return cls(check, ANY, enough)
+        (verdict,) = check([undisturbed])
+        lost = {one.vehicles: one.message for one in verdict.violations if one.cause == Cause.REACTION}
+        return cls(check, verdict.not_applicable, enough, lost)
 
     def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
         """Return the first cause for which each scenario is refused, None for a valid one."""
         return [self._cause(verdict) for verdict in self.check(scenarios)]
 
     def _cause(self, verdict: Verdict) -> Cause | None:
-        if verdict.violations:
-            return verdict.violations[0].cause
+        for violation in verdict.violations:
+            if violation.cause != Cause.REACTION or violation.vehicles not in self.lost:
+                return violation.cause
         return Cause.CONFLICT_LOST if verdict.not_applicable > self.absent else None
 
 

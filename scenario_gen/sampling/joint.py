@@ -37,7 +37,7 @@ _BLUR = 3.0  # s to either side, over which a leader's motion is averaged in the
 _SLOWLY, _QUICKLY = 8.0, 1.2  # s, over which a follower's own residual varies
 _QUICK = 0.08  # m, of that quick part
 _ROUGH = 0.05  # of a residual, that varies from equation to equation
-_SLOWEST, _STANDS = 2.0, 0.5  # m/s, at least, by which metres are made seconds
+_SLOWEST, _STANDS = 1.0, 0.5  # m/s, at least, by which metres are made seconds
 _EVENT = 0.05  # s, of an event beside its residual
 
 Rows = dict[int, Floats]

@@ -192,8 +192,6 @@ def prepare(
 ) -> Prepared:
     """Build the model: on the template's clock, slowed ahead of bends, and stretched only where no speed exists otherwise.
 
-    Where an `order` other than the template's is asked for, nobody is made to wait for anybody.
-
     Raises:
         InputError: routes, segmentation and encounter disagree in their numbers.
     """
@@ -225,22 +223,26 @@ def prepare(
         sentences.append(f"clock stretched by {share:.1f} % so that every vehicle can keep to its limits and its changepoints")
     warp = TimeWarp(clock_of(clock.grid, stretch * clock.rate), config, least_shares(clock.grid, waits))
     vehicles = [_model(d, road, *mean, config, sentences) for d, mean in zip(drives, found, strict=True)]
-    reactions = None
     if config.variety == "wide":
         tied = (asked.freed[..., 0] == 0.0).any(axis=0)
         vehicles = [
             replace(v, freedom=_freedom(drive, v, warp.nominal, asked.freed[n], tied, road, config))
             for n, (v, drive) in enumerate(zip(vehicles, drives, strict=True))
         ]
-        reactions = _reactions(encounter, config, order)
+    reactions = kept_reactions(encounter, config, order)
     return Prepared(CandidateModel(tuple(vehicles), warp, reactions), tuple(sentences))
 
 
-def _reactions(encounter: Encounter, config: SamplingConfig, order: str) -> ReactionGraph | None:
-    """The reactions that candidates keep; None where there are none."""
+def kept_reactions(encounter: Encounter, config: SamplingConfig, order: str = "keep") -> ReactionGraph | None:
+    """Return the reactions of the template that scenarios keep; None where there are none, or nothing is freed.
+
+    Where an `order` other than the template's is asked for, nobody is made to wait for anybody.
+    """
+    if config.variety != "wide" or config.reactions != "keep":
+        return None
     graph = reactions_of(encounter)
     edges = tuple(edge for edge in graph.edges if order == "keep" or edge.kind == FOLLOW)
-    return replace(graph, edges=edges) if config.reactions == "keep" and edges else None
+    return replace(graph, edges=edges) if edges else None
 
 
 def _freedom(

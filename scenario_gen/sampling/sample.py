@@ -126,7 +126,10 @@ def sample_scenarios(
         loop = _Loop(sampler, judge, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
         loop.aim, loop.measures = aim, measures
         loop.run_request(config.attempts, diverse=request.choose == "diverse")
-        sentences = (*prepared.adaptations, *loop.adaptations)
+        lost = [f"on this road a reaction is not kept: {said}" for said in judge.lost.values()]
+        graph, ids = prepared.model.reactions, [vehicle.id for vehicle in encounter.vehicles]
+        kept = [edge.words(ids) for edge in graph.edges if (edge.who, edge.whom) not in judge.lost] if graph is not None else []
+        sentences = (*prepared.adaptations, *kept, *lost, *loop.adaptations)
         made = ScenarioSet(
             count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot, loop.reached, loop.chosen_from
         )  # fmt: skip

@@ -26,6 +26,7 @@ import numpy as np
 
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, wrap_angle
+from scenario_gen.template.answers import SLOWEST, time_gaps
 from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits
 from scenario_gen.types.encounter import Encounter, once_per_encounter
 from scenario_gen.types.reaction import FOLLOW, Reaction, ReactionGraph, YIELD
@@ -34,7 +35,6 @@ FAR = 60.0  # m, within which one follows
 LONG_ENOUGH = 3.0  # s, for which it drives behind the other
 LAGS = 0.3, 3.0  # s, between which a follower answers
 SURE = 0.3  # confidence below which there is no edge
-SLOWEST = 2.0  # m/s, below which a time gap says nothing
 ANTICIPATES, LATEST = 1.5, 4.0  # s, by which a yielder leaves before the other has cleared, and behind it, at most
 _LANE = 2.2  # m, to the side of the other's path
 _ALIKE = 0.5  # rad, of two headings on one way
@@ -141,7 +141,9 @@ def _follows(encounter: Encounter, who: int, whom: int, behind: Bools, apart: Fl
     if moves.sum() * dt < LONG_ENOUGH:
         return None
     lag, drop = _best_lag(np.gradient(own, dt), np.gradient(other, dt), behind, dt)
-    headway = apart[moves] / own[moves]
+    headway = time_gaps(encounter, who, whom)
+    if len(headway) == 0:
+        return None
     near = moves & (apart < _HEADWAY * np.maximum(own, SLOWEST))
     even = 0.0
     if near.sum() * dt >= _EVEN_FOR:

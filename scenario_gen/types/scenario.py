@@ -120,6 +120,7 @@ class Cause(StrEnum):
     CURVATURE = "curvature"
     PASSING_ORDER = "passing_order"  # not the template's order at a conflict
     STOP_NOT_KEPT = "stop_not_kept"  # a vehicle does not keep a stop of the template
+    REACTION = "reaction"  # who reacts in the template goes too early, too late, or at another distance
     CONFLICT_LOST = "conflict_lost"  # the stretch in which all are there leaves out a conflict of the template
     NOT_FINITE = "not_finite"
     OUT_OF_RANGE = "out_of_range"  # not in the range that was asked for; it was not checked
