@@ -64,10 +64,14 @@ def departure(motion: Motion, who: int, entry: float) -> float:
     """Return when [s] a vehicle leaves before it enters somewhere at `entry` [s].
 
     That is when its speed rises above 0.5 m/s and stays there, or, if it never is so slow, when it is slowest. A vehicle that is
-    faster throughout and slowest at once is one that nothing is seen of: it left when it came.
+    faster throughout and slowest at once is one that nothing is seen of: it left when it came. Who stands at the very place, or
+    in it, leaves when that stand ends.
     """
     first = int(motion.present[who, 0])
     last = max(int(np.searchsorted(motion.time, entry + 1e-9)), first + 1)
+    later = motion.speed[who, last : int(motion.present[who, 1]) + 1]
+    if motion.speed[who, last - 1] < WAIT_SPEED and len(later):  # it stands where the area begins
+        last += int(np.argmax(later >= WAIT_SPEED)) + 1 if (later >= WAIT_SPEED).any() else len(later)
     speed, time = motion.speed[who, first:last], motion.time[first:last]
     slow = np.flatnonzero(speed < WAIT_SPEED)
     if len(slow) == 0:
