@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Interaction: do generated vehicles drive with one another? Figures of docs/interaction.md, on the own road of each encounter.
+"""Interaction: do generated vehicles drive with one another? Figures of docs/interaction.md, on the own road of each encounter, or `--roads`.
 
 Encounters cut at random from the full recordings and by people (see `_naturalness_cuts.py`), where they are present, and the
 bundled ones. `--cases 10` takes the first ten, `--held-out` the third that is kept apart, `--count` so many scenarios of
@@ -80,15 +80,17 @@ def run(
     count: int | None = None,
     details: str | None = None,
     variety: str = "wide",
+    roads: str = "corridor",
     *,
     held_out: bool = False,
 ) -> list[Row]:
     """Measure; arguments as said above."""
     found = []
     for name, encounter in list(_encounters(held_out=held_out))[:LOGS][:cases]:
-        case = _measured(name, encounter, count or COUNT, variety)
-        found.append(case)
-        print(json.dumps(_finite(case.figures)), file=sys.stderr, flush=True)
+        for road in roads.split(","):
+            case = _measured(name, encounter, road, count or COUNT, variety)
+            found.append(case)
+            print(json.dumps(_finite(case.figures)), file=sys.stderr, flush=True)
     if details:
         Path(details).write_text("".join(json.dumps(_finite(case.figures)) + "\n" for case in found))
     return _rows(found)
@@ -106,14 +108,14 @@ def _encounters(*, held_out: bool) -> Any:
             yield f"bundled {letter}", read_log([bundled(letter)]).encounters[0]
 
 
-def _measured(name: str, encounter: Encounter, count: int, variety: str) -> Case:
-    """Generate on the encounter's own road, and measure."""
+def _measured(name: str, encounter: Encounter, road_name: str, count: int, variety: str) -> Case:
+    """Generate on a road, and measure."""
     graph, ids = reactions_of(encounter), [vehicle.id for vehicle in encounter.vehicles]
     config = PipelineConfig()
     config = replace(config, sampling=replace(config.sampling, variety=variety))
-    case = Case({"name": name, "edges": [edge.document(ids) for edge in graph.edges]}, [], [], [], [])
+    case = Case({"name": name, "road": road_name, "edges": [edge.document(ids) for edge in graph.edges]}, [], [], [], [])
     try:
-        road, segmentation = build_road("corridor", encounter, config.road), segment(encounter, config.segmentation, SEED)
+        road, segmentation = build_road(road_name, encounter, config.road), segment(encounter, config.segmentation, SEED)
         begun = process_time()
         made = attempt(encounter, segmentation, road, config, Request(), count=count, seed=SEED)
         seconds = process_time() - begun
@@ -124,6 +126,7 @@ def _measured(name: str, encounter: Encounter, count: int, variety: str) -> Case
     case.figures |= {
         "scenarios": len(scenarios), "acceptance": made.generated.acceptance, "seconds": seconds,
         "refused by": {cause.value: n for cause, n in made.generated.refused.most_common()},
+        "kept": len(made.generated.reactions),
     }  # fmt: skip
     if len(scenarios) < 2:
         case.figures["refused"] = "fewer than two scenarios"

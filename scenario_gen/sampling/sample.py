@@ -127,11 +127,11 @@ def sample_scenarios(
         loop.aim, loop.measures = aim, measures
         loop.run_request(config.attempts, diverse=request.choose == "diverse")
         lost = [f"on this road a reaction is not kept: {said}" for said in judge.lost.values()]
-        graph, ids = prepared.model.reactions, [vehicle.id for vehicle in encounter.vehicles]
-        kept = [edge.words(ids) for edge in graph.edges if (edge.who, edge.whom) not in judge.lost] if graph is not None else []
-        sentences = (*prepared.adaptations, *kept, *lost, *loop.adaptations)
+        graph = prepared.model.reactions
+        kept = tuple(edge for edge in (graph.edges if graph is not None else ()) if (edge.who, edge.whom) not in judge.lost)
+        sentences = (*prepared.adaptations, *lost, *loop.adaptations)
         made = ScenarioSet(
-            count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot, loop.reached, loop.chosen_from
+            count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot, loop.reached, loop.chosen_from, kept,
         )  # fmt: skip
     if request.moves and not made.scenarios and not cancelled():
         causes = ", ".join(f"{number} × {cause.value}" for cause, number in made.refused.most_common())

@@ -1,0 +1,135 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Who reacts to whom: planted reactions are found with their lag, independent drives have none, circles are cut."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from scenario_gen.template.reactions import reactions_of, without_circles
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.reaction import FOLLOW, Reaction, YIELD
+
+DT = 0.1
+
+
+def wander(rng, count, sigma=1.0, length=2.0):
+    """A smooth random speed about 12 m/s."""
+    time = np.arange(count) * DT
+    covariance = sigma**2 * np.exp(-0.5 * ((time[:, None] - time) / length) ** 2) + 1e-8 * np.eye(count)
+    return 12.0 + np.linalg.cholesky(covariance) @ rng.standard_normal(count)
+
+
+def along(speed, start, lane=0.0):
+    s = start + np.concatenate([[0.0], np.cumsum(0.5 * DT * (speed[1:] + speed[:-1]))])
+    return np.column_stack([s, np.full(len(s), lane)])
+
+
+def lane_encounter(leader, follower, gap=20.0, lane=0.0):
+    """Two vehicles on the x axis, the second `gap` metres behind the first."""
+    position = np.stack([along(leader, gap), along(follower, 0.0, lane)])
+    return Encounter(
+        "lane", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, np.zeros((2, len(leader))), np.stack([leader, follower])
+    )
+
+
+def crossing(wait_until, speed=8.0, seconds=20.0):
+    """Vehicle 1 drives east through the origin at 6 s; vehicle 2 comes from the south, stands before it, and leaves then."""
+    time = np.arange(round(seconds / DT) + 1) * DT
+    first = np.column_stack([speed * (time - 6.0), np.zeros(len(time))])
+    stop, begins = -8.0, 3.0
+    own = np.where(
+        time < begins,
+        8.0 * (1.0 - time / begins),
+        np.where(time < wait_until, 0.0, np.minimum(2.0 * (time - wait_until), 8.0)),
+    )
+    y = np.concatenate([[0.0], np.cumsum(0.5 * DT * (own[1:] + own[:-1]))])
+    y += stop - y[round(begins / DT)]
+    position = np.stack([first, np.column_stack([np.full(len(time), 0.0), y])])
+    heading = np.stack([np.zeros(len(time)), np.full(len(time), 0.5 * np.pi)])
+    speeds = np.stack([np.full(len(time), speed), own])
+    return Encounter("crossing", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, heading, speeds)
+
+
+@pytest.mark.parametrize("lag", [0.6, 1.2, 2.0])
+def test_a_planted_lag_and_gain_are_found(lag):
+    found = []
+    for seed in range(6):
+        leader = wander(np.random.default_rng(seed), 400)
+        late = round(lag / DT)
+        follower = 12.0 + 0.8 * (np.concatenate([np.full(late, leader[0]), leader[:-late]]) - 12.0)
+        (edge,) = reactions_of(lane_encounter(leader, follower)).edges
+        assert (edge.kind, edge.who, edge.whom) == (FOLLOW, 1, 0)
+        assert edge.gain == pytest.approx(0.8, abs=0.1)
+        found.append(edge.lag)
+    assert np.median(found) == pytest.approx(lag, abs=0.15)
+
+
+def test_independent_drives_hardly_ever_react():
+    """Neighbouring lanes never do; one behind another with a speed of its own hardly ever."""
+    behind = beside = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        leader, other = wander(rng, 300, 1.5), wander(rng, 300, 1.5) - 2.5
+        behind += bool(reactions_of(lane_encounter(leader, other, 45.0)).edges)
+        beside += bool(reactions_of(lane_encounter(leader, other, 25.0, lane=3.5)).edges)
+    assert beside == 0
+    assert behind <= 4
+
+
+@pytest.mark.parametrize("lag", [0.3, 1.5, 2.5])
+def test_who_waits_for_another_one_and_leaves_behind_it_yields(lag):
+    clears = reactions_of(crossing(8.0)).edges[0].clears
+    graph = reactions_of(crossing(clears + lag))
+    (edge,) = graph.edges
+    assert (edge.kind, edge.who, edge.whom, edge.stands) == (YIELD, 1, 0, True)
+    assert edge.lag == pytest.approx(lag, abs=0.35)  # it leaves when it is faster than 0.5 m/s
+    assert graph.sentences(("1", "2"))[0].startswith("vehicle 2 waits for vehicle 1 to pass and leaves")
+
+
+def test_who_leaves_long_after_waits_for_something_else():
+    graph = reactions_of(crossing(14.0))
+    assert graph.edges == ()
+    assert graph.sentences(("1", "2")) == ("nobody is seen to react to anybody",)
+
+
+def edge(who, whom, confidence):
+    return Reaction(FOLLOW, who, whom, 1.0, 1.0, 1.0, confidence, 0.0, 10.0, (1.0, 1.0, 1.0))
+
+
+def test_the_least_sure_edge_of_a_circle_is_cut_and_said():
+    graph = without_circles([edge(0, 1, 0.9), edge(1, 2, 0.4), edge(2, 0, 0.8)], 3)
+    assert [(one.who, one.whom) for one in graph.cut] == [(1, 2)]
+    assert graph.order == (1, 0, 2)
+    assert "left out, for it closes a circle" in graph.sentences("abc")[-1]
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_whatever_the_edges_everybody_comes_behind_those_it_reacts_to(count):
+    pairs = list(itertools.permutations(range(count), 2))
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        edges = [edge(a, b, float(rng.random())) for a, b in pairs if rng.random() < 0.7]
+        graph = without_circles(edges, count)
+        assert sorted(graph.order) == list(range(count))
+        assert len(graph.edges) + len(graph.cut) == len(edges)
+        assert all(graph.order.index(one.whom) < graph.order.index(one.who) for one in graph.edges)
+
+
+def test_a_doubtful_edge_is_said_to_be():
+    assert edge(0, 1, 0.4).words("ab").endswith("(doubtful)")
+    assert "doubtful" not in edge(0, 1, 0.6).words("ab")
+    assert edge(0, 1, 0.6).document("ab")["words"].startswith("vehicle a follows vehicle b, 1.0 s behind")
