@@ -12,11 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Interaction: do generated vehicles drive with one another? Figures of docs/interaction.md, on the own road of each encounter, or `--roads`.
+"""Interaction: do generated vehicles drive with one another? Figures of docs/interaction.md, on each encounter's own road.
 
 Encounters cut at random from the full recordings and by people (see `_naturalness_cuts.py`), where they are present, and the
 bundled ones. `--cases 10` takes the first ten, `--held-out` the third that is kept apart, `--count` so many scenarios of
-each (30), `--details FILE` writes a line of JSON per case, `--variety` takes another preset.
+each (30), `--details FILE` writes a line of JSON per case, `--variety` takes another preset, `--roads` other
+roads, with commas.
 Intervals: 95 %, bootstrap over encounters.
 """
 

@@ -307,7 +307,10 @@ class Checker:
             lag = lag_behind(scenario, conflict)
             low, high = min(edge.lag, 0.0) - limits.anticipation, max(edge.lag, 0.0) + limits.patience
             if not low <= lag <= high:
-                message = f"vehicle {edge.who}: leaves {lag:.2f} s after vehicle {edge.whom} has cleared; {low:.2f} to {high:.2f} s may be"
+                message = (
+                    f"vehicle {edge.who}: leaves {lag:.2f} s after vehicle {edge.whom} has cleared; "
+                    f"allowed are {low:.2f} to {high:.2f} s"
+                )
                 yield Violation(Cause.REACTION, conflict.exit_first + lag, (edge.who, edge.whom), message)
 
     def _waits(self, scenario: Scenario) -> Iterator[Violation]:

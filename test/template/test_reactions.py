@@ -18,50 +18,10 @@ import itertools
 
 import numpy as np
 import pytest
+from reaction_scenes import answering, crossing, lane_encounter, wander
 
 from scenario_gen.template.reactions import reactions_of, without_circles
-from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.reaction import FOLLOW, Reaction, YIELD
-
-DT = 0.1
-
-
-def wander(rng, count, sigma=1.0, length=2.0):
-    """A smooth random speed about 12 m/s."""
-    time = np.arange(count) * DT
-    covariance = sigma**2 * np.exp(-0.5 * ((time[:, None] - time) / length) ** 2) + 1e-8 * np.eye(count)
-    return 12.0 + np.linalg.cholesky(covariance) @ rng.standard_normal(count)
-
-
-def along(speed, start, lane=0.0):
-    s = start + np.concatenate([[0.0], np.cumsum(0.5 * DT * (speed[1:] + speed[:-1]))])
-    return np.column_stack([s, np.full(len(s), lane)])
-
-
-def lane_encounter(leader, follower, gap=20.0, lane=0.0):
-    """Two vehicles on the x axis, the second `gap` metres behind the first."""
-    position = np.stack([along(leader, gap), along(follower, 0.0, lane)])
-    return Encounter(
-        "lane", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, np.zeros((2, len(leader))), np.stack([leader, follower])
-    )
-
-
-def crossing(wait_until, speed=8.0, seconds=20.0):
-    """Vehicle 1 drives east through the origin at 6 s; vehicle 2 comes from the south, stands before it, and leaves then."""
-    time = np.arange(round(seconds / DT) + 1) * DT
-    first = np.column_stack([speed * (time - 6.0), np.zeros(len(time))])
-    stop, begins = -8.0, 3.0
-    own = np.where(
-        time < begins,
-        8.0 * (1.0 - time / begins),
-        np.where(time < wait_until, 0.0, np.minimum(2.0 * (time - wait_until), 8.0)),
-    )
-    y = np.concatenate([[0.0], np.cumsum(0.5 * DT * (own[1:] + own[:-1]))])
-    y += stop - y[round(begins / DT)]
-    position = np.stack([first, np.column_stack([np.full(len(time), 0.0), y])])
-    heading = np.stack([np.zeros(len(time)), np.full(len(time), 0.5 * np.pi)])
-    speeds = np.stack([np.full(len(time), speed), own])
-    return Encounter("crossing", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, heading, speeds)
 
 
 @pytest.mark.parametrize("lag", [0.6, 1.2, 2.0])
@@ -69,9 +29,7 @@ def test_a_planted_lag_and_gain_are_found(lag):
     found = []
     for seed in range(6):
         leader = wander(np.random.default_rng(seed), 400)
-        late = round(lag / DT)
-        follower = 12.0 + 0.8 * (np.concatenate([np.full(late, leader[0]), leader[:-late]]) - 12.0)
-        (edge,) = reactions_of(lane_encounter(leader, follower)).edges
+        (edge,) = reactions_of(lane_encounter(leader, answering(leader, lag, 0.8))).edges
         assert (edge.kind, edge.who, edge.whom) == (FOLLOW, 1, 0)
         assert edge.gain == pytest.approx(0.8, abs=0.1)
         found.append(edge.lag)
