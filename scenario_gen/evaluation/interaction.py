@@ -102,7 +102,8 @@ def braking(motion: Motion, who: int) -> list[int]:
 
 def ghosts(motion: Motion, who: int) -> int:
     """Return how often a vehicle brakes for nobody: nobody near, nobody on a path that meets its own, no bend."""
-    return sum(_for_nobody(motion, who, k) for k in braking(motion, who) if motion.time[k] - motion.time[0] > _START)
+    begins = [k for k in braking(motion, who) if motion.time[k] - motion.time[0] > _START]
+    return len([k for k in begins if _for_nobody(motion, who, k)])
 
 
 def _for_nobody(motion: Motion, who: int, k: int) -> bool:

@@ -303,7 +303,9 @@ class Checker:
                 continue
             conflict = met.get((edge.who, edge.whom))
             if conflict is None:
-                continue  # that is no conflict, or another order, which is a cause of its own
+                message = f"vehicle {edge.who}: does not come behind vehicle {edge.whom}, for which it waits in the template"
+                yield Violation(Cause.REACTION, 0.0, (edge.who, edge.whom), message)
+                continue
             lag = lag_behind(scenario, conflict)
             low, high = min(edge.lag, 0.0) - limits.anticipation, max(edge.lag, 0.0) + limits.patience
             if not low <= lag <= high:

@@ -70,6 +70,13 @@ def test_the_bounds_of_a_lag_are_parameters():
     assert refusals(late, TEMPLATE, Limits(patience=6.0)) == []
 
 
+def test_a_yielder_that_no_longer_meets_the_other_does_not_yield():
+    moved = TEMPLATE.position.copy()
+    moved[0, :, 1] += 500.0
+    (found,) = refusals(as_scenario(replace(TEMPLATE, position=moved)), TEMPLATE)
+    assert "does not come behind" in found.message
+
+
 LEADER = wander(np.random.default_rng(3), 200)
 LANE = lane_encounter(LEADER, answering(LEADER, 1.2, 0.9))
 
