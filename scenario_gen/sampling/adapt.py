@@ -25,6 +25,8 @@ from scenario_gen.sampling.directed import Aim, CHUNK, FAIR, GOOD, Measures, PAT
 from scenario_gen.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
 from scenario_gen.template.interaction import closest_crossing, Conflict, find_conflicts, pair_conflict
 from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.names import token
+from scenario_gen.types.reaction import Reaction
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import Cause, Scenario, Verdict
 from scenario_gen.types.target import Target
@@ -102,14 +104,16 @@ def _conflicts(encounter: Encounter) -> tuple[Conflict, ...]:
     return find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
 
 
-def label_of(encounter: Encounter, request: Request, aim: Aim | None) -> Label:
-    """Return what says a scenario's facts: the figures of the targets, and, unless it is kept, the order at each conflict."""
+def label_of(encounter: Encounter, request: Request, aim: Aim | None, reactions: Sequence[Reaction] = ()) -> Label:
+    """Return what says a scenario's facts: figures of targets, reactions that it keeps, orders if they are not kept."""
+    names = [token(vehicle.id) for vehicle in encounter.vehicles] if reactions else []
+    held = {"reactions": "; ".join(edge.name(names) for edge in reactions)} if reactions else {}
     conflicts = () if request.order == "keep" else _conflicts(encounter)
 
     def label(whole: Scenario) -> dict[str, str]:
-        facts = {}
+        facts = dict(held)
         if aim is not None:
-            facts = {f"target.{t.label}": f"{v:.6g}" for t, v in zip(aim.targets, aim.values(whole), strict=True)}
+            facts |= {f"target.{t.label}": f"{v:.6g}" for t, v in zip(aim.targets, aim.values(whole), strict=True)}
         if request.order == "keep":
             return facts
         said = [_order(encounter, own, whole) for own in conflicts]

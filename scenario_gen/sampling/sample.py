@@ -123,12 +123,13 @@ def sample_scenarios(
         aim = aim_of(encounter, request, measures)
         sampler = Sampler(prepared.model, seed, road.frame_id, ego, label=label_of(encounter, request, aim))
         judge = Judge.of(sampler, check, _enough(config, request))
+        graph = prepared.model.reactions
+        kept = tuple(edge for edge in (graph.edges if graph is not None else ()) if (edge.who, edge.whom) not in judge.lost)
+        sampler = replace(sampler, label=label_of(encounter, request, aim, kept))
         loop = _Loop(sampler, judge, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
         loop.aim, loop.measures = aim, measures
         loop.run_request(config.attempts, diverse=request.choose == "diverse")
         lost = [f"on this road a reaction is not kept: {said}" for said in judge.lost.values()]
-        graph = prepared.model.reactions
-        kept = tuple(edge for edge in (graph.edges if graph is not None else ()) if (edge.who, edge.whom) not in judge.lost)
         sentences = (*prepared.adaptations, *lost, *loop.adaptations)
         made = ScenarioSet(
             count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot, loop.reached, loop.chosen_from, kept,

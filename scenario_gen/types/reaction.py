@@ -56,6 +56,10 @@ class Reaction:
         """When [s] the other has cleared the shared area, on the template's clock; of a yielder."""
         return self.until - self.lag
 
+    def name(self, ids: Sequence[str]) -> str:
+        """Return who reacts to whom, by the vehicles' ids: as it is named in an entry of `scenarios/info`."""
+        return f"{ids[self.who]} {'follows' if self.kind == FOLLOW else 'yields to'} {ids[self.whom]}"
+
     def words(self, ids: Sequence[str]) -> str:
         """Return the reaction in words, with the vehicles' ids."""
         who, whom = f"vehicle {ids[self.who]}", f"vehicle {ids[self.whom]}"

@@ -99,7 +99,9 @@ def test_a_mixing_is_linear_so_mirror_images_stay_mirror_images(case):
 def test_what_is_published_answers_as_the_template_does(case):
     encounter, _, made, free = case
     (edge,) = made.generated.reactions
-    assert free.generated.reactions == ()
+    named = "2 follows 1" if edge.kind == FOLLOW else "2 yields to 1"
+    assert {scenario.facts["reactions"] for scenario in made.generated.scenarios} == {named}
+    assert free.generated.reactions == () and free.generated.scenarios[0].facts == {}
     assert len(made.generated.scenarios) == 40
     if edge.kind == FOLLOW:
         seen, before = (following(edge, encounter, one.generated.scenarios) for one in (made, free))
