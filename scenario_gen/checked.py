@@ -17,7 +17,7 @@
 from dataclasses import replace
 
 from scenario_gen.evaluation.measures import MEASURES
-from scenario_gen.sampling import Cancelled, freed_states, OnValid, Progress, sample_scenarios, SamplingConfig
+from scenario_gen.sampling import Cancelled, freed_states, kept_reactions, OnValid, Progress, sample_scenarios, SamplingConfig
 from scenario_gen.template.interaction import Wait, waits_to_keep
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.request import Request
@@ -56,7 +56,9 @@ def sample_checked(
     encounter, (road, fit) = planned.encounter, planned.placed()
     waits = waits_to_keep(encounter, planned.segmentation) if waits is None else waits
     fit = replace(fit, asked=freed_states(fit.asked, encounter, sampling, request))
-    check = Checker.of_template(encounter, road, fit.asked, waits, limits, request.order).check
+    graph = kept_reactions(encounter, sampling, request.order)
+    edges = graph.edges if graph is not None else ()
+    check = Checker.of_template(encounter, road, fit.asked, waits, limits, request.order, edges).check
     generated = sample_scenarios(
         encounter, planned.segmentation, road, planned.routes, fit.asked, check, sampling, count=count, seed=planned.seed,
         waits=waits, request=request, progress=progress, cancelled=cancelled, found=found, measures=MEASURES,

@@ -28,7 +28,7 @@ from scenario_gen.recordings.read import INFO, Namespace, read_recording, Reques
 from scenario_gen.recordings.template import decode_template, missing_topics
 from scenario_gen.recordings.write import add_message, same_tracks, scenario_bytes
 from scenario_gen.routing import plan_routes, PlanningConfig
-from scenario_gen.sampling import freed_states, regenerate, SamplingConfig
+from scenario_gen.sampling import freed_states, kept_reactions, regenerate, SamplingConfig
 from scenario_gen.segmentation import segment, SegmentationConfig
 from scenario_gen.storage.bag import bag_topics, BagMessage, within
 from scenario_gen.storage.config import BagConfig
@@ -110,7 +110,9 @@ def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
     check = None
     if asked.target or asked.order == "swap":  # a proposal is found again with them
         limits = read_parameters(Limits(), values, "limits.", what)
-        check = Checker.of_template(encounter, road, states, waits, limits, asked.order).check
+        graph = kept_reactions(encounter, sampling, asked.order)
+        edges = graph.edges if graph is not None else ()
+        check = Checker.of_template(encounter, road, states, waits, limits, asked.order, edges).check
     scenario = regenerate(
         encounter, segmentation, road, routes, states, sampling, seed=seed, index=index, waits=waits, request=asked,
         check=check, measures=MEASURES,

@@ -31,8 +31,10 @@ from scenario_gen.recordings.read import INFO, Namespace, read_recording, Scenar
 from scenario_gen.storage.bag import within
 from scenario_gen.storage.config import BagConfig
 from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, orders_asked, Wait
+from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.ego import together
 from scenario_gen.types.names import tokens
+from scenario_gen.types.reaction import Reaction
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Scenario
 from scenario_gen.validity import Checker, Limits
@@ -83,6 +85,7 @@ class Reference:
     """What the scenarios of one stamp are held against.
 
     `first` says who must go first at each conflict, by index in `template`, None for anyone; nothing: as in the template.
+    `reactions` are those of the template that the entry says are kept.
     """
 
     road: Road | None
@@ -90,6 +93,7 @@ class Reference:
     conflicts: tuple[Conflict, ...]
     waits: tuple[Wait, ...] | None
     first: tuple[int | None, ...] = ()
+    reactions: tuple[Reaction, ...] = ()
 
     def checker(self, scenario: Scenario, limits: Limits | None, asked: BoundaryStates | None) -> Checker:
         """Return the checker of scenarios with this one's vehicles, of which `asked` was asked."""
@@ -102,7 +106,8 @@ class Reference:
         asked_first = self.first or tuple(c.first for c in self.conflicts)
         first = [None if one is None else at[one] for one in (asked_first[k] for k in known)]
         waits = None if self.waits is None else [replace(w, vehicle=at[w.vehicle]) for w in self.waits if w.vehicle in at]
-        return Checker(self.road, asked, conflicts, waits, limits, first)
+        edges = [replace(e, who=at[e.who], whom=at[e.whom]) for e in self.reactions if {e.who, e.whom} <= set(at)]
+        return Checker(self.road, asked, conflicts, waits, limits, first, edges)
 
 
 def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = BagConfig()) -> tuple[Validation, ...]:
@@ -149,7 +154,8 @@ def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
             states = entry.asked(namespace.where(INFO), witness=scenario.witness is not None)
         scenario = together(scenario)
         is_lost = k in namespace.unknown and entry is None
-        place = (stamp, is_lost, entry and entry.template_hash, entry and entry.map_hash, entry and entry.order)
+        kept = "" if entry is None else entry.facts.get("reactions", "")
+        place = (stamp, is_lost, entry and entry.template_hash, entry and entry.map_hash, entry and entry.order, kept)
         if place not in references:
             references[place] = _reference(namespace, stamp, entry, is_lost)
         of_these = b"" if states is None else states.start.tobytes() + states.end.tobytes()
@@ -190,4 +196,7 @@ def _reference(namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is
     if segmentation is not None:
         waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
-    return Reference(road, names, tuple(conflicts), waits, orders_asked(conflicts, entry.order if entry else "keep"))
+    kept = entry.facts.get("reactions", "").split("; ") if entry else []
+    reactions = tuple(edge for edge in reactions_of(encounter).edges if edge.name(names) in kept) if any(kept) else ()
+    first = orders_asked(conflicts, entry.order if entry else "keep")
+    return Reference(road, names, tuple(conflicts), waits, first, reactions)

@@ -16,6 +16,9 @@
 
 from scenario_gen.sampling.config import SamplingConfig
 from scenario_gen.sampling.freedom import freed_states
+from scenario_gen.sampling.prepare import kept_reactions
 from scenario_gen.sampling.sample import Cancelled, OnValid, Progress, regenerate, sample_scenarios
 
-__all__ = ["Cancelled", "OnValid", "Progress", "SamplingConfig", "freed_states", "regenerate", "sample_scenarios"]
+__all__ = [
+    "Cancelled", "OnValid", "Progress", "SamplingConfig", "freed_states", "kept_reactions", "regenerate", "sample_scenarios",
+]  # fmt: skip

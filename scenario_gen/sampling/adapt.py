@@ -14,8 +14,8 @@
 
 """What a request aims at, and the proposal that gets there, found stage by stage."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from scenario_gen.sampling.directed import Aim, CHUNK, FAIR, GOOD, Measures, PAT
 from scenario_gen.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
 from scenario_gen.template.interaction import closest_crossing, Conflict, find_conflicts, pair_conflict
 from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.names import token
+from scenario_gen.types.reaction import Reaction
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import Cause, Scenario, Verdict
 from scenario_gen.types.target import Target
@@ -46,25 +48,33 @@ class Judge:
         check: the validity checker.
         absent: conflicts of the template that the undisturbed drive leaves out; where clocks are free none may lose more.
         enough: share of valid candidates from which on a level of standard deviations is good enough.
+        lost: reactions of the template, by their vehicles, that the undisturbed drive does not keep on this road, with what is
+            said of each; no candidate is refused for them.
     """
 
     check: Check
     absent: int
     enough: float
+    lost: Mapping[tuple[int, ...], str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, sampler: Sampler, check: Check, enough: float) -> "Judge":
         """Look what the drive without deviations loses."""
         undisturbed = sampler.undisturbed()
-        return cls(check, ANY if undisturbed is None else check([undisturbed])[0].not_applicable, enough)
+        if undisturbed is None:
+            return cls(check, ANY, enough)
+        (verdict,) = check([undisturbed])
+        lost = {one.vehicles: one.message for one in verdict.violations if one.cause == Cause.REACTION}
+        return cls(check, verdict.not_applicable, enough, lost)
 
     def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
         """Return the first cause for which each scenario is refused, None for a valid one."""
         return [self._cause(verdict) for verdict in self.check(scenarios)]
 
     def _cause(self, verdict: Verdict) -> Cause | None:
-        if verdict.violations:
-            return verdict.violations[0].cause
+        for violation in verdict.violations:
+            if violation.cause != Cause.REACTION or violation.vehicles not in self.lost:
+                return violation.cause
         return Cause.CONFLICT_LOST if verdict.not_applicable > self.absent else None
 
 
@@ -94,14 +104,16 @@ def _conflicts(encounter: Encounter) -> tuple[Conflict, ...]:
     return find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
 
 
-def label_of(encounter: Encounter, request: Request, aim: Aim | None) -> Label:
-    """Return what says a scenario's facts: the figures of the targets, and, unless it is kept, the order at each conflict."""
+def label_of(encounter: Encounter, request: Request, aim: Aim | None, reactions: Sequence[Reaction] = ()) -> Label:
+    """Return what says a scenario's facts: figures of targets, reactions that it keeps, orders if they are not kept."""
+    names = [token(vehicle.id) for vehicle in encounter.vehicles] if reactions else []
+    held = {"reactions": "; ".join(edge.name(names) for edge in reactions)} if reactions else {}
     conflicts = () if request.order == "keep" else _conflicts(encounter)
 
     def label(whole: Scenario) -> dict[str, str]:
-        facts = {}
+        facts = dict(held)
         if aim is not None:
-            facts = {f"target.{t.label}": f"{v:.6g}" for t, v in zip(aim.targets, aim.values(whole), strict=True)}
+            facts |= {f"target.{t.label}": f"{v:.6g}" for t, v in zip(aim.targets, aim.values(whole), strict=True)}
         if request.order == "keep":
             return facts
         said = [_order(encounter, own, whole) for own in conflicts]

@@ -20,7 +20,6 @@ path's own length, so the published speed is the rate of arc length, and acceler
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -30,7 +29,7 @@ from scenario_gen.sampling.deviations import soft_clipped
 from scenario_gen.sampling.freedom import Freedom, onward, seconds_onward
 from scenario_gen.sampling.path import BasePath, states
 from scenario_gen.sampling.speed_profile.model import SpeedModel
-from scenario_gen.sampling.time_warp import Clock, DT, template_times, TimeWarp
+from scenario_gen.sampling.time_warp import Clock, DT, template_times
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import Scenario
 
@@ -240,28 +239,3 @@ class Batch:
             position, vehicles = np.stack([x, y], axis=-1), tuple(one.vehicles[s] for one in self.drawn)
             made.append(Scenario(vehicles, t, position, yaw, speed, acceleration, seed, index[s], frame_id, self.present[s]))
         return made
-
-
-class CandidateModel:
-    """Draws candidates of one encounter on its routes.
-
-    Source: paper III-C.
-    """
-
-    def __init__(self, vehicles: tuple[VehicleModel, ...], warp: TimeWarp) -> None:
-        self.vehicles, self.warp = vehicles, warp
-
-    @property
-    def size(self) -> int:
-        """Standard normal numbers needed per candidate."""
-        return self.warp.size + sum(int(v.size) for v in self.vehicles)
-
-    def draw(self, z: Floats, scale: Scale) -> Batch:
-        """Candidates from numbers z (S, size), their standard deviations multiplied by `scale`."""
-        parts = np.cumsum([self.warp.size] + [v.size for v in self.vehicles])
-        clock = self.warp.sample(z[:, : self.warp.size], scale.time)
-        drawn = [
-            v.draw(z[:, a:b], scale, clock, self.warp.nominal)
-            for v, (a, b) in zip(self.vehicles, pairwise(parts.tolist()), strict=True)
-        ]
-        return Batch.of(self.vehicles, drawn)

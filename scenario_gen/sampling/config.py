@@ -41,6 +41,11 @@ class SamplingConfig(Parameters):
     sizes: str = parameter(
         "catalogue", "wide: sizes of cars, from the catalogue of eight or as recorded", choices=("catalogue", "recorded")
     )
+    reactions: str = parameter(
+        "keep",
+        "wide: `keep` lets followers and yielders of the template answer to those they react to, `none` lets nobody",
+        choices=("keep", "none"),
+    )
     freedom: float = parameter(2.5, "wide: standard deviations at which all that is free is cut", low=0.5, high=4.0)
     lateral_sigma: float = parameter(
         0.3, "σ_f: standard deviation across the route, between anchors", unit="m", low=0.0, high=10.0

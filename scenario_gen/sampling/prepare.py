@@ -21,7 +21,7 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats
 from scenario_gen.errors import InputError
-from scenario_gen.sampling.candidates import CandidateModel, VehicleModel
+from scenario_gen.sampling.candidates import VehicleModel
 from scenario_gen.sampling.config import SamplingConfig
 from scenario_gen.sampling.deviations import (
     lateral_covariance_root,
@@ -32,6 +32,7 @@ from scenario_gen.sampling.deviations import (
     Steering,
 )
 from scenario_gen.sampling.freedom import FADES, Freedom, freedom_of, MOST_ONWARD
+from scenario_gen.sampling.model import CandidateModel
 from scenario_gen.sampling.pace import clock_of, slowed_clock, template_grid
 from scenario_gen.sampling.path import BasePath
 from scenario_gen.sampling.speed_profile.knots import speed_knots, SpeedKnots, STAND
@@ -41,8 +42,10 @@ from scenario_gen.sampling.speed_profile.spline import SpeedSpline
 from scenario_gen.sampling.speed_profile.stops import least_shares, lengthened, SHORTEST_WAIT, standing_part
 from scenario_gen.sampling.time_warp import Clock, TimeWarp
 from scenario_gen.template.interaction import Wait, WAIT_SPEED
+from scenario_gen.template.reactions import reactions_of
 from scenario_gen.template.tracks import clean_tracks
 from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.reaction import FOLLOW, ReactionGraph
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates
@@ -183,6 +186,7 @@ def prepare(
     asked: BoundaryStates,
     waits: Sequence[Wait],
     config: SamplingConfig,
+    order: str = "keep",
 ) -> Prepared:
     """Build the model: on the template's clock, slowed ahead of bends, and stretched only where no speed exists otherwise.
 
@@ -223,7 +227,20 @@ def prepare(
             replace(v, freedom=_freedom(drive, v, warp.nominal, asked.freed[n], tied, road, config))
             for n, (v, drive) in enumerate(zip(vehicles, drives, strict=True))
         ]
-    return Prepared(CandidateModel(tuple(vehicles), warp), tuple(sentences))
+    reactions = kept_reactions(encounter, config, order)
+    return Prepared(CandidateModel(tuple(vehicles), warp, reactions), tuple(sentences))
+
+
+def kept_reactions(encounter: Encounter, config: SamplingConfig, order: str = "keep") -> ReactionGraph | None:
+    """Return the reactions of the template that scenarios keep; None where there are none, or nothing is freed.
+
+    Where an `order` other than the template's is asked for, nobody is made to wait for anybody.
+    """
+    if config.variety != "wide" or config.reactions != "keep":
+        return None
+    graph = reactions_of(encounter)
+    edges = tuple(edge for edge in graph.edges if order == "keep" or edge.kind == FOLLOW)
+    return replace(graph, edges=edges) if edges else None
 
 
 def _freedom(

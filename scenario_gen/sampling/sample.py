@@ -115,7 +115,7 @@ def sample_scenarios(
         RefusedError: states or a target were asked for, and not one candidate that meets them is valid.
     """
     ego = request.ego_of(encounter)
-    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config)
+    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config, request.order)
     slot = None if ego is None else EgoSlot(encounter.vehicles[ego], asked.start[ego], asked.end[ego])
     if prepared.model is None:
         made = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot)
@@ -123,12 +123,16 @@ def sample_scenarios(
         aim = aim_of(encounter, request, measures)
         sampler = Sampler(prepared.model, seed, road.frame_id, ego, label=label_of(encounter, request, aim))
         judge = Judge.of(sampler, check, _enough(config, request))
+        graph = prepared.model.reactions
+        kept = tuple(edge for edge in (graph.edges if graph is not None else ()) if (edge.who, edge.whom) not in judge.lost)
+        sampler = replace(sampler, label=label_of(encounter, request, aim, kept))
         loop = _Loop(sampler, judge, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
         loop.aim, loop.measures = aim, measures
         loop.run_request(config.attempts, diverse=request.choose == "diverse")
-        sentences = (*prepared.adaptations, *loop.adaptations)
+        lost = [f"on this road a reaction is not kept: {said}" for said in judge.lost.values()]
+        sentences = (*prepared.adaptations, *lost, *loop.adaptations)
         made = ScenarioSet(
-            count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot, loop.reached, loop.chosen_from
+            count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot, loop.reached, loop.chosen_from, kept,
         )  # fmt: skip
     if request.moves and not made.scenarios and not cancelled():
         causes = ", ".join(f"{number} × {cause.value}" for cause, number in made.refused.most_common())
@@ -159,7 +163,7 @@ def regenerate(
     Raises:
         InputError: no candidate has this index, or nothing is said of the target.
     """
-    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config)
+    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config, request.order)
     if prepared.model is None:
         return None
     ego, aim = request.ego_of(encounter), aim_of(encounter, request, measures)

@@ -22,8 +22,9 @@ import numpy as np
 from scenario_gen import exact
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import InputError
-from scenario_gen.sampling.candidates import Batch, CandidateModel, Scale
+from scenario_gen.sampling.candidates import Batch, Scale
 from scenario_gen.sampling.directed import Proposal
+from scenario_gen.sampling.model import CandidateModel
 from scenario_gen.types.ego import with_witness
 from scenario_gen.types.scenario import Scenario
 

@@ -24,9 +24,10 @@ import numpy as np
 from scenario_gen.arrays import Bools, canonical_heading, canonical_poses, Floats, frozen, Ints
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
+from scenario_gen.types.reaction import Reaction
 from scenario_gen.types.target import Reached
 
-FACTS = ("weight", "target.", "order", "passing_order")
+FACTS = ("weight", "target.", "order", "passing_order", "reactions")
 """How the names of a scenario's facts begin."""
 
 
@@ -49,7 +50,7 @@ class Scenario:
         present: (N, 2) first and last instant at which each vehicle is there, as in `Tracks`; default: everybody throughout.
         witness: of a scenario with an ego slot: a trajectory of the vehicle that was left out, as a scenario of that vehicle
             alone on the same clock. Both together were proven valid, so the slot can be driven.
-        facts: what else its entry in `scenarios/info` says: `weight`, `target.…`, `order`, `passing_order` (FACTS).
+        facts: what else its entry in `scenarios/info` says: `weight`, `target.…`, `order`, `passing_order`, `reactions` (FACTS).
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -120,6 +121,7 @@ class Cause(StrEnum):
     CURVATURE = "curvature"
     PASSING_ORDER = "passing_order"  # not the template's order at a conflict
     STOP_NOT_KEPT = "stop_not_kept"  # a vehicle does not keep a stop of the template
+    REACTION = "reaction"  # who reacts in the template goes too early, too late, or at another distance
     CONFLICT_LOST = "conflict_lost"  # the stretch in which all are there leaves out a conflict of the template
     NOT_FINITE = "not_finite"
     OUT_OF_RANGE = "out_of_range"  # not in the range that was asked for; it was not checked
@@ -174,6 +176,7 @@ class ScenarioSet:
     vehicle that was left out for a planner under test, if one was; each scenario then has its witness.
     The scenarios of a large set are not in memory but drawn again whenever they are looked at. `reached` says what sampling
     towards a target came to, `chosen` from how many valid candidates the set was chosen (0: as they were drawn).
+    `reactions` are those of the template that every scenario keeps.
     """
 
     requested: int
@@ -184,6 +187,7 @@ class ScenarioSet:
     ego: EgoSlot | None = None
     reached: Reached | None = None
     chosen: int = 0
+    reactions: tuple[Reaction, ...] = ()
 
     @property
     def acceptance(self) -> float:

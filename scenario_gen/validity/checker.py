@@ -24,9 +24,11 @@ from scenario_gen.arrays import Floats, runs
 from scenario_gen.errors import InputError
 from scenario_gen.roads.clearance import clearance_in_cells
 from scenario_gen.roads.vector.ground import drives_against
-from scenario_gen.template.interaction import Conflict, find_conflicts, orders_asked, pair_conflict, Wait
+from scenario_gen.template.answers import conflict_of, lag_behind, time_gaps
+from scenario_gen.template.interaction import Conflict, find_conflicts, orders_asked, Wait
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.presence import together
+from scenario_gen.types.reaction import FOLLOW, Reaction
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, Verdict, Violation
 from scenario_gen.validity import collision as apart
@@ -54,6 +56,7 @@ class Checker:
         waits: Sequence[Wait] | None,
         limits: Limits | None = None,
         first: Sequence[int | None] | None = None,
+        reactions: Sequence[Reaction] = (),
     ) -> None:
         """Prepare for many scenarios of one request.
 
@@ -65,10 +68,11 @@ class Checker:
             limits: the limits; the default ones if None.
             first: who must go first at each of them, by index, None for anyone (`orders_asked`); a conflict whose order is
                 not the template's must be there.
+            reactions: of the template, which every scenario keeps.
         """
         self._first = tuple(conflict.first for conflict in conflicts or ()) if first is None else tuple(first)
         self.road, self.asked, self.conflicts, self.waits = road, asked, conflicts, waits
-        self.limits = limits or Limits()
+        self.limits, self.reactions = limits or Limits(), tuple(reactions)
         self._limits = np.array([getattr(self.limits, name) for name in dynamics.LIMITS])
         if road is not None:
             self._clearance, self._blocked = clearance_in_cells(road), inside.blocked_before(road.drivable)
@@ -83,6 +87,7 @@ class Checker:
         waits: Sequence[Wait],
         limits: Limits | None = None,
         order: str = "keep",
+        reactions: Sequence[Reaction] = (),
     ) -> "Checker":
         """Return the checker of scenarios of a template, with all of its vehicles.
 
@@ -93,12 +98,14 @@ class Checker:
             waits: the template's waits that are kept.
             limits: the limits; the default ones if None.
             order: who goes first, see `orders_asked`.
+            reactions: of the template, that are kept.
 
         Raises:
             RefusedError: an order is to be swapped, and there is none.
         """
         conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
-        return cls(road, asked, conflicts, waits, (limits or Limits()).for_template(encounter), orders_asked(conflicts, order))
+        own = (limits or Limits()).for_template(encounter)
+        return cls(road, asked, conflicts, waits, own, orders_asked(conflicts, order), reactions)
 
     @property
     def not_applicable(self) -> tuple[str, ...]:
@@ -137,8 +144,9 @@ class Checker:
             *self._wrong_ways(scenario),
             *self._waits(scenario),
         ]
-        wrong, present, absent = self._passing_orders(scenario)
-        return Verdict((*violations, *wrong), present, absent)
+        found = [conflict_of(scenario, asked.first, asked.second) for asked in self.conflicts or ()]
+        wrong, present, absent = self._passing_orders(scenario, found)
+        return Verdict((*violations, *wrong, *self._reactions(scenario, found)), present, absent)
 
     def _refuse_misfits(self, scenario: Scenario) -> None:
         n, where = len(scenario.vehicles), f"scenario {scenario.index} of seed {scenario.seed}"
@@ -155,6 +163,7 @@ class Checker:
         if self.asked is not None and len(self.asked.start) != n:
             raise InputError(f"{where} has {n} vehicle(s), but states were asked for {len(self.asked.start)}")
         indices = [i for c in self.conflicts or () for i in (c.first, c.second)] + [w.vehicle for w in self.waits or ()]
+        indices += [i for edge in self.reactions for i in (edge.who, edge.whom)]
         if any(i >= n for i in indices):
             raise InputError(f"{where} has {n} vehicle(s), but the template's waits and conflicts name vehicle {max(indices)}")
 
@@ -283,13 +292,11 @@ class Checker:
             message = f"vehicle {i}: drives against its lane near ({x:.2f}, {y:.2f}), {int(against[i].sum())} samples in all"
             yield Violation(Cause.WRONG_WAY, float(scenario.time[k]), (i,), message)
 
-    def _passing_orders(self, scenario: Scenario) -> tuple[list[Violation], int, int]:
-        """Violations, and how many of the template's conflicts are present and absent in the scenario."""
+    def _passing_orders(self, scenario: Scenario, conflicts: Sequence[Conflict | None]) -> tuple[list[Violation], int, int]:
+        """Violations, and how many of the template's conflicts are present and absent in the scenario, which has `conflicts`."""
         wrong, present = [], 0
-        for asked, first in zip(self.conflicts or (), self._first, strict=True):
+        for asked, first, found in zip(self.conflicts or (), self._first, conflicts, strict=True):
             a, b = sorted((asked.first, asked.second))
-            arrays = (scenario.time, scenario.position, scenario.heading)
-            found = pair_conflict(scenario.vehicles, *arrays, a, b, scenario.present)
             present += found is not None
             swapped = first == asked.second
             wanted = "asked is that" if swapped else "in the template"
@@ -303,6 +310,35 @@ class Checker:
                 message = f"vehicles {a} and {b} do not meet; {wanted} vehicle {first} goes first"
                 wrong.append(Violation(Cause.PASSING_ORDER, 0.0, (a, b), message))
         return wrong, present, len(self.conflicts or ()) - present
+
+    def _reactions(self, scenario: Scenario, conflicts: Sequence[Conflict | None]) -> Iterator[Violation]:
+        """Yielders that leave too early or too late, followers that are too near or too far, in the scenario with `conflicts`."""
+        limits = self.limits
+        met = {(c.second, c.first): c for c in conflicts if c is not None}
+        for edge in self.reactions:
+            if edge.kind == FOLLOW:
+                gaps = time_gaps(scenario, edge.who, edge.whom)
+                low, high = (1.0 - limits.headway_share) * edge.headway[0], (1.0 + limits.headway_share) * edge.headway[2]
+                if len(gaps) and (gaps.min() < low or gaps.max() > high):
+                    message = (
+                        f"vehicle {edge.who}: drives {gaps.min():.2f} to {gaps.max():.2f} s behind vehicle {edge.whom}; its own "
+                        f"driver's gaps allow {low:.2f} to {high:.2f} s"
+                    )
+                    yield Violation(Cause.REACTION, 0.0, (edge.who, edge.whom), message)
+                continue
+            conflict = met.get((edge.who, edge.whom))
+            if conflict is None:
+                message = f"vehicle {edge.who}: does not come behind vehicle {edge.whom}, for which it waits in the template"
+                yield Violation(Cause.REACTION, 0.0, (edge.who, edge.whom), message)
+                continue
+            lag = lag_behind(scenario, conflict)
+            low, high = min(edge.lag, 0.0) - limits.anticipation, max(edge.lag, 0.0) + limits.patience
+            if not low <= lag <= high:
+                message = (
+                    f"vehicle {edge.who}: leaves {lag:.2f} s after vehicle {edge.whom} has cleared; "
+                    f"allowed are {low:.2f} to {high:.2f} s"
+                )
+                yield Violation(Cause.REACTION, conflict.exit_first + lag, (edge.who, edge.whom), message)
 
     def _waits(self, scenario: Scenario) -> Iterator[Violation]:
         waits = self.waits or ()

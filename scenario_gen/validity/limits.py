@@ -65,6 +65,19 @@ class Limits(Parameters):
         low=0.0,
         high=10.0,
     )
+    anticipation: float = parameter(
+        0.5,
+        "who waits for another one in the template leaves at most this long before that one has cleared, or earlier by this than "
+        "the template's if that anticipates",
+        unit="s",
+        low=0.0,
+    )
+    patience: float = parameter(
+        3.0, "and at most this long after the template's own lag, or after the clearing if that is later", unit="s", low=0.0
+    )
+    headway_share: float = parameter(
+        0.5, "a follower's time gaps stay within those of the template's, widened by this share", low=0.0, high=10.0
+    )
     time_resolution: float = parameter(
         1e-6, "what cannot be proven over an interval this short is refused", unit="s", low=1e-9, high=1.0
     )

@@ -41,6 +41,7 @@ from scenario_gen.storage.metadata import qos_yaml
 from scenario_gen.storage.writer import atomic_bag
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import BoundaryStates
+from scenario_gen.validity import Limits
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +92,20 @@ def test_each_fault_is_found_with_its_cause_and_place(run, tmp_path):
     assert found.found["overlap"].scenario == 2
     assert found.found[UNUSABLE].scenario == 3
     assert "elsewhere" in found.found[UNUSABLE].message
+
+
+def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
+    """The bundled case b has a yielder; hold it to more than it was held to."""
+    (encounter,) = read_log([bundled("b")]).encounters
+    config = PipelineConfig()
+    road = build_road("t_intersection", encounter, config.road)
+    made = attempt(encounter, segment(encounter, config.segmentation, 7), road, config, Request(), count=4, seed=7)
+    assert [edge.name("12") for edge in made.generated.reactions] == ["2 yields to 1"]
+    bag = write_recording(tmp_path / "b", {"/here": made})
+    assert validate_bag(bag)[0].found == {}
+    (found,) = validate_bag(bag, Limits(anticipation=0.0, patience=0.0))
+    assert set(found.found) == {"reaction"}
+    assert "has cleared; allowed are" in found.found["reaction"].message
 
 
 def test_what_the_bag_does_not_say_is_said(run, tmp_path):

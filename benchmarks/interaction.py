@@ -1,0 +1,276 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Interaction: do generated vehicles drive with one another? Figures of docs/interaction.md, on each encounter's own road.
+
+Encounters cut at random from the full recordings and by people (see `_naturalness_cuts.py`), where they are present, and the
+bundled ones. `--cases 10` takes the first ten, `--held-out` the third that is kept apart, `--count` so many scenarios of
+each (30), `--details FILE` writes a line of JSON per case, `--variety` takes another preset, `--roads` other
+roads, with commas.
+Intervals: 95 %, bootstrap over encounters.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+import json
+import math
+from pathlib import Path
+import sys
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+from benchmarks._naturalness_cuts import cuts, recorded
+from benchmarks._size import sized
+from benchmarks.naturalness import DATA
+from benchmarks.row import Row
+from scenario_gen.arrays import Floats
+from scenario_gen.errors import ScenarioGenError
+from scenario_gen.evaluation.interaction import following, ghosts, pair_windows, yielding
+from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
+from scenario_gen.nearest import attempt
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.roads import build_road
+from scenario_gen.segmentation import segment
+from scenario_gen.template.reactions import reactions_of
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.reaction import FOLLOW
+from scenario_gen.types.request import Request
+from scenario_gen.types.scenario import Scenario
+
+COUNT = sized(30, quick=4)
+LOGS = sized(None, quick=1)
+SEED, APART = 7, 7  # of a set; how far apart two scenarios are that a mixed pair is of
+RESAMPLES = sized(1000, quick=20)
+FOLDS = 5
+_FIGURES = 3  # of an edge, at least, for an interval
+
+
+@dataclass
+class Case:
+    """What one encounter comes to.
+
+    Attributes:
+        figures: a flat document.
+        together, mixed: windows of pairs with an edge, of one scenario and of two.
+        apart, apart_mixed: the same of pairs without one.
+    """
+
+    figures: dict[str, Any]
+    together: list[Floats]
+    mixed: list[Floats]
+    apart: list[Floats]
+    apart_mixed: list[Floats]
+
+
+def run(
+    cases: int | None = None,
+    count: int | None = None,
+    details: str | None = None,
+    variety: str = "wide",
+    roads: str = "corridor",
+    *,
+    held_out: bool = False,
+) -> list[Row]:
+    """Measure; arguments as said above."""
+    found = []
+    for name, encounter in list(_encounters(held_out=held_out))[:LOGS][:cases]:
+        for road in roads.split(","):
+            case = _measured(name, encounter, road, count or COUNT, variety)
+            found.append(case)
+            print(json.dumps(_finite(case.figures)), file=sys.stderr, flush=True)
+    if details:
+        Path(details).write_text("".join(json.dumps(_finite(case.figures)) + "\n" for case in found))
+    return _rows(found)
+
+
+def _encounters(*, held_out: bool) -> Any:
+    """Yield names and encounters: those of recordings that are there, and the bundled ones."""
+    chosen = cuts()[1] if held_out else [*cuts()[0], *recorded(DATA)]
+    for cut in chosen:
+        paths = [DATA / "trajectories" / file for file in cut.files]
+        if all(path.is_file() for path in paths):
+            yield cut.name, max(read_log(paths, cut.config()).encounters, key=lambda one: one.duration)
+    if not held_out:
+        for letter in "abc":
+            yield f"bundled {letter}", read_log([bundled(letter)]).encounters[0]
+
+
+def _measured(name: str, encounter: Encounter, road_name: str, count: int, variety: str) -> Case:
+    """Generate on a road, and measure."""
+    graph, ids = reactions_of(encounter), [vehicle.id for vehicle in encounter.vehicles]
+    config = PipelineConfig()
+    config = replace(config, sampling=replace(config.sampling, variety=variety))
+    case = Case({"name": name, "road": road_name, "edges": [edge.document(ids) for edge in graph.edges]}, [], [], [], [])
+    try:
+        road, segmentation = build_road(road_name, encounter, config.road), segment(encounter, config.segmentation, SEED)
+        begun = process_time()
+        made = attempt(encounter, segmentation, road, config, Request(), count=count, seed=SEED)
+        seconds = process_time() - begun
+    except ScenarioGenError as error:
+        case.figures["refused"] = str(error)
+        return case
+    scenarios = list(made.generated.scenarios)
+    case.figures |= {
+        "scenarios": len(scenarios), "acceptance": made.generated.acceptance, "seconds": seconds,
+        "refused by": {cause.value: n for cause, n in made.generated.refused.most_common()},
+        "kept": len(made.generated.reactions),
+    }  # fmt: skip
+    if len(scenarios) < 2:
+        case.figures["refused"] = "fewer than two scenarios"
+        return case
+    own = [ghosts(encounter, n) for n in range(len(ids))]
+    case.figures["clean drives"] = own.count(0) * len(scenarios)
+    case.figures["ghosts"] = sum(ghosts(one, n) > 0 for one in scenarios for n in range(len(ids)) if own[n] == 0)
+    edges = {(edge.whom, edge.who): edge for edge in graph.edges}
+    told = []
+    for edge in graph.edges:
+        if edge.kind == FOLLOW:
+            measured = following(edge, encounter, scenarios)
+            told.append({"slope": measured.slope, "gaps": measured.gaps, "lag": measured.lag, "own": measured.own})
+            told[-1]["lag off"] = measured.lag - edge.lag
+        else:
+            seen = yielding(edge, scenarios)
+            told.append({"early": seen.early, "mean": seen.mean, "spread": seen.spread, "template": edge.lag})
+    case.figures["figures"] = told
+    for a in range(len(ids)):
+        for b in range(len(ids)):
+            if (a, b) in edges or (a < b and (b, a) not in edges):
+                kept, other = (case.together, case.mixed) if (a, b) in edges else (case.apart, case.apart_mixed)
+                for k, one in enumerate(scenarios):
+                    kept += _windows(one, a, one, b)
+                    other += _windows(one, a, scenarios[(k + APART) % len(scenarios)], b)
+    return case
+
+
+def _windows(one: Scenario, a: int, other: Scenario, b: int) -> list[Floats]:
+    """Windows of a vehicle of one scenario beside a vehicle of another one, both from the scenario's start."""
+    first = max(int(one.present[a, 0]), int(other.present[b, 0]))
+    last = min(int(one.present[a, 1]), int(other.present[b, 1])) + 1
+    if last - first < 2:
+        return []
+    position = np.stack([one.position[a, first:last], other.position[b, first:last]])
+    speed = np.stack([one.speed[a, first:last], other.speed[b, first:last]])
+    return list(pair_windows(one.time[first:last], position, speed))
+
+
+def _rows(found: Sequence[Case]) -> list[Row]:
+    """Sum the cases up."""
+    good = [case for case in found if "figures" in case.figures]
+    follows = [(case, told) for case in good for told in case.figures["figures"] if "slope" in told]
+    yields = [(case, told) for case in good for told in case.figures["figures"] if "early" in told]
+    behind = [(case, told) for case, told in yields if told["template"] > -0.5]
+    rows = [Row("encounters that generate", len(good) / max(len(found), 1), "share", "higher", None, f"{len(found)} encounters")]
+
+    def row(label: str, pairs: Any, of: Callable[[Any], float], unit: str, better: Any, target: float | None) -> None:
+        if pairs:
+            rows.append(Row(label, of([told for _, told in pairs]), unit, better, target, _interval(pairs, of)))
+
+    row("follower's mean speed on its leader's, median slope", follows, _median("slope"), "", "higher", 0.75)
+    row("time gap over the template's, 10th percentile", follows, _median("gaps", 0), "×", "higher", 0.65)
+    row("time gap over the template's, 90th percentile", follows, _median("gaps", 1), "×", "lower", 1.35)
+    row(
+        "lag of followers' deviations off the template's, median",
+        follows,
+        _median("lag off", None, absolute=True),
+        "s",
+        "lower",
+        0.5,
+    )
+    row("own part of followers' deviations, median", follows, _median("own"), "share", "higher", 0.05)
+    row("yielder leaves early where the template does not, mean", behind, _mean("early"), "share", "lower", 0.01)
+    row("spread of a yielder's lag, median", yields, _median("spread"), "s", "lower", 0.9)
+    drives = [(case, case.figures) for case in good if case.figures["clean drives"]]
+    row("drives with ghost braking, clean ones", drives, _ratio("ghosts", "clean drives"), "share", "lower", 0.04)
+    row("acceptance, median", [(case, case.figures) for case in good], _median("acceptance"), "share", "higher", None)
+    for label, kept, other, target in (
+        ("AUC, pairs with an edge against mixed ones", "together", "mixed", 0.62),
+        ("AUC, pairs without an edge against mixed ones", "apart", "apart_mixed", None),
+    ):
+        area = _told_apart([(getattr(case, kept), getattr(case, other)) for case in good])
+        if area is not None:
+            rows.append(Row(label, area[0], "", "higher", target, f"{area[1]:.3f} to {area[2]:.3f}"))
+    return rows
+
+
+def _told_apart(sets: Sequence[tuple[list[Floats], list[Floats]]]) -> tuple[float, float, float] | None:
+    """Area under the curve with its interval, boosted trees, whole encounters held out; None with too few of them."""
+    try:
+        from sklearn.ensemble import HistGradientBoostingClassifier
+        from sklearn.metrics import roc_auc_score
+        from threadpoolctl import threadpool_limits
+    except ImportError:
+        return None
+    sets = [(np.array(one), np.array(other)) for one, other in sets if one and other]  # type: ignore[misc]
+    if len(sets) < FOLDS:
+        return None
+    data = np.concatenate([part for pair in sets for part in pair])
+    label = np.concatenate([np.repeat((1, 0), (len(one), len(other))) for one, other in sets])
+    group = np.concatenate([np.full(len(one) + len(other), k) for k, (one, other) in enumerate(sets)])
+    weight = np.concatenate([np.full(len(part), 1.0 / len(part)) for pair in sets for part in pair])
+    weight *= len(weight) / weight.sum()
+    rng = np.random.default_rng(0)
+    told, rounds = np.zeros(len(data)), sized(3, 1)
+    with threadpool_limits(1):
+        for _ in range(rounds):
+            fold = rng.permutation(len(sets)) % FOLDS
+            for k in range(FOLDS):
+                test = fold[group] == k
+                model = HistGradientBoostingClassifier(max_leaf_nodes=8, max_iter=150, min_samples_leaf=40, random_state=0)
+                model.fit(data[~test], label[~test], sample_weight=weight[~test])
+                told[test] += model.predict_proba(data[test])[:, 1] / rounds
+    each = np.array([float(roc_auc_score(label[group == k], told[group == k])) for k in range(len(sets))])
+    draws = [float(each[rng.integers(0, len(each), len(each))].mean()) for _ in range(RESAMPLES)]
+    return float(each.mean()), float(np.percentile(draws, 2.5)), float(np.percentile(draws, 97.5))
+
+
+def _median(key: str, part: int | None = None, *, absolute: bool = False) -> Callable[[Any], float]:
+    def of(told: Any) -> float:
+        values = np.array([one[key] if part is None else one[key][part] for one in told], dtype=float)
+        return float(np.nanmedian(np.abs(values) if absolute else values)) if np.isfinite(values).any() else math.nan
+
+    return of
+
+
+def _mean(key: str) -> Callable[[Any], float]:
+    return lambda told: float(np.mean([one[key] for one in told]))
+
+
+def _ratio(key: str, base: str) -> Callable[[Any], float]:
+    return lambda told: sum(one[key] for one in told) / sum(one[base] for one in told)
+
+
+def _interval(pairs: Sequence[tuple[Case, Any]], of: Callable[[Any], float]) -> str:
+    """The 95 % interval of a figure: whole encounters are drawn again."""
+    rng = np.random.default_rng(0)
+    names = sorted({case.figures["name"] for case, _ in pairs})
+    groups = [[told for case, told in pairs if case.figures["name"] == name] for name in names]
+    if len(groups) < _FIGURES:
+        return f"{len(pairs)} of {len(groups)} encounters"
+    draws = [of([told for k in rng.integers(0, len(groups), len(groups)) for told in groups[k]]) for _ in range(RESAMPLES)]
+    low, high = np.nanpercentile(draws, (2.5, 97.5)).tolist()
+    return f"{low:.3g} to {high:.3g}; {len(pairs)} of {len(groups)} encounters"
+
+
+def _finite(value: Any) -> Any:
+    """Replace what JSON cannot say."""
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,101 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A reaction: who answers to whom in an encounter, how late and how strongly, and how sure that is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+FOLLOW, YIELD = "follow", "yield"
+DOUBTFUL = 0.5  # confidence below which an edge is said to be doubtful
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """Vehicle `who` reacts to vehicle `whom`; both are indices into the encounter's vehicles.
+
+    Attributes:
+        kind: FOLLOW (same way, behind) or YIELD (crossing or merging, second).
+        who: the one that reacts.
+        whom: the one it reacts to.
+        lag: seconds; of a follower from its leader's change of speed to its own, of a yielder from the other's clearing of the
+            shared area to its own departure (slightly negative if it anticipates).
+        gain: how much of a leader's quick change of speed its follower takes over, 0 to 1; 1 of a yielder.
+        residual: what is its own: metres of gap of a follower, seconds of lag of a yielder (one standard deviation).
+        confidence: 0 to 1, how much better the record is explained with the edge than without.
+        since, until: seconds of the template's clock: during which it follows; from its wait's begin to its departure.
+        headway: least, median and greatest time gap [s], centre to centre, of a follower while it drives; zeros of a yielder.
+        stands: whether a yielder stands before it goes; one that does not only slows down.
+    """
+
+    kind: str
+    who: int
+    whom: int
+    lag: float
+    gain: float
+    residual: float
+    confidence: float
+    since: float
+    until: float
+    headway: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    stands: bool = False
+
+    @property
+    def clears(self) -> float:
+        """When [s] the other has cleared the shared area, on the template's clock; of a yielder."""
+        return self.until - self.lag
+
+    def name(self, ids: Sequence[str]) -> str:
+        """Return who reacts to whom, by the vehicles' ids: as it is named in an entry of `scenarios/info`."""
+        return f"{ids[self.who]} {'follows' if self.kind == FOLLOW else 'yields to'} {ids[self.whom]}"
+
+    def words(self, ids: Sequence[str]) -> str:
+        """Return the reaction in words, with the vehicles' ids."""
+        who, whom = f"vehicle {ids[self.who]}", f"vehicle {ids[self.whom]}"
+        if self.kind == FOLLOW:
+            said = f"{who} follows {whom}, {self.headway[1]:.1f} s behind, and answers its speed after {self.lag:.1f} s"
+        else:
+            verb = "waits for" if self.stands else "slows down for"
+            when = f"{self.lag:.1f} s after" if self.lag >= 0.0 else f"{-self.lag:.1f} s before it has"
+            said = f"{who} {verb} {whom} to pass and leaves {when}"
+        return f"{said} (doubtful)" if self.confidence < DOUBTFUL else said
+
+    def document(self, ids: Sequence[str]) -> dict[str, str | float]:
+        """Return the reaction as a flat document, with the vehicles' ids and the words."""
+        return {
+            "kind": self.kind, "who": ids[self.who], "whom": ids[self.whom], "lag": round(self.lag, 3),
+            "gain": round(self.gain, 3), "residual": round(self.residual, 3), "confidence": round(self.confidence, 3),
+            "words": self.words(ids),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ReactionGraph:
+    """All reactions of an encounter, without a circle.
+
+    Attributes:
+        edges: the reactions, those of a vehicle behind those of the ones it reacts to.
+        order: all vehicles, each behind those it reacts to.
+        cut: reactions that were left out because they close a circle, each the least sure one of it.
+    """
+
+    edges: tuple[Reaction, ...]
+    order: tuple[int, ...]
+    cut: tuple[Reaction, ...] = ()
+
+    def sentences(self, ids: Sequence[str]) -> tuple[str, ...]:
+        """Return what is said of the graph, one sentence an edge."""
+        said = [edge.words(ids) for edge in self.edges]
+        said += [f"{edge.words(ids)}: left out, for it closes a circle of reactions" for edge in self.cut]
+        return tuple(said) or ("nobody is seen to react to anybody",)

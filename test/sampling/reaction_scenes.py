@@ -1,0 +1,65 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Encounters whose reactions are known: one behind another, and one that waits for another to cross."""
+
+import numpy as np
+
+from scenario_gen.types.encounter import Encounter, Vehicle
+
+DT = 0.1
+
+
+def wander(rng, count, sigma=1.0, length=2.0):
+    """A smooth random speed about 12 m/s."""
+    time = np.arange(count) * DT
+    covariance = sigma**2 * np.exp(-0.5 * ((time[:, None] - time) / length) ** 2) + 1e-8 * np.eye(count)
+    return 12.0 + np.linalg.cholesky(covariance) @ rng.standard_normal(count)
+
+
+def answering(leader, lag, gain):
+    """The speed of one who answers a leader's speed after `lag` seconds."""
+    late = round(lag / DT)
+    return 12.0 + gain * (np.concatenate([np.full(late, leader[0]), leader[:-late]]) - 12.0)
+
+
+def along(speed, start, lane=0.0):
+    s = start + np.concatenate([[0.0], np.cumsum(0.5 * DT * (speed[1:] + speed[:-1]))])
+    return np.column_stack([s, np.full(len(s), lane)])
+
+
+def lane_encounter(leader, follower, gap=20.0, lane=0.0):
+    """Two vehicles on the x axis, the second `gap` metres behind the first."""
+    position = np.stack([along(leader, gap), along(follower, 0.0, lane)])
+    return Encounter(
+        "lane", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, np.zeros((2, len(leader))), np.stack([leader, follower])
+    )
+
+
+def crossing(wait_until, speed=8.0, seconds=20.0):
+    """Vehicle 1 drives east through the origin at 6 s; vehicle 2 comes from the south, stands before it, and leaves then."""
+    time = np.arange(round(seconds / DT) + 1) * DT
+    first = np.column_stack([speed * (time - 6.0), np.zeros(len(time))])
+    stop, begins = -8.0, 3.0
+    own = np.where(
+        time < begins,
+        8.0 * (1.0 - time / begins),
+        np.where(time < wait_until, 0.0, np.minimum(2.0 * (time - wait_until), 8.0)),
+    )
+    y = np.concatenate([[0.0], np.cumsum(0.5 * DT * (own[1:] + own[:-1]))])
+    y += stop - y[round(begins / DT)]
+    position = np.stack([first, np.column_stack([np.full(len(time), 0.0), y])])
+    heading = np.stack([np.zeros(len(time)), np.full(len(time), 0.5 * np.pi)])
+    speeds = np.stack([np.full(len(time), speed), own])
+    return Encounter("crossing", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, heading, speeds)

@@ -1,0 +1,93 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Who reacts to whom: planted reactions are found with their lag, independent drives have none, circles are cut."""
+
+import itertools
+
+import numpy as np
+import pytest
+from reaction_scenes import answering, crossing, lane_encounter, wander
+
+from scenario_gen.template.reactions import reactions_of, without_circles
+from scenario_gen.types.reaction import FOLLOW, Reaction, YIELD
+
+
+@pytest.mark.parametrize("lag", [0.6, 1.2, 2.0])
+def test_a_planted_lag_and_gain_are_found(lag):
+    found = []
+    for seed in range(6):
+        leader = wander(np.random.default_rng(seed), 400)
+        (edge,) = reactions_of(lane_encounter(leader, answering(leader, lag, 0.8))).edges
+        assert (edge.kind, edge.who, edge.whom) == (FOLLOW, 1, 0)
+        assert edge.gain == pytest.approx(0.8, abs=0.1)
+        found.append(edge.lag)
+    assert np.median(found) == pytest.approx(lag, abs=0.15)
+
+
+def test_independent_drives_hardly_ever_react():
+    """Neighbouring lanes never do; one behind another with a speed of its own hardly ever."""
+    behind = beside = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        leader, other = wander(rng, 300, 1.5), wander(rng, 300, 1.5) - 2.5
+        behind += bool(reactions_of(lane_encounter(leader, other, 45.0)).edges)
+        beside += bool(reactions_of(lane_encounter(leader, other, 25.0, lane=3.5)).edges)
+    assert beside == 0
+    assert behind <= 4
+
+
+@pytest.mark.parametrize("lag", [0.3, 1.5, 2.5])
+def test_who_waits_for_another_one_and_leaves_behind_it_yields(lag):
+    clears = reactions_of(crossing(8.0)).edges[0].clears
+    graph = reactions_of(crossing(clears + lag))
+    (edge,) = graph.edges
+    assert (edge.kind, edge.who, edge.whom, edge.stands) == (YIELD, 1, 0, True)
+    assert edge.lag == pytest.approx(lag, abs=0.35)  # it leaves when it is faster than 0.5 m/s
+    assert graph.sentences(("1", "2"))[0].startswith("vehicle 2 waits for vehicle 1 to pass and leaves")
+
+
+def test_who_leaves_long_after_waits_for_something_else():
+    graph = reactions_of(crossing(14.0))
+    assert graph.edges == ()
+    assert graph.sentences(("1", "2")) == ("nobody is seen to react to anybody",)
+
+
+def edge(who, whom, confidence):
+    return Reaction(FOLLOW, who, whom, 1.0, 1.0, 1.0, confidence, 0.0, 10.0, (1.0, 1.0, 1.0))
+
+
+def test_the_least_sure_edge_of_a_circle_is_cut_and_said():
+    graph = without_circles([edge(0, 1, 0.9), edge(1, 2, 0.4), edge(2, 0, 0.8)], 3)
+    assert [(one.who, one.whom) for one in graph.cut] == [(1, 2)]
+    assert graph.order == (1, 0, 2)
+    assert "left out, for it closes a circle" in graph.sentences("abc")[-1]
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_whatever_the_edges_everybody_comes_behind_those_it_reacts_to(count):
+    pairs = list(itertools.permutations(range(count), 2))
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        edges = [edge(a, b, float(rng.random())) for a, b in pairs if rng.random() < 0.7]
+        graph = without_circles(edges, count)
+        assert sorted(graph.order) == list(range(count))
+        assert len(graph.edges) + len(graph.cut) == len(edges)
+        assert all(graph.order.index(one.whom) < graph.order.index(one.who) for one in graph.edges)
+
+
+def test_a_doubtful_edge_is_said_to_be():
+    assert edge(0, 1, 0.4).words("ab").endswith("(doubtful)")
+    assert "doubtful" not in edge(0, 1, 0.6).words("ab")
+    assert edge(0, 1, 0.6).document("ab")["words"].startswith("vehicle a follows vehicle b, 1.0 s behind")
