@@ -187,7 +187,7 @@ def test_who_drives_against_its_lane_does_so_while_it_is_there():
     lane = Lane("west", *(np.column_stack((x, np.full(2, y))) for y in (-2.0, 2.0)))
     road = replace(ROAD, lanes=LaneNetwork("one lane", (lane,)))
     scenario = replace(
-        scenario_of([straight(-25, 0, 0, 5, TIME)] + [straight(0, 30, 0, 5, TIME)], TIME), present=[[20, 60], [0, 100]]
+        scenario_of([straight(-25, 0, 0, 5, TIME), straight(0, 30, 0, 5, TIME)], TIME), present=[[20, 60], [0, 100]]
     )
     found, verdict = causes(scenario, road=road)
     assert found == [Cause.WRONG_WAY]
