@@ -37,10 +37,13 @@ def canonical_presence(present: Ints, count: int, samples: int, name: str) -> In
         name: what it belongs to, for the message.
 
     Raises:
-        InputError: the shape is wrong, or a vehicle has fewer than two samples or lies outside of 0 … T - 1.
+        InputError: the shape is wrong, or they are no whole numbers, or a vehicle has fewer than two samples or lies
+            outside of 0 … T - 1.
     """
     if np.shape(present) == (0, 2):
         return _sealed(np.tile(np.array([0, samples - 1], dtype=np.int64), (count, 1)))
+    if np.asarray(present).dtype.kind not in "iu":
+        raise InputError(f"{name}: presence is of type {np.asarray(present).dtype}; whole numbers are needed")
     made = np.array(present, dtype=np.int64, order="C")
     if made.shape != (count, 2):
         raise InputError(f"{name}: presence has shape {made.shape}; {count} rows of first and last sample are needed")

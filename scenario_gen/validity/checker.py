@@ -160,12 +160,15 @@ class Checker:
             raise InputError(f"{where}: a vehicle's length or width is not positive")
         if self.road is not None and scenario.frame_id != self.road.frame_id:
             raise InputError(f"{where} is in frame {scenario.frame_id!r}, its road in {self.road.frame_id!r}")
-        if self.asked is not None and len(self.asked.start) != n:
-            raise InputError(f"{where} has {n} vehicle(s), but states were asked for {len(self.asked.start)}")
+        known = () if self.asked is None else (self.asked.start, self.asked.end, self.asked.freed)
+        counts = sorted({len(states) for states in known} - {n})
+        if counts:
+            raise InputError(f"{where} has {n} vehicle(s), but states were asked for {counts[0]}")
         indices = [i for c in self.conflicts or () for i in (c.first, c.second)] + [w.vehicle for w in self.waits or ()]
         indices += [i for edge in self.reactions for i in (edge.who, edge.whom)]
-        if any(i >= n for i in indices):
-            raise InputError(f"{where} has {n} vehicle(s), but the template's waits and conflicts name vehicle {max(indices)}")
+        strangers = [i for i in indices if not 0 <= i < n]
+        if strangers:
+            raise InputError(f"{where} has {n} vehicle(s), but the template's waits, conflicts and reactions name vehicle {strangers[0]}")
 
     def _boundary_states(self, scenario: Scenario) -> Iterator[Violation]:
         if self.asked is None:
@@ -180,7 +183,7 @@ class Checker:
                 far, off = self._within_a_step(scenario, i, k)
                 free, faster = freed[i][k]
                 far, off = far + free + limits.position_tolerance, off + faster + limits.speed_tolerance
-                if distance > far + 1e-9 or difference > off + 1e-9:
+                if not (distance <= far + 1e-9 and difference <= off + 1e-9):  # NaN is not near
                     bounds = f" (free are {free:.3f} m and {faster:.3f} m/s)" if free or faster else ""
                     message = f"vehicle {i}: {name} is {distance:.3f} m and {difference:.3f} m/s from what was asked{bounds}"
                     yield Violation(Cause.BOUNDARY_STATE, float(scenario.time[scenario.present[i, k]]), (i,), message)
@@ -198,12 +201,12 @@ class Checker:
         return step * float(scenario.speed[i, at]), step * abs(float(scenario.acceleration[i, at]))
 
     def _dynamics(self, scenario: Scenario) -> Iterator[Violation]:
-        out = np.empty((len(scenario.vehicles), len(dynamics.Check), 4))
+        out = np.full((len(scenario.vehicles), len(dynamics.Check), 4), np.nan)
         names = ("position", "heading", "speed", "acceleration")
         for rows, at in spans(scenario):
             position, heading, speed, acceleration = (np.ascontiguousarray(getattr(scenario, name)[rows, at]) for name in names)
             dynamics.worst_excess(scenario.time[at], position, heading, speed, acceleration, self._limits, out[rows])
-        for i, row in zip(*(index.tolist() for index in np.nonzero(out[..., 0] > 0.0)), strict=True):
+        for i, row in zip(*(index.tolist() for index in np.nonzero(~(out[..., 0] <= 0.0))), strict=True):  # NaN, too
             _, value, limit, time = out[i, row].tolist()
             cause, sentence = dynamics.MESSAGES[dynamics.Check(row)]
             yield Violation(cause, time, (i,), f"vehicle {i}: {sentence.format(value=value, limit=limit)}")
@@ -260,7 +263,7 @@ class Checker:
     def _exits(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
         if self.road is None:
             return
-        out = np.empty((len(half), 2))
+        out = np.full((len(half), 2), np.nan)  # NaN is no proof
         for rows, at in spans(scenario):
             inside.first_exits(
                 scenario.time[at],
@@ -285,7 +288,7 @@ class Checker:
         """Vehicles that drive against all lanes where they are, at the samples."""
         if self.road is None or self.road.lanes is None:
             return
-        against = drives_against(self.road, scenario.position, scenario.heading)
+        against = drives_against(self.road, scenario.position, scenario.heading) & scenario.there
         for i in np.flatnonzero(against.any(axis=1)).tolist():
             k = int(np.argmax(against[i]))
             x, y = scenario.position[i, k].tolist()
@@ -387,18 +390,20 @@ def spans(scenario: Scenario) -> list[tuple[slice, slice]]:
 
 
 def _not_finite(scenario: Scenario) -> Violation | None:
-    """A violation if a value is not finite, or time does not increase."""
+    """A violation if a value is not finite, or too large to be reckoned with, or time does not increase."""
     names = ("time", "position", "heading", "speed", "acceleration")
     if is_motion(*(getattr(scenario, name) for name in names)):
         return None
     for name in names:
         values = getattr(scenario, name)
-        if not np.isfinite(values).all():
-            where = np.argwhere(~np.isfinite(values))[0]
+        usable = np.abs(values) <= dynamics.LARGEST
+        if not usable.all():
+            where = np.argwhere(~usable)[0]
             vehicles = () if name == "time" else (int(where[0]),)
             k = int(where[0]) if name == "time" else int(where[1])
+            what = f"beyond {dynamics.LARGEST:g}" if np.isfinite(values[tuple(where)]) else "not finite"
             return Violation(
-                Cause.NOT_FINITE, float(np.nan_to_num(scenario.time[k])), vehicles, f"{name} is not finite at sample {k}"
+                Cause.NOT_FINITE, float(np.nan_to_num(scenario.time[k])), vehicles, f"{name} is {what} at sample {k}"
             )
     steps = np.diff(scenario.time)
     if (steps <= 0.0).any():

@@ -28,7 +28,7 @@ from scenario_gen.kernels import F, F1, F2, F4, kernel, OUT2
 from scenario_gen.validity.dynamics import stretch
 
 BLOCK = 16  # intervals that share one bounding box
-ROUNDING = 1e-9  # m, far above the rounding of coordinates up to 1000 km
+ROUNDING = 1e-7  # m, above the rounding of the largest coordinates (`dynamics.LARGEST`)
 PROVEN, FOUND, UNPROVEN = 0.0, 1.0, 2.0
 
 

@@ -23,18 +23,21 @@ from scenario_gen.arrays import Floats
 from scenario_gen.kernels import F1, F2, F3, kernel, OUT3, OUT4
 from scenario_gen.types.scenario import Cause
 
+LARGEST = 1e8  # m, s, m/s, …: a coordinate is rounded by some 10 nm here, and more beyond
+
 
 @kernel(F1, F3, F2, F2, F2)
 def is_motion(time: Floats, position: Floats, heading: Floats, speed: Floats, acceleration: Floats) -> bool:
-    """Whether all values are finite and time increases; one vehicle's (T,) arrays in SI units, position (T, 2) [m]."""
+    """Whether all values are within LARGEST, none is NaN, and time increases; SI units, position (N, T, 2), the others (N, T)."""
     n, t = heading.shape
     for k in range(t):
-        if not np.isfinite(time[k]) or (k > 0 and time[k] <= time[k - 1]):
+        if not abs(time[k]) <= LARGEST or (k > 0 and time[k] <= time[k - 1]):
             return False
     for i in range(n):
         for k in range(t):
-            # a sum is finite only if all its terms are
-            if not np.isfinite(position[i, k, 0] + position[i, k, 1] + heading[i, k] + speed[i, k] + acceleration[i, k]):
+            if not (abs(position[i, k, 0]) <= LARGEST and abs(position[i, k, 1]) <= LARGEST and abs(heading[i, k]) <= LARGEST):
+                return False
+            if not (abs(speed[i, k]) <= LARGEST and abs(acceleration[i, k]) <= LARGEST):
                 return False
     return True
 
@@ -79,7 +82,8 @@ def stretch(b: Floats, u0: float, u1: float, out: Floats) -> None:
         out[3, c] = blossom(b, c, u1, u1, u1)
 
 
-TURN_ROUNDING = 1e-4  # rad, change of heading that a vehicle may show without having moved
+TURN_ROUNDING = 1e-4  # rad, change of heading that a vehicle may show in a step without having moved
+TURN_DRIFT = 1e-3  # rad/s, and as a rate: many short steps would make a turn of it
 SLACK = 1e-6  # rounding of a value that keeps exactly to its limit
 LIMITS = (
     *("max_speed", "max_acceleration", "max_deceleration", "max_lateral_acceleration", "max_curvature"),
@@ -202,7 +206,7 @@ def worst_excess(
             _note(out[i], 5, fast * turn / h - lateral - SLACK, fast * turn / h, lateral, now)
             dx, dy = position[i, k + 1, 0] - position[i, k, 0], position[i, k + 1, 1] - position[i, k, 1]
             moved = np.sqrt(dx * dx + dy * dy)
-            if turn > TURN_ROUNDING + curvature * moved:
+            if turn > min(TURN_ROUNDING, TURN_DRIFT * h + 1e-8) + curvature * moved:  # headings are rounded to 1 nrad
                 bend = turn / moved
                 _note(out[i], 6, bend - curvature, bend, curvature, now)
             c0, s0, c1, s1 = (

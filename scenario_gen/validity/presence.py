@@ -20,6 +20,8 @@ from scenario_gen import exact
 from scenario_gen.arrays import Floats, Ints
 from scenario_gen.types.scenario import Scenario
 
+SAME = 0.5e-9  # s, instants are whole nanoseconds
+
 
 def driven_on(scenario: Scenario, margin: float) -> tuple[Floats, Floats, Floats, Ints]:
     """Return positions (N, T, 2) [m], headings (N, T) [rad], speeds (N, T) [m/s] and presence (N, 2), widened.
@@ -29,13 +31,13 @@ def driven_on(scenario: Scenario, margin: float) -> tuple[Floats, Floats, Floats
 
     Args:
         scenario: whose vehicles are there for a part of the time.
-        margin: seconds by which each presence is widened at either end, where the scenario has such instants.
+        margin: seconds by which each presence is widened at least at either end, up to an instant of the scenario, if it has one.
     """
     time, present = scenario.time, scenario.present.copy()
     position, heading, speed = scenario.position.copy(), scenario.heading.copy(), scenario.speed.copy()
     for i, (first, last) in enumerate(scenario.present.tolist()):
-        present[i, 0] = np.searchsorted(time, time[first] - margin)
-        present[i, 1] = np.searchsorted(time, time[last] + margin, side="right") - 1
+        present[i, 0] = max(np.searchsorted(time, time[first] - margin + SAME, side="right") - 1, 0)
+        present[i, 1] = min(np.searchsorted(time, time[last] + margin - SAME), len(time) - 1)
         for end, inner, beyond in (
             (first, first + 1, slice(present[i, 0], first)),
             (last, last - 1, slice(last + 1, present[i, 1] + 1)),

@@ -145,8 +145,9 @@ def _overlaps_of_those_there(scenario, limits, dt):
     """Pairs while both are there, each for `presence_margin` more than it is shown, as far as the scenario has instants."""
     time, wide = scenario.time, []
     for first, last in scenario.present:
-        shown = np.flatnonzero((time >= time[first] - limits.presence_margin) & (time <= time[last] + limits.presence_margin))
-        wide.append((time[shown[0]], time[shown[-1]]))
+        before = time[time < time[first] - limits.presence_margin + 1e-9]  # the margin is whole: it ends at an instant, or later
+        after = time[time > time[last] + limits.presence_margin - 1e-9]
+        wide.append((before[-1] if len(before) else time[0], after[0] if len(after) else time[-1]))
     for i, j in combinations(range(len(scenario.vehicles)), 2):
         begin, end = max(wide[i][0], wide[j][0]), min(wide[i][1], wide[j][1])
         if end < begin:

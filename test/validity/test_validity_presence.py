@@ -29,6 +29,7 @@ import shapely
 
 from scenario_gen.template.interaction import Wait
 from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.lanes import Lane, LaneNetwork
 from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario
 from scenario_gen.validity import Checker, checker
 
@@ -178,3 +179,16 @@ def test_who_waits_from_its_arrival_on_to_its_end_stands_throughout():
     speed = scenario.speed.copy()
     speed[1, 50] = 0.4
     assert causes(replace(scenario, speed=speed), asked=asked, waits=[Wait(1, 2.0, 8.0)])[0] == [Cause.STOP_NOT_KEPT]
+
+
+def test_who_drives_against_its_lane_does_so_while_it_is_there():
+    """A lane to the west, a car to the east that comes after 2 s and goes after 6 s."""
+    x = np.array([40.0, -40.0])
+    lane = Lane("west", *(np.column_stack((x, np.full(2, y))) for y in (-2.0, 2.0)))
+    road = replace(ROAD, lanes=LaneNetwork("one lane", (lane,)))
+    scenario = replace(
+        scenario_of([straight(-25, 0, 0, 5, TIME), straight(0, 30, 0, 5, TIME)], TIME), present=[[20, 60], [0, 100]]
+    )
+    found, verdict = causes(scenario, road=road)
+    assert found == [Cause.WRONG_WAY]
+    assert verdict.violations[0].time == 2.0 and "41 samples" in verdict.violations[0].message
