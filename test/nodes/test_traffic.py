@@ -143,6 +143,7 @@ def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, clie
     assert process.poll() is None
     said = {"over": False}
     while not said["over"]:
+        client.say("ego/cmd_vel", encode_twist(3.0, 0.0))  # a step waits for no silent ego
         said = step(client)
     client.wait("verdicts")
     values = decode_diagnostics(client.heard["verdicts"][-1])[1][0].values

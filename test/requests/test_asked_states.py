@@ -101,8 +101,9 @@ def moved(error, chain, texts, end):
     return float(np.nanmax(np.hypot(*(after - before).T)))
 
 
-def test_a_goal_off_the_road(chain, plain):
-    texts = {"goals": state(plain, "end", 1, left=-4.0)}
+@pytest.mark.parametrize("vehicle", [0, pytest.param(1, marks=pytest.mark.long)])  # the second needs a search along its way
+def test_a_goal_off_the_road(chain, plain, vehicle):
+    texts = {"goals": state(plain, "end", vehicle, left=-4.0)}
     error = refused(chain, **texts)
     assert "off the road" in str(error)
     assert 0.0 < moved(error, chain, texts, "goals") < 4.5
@@ -145,9 +146,9 @@ def test_a_start_too_fast_to_stop(chain, plain):
 
 
 def test_a_speed_above_the_limit(chain, plain):
-    error = refused(chain, starts=state(plain, "start", 0, speed=60.0))
+    error = refused(chain, starts=state(plain, "start", 1, speed=60.0))
     assert "sampling.max_speed is 40" in str(error)
-    assert 20.0 < error.suggestions[0].request.states("starts")["1"][3] <= 40.0
+    assert 20.0 < error.suggestions[0].request.states("starts")["2"][3] <= 40.0
 
 
 def test_errors_of_the_caller_are_no_impossible_requests(chain):
