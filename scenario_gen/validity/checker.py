@@ -168,7 +168,9 @@ class Checker:
         indices += [i for edge in self.reactions for i in (edge.who, edge.whom)]
         strangers = [i for i in indices if not 0 <= i < n]
         if strangers:
-            raise InputError(f"{where} has {n} vehicle(s), but the template's waits, conflicts and reactions name vehicle {strangers[0]}")
+            raise InputError(
+                f"{where} has {n} vehicle(s), but the template's waits, conflicts and reactions name vehicle {strangers[0]}"
+            )
 
     def _boundary_states(self, scenario: Scenario) -> Iterator[Violation]:
         if self.asked is None:
