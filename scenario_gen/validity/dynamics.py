@@ -28,7 +28,7 @@ LARGEST = 1e8  # m, s, m/s, …: a coordinate is rounded by some 10 nm here, and
 
 @kernel(F1, F3, F2, F2, F2)
 def is_motion(time: Floats, position: Floats, heading: Floats, speed: Floats, acceleration: Floats) -> bool:
-    """Whether all values are within LARGEST and time (T,) [s] increases; position (N, T, 2) [m], the others (N, T) in SI units."""
+    """Whether all are within LARGEST and time (T,) [s] increases; position (N, T, 2) [m], the others (N, T) in SI units."""
     n, t = heading.shape
     for k in range(t):
         if not abs(time[k]) <= LARGEST or (k > 0 and time[k] <= time[k - 1]):
