@@ -25,7 +25,7 @@ demo: $(RUN)
 test: $(TEST) tools
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -n 4 --dist loadgroup --durations=10; tests=$$?; wait $$types && exit $$tests
+	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -n 3 --dist loadgroup --durations=10; tests=$$?; wait $$types && exit $$tests
 
 # Long tests: `make soak PART=kills` runs one part; a part that was stopped goes on where it was. One table at the end.
 soak: $(TEST)

@@ -26,13 +26,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats, frozen, wrap_angle
+from scenario_gen.arrays import Floats, frozen, Ints, wrap_angle
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.fitting.kept import count_lost, find_unused, refuse_lost_turns
 from scenario_gen.fitting.placement import check_scale, Equation, equations, find_relations, Placement, Relation, separated
+from scenario_gen.kernels import F2, F3, kernel, OUTI2
 from scenario_gen.roads.arms import ring_of
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn, relative
@@ -282,8 +283,8 @@ class _Laying:
         for poses, samples, spacing, extra in zip(self.poses, self.samples, self.spacing, self.extra, strict=True):
             d = self.scale * (poses[:, :2] - self.middle)
             at = motion[:2] + np.column_stack((cos * d[:, 0] - sin * d[:, 1], sin * d[:, 0] + cos * d[:, 1]))
-            off = at[None, :, None, :] - samples[:, None, :, :2]
-            which = np.argmin(np.square(off[..., 0]) + np.square(off[..., 1]), axis=2)
+            which = np.empty((len(samples), len(at)), dtype=np.int64)
+            _nearest(at, samples, which)
             near = np.take_along_axis(samples, which[..., None], axis=1)
             off = at[None] - near[..., :2]
             along = off[..., 0] * near[..., 3] + off[..., 1] * near[..., 4]
@@ -313,6 +314,25 @@ class _Laying:
         rows.append(_LATERAL_ONLY * np.eye(3))
         values.append(np.zeros(3))
         return motion + exact.lstsq(np.concatenate(rows), np.concatenate(values))
+
+
+@kernel(F2, F3, OUTI2)
+def _nearest(points: Floats, samples: Floats, which: Ints) -> None:
+    """Fill `which` (W, K) with the sample of each of W ways that is nearest to each of K points (K, 2) [m], the first of equals.
+
+    Args:
+        points: (K, 2) metres.
+        samples: (W, S, 5) x, y [m] first.
+        which: (W, K) index of the sample.
+    """
+    for w in range(samples.shape[0]):
+        for k in range(points.shape[0]):
+            least, which[w, k] = np.inf, 0
+            for s in range(samples.shape[1]):
+                x, y = points[k, 0] - samples[w, s, 0], points[k, 1] - samples[w, s, 1]
+                square = x * x + y * y
+                if square < least:
+                    least, which[w, k] = square, s
 
 
 class _Solver:
