@@ -21,14 +21,14 @@ import itertools
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats
+from scenario_gen.arrays import Bools, Floats, wrap_angle
 from scenario_gen.cancelling import stop_if_cancelled
 from scenario_gen.errors import RefusedError
 from scenario_gen.roads.clearance import clearance_field, footprint_fits, nearest_pose_with_room
 from scenario_gen.roads.vector.ground import own_ground
 from scenario_gen.routing.config import PlanningConfig
 from scenario_gen.routing.connections import candidates, direct
-from scenario_gen.routing.distance import farthest
+from scenario_gen.routing.distance import distances_to_line, farthest
 from scenario_gen.routing.search.planner import (  # fmt: skip
     BlockedError,
     Budget,
@@ -40,6 +40,7 @@ from scenario_gen.routing.search.planner import (  # fmt: skip
 )
 from scenario_gen.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect, Wishes
 from scenario_gen.routing.search.rrt_star_connect import RrtStarConnect
+from scenario_gen.routing.search.sweep import sweep_is_free
 from scenario_gen.routing.smooth import Curve, Guess, monotone_matching, smooth, Targets
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
@@ -52,7 +53,8 @@ SHORTEST = 0.1  # [m] what a moving primitive covers at least, else it is a dwel
 SHARP = np.deg2rad(100.0)  # a waypoint farther off the heading than this lies behind
 SOFT_WEIGHT = 0.1  # weight of an anchor that is no waypoint
 FIRMNESS = ((1.0, 12), (10.0, 12), (100.0, 12), (1000.0, 24))  # by which a guess is held, ever more firmly, and rounds for each
-DIRECT_HOLD, PATH_HOLD = 0.3, 0.1
+OWN_HOLD, DIRECT_HOLD, PATH_HOLD = 1.0, 0.3, 0.1
+ON_PATH = 0.05  # [m] an anchor nearer to the fitted path than this is on it
 GUIDE_STRIDE = 10  # poses of a guide that are left out between two
 AGAINST = 3.0  # times as dear as the other way it is to leave a leg's direct line towards oncoming traffic
 HALF_LANE = 1.75  # [m] that far towards it is one's own side
@@ -294,6 +296,9 @@ def _weights(anchors: Floats, waypoints: list[int]) -> Floats:
 def _leg(task: _Task, a: int, b: int, poses: Floats, *, last: bool) -> _Leg:
     """The way from anchor a to anchor b, at `poses` (A, 3): a direct curve, else one that is searched for; `last`: patiently."""
     start, end, config = poses[a], poses[b], task.config
+    own = _fitted_piece(task, start, end)
+    if own is not None:
+        return _Leg(Guess(own[:, :2], np.full(len(own), OWN_HOLD)), searched=False)
     curve = direct(task.road, task.vehicle, start, end, config.max_curvature)
     if curve is not None:
         return _Leg(Guess(curve[:, :2], np.full(len(curve), DIRECT_HOLD)), searched=False)
@@ -303,6 +308,25 @@ def _leg(task: _Task, a: int, b: int, poses: Floats, *, last: bool) -> _Leg:
         else _searched(task, a, b)
     )
     return _Leg(Guess(points, np.full(len(points), PATH_HOLD)), searched=True)
+
+
+def _fitted_piece(task: _Task, start: Floats, end: Floats) -> Floats | None:
+    """Poses (P, 3) of the fitted path from pose to pose, if both are on it and it can be driven; None if not."""
+    path = task.fitted.path
+    if len(path) < 2:
+        return None
+    first, last = (int(np.argmin(exact.hypot(*(path - pose)[:, :2].T))) for pose in (start, end))
+    if last - first < 2:
+        return None
+    poses = np.vstack([start[None], path[first + 1 : last], end[None]])
+    if max(distances_to_line(np.stack([start, end]), path)) > ON_PATH:
+        return None
+    step = exact.hypot(*np.diff(poses[:, :2], axis=0).T)
+    bend = np.abs(wrap_angle(np.diff(path[first : last + 1, 2]))) / exact.hypot(*np.diff(path[first : last + 1, :2], axis=0).T)
+    if bend.max() > task.config.max_curvature or step.min() < 1e-6:
+        return None
+    free = sweep_is_free(task.road, poses, task.vehicle.length, task.vehicle.width)[:, 0] > 0.0
+    return poses if free.all() else None
 
 
 def _searched_poses(task: _Task, a: int, b: int, start: Floats, end: Floats, patience: int) -> Floats:

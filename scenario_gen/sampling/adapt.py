@@ -65,7 +65,7 @@ class Judge:
             return cls(check, ANY, enough)
         (verdict,) = check([undisturbed])
         lost = {one.vehicles: one.message for one in verdict.violations if one.cause == Cause.REACTION}
-        return cls(check, verdict.not_applicable, enough, lost)
+        return cls(check, verdict.not_applicable if sampler.free else ANY, enough, lost)
 
     def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
         """Return the first cause for which each scenario is refused, None for a valid one."""

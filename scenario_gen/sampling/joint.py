@@ -81,8 +81,8 @@ class Mixing:
         steps = []
         for n in graph.order:
             edges = [edge for edge in graph.edges if edge.who == n]
-            if edges and models[n].freedom is not None:
-                equations = [one for edge in edges for one in _equations(edge, models, nominal, scale)]
+            equations = [one for edge in edges for one in _equations(edge, models, nominal, scale) if one[0][n].any()]
+            if equations:
                 steps.append(_step(n, equations, first))
         return cls(tuple(steps))
 

@@ -34,16 +34,16 @@ from scenario_gen.sampling.deviations import (
 from scenario_gen.sampling.freedom import FADES, Freedom, freedom_of, MOST_ONWARD
 from scenario_gen.sampling.model import CandidateModel
 from scenario_gen.sampling.pace import clock_of, slowed_clock, template_grid
-from scenario_gen.sampling.path import BasePath
+from scenario_gen.sampling.path import BasePath, MIN_NODES, NODE_SPACING
 from scenario_gen.sampling.speed_profile.knots import speed_knots, SpeedKnots, STAND
 from scenario_gen.sampling.speed_profile.mean import Bounds, mean_speed, Motion, rounded_lines, Target
 from scenario_gen.sampling.speed_profile.model import speed_model
 from scenario_gen.sampling.speed_profile.spline import SpeedSpline
-from scenario_gen.sampling.speed_profile.stops import least_shares, lengthened, SHORTEST_WAIT, standing_part
+from scenario_gen.sampling.speed_profile.stops import least_shares, lengthened, SHORTEST_WAIT, standing_part, standing_within
 from scenario_gen.sampling.time_warp import Clock, TimeWarp
 from scenario_gen.template.interaction import Wait, WAIT_SPEED
 from scenario_gen.template.reactions import reactions_of
-from scenario_gen.template.tracks import clean_tracks
+from scenario_gen.template.tracks import clean_tracks, Track
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.reaction import FOLLOW, ReactionGraph
 from scenario_gen.types.road import Road
@@ -57,6 +57,7 @@ _CREEPS = 0.9 * WAIT_SPEED  # m/s, fastest in a creeping wait
 _RAMP = 1.5  # m/s², by which an asked end speed is reached from the template's
 _CURVE_REACH = 2.0  # m, around a position, in which the route's curvature is looked at
 _CURVE_MARGIN = 0.85  # share of the lateral limit that the mean may use; the rest is the samples'
+_OWN_MARGIN = 0.95  # the same where the template itself drives bends that fast
 _BOUND_ROUNDS = 4
 _JERK_SHARE, _LEAST_JERK = 1.2, 1.0  # of the template's largest jerk; m/s³
 _BEND_SHARE, _LEAST_BEND = 1.2, 2.0  # of the template's largest lateral acceleration; m/s²
@@ -99,8 +100,9 @@ class _Drive:
         anchor: (K + 2,) arc lengths [m] of their anchors.
         time: (T,) the template's samples while it is there [s].
         speed: (T,) its speeds [m/s] there, scaled to the route.
-        ends: asked speeds [m/s] at start and end.
+        ends: asked speeds [m/s] at start and end; recorded: the template's there, scaled to the route.
         jerk: m/s³ that it keeps to; bend: m/s² sideways above which the pace is lowered.
+        sideways: (T,) m/s² that the template drives at `time`: it is at ease with that, too.
         steering: the small corrections of its driver.
         rests: begin and end [s] of the stands in which its speed is zero.
     """
@@ -114,8 +116,10 @@ class _Drive:
     time: Floats
     speed: Floats
     ends: tuple[float, float]
+    recorded: tuple[float, float]
     jerk: float
     bend: float
+    sideways: Floats
     steering: Steering
     rests: list[tuple[float, float]]
 
@@ -126,7 +130,7 @@ class _Drive:
         rates = clock.at(self.times[[0, -1]])[1]
         ends = (self.ends[0] * float(rates[0]), self.ends[1] * float(rates[1]))
         for end, since in ((0, grid - grid[0]), (-1, grid[-1] - grid)):
-            off = ends[end] - float(line[end])
+            off = ends[end] - self.recorded[end]
             line = line + off * np.square(np.maximum(1.0 - since / max(2.0 * abs(off) / _RAMP, 1.0), 0.0))
         inner = 1 + np.flatnonzero(np.diff(self.anchor[:-1]) != 0.0)
         return Target(grid, np.maximum(line, 0.0), self.times[inner], self.anchor[inner], ends, self.path.length)
@@ -147,7 +151,8 @@ class _Drive:
             if mean is None:
                 longest = f"{clock.time[-1]:.1f} s"
                 return f"cannot drive {self.path.length:.1f} m{limit} in {longest} within the limits"
-            allowed = self._bend_speed(exact.matmul(spline.driven(at), mean), _CURVE_MARGIN * config.max_lateral_acceleration)
+            sideways = np.clip(self._own_sideways(at) / config.max_lateral_acceleration, _CURVE_MARGIN, _OWN_MARGIN)
+            allowed = self._bend_speed(exact.matmul(spline.driven(at), mean), sideways * config.max_lateral_acceleration)
             if (mean <= allowed * pace * 1.01 + 1e-6)[1:-1].all():
                 return mean, motion, bounds
             most, limit = np.minimum(most, allowed * pace), " through its curves"
@@ -166,16 +171,24 @@ class _Drive:
         there = (grid >= self.times[0]) & (grid <= self.times[-1])
         s, v = (exact.matmul(rows, mean) for rows in (self.spline.driven(grid[there]), self.spline.design(grid[there])))
         need = np.ones(len(grid))
-        need[there] = v / self._bend_speed(s, self.bend)
+        need[there] = v / self._bend_speed(s, np.maximum(self._own_sideways(grid[there]), self.bend))
         return need
 
-    def _bend_speed(self, s: Floats, limit: float) -> Floats:
-        """Speed [m/s] that the route's bends allow at arc lengths (q,) [m]."""
+    def _own_sideways(self, at: Floats) -> Floats:
+        """Lateral acceleration [m/s²] that the template drives at template times (q,) [s], and a little more."""
+        return np.asarray(_BEND_SHARE * np.interp(at, self.time, self.sideways))
+
+    def _bend_speed(self, s: Floats, limit: Floats) -> Floats:
+        """Speed [m/s] that the route's bends allow at arc lengths (q,) [m], by limits (q,) [m/s²]."""
         if len(self.path.node) == 1:
             return np.full(len(s), np.inf)
-        reach = 2 * int(np.ceil(_CURVE_REACH / self.path.spacing)) + 1
-        bend = exact.moving_max(exact.moving_mean(np.abs(self.path.curvature), 3), reach)
-        return np.asarray(np.sqrt(limit / np.maximum(np.interp(s, self.path.arc, bend), 1e-6)))
+        return np.asarray(np.sqrt(limit / np.maximum(np.interp(s, self.path.arc, _bends(self.path)), 1e-6)))
+
+
+def _bends(path: BasePath) -> Floats:
+    """(G,) the sharpest curvature [1/m] near each node."""
+    reach = 2 * int(np.ceil(_CURVE_REACH / path.spacing)) + 1
+    return np.asarray(exact.moving_max(exact.moving_mean(np.abs(path.curvature), 3), reach))
 
 
 def prepare(
@@ -236,7 +249,7 @@ def kept_reactions(encounter: Encounter, config: SamplingConfig, order: str = "k
 
     Where an `order` other than the template's is asked for, nobody is made to wait for anybody.
     """
-    if config.variety != "wide" or config.reactions != "keep":
+    if config.reactions != "keep":
         return None
     graph = reactions_of(encounter)
     edges = tuple(edge for edge in graph.edges if order == "keep" or edge.kind == FOLLOW)
@@ -297,6 +310,8 @@ def _drive(
         ends = (0.0, 0.0)
     driven = float(0.5 * encounter.dt * (speed[1:] + speed[:-1]).sum())
     scale = min(path.length / driven, _MOST_SCALE) if driven > 1e-3 else 1.0
+    if not dwells.all():
+        stands, dwells = standing_within(times, dwells, stands, time, speed)
     knots = speed_knots(times, dwells, stands, time, speed, ends, 0.0, creeps)
     standing = [v if v > STAND or not still else 0.0 for v, still in zip(ends, knots.still[[0, -1]], strict=True)]
     rests = _at_rest(knots, times)
@@ -304,6 +319,7 @@ def _drive(
     recorded = [0.0 if still else scale * float(speed[k]) for k, still in zip((0, -1), knots.still[[0, -1]], strict=True)]
     lines = rounded_lines(spline, knots, time, scale * speed, (recorded[0], recorded[1]))
     jerk, sideways = _largest_jerk(scale * speed, encounter.dt), _largest_sideways(encounter, n)
+    track = clean_tracks(encounter)[n]
     return _Drive(
         encounter.vehicles[n],
         path,
@@ -314,11 +330,13 @@ def _drive(
         time,
         scale * speed,
         (standing[0], standing[1]),
+        (recorded[0], recorded[1]),
         config.max_jerk or max(_JERK_SHARE * jerk, _LEAST_JERK),
         min(
             config.bend_acceleration or max(_BEND_SHARE * sideways, _LEAST_BEND), _CURVE_MARGIN * config.max_lateral_acceleration
         ),
-        Steering.of(time, clean_tracks(encounter)[n].poses[here, 2], encounter.speed[n, here], path.length),
+        _sideways(track, encounter.speed[n])[here],
+        Steering.of(time, track.poses[here, 2], encounter.speed[n, here], path.length),
         rests,
     )
 
@@ -345,6 +363,17 @@ def _largest_sideways(encounter: Encounter, n: int) -> float:
     width = 2 * round(0.5 * _SMOOTH / encounter.dt) + 1
     sideways = np.gradient(yaw, encounter.dt) * encounter.speed[n, first : last + 1]
     return float(np.abs(exact.moving_mean(sideways, width)).max())
+
+
+def _sideways(track: Track, speed: Floats) -> Floats:
+    """Lateral acceleration (T,) [m/s²] of a template's vehicle with speeds (T,) [m/s]; its bends are taken as a route's."""
+    if track.still:
+        return np.zeros(len(speed))
+    driven = np.arange(track.progress[0], track.progress[-1], NODE_SPACING)
+    if len(driven) < MIN_NODES:
+        return np.zeros(len(speed))
+    path = BasePath(track.curve.at(driven), NODE_SPACING, driven[:0])
+    return np.asarray(np.interp(track.progress, driven, _bends(path)) * np.square(speed))
 
 
 def _model(

@@ -95,8 +95,8 @@ class Sampler:
         return any(vehicle.freedom is not None for vehicle in self.model.vehicles)
 
     def undisturbed(self) -> Scenario | None:
-        """The drive without deviations; None where nothing is free, or it has no speed profile."""
-        if not self.free:
+        """The drive without deviations; None where nothing is free and nobody reacts, or it has no speed profile."""
+        if not self.free and self.model.reactions is None:
             return None
         return self.model.draw(np.zeros((1, self.model.size)), LEVELS[0]).scenarios(self.seed, [0], self.frame_id)[0]
 

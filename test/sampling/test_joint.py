@@ -130,4 +130,4 @@ def test_nobody_is_made_to_wait_where_another_order_is_asked_for():
     assert kept_reactions(CROSSING, CONFIG.sampling, "free") is None
     assert kept_reactions(CROSSING, CONFIG.sampling, "swap") is None
     assert kept_reactions(LANE, CONFIG.sampling, "free") is not None
-    assert kept_reactions(LANE, SamplingConfig(variety="narrow")) is None
+    assert kept_reactions(LANE, SamplingConfig(reactions="none")) is None

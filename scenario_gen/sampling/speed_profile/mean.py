@@ -33,6 +33,7 @@ from scenario_gen.sampling.speed_profile.knots import SpeedKnots
 from scenario_gen.sampling.speed_profile.spline import SpeedSpline
 
 SMOOTHING = 0.5  # s, ℓ: kinks of the lines are rounded over about this time
+SHARP_WEIGHT = 0.3  # of how near the lines are to the speeds before they are rounded; it decides what rounding hides
 ANCHOR_WEIGHT = 10.0  # 1/s, w: a changepoint passed 0.5 m from its place weighs as 1.6 m/s too fast for a second
 JERK_PRICE = 20.0  # m s, of each 1 m/s³ above the bound for a second
 
@@ -132,9 +133,11 @@ def rounded_lines(spline: SpeedSpline, knots: SpeedKnots, time: Floats, speed: F
     base[loose] -= exact.solve_positive(stiff[np.ix_(loose, loose)], exact.matmul(stiff[loose], value))
     seen = spline.design(time)
     guess = lines[free]
-    rest = speed - exact.matmul(seen, base + exact.matmul(rounded, guess))
     lines = np.where(free, lines, 0.0)
-    lines[free] += exact.lstsq(exact.matmul(seen, rounded), rest)
+    sharp = SHARP_WEIGHT * np.array([np.interp(time, knots.knot, hat) for hat in hats]).T
+    rest = speed - exact.matmul(seen, base + exact.matmul(rounded, guess))
+    sharp_rest = SHARP_WEIGHT * (speed - np.interp(time, knots.knot, lines))
+    lines[free] += exact.lstsq(np.vstack([exact.matmul(seen, rounded), sharp]), np.concatenate([rest, sharp_rest]))
     return np.asarray(np.maximum(lines, 0.0))
 
 

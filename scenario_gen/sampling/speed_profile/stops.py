@@ -19,7 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.arrays import Floats
+from scenario_gen.arrays import Bools, Floats, runs
 from scenario_gen.sampling.time_warp import SHORTEST_SHARE
 from scenario_gen.template.interaction import STAND_SPEED, Wait
 from scenario_gen.types.encounter import Encounter
@@ -40,6 +40,33 @@ def standing_part(encounter: Encounter, wait: Wait) -> Wait:
     start = wait.start if wait.start <= encounter.time[0] else float(stands[0])
     end = wait.end if wait.end >= encounter.time[-1] else float(stands[-1])
     return replace(wait, start=start, end=end)
+
+
+def standing_within(
+    times: Floats, dwells: Bools, stands: Sequence[tuple[float, float]], time: Floats, speed: Floats
+) -> tuple[list[tuple[float, float]], Bools]:
+    """Replace dwells by the parts of them in which the template stands: a vehicle still rolls when a primitive begins.
+
+    Args:
+        times: (K + 2,) of start, changepoints and end [s].
+        dwells: (K + 1,) primitives in which the route does not move.
+        stands: begin and end [s] of the waits in which it stands.
+        time: (T,) the template's samples [s].
+        speed: (T,) its speeds [m/s].
+
+    Returns:
+        The stands with those of dwells, and the dwells (K + 1,) that are left: of those it is never slow enough to stand.
+    """
+    found, left = list(stands), dwells.copy()
+    for a, b in runs(dwells):
+        inside = (time >= times[a]) & (time <= times[b])
+        still = time[inside & (speed <= STAND_SPEED)]
+        if len(still):
+            start = times[a] if a == 0 and speed[0] <= STAND_SPEED else still[0]
+            end = times[b] if b == len(dwells) and speed[-1] <= STAND_SPEED else still[-1]
+            found.append((float(start), float(end)))
+            left[a:b] = False
+    return found, left
 
 
 def least_shares(grid: Floats, waits: Sequence[Wait]) -> Floats:
