@@ -14,6 +14,8 @@
 
 """A kernel has one compiled form, kept by what it is compiled from: its sources, those of what it calls, and their constants."""
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 import os
 from pathlib import Path
 import shutil
@@ -40,24 +42,37 @@ from scenario_gen.helper_of_a_test import half, OFFSET
 def quarter(x):
     return half(half(x)) + OFFSET
 """
-RUN = """
-import sys, importlib.util
+SERVER = """
+import os, sys, importlib.util
+import scenario_gen.kernels
 def load(name, path):
     spec = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
-load("scenario_gen.helper_of_a_test", sys.argv[1] + "/helper.py")
-print(load("scenario_gen.caller_of_a_test", sys.argv[1] + "/caller.py").quarter(8.0))
+for folder in map(str.strip, sys.stdin):
+    if os.fork() == 0:
+        load("scenario_gen.helper_of_a_test", folder + "/helper.py")
+        print(load("scenario_gen.caller_of_a_test", folder + "/caller.py").quarter(8.0), flush=True)
+        os._exit(0)
+    os.wait()
 """
 
 
-def result(folder: Path, cache: Path) -> float:
-    """What the caller gives in a fresh process."""
+@contextmanager
+def results(cache: Path) -> Iterator[Callable[[Path], float]]:
+    """What the caller in a folder gives, each time in a process that knows no kernel yet: a fork of one that has loaded numba."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(cache)}
-    done = subprocess.run([sys.executable, "-c", RUN, str(folder)], capture_output=True, text=True, check=True, env=environment)
-    return float(done.stdout)
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen([sys.executable, "-c", SERVER], env=environment, **pipes) as server:
+
+        def result(folder: Path) -> float:
+            print(folder, file=server.stdin, flush=True)
+            return float(server.stdout.readline())
+
+        yield result
+        server.stdin.close()
 
 
 def compiled(cache: Path) -> int:
@@ -70,15 +85,16 @@ def test_a_cached_kernel_follows_what_it_is_compiled_from_and_not_where_that_lie
     here.mkdir()
     (here / "caller.py").write_text(CALLER)
     (here / "helper.py").write_text(HELPER.format(value="0.5", offset=0.0))
-    assert result(here, cache) == 2.0
-    assert compiled(cache) == 1, "nothing was cached, so nothing is tested"
-    copy = shutil.copytree(here, tmp_path / "elsewhere")  # as colcon and a clone do: other times, another place
-    assert result(copy, cache) == 2.0 and compiled(cache) == 1
-    (here / "helper.py").write_text(HELPER.format(value="0.25", offset=0.0))
-    assert result(here, cache) == 0.5 and compiled(cache) == 2
-    assert result(copy, cache) == 2.0 and compiled(cache) == 2
-    (here / "helper.py").write_text(HELPER.format(value="0.25", offset=1.0))
-    assert result(here, cache) == 1.5 and compiled(cache) == 3
+    with results(cache) as result:
+        assert result(here) == 2.0
+        assert compiled(cache) == 1, "nothing was cached, so nothing is tested"
+        copy = shutil.copytree(here, tmp_path / "elsewhere")  # as colcon and a clone do: other times, another place
+        assert result(copy) == 2.0 and compiled(cache) == 1
+        (here / "helper.py").write_text(HELPER.format(value="0.25", offset=0.0))
+        assert result(here) == 0.5 and compiled(cache) == 2
+        assert result(copy) == 2.0 and compiled(cache) == 2
+        (here / "helper.py").write_text(HELPER.format(value="0.25", offset=1.0))
+        assert result(here) == 1.5 and compiled(cache) == 3
 
 
 def test_a_helper_is_called_by_kernels_alone():

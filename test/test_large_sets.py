@@ -118,7 +118,7 @@ def test_of_a_large_set_evenly_spaced_runs_are_measured(size):
 
 def test_memory_does_not_grow_with_the_number_of_scenarios(chain, monkeypatch, tmp_path):
     """Sampled, checked and written: scenarios of some 15 kB each raise the peak by less than a tenth of that (short: a third)."""
-    monkeypatch.setattr(sample, "KEPT", 100)
+    monkeypatch.setattr(sample, "KEPT", 100 if LONG else 40)
 
     def peak(count):
         tracemalloc.reset_peak()
@@ -127,8 +127,8 @@ def test_memory_does_not_grow_with_the_number_of_scenarios(chain, monkeypatch, t
         write_recording(tmp_path / str(count), outcome)
         return tracemalloc.get_traced_memory()[1]
 
-    small, large, most = (300, 1500, 1_500_000) if LONG else (105, 255, 750_000)
-    peak(110)  # what is loaded and compiled once
+    small, large, most = (300, 1500, 1_500_000) if LONG else (45, 145, 500_000)
+    peak(50)  # what is loaded and compiled once
     tracemalloc.start()
     try:
         few, many = peak(small), peak(large)

@@ -15,7 +15,7 @@
 """rosbag2's metadata.yaml, version 9, and QoS profiles: as it writes them, and as any version of it wrote them."""
 
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import yaml
@@ -101,6 +101,20 @@ def qos_yaml(quality: Quality) -> str:
     return dump([profile]).rstrip("\n")
 
 
+@lru_cache(maxsize=256)
+def _topic_yaml(name: str, type_name: str, qos: str, type_hash: str) -> str:
+    """Return what metadata.yaml says of a topic, up to the number of its messages."""
+    metadata = {
+        "name": name,
+        "type": type_name,
+        "serialization_format": "cdr",
+        "offered_qos_profiles": profiles(qos),
+        "type_description_hash": type_hash,
+    }
+    text = dump({"bag": {"topics": [{"topic_metadata": metadata, "message_count": 0}]}})  # as deep as it will stand
+    return text.split("\n", 2)[2].removesuffix("0\n")
+
+
 def metadata_yaml(info: BagInfo) -> str:
     """Return the text of metadata.yaml."""
     whole = FileInfo("")
@@ -109,7 +123,7 @@ def metadata_yaml(info: BagInfo) -> str:
             whole.start_ns, whole.end_ns = min(whole.start_ns, file.start_ns), max(whole.end_ns, file.end_ns)
             whole.count += file.count
     start, duration = whole.span
-    return dump(
+    text = dump(
         {
             "rosbag2_bagfile_information": {
                 "version": VERSION,
@@ -117,19 +131,7 @@ def metadata_yaml(info: BagInfo) -> str:
                 "duration": {"nanoseconds": duration},
                 "starting_time": {"nanoseconds_since_epoch": start},
                 "message_count": whole.count,
-                "topics_with_message_count": [
-                    {
-                        "topic_metadata": {
-                            "name": topic.name,
-                            "type": topic.type,
-                            "serialization_format": "cdr",
-                            "offered_qos_profiles": profiles(topic.qos),
-                            "type_description_hash": topic.type_hash,
-                        },
-                        "message_count": topic.count,
-                    }
-                    for topic in info.topics
-                ],
+                "topics_with_message_count": [],
                 "compression_format": "",
                 "compression_mode": "",
                 "relative_file_paths": [file.path for file in info.files],
@@ -147,6 +149,8 @@ def metadata_yaml(info: BagInfo) -> str:
             }
         }
     )
+    topics = "".join(f"{_topic_yaml(one.name, one.type, one.qos, one.type_hash)}{one.count}\n" for one in info.topics)
+    return text.replace(" []\n", "\n" + topics, 1) if topics else text
 
 
 def profiles(text: str) -> list[dict[str, Any]]:
@@ -169,6 +173,7 @@ def _is_whole(profile: Any) -> bool:
     )
 
 
+@lru_cache(maxsize=256)
 def quality_of(text: str) -> Quality:
     """Return the quality that the first of the profiles offers: volatile, depth 10 where the text says none."""
     for profile in profiles(text)[:1]:

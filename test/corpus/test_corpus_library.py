@@ -16,7 +16,6 @@
 
 import numpy as np
 import pytest
-from sklearn.metrics import adjusted_rand_score
 
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.library import adjusted_rand, build, pair_encounters
@@ -42,6 +41,8 @@ def test_who_is_first_does_not_depend_on_the_order_in_the_log():
 
 
 def test_agreement_is_that_of_scikit_learn():
+    from sklearn.metrics import adjusted_rand_score
+
     random = np.random.default_rng(1)
     for _ in range(20):
         one, other = random.integers(0, 4, 60), random.integers(0, 3, 60)

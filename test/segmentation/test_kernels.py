@@ -22,6 +22,7 @@ import pytest
 from scipy.special import gammainccinv, gammaln
 from scipy.stats import kstest, multivariate_normal, norm
 
+from scenario_gen.kernels import OPTIONS
 from scenario_gen.segmentation.hdp_hmm import chain, emission, observed, random
 from scenario_gen.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.segmentation.hdp_hmm.emission import BLOCK
@@ -33,8 +34,8 @@ from scenario_gen.segmentation.trends import chi2_above
 
 
 def from_python(helper):
-    """A helper of kernels, compiled for calls from Python."""
-    return numba.njit(helper.py_func)
+    """A helper of kernels, compiled as they are, for calls from Python."""
+    return numba.jit(helper.py_func, **OPTIONS)
 
 
 block_log_likelihood, block_likelihood = from_python(emission.block_log_likelihood), from_python(emission.block_likelihood)

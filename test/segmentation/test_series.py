@@ -116,7 +116,7 @@ def test_never_nan_and_always_consistent(samples, dimensions, seed, emission):
 
 @pytest.mark.parametrize("emission", ["gaussian", "autoregressive"])
 def test_more_channels_than_samples(emission):
-    x = np.random.default_rng(3).normal(size=(10, 24))
+    x = np.random.default_rng(3).normal(size=(10, 12))
     posterior = segment_series(x, SamplerConfig(emission=emission), seed=0)
     assert posterior.labels.shape == (10,)
     assert np.isfinite(posterior.probability).all()

@@ -73,7 +73,7 @@ class Motion:
     def of(cls, spline: SpeedSpline, rate: Floats, slope: Floats, bend: Floats) -> "Motion":
         """Take r, r' [1/s] and r'' [1/s²] (b,) at the spline's stations."""
         r, a, b = rate[:, None], slope[:, None], bend[:, None]
-        u, du, ddu = (spline.design(spline.stations, k) for k in range(3))
+        u, du, ddu = spline.at_stations
         cubed = r * r * r
         acceleration = du / (r * r) - u * a / cubed
         jerk = ddu / cubed - (3.0 * du * a + u * b) / (cubed * r) + 3.0 * u * a * a / (cubed * r * r)
@@ -143,7 +143,7 @@ def rounded_lines(spline: SpeedSpline, knots: SpeedKnots, time: Floats, speed: F
 
 def _smoothness(spline: SpeedSpline) -> Floats:
     """(n, n) of the quadratic form ∫ u² + ℓ⁴ u″² dτ."""
-    return np.asarray(spline.gram() + exact.power(SMOOTHING, 4) * spline.gram(2))
+    return np.asarray(spline.gram + exact.power(SMOOTHING, 4) * spline.bending)
 
 
 def mean_speed(spline: SpeedSpline, target: Target, motion: Motion, bounds: Bounds) -> Floats | None:

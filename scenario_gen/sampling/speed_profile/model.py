@@ -160,7 +160,7 @@ def _spread_length(spline: SpeedSpline) -> tuple[Floats, Floats]:
     longer, faster = np.zeros(spline.size), np.zeros((spline.size, 2))
     if len(free) == 0:
         return longer, faster
-    stiff = spline.gram() + exact.power(LENGTH_SMOOTHING, 4) * spline.gram(2)
+    stiff = spline.gram + exact.power(LENGTH_SMOOTHING, 4) * spline.bending
     loose = stiff[np.ix_(free, free)]
     way = exact.solve_positive(loose, spline.length[free])
     longer[free] = way / float(exact.matmul(way, spline.length[free]))

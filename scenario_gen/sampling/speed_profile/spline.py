@@ -84,6 +84,12 @@ class SpeedSpline:
         return frozen(np.sort(np.concatenate([self.breaks, inner[1:][np.diff(inner) == 0.0] - _BEFORE])))
 
     @cached_property
+    def at_stations(self) -> tuple[Floats, Floats, Floats]:
+        """Three of (b, n): the values of all basis functions at the stations, their first derivatives, and their second."""
+        value, slope, bend = (frozen(self.design(self.stations, k)) for k in range(3))
+        return value, slope, bend
+
+    @cached_property
     def middle(self) -> Floats:
         """(n,) seconds at which a spline with coefficients t has the value t (Greville's abscissae)."""
         return frozen((self.knots[1:-3] + self.knots[2:-2] + self.knots[3:-1]) / 3.0)
@@ -92,18 +98,21 @@ class SpeedSpline:
         """Values (q, n) of all basis functions, or of their derivatives, at times (q,) [s] inside the basis' interval."""
         t, degree = self.knots, DEGREE - derivative
         cell = self.first[np.clip(np.searchsorted(self.breaks, at, side="right") - 1, 0, len(self.breaks) - 2)] + DEGREE
-        basis = np.zeros((len(at), len(t) - 1))
-        basis[np.arange(len(at)), cell] = 1.0
-        for p in range(1, degree + 1):  # Cox and de Boor
-            count = len(t) - 1 - p
-            left = _ratio(at[:, None] - t[:count], t[p : p + count] - t[:count])
-            right = _ratio(t[p + 1 : p + 1 + count] - at[:, None], t[p + 1 : p + 1 + count] - t[1 : 1 + count])
-            basis = left * basis[:, :count] + right * basis[:, 1 : 1 + count]
-        for p in range(degree + 1, DEGREE + 1):  # the derivative of degree p has differences of its coefficients
-            count = len(t) - 1 - p
-            rate = _ratio(np.array(float(p)), t[p:] - t[: len(t) - p])
-            basis = basis[:, :count] * rate[:count] - basis[:, 1 : 1 + count] * rate[1 : 1 + count]
-        return basis
+        basis = np.zeros((len(at), DEGREE + 2))  # functions cell - p to cell of degree p, and a zero on either side
+        basis[:, 1] = 1.0
+        for p in range(1, DEGREE + 1):
+            i = cell[:, None] + np.arange(-p, 1)
+            low, high = t[i], t[i + p + 1]
+            left, right = t[i + p] - low, high - t[i + 1]
+            if p <= degree:  # Cox and de Boor
+                left, right = _ratio(at[:, None] - low, left), _ratio(high - at[:, None], right)
+                basis[:, 1 : p + 2] = left * basis[:, : p + 1] + right * basis[:, 1 : p + 2]
+            else:  # the derivative of degree p has differences of its coefficients
+                top = np.array(float(p))
+                basis[:, 1 : p + 2] = basis[:, : p + 1] * _ratio(top, left) - basis[:, 1 : p + 2] * _ratio(top, right)
+        out = np.zeros((len(at), self.size))
+        out[np.arange(len(at))[:, None], cell[:, None] + np.arange(-DEGREE, 1)] = basis[:, 1:]
+        return out
 
     @cached_property
     def length(self) -> Floats:
@@ -112,23 +121,36 @@ class SpeedSpline:
 
     def driven(self, until: Floats) -> Floats:
         """(q, n) metres that each coefficient of 1 m/s drives until times (q,) [s]."""
-        at, weight = self._quadrature()
-        whole = self._summed(at, weight)
-        before = np.concatenate([np.zeros((1, self.size)), np.cumsum(whole, axis=0)])
         cell = np.clip(np.searchsorted(self.breaks, until, side="right") - 1, 0, len(self.breaks) - 2)
         half = 0.5 * (until - self.breaks[cell])
         points = self.breaks[cell][:, None] + half[:, None] * (1.0 + _GAUSS_X)
-        return np.asarray(before[cell] + self._summed(points, half[:, None] * _GAUSS_W))
+        return np.asarray(self._driven_before[cell] + self._summed(points, half[:, None] * _GAUSS_W))
+
+    @cached_property
+    def _driven_before(self) -> Floats:
+        """(m + 1, n) metres that each coefficient of 1 m/s drives until each break."""
+        whole = self._summed(*self._quadrature())
+        return frozen(np.concatenate([np.zeros((1, self.size)), np.cumsum(whole, axis=0)]))
 
     def _summed(self, at: Floats, weight: Floats) -> Floats:
         """(q, n) weighted sums of the basis functions over points (q, 4) [s]."""
         return np.asarray((self.design(at.ravel()).reshape(*at.shape, self.size) * weight[..., None]).sum(axis=1))
 
-    def gram(self, derivative: int = 0) -> Floats:
-        """(n, n) integrals [s] of products of two basis functions, or of their derivatives."""
+    @cached_property
+    def gram(self) -> Floats:
+        """(n, n) integrals [s] of products of two basis functions."""
+        return self._gram(0)
+
+    @cached_property
+    def bending(self) -> Floats:
+        """(n, n) integrals [1/s³] of products of second derivatives of two basis functions."""
+        return self._gram(2)
+
+    def _gram(self, derivative: int) -> Floats:
+        """(n, n) integrals of products of derivatives of two basis functions."""
         at, weight = self._quadrature()
         basis = self.design(at.ravel(), derivative)
-        return exact.matmul((basis * weight.ravel()[:, None]).T, basis)
+        return frozen(exact.matmul((basis * weight.ravel()[:, None]).T, basis))
 
     def projected(self, at: Floats, values: Floats) -> Floats:
         """(n,) integrals of each basis function times the straight lines through `values` (q,) at times `at` (q,) [s]."""
