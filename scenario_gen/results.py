@@ -69,9 +69,9 @@ def write_results(
 
 
 def _figures(case: GenerationResult) -> dict[str, Any]:
-    """Return a case's evaluation and coverage, its target, what the fitting lost and decided, and how routes were planned."""
+    """Return a case's E beside what it is compared with, evaluation, coverage, target, what the fitting did, and its routes."""
     vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
-    figures: dict[str, Any] = json.loads(case.evaluation.to_json())
+    figures: dict[str, Any] = {"similarity": case.similarity(), **json.loads(case.evaluation.to_json())}
     fit = {} if case.fit is None else case.fit.figures()
     coverage = {} if case.coverage is None else case.coverage.document()
     reached = {} if case.generated.reached is None else case.generated.reached.figures()

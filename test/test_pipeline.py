@@ -15,20 +15,27 @@
 """The arms of a case: what the segmenter's changepoints are measured against, made by the same chain."""
 
 from dataclasses import replace
+from io import StringIO
 import json
 from pathlib import Path
+import re
 
 import numpy as np
 import pytest
+from rich.console import Console
 
-from scenario_gen.evaluation import EvaluationConfig
+from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.report.page import render, ReportInput
+from scenario_gen.report.summary import summary
+from scenario_gen.results import write_results
 from scenario_gen.types.generation import NARROW, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.request import Request
 
 QUICK = EvaluationConfig(resamples=50)
+WORDS = {"without": WITHOUT, "uniform": UNIFORM, "narrow": NARROW, "replayed": ORACLE}
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +49,7 @@ def case(encounter):
 
 
 def test_every_arm_has_its_row_and_its_account(case):
-    assert [row.name for row in case.evaluation.rows] == ["template", WITH, WITHOUT, NARROW, UNIFORM, ORACLE]
+    assert [row.name for row in case.evaluation.rows] == ["template", WITH, WITHOUT, UNIFORM, NARROW, ORACLE]
     assert len(case.references[UNIFORM].scenarios) == 4 and not case.refusals
     accepted = case.evaluation.value(UNIFORM, "acceptance")
     assert accepted == pytest.approx(1.0 - sum(case.references[UNIFORM].refused.values()) / case.references[UNIFORM].candidates)
@@ -64,3 +71,37 @@ def test_it_can_be_left_out_and_changes_nothing_else(encounter, case):
     rows = [{row["name"]: row for row in json.loads(one.evaluation.to_json())["rows"]} for one in (plain, case)]
     assert set(rows[1]) - set(rows[0]) == {UNIFORM}
     assert all(rows[0][name] == rows[1][name] for name in rows[0])
+
+
+def test_what_is_compared_is_drawn_with_the_same_freedom(case):
+    for name in (WITHOUT, UNIFORM):
+        sizes = {scenario.vehicles[0].length for scenario in case.references[name].scenarios}
+        assert len(sizes) > 1, f"{name}: preset wide draws sizes"
+    assert len({scenario.vehicles[0].length for scenario in case.references[NARROW].scenarios}) == 1
+    assert case.compared == (WITH, WITHOUT, UNIFORM)
+
+
+def test_the_first_figures_that_anybody_sees_are_those_of_the_delivered_set(case, tmp_path):
+    write_results(tmp_path, [case], seed=3, title="", quality=(), provenance={})
+    (figures,) = json.loads((tmp_path / "evaluation.json").read_text())["cases"]
+    assert next(iter(figures)) == "similarity" and next(iter(figures["similarity"]["compared"])) == WITH
+    delivered = evaluate_scenarios(case.encounter, {WITH: case.generated}, config=QUICK).value(WITH, "e_position")
+    assert figures["similarity"]["compared"][WITH]["e_position"] == pytest.approx(delivered, rel=1e-5)
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(summary([case]))
+    said = next(line for line in console.export_text().splitlines() if "E position" in line)
+    words = [f"{word} {case.evaluation.value(row, 'e_position'):.3f}" for word, row in WORDS.items()]
+    assert said.split() == f"E position {delivered:.3f} | {words[0]}, {words[1]} ({words[2]}, {words[3]})".split()
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    cell = re.search(r'<td class="(good|bad)">([\d.]+)<small', page)
+    assert float(cell[2]) == pytest.approx(delivered, rel=5e-3)
+    assert (cell[1] == "good") == (case.best("e_position") == WITH)
+
+
+def test_a_set_with_a_target_is_not_compared_with_sets_without_it(encounter):
+    config = PipelineConfig(evaluation=QUICK)
+    made = generate(encounter, "t_intersection", config, count=2, seed=3, request=Request(order="free"))
+    assert made.compared == (WITH,) and "order" in made.apart
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(summary([made]))
+    assert "nothing is compared: only the delivered set was drawn with order as asked" in console.export_text()
