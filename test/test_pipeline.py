@@ -31,7 +31,9 @@ from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.report.page import render, ReportInput
 from scenario_gen.report.summary import summary
 from scenario_gen.results import write_results
+from scenario_gen.sampling import SamplingConfig
 from scenario_gen.types.generation import NARROW, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.request import Request
 
 QUICK = EvaluationConfig(resamples=50)
@@ -105,3 +107,32 @@ def test_a_set_with_a_target_is_not_compared_with_sets_without_it(encounter):
     console = Console(width=200, record=True, file=StringIO())
     console.print(summary([made]))
     assert "nothing is compared: only the delivered set was drawn with order as asked" in console.export_text()
+
+
+def test_who_reacts_to_whom_is_said_in_terminal_page_and_figures(case, encounter, tmp_path):
+    said = "vehicle 2 slows down for vehicle 1 to pass and leaves 0.4 s after"
+    config = PipelineConfig(evaluation=QUICK, sampling=SamplingConfig(reactions="none"))
+    free = generate(encounter, "t_intersection", config, count=2, seed=3)
+    for made, kept in ((case, True), (free, False)):
+        write_results(tmp_path, [made], seed=3, title="", quality=(), provenance={})
+        console = Console(width=200, record=True, file=StringIO())
+        console.print(summary([made]))
+        sentence = said if kept else f"{said}: the scenarios are not held to it"
+        assert sentence in [line.strip() for line in console.export_text().splitlines()]
+        page = (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert said in page and ("are held to it" in page) == kept and ("are not held to it" in page) != kept
+        (figures,) = json.loads((tmp_path / "evaluation.json").read_text())["cases"]
+        assert figures["reactions"]["sentences"] == [sentence]
+        (edge,) = figures["reactions"]["edges"]
+        assert (edge["who"], edge["whom"], edge["kept"]) == ("2", "1", kept) and edge["lag"] == pytest.approx(0.4, abs=0.05)
+
+
+def test_the_figures_of_a_reaction_that_the_road_does_not_keep_are_said(case, tmp_path):
+    sentence = f"{NOT_KEPT}: vehicle 2: leaves 9.00 s after vehicle 1 has cleared"
+    made = replace(case, generated=replace(case.generated, reactions=(), adaptations=(sentence,)))
+    write_results(tmp_path, [made], seed=3, title="", quality=(), provenance={})
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(summary([made]))
+    assert sentence in console.export_text()
+    assert f"{sentence}." in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert json.loads((tmp_path / "evaluation.json").read_text())["cases"][0]["adaptations"] == [sentence]

@@ -24,6 +24,7 @@ from scenario_gen.report.data import case_data
 from scenario_gen.report.html import render_page
 from scenario_gen.types.evaluation import formatted, Interval
 from scenario_gen.types.generation import ERRORS, GenerationResult, NARROW, ORACLE, UNIFORM, WITHOUT
+from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.route import Route, routes_in_words
 from scenario_gen.types.scenario import ScenarioSet
 
@@ -99,6 +100,8 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "rate": len(case.segmentation.changepoints) / duration,
         "errors": {key: _errors(case, key) for key in ERRORS},
         "best": {key: case.best(key) for key in ERRORS},
+        "reactions": case.reacting,
+        "not_kept": [said for said in case.generated.adaptations if said.startswith(NOT_KEPT)],
         "outdone": case.similarity()["said"],
         "segments": [
             {"from": bounds[k], "to": bounds[k + 1], "label": int(case.segmentation.labels[start]), "text": text}

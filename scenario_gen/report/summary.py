@@ -24,6 +24,7 @@ from rich.text import Text
 from scenario_gen.errors import printable
 from scenario_gen.types.evaluation import formatted, Interval
 from scenario_gen.types.generation import ERRORS, GenerationResult, NARROW, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.route import routes_in_words
 from scenario_gen.types.scenario import Cause
 
@@ -72,9 +73,12 @@ def _case(case: GenerationResult) -> list[Text]:
         figures.append(f"  routes: {planned}")
     similar = [_errors(case, metric) for metric in ERRORS if found and metric in found.values]
     kept += case.similarity()["said"]
+    kept += [said for said in made.adaptations if said.startswith(NOT_KEPT)]
+    reactions = case.reacting["sentences"]
     return [
         title,
         figures,
+        *(Text(f"  {printable(line)}") for line in reactions),
         *similar,
         *(Text(f"  {printable(line)}", style="yellow") for line in (*lost, *kept, *routes, *([remark] if remark else []))),
     ]

@@ -134,6 +134,12 @@ class GenerationResult:
         return f"{self.encounter.name} on {self.road.name}" if self.road else self.encounter.name
 
     @property
+    def reacting(self) -> dict[str, Any]:
+        """Who reacts to whom in the template, and what the scenarios keep of it, as a document."""
+        made, ids = self.generated, [vehicle.id for vehicle in self.encounter.vehicles]
+        return {"edges": [], "cut": [], "sentences": []} if made.graph is None else made.graph.document(ids, made.reactions)
+
+    @property
     def published(self) -> int:
         """Number of valid scenarios."""
         return len(self.generated.scenarios) if self.valid is None else self.valid
