@@ -20,6 +20,7 @@ from typing import Any
 
 FOLLOW, YIELD = "follow", "yield"
 DOUBTFUL = 0.5  # confidence below which an edge is said to be doubtful
+_FOLLOWS, _YIELDS = " follows ", " yields to "  # of names
 NOT_KEPT = "on this road a reaction is not kept"  # begins the sentence of a set's adaptations that gives the figures
 
 
@@ -60,7 +61,7 @@ class Reaction:
 
     def name(self, ids: Sequence[str]) -> str:
         """Return who reacts to whom, by the vehicles' ids: as it is named in an entry of `scenarios/info`."""
-        return f"{ids[self.who]} {'follows' if self.kind == FOLLOW else 'yields to'} {ids[self.whom]}"
+        return f"{ids[self.who]}{_FOLLOWS if self.kind == FOLLOW else _YIELDS}{ids[self.whom]}"
 
     def words(self, ids: Sequence[str]) -> str:
         """Return the reaction in words, with the vehicles' ids."""
@@ -115,3 +116,9 @@ class ReactionGraph:
             "cut": [edge.document(ids) for edge in self.cut],
             "sentences": list(self.sentences(ids, kept)),
         }
+
+
+def yielders_of(names: str, ids: Sequence[str]) -> tuple[tuple[int, int], ...]:
+    """Return (who, whom) of the yielding reactions that an entry names ("2 yields to 1; 3 follows 2"), of vehicles `ids`."""
+    pairs = [name.split(_YIELDS) for name in names.split("; ") if _YIELDS in name]
+    return tuple((ids.index(who), ids.index(whom)) for who, whom in pairs if who in ids and whom in ids)
