@@ -135,7 +135,7 @@ def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
     return {
         "own": formatted(Interval(case.evaluation.value(case.row, metric)), ""),
         "kind": "" if not best else "good" if best == case.row else "bad",
-        "beside": [(f"{value} {words[row]}", row == best) for row, value in found.items()],
+        "beside": [(f"{value} {words[row]}", row == best) for row, value in found.items() if value != "–"],
     }
 
 
@@ -149,7 +149,7 @@ def _causes(made: ScenarioSet) -> list[tuple[str, int]]:
 def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the page's first sentences in figures: how many were accepted, and where E is below what it is compared with."""
     better: dict[str, dict[str, tuple[int, int]]] = {}
-    for row, words in ((WITHOUT, "none"), (UNIFORM, "as many evenly spaced ones")):
+    for row, words in ((WITHOUT, "without changepoints"), (UNIFORM, "with as many evenly spaced ones")):
         cases = [view["case"] for view in views if row in view["case"].compared]
         for key, what in ERRORS.items():
             pairs = [(case.evaluation.value(case.row, key), case.evaluation.value(row, key)) for case in cases]
