@@ -20,8 +20,10 @@ import json
 from pathlib import Path
 import re
 
+from markupsafe import escape
 import numpy as np
 import pytest
+from reaction_scenes import answering, lane_encounter, wander
 from rich.console import Console
 
 from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
@@ -127,12 +129,20 @@ def test_who_reacts_to_whom_is_said_in_terminal_page_and_figures(case, encounter
         assert (edge["who"], edge["whom"], edge["kept"]) == ("2", "1", kept) and edge["lag"] == pytest.approx(0.4, abs=0.05)
 
 
-def test_the_figures_of_a_reaction_that_the_road_does_not_keep_are_said(case, tmp_path):
-    sentence = f"{NOT_KEPT}: vehicle 2: leaves 9.00 s after vehicle 1 has cleared"
-    made = replace(case, generated=replace(case.generated, reactions=(), adaptations=(sentence,)))
+def test_the_figures_of_a_reaction_that_the_road_does_not_keep_are_said(tmp_path):
+    """A follower that is asked to start much nearer to its leader than it ever drove."""
+    leader = wander(np.random.default_rng(3), 200)
+    lane, config = lane_encounter(leader, answering(leader, 1.2, 0.9)), PipelineConfig(evaluation=QUICK)
+    x, y, yaw, _ = generate(lane, "corridor", config, count=1, seed=3).fit.asked.start[1].tolist()
+    asked = Request(starts=f"2: {x + 13.0:.2f} {y:.2f} {yaw:.3f}")
+    made = generate(lane, "corridor", config, count=2, seed=3, request=asked)
+    (sentence,) = [said for said in made.generated.adaptations if "reaction" in said]
+    assert sentence.startswith(f"{NOT_KEPT}: vehicle 2: drives ") and made.generated.reactions == ()
     write_results(tmp_path, [made], seed=3, title="", quality=(), provenance={})
     console = Console(width=200, record=True, file=StringIO())
     console.print(summary([made]))
-    assert sentence in console.export_text()
-    assert f"{sentence}." in (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert json.loads((tmp_path / "evaluation.json").read_text())["cases"][0]["adaptations"] == [sentence]
+    text = console.export_text()
+    assert sentence in text and "1.5 s behind, and answers its speed after 1.2 s: the scenarios are not held to it" in text
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count(str(escape(sentence))) == 2 and "are not held to it" in page  # beside the reaction, and in the account
+    assert json.loads((tmp_path / "evaluation.json").read_text())["cases"][0]["adaptations"] == list(made.generated.adaptations)
