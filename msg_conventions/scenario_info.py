@@ -23,6 +23,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 import json
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,7 @@ from msg_conventions.ego import ego_values
 from msg_conventions.hashes import MAP_HASH, TEMPLATE_HASH
 from msg_conventions.scenarios import digest, encode_scenario, messages_of
 from scenario_gen.arrays import Floats
+from scenario_gen.documents import parse_json
 from scenario_gen.errors import guarded, InputError
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.request import ORDERS
@@ -39,6 +41,7 @@ from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, FACTS, S
 
 INFO = "scenarios/info"
 REFUSED, ADAPTATION, TARGET = "refused.", "adaptation.", "target."
+REACTION, CUT = "reaction.", "reaction.cut."  # who reacts to whom in the template, JSON; what closes a circle
 MESSAGES, PRESENT = "messages", "present"  # of a scenario in which not all are there throughout
 FREED = "freed"  # metres and m/s by which start and end of each vehicle may differ from the asked states
 EGO_WITNESS = "ego_witness"  # of one with an ego slot
@@ -181,7 +184,7 @@ class RequestSummary:
         return {
             key: value
             for key, value in self.values.items()
-            if key not in known and not key.startswith((REFUSED, ADAPTATION, TARGET, "ego"))
+            if key not in known and not key.startswith((REFUSED, ADAPTATION, TARGET, REACTION, "ego"))
         }
 
     def result(self, scenarios: tuple[Scenario, ...] = ()) -> ScenarioSet:
@@ -203,6 +206,19 @@ class RequestSummary:
             refused=Counter(refused),
             adaptations=tuple(text for key, text in self.values.items() if key.startswith(ADAPTATION)),
         )
+
+    @property
+    def reactions(self) -> tuple[dict[str, Any], ...]:
+        """Who reacts to whom in the template, each as `Reaction.document` with `kept`; those that were cut have no `kept`.
+
+        Raises:
+            InputError: they are damaged.
+        """
+        what, found = f"{INFO}: {REACTION} of {self.status.message}", []
+        for key, text in self.values.items():
+            if key.startswith(REACTION):
+                found.append(parse_json(text, what, {"type": "object", "required": ["words", "lag", "confidence"]}))
+        return tuple(found)
 
     def sentence(self) -> str:
         """Say what the request came to."""
@@ -294,9 +310,27 @@ def scenario_entry(
 
 
 def request_summary(
-    result: ScenarioSet, request: str, node: str, seed: int, provenance: Values | None = None, *, cancelled: bool = False
+    result: ScenarioSet,
+    request: str,
+    node: str,
+    seed: int,
+    provenance: Values | None = None,
+    *,
+    cancelled: bool = False,
+    reactions: Mapping[str, Any] | None = None,
 ) -> RequestSummary:
-    """Return the summary of a request; `provenance` is what is needed to make it again."""
+    """Return the summary of a request.
+
+    Args:
+        result: what it came to.
+        request: its id.
+        node: full name of the publishing node.
+        seed: of the request.
+        provenance: what is needed to make it again.
+        cancelled: whether it was ended early.
+        reactions: who reacts to whom in the template, `ReactionGraph.document` with what is kept.
+    """
+    edges = {REACTION: (reactions or {}).get("edges", ()), CUT: (reactions or {}).get("cut", ())}
     values = {
         **(provenance or {}),
         **({"cancelled": "true"} if cancelled else {}),
@@ -308,6 +342,7 @@ def request_summary(
         "candidates": str(result.candidates),
         **{f"{REFUSED}{cause.value}": str(count) for cause, count in sorted(result.refused.items())},
         **{f"{ADAPTATION}{k}": text for k, text in enumerate(result.adaptations)},
+        **{f"{key}{k}": json.dumps(edge) for key, found in edges.items() for k, edge in enumerate(found)},
         **({} if result.reached is None else {f"{TARGET}{key}": text for key, text in result.reached.figures().items()}),
         **({"chosen_from": str(result.chosen)} if result.chosen else {}),
     }

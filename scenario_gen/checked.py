@@ -19,6 +19,7 @@ from dataclasses import replace
 from scenario_gen.evaluation.measures import MEASURES
 from scenario_gen.sampling import Cancelled, freed_states, kept_reactions, OnValid, Progress, sample_scenarios, SamplingConfig
 from scenario_gen.template.interaction import Wait, waits_to_keep
+from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.request import Request
 from scenario_gen.validity import Checker, Limits
@@ -63,4 +64,4 @@ def sample_checked(
         encounter, planned.segmentation, road, planned.routes, fit.asked, check, sampling, count=count, seed=planned.seed,
         waits=waits, request=request, progress=progress, cancelled=cancelled, found=found, measures=MEASURES,
     )  # fmt: skip
-    return replace(planned, fit=fit, generated=generated)
+    return replace(planned, fit=fit, generated=replace(generated, graph=reactions_of(encounter)))

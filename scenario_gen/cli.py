@@ -264,7 +264,7 @@ def validate(
             say(table, wrap=True)
         if one.unaccounted:
             say(f"  {one.unaccounted} unaccounted: {NO_ENTRY}")
-        for sentence in one.missing:
+        for sentence in (*(f"{said}: kept by {count}" for said, count in one.proven.items()), *one.missing):
             say(f"  {sentence}")
         for sentence, count in one.left_out.items():
             say(f"  not applicable to {count}: {sentence}")

@@ -81,25 +81,26 @@ def with_references(
 ) -> GenerationResult:
     """Add what a result is measured against: sets without changepoints and, if `evaluation.uniform`, with uniform ones.
 
+    They are drawn as the result is, with the same parameters and seed; beside preset `wide` there is a set of `narrow`, too.
     A reference knows of the template what its own changepoints tell, so no wait is asked of it: a wait whose ends were known
-    besides would be two more of them. Nor is a target, a choice or another order. Of a reference no more scenarios
-    are made than are measured.
+    besides would be two more of them. Nor is a target, a choice or another order, and what has one is not compared. Of a
+    reference no more scenarios are made than are measured.
     """
     road, fit = made.placed()
     plain, seed, few = request.plain, made.seed, min(made.generated.requested, MEASURED)
-    narrow = replace(config, sampling=replace(config.sampling, variety="narrow"))
 
-    def similar() -> ScenarioSet:
-        return sample_checked(made, narrow.sampling, narrow.limits, plain, count=few).generated
+    def narrow() -> ScenarioSet:
+        sampling = replace(config.sampling, variety="narrow")
+        return sample_checked(made, sampling, config.limits, plain, count=few).generated
 
     def with_changepoints(segmentation: Segmentation) -> ScenarioSet:
-        return attempt(made.encounter, segmentation, road, narrow, plain, count=few, seed=seed, waits=()).generated
+        return attempt(made.encounter, segmentation, road, config, plain, count=few, seed=seed, waits=()).generated
 
     rows: dict[str, Callable[[], ScenarioSet]] = {WITHOUT: partial(with_changepoints, without_changepoints(made.segmentation))}
-    if config.sampling.variety == "wide":
-        rows[NARROW] = similar
     if config.evaluation.uniform and made.segmentation.changepoints.size:
         rows[UNIFORM] = partial(with_changepoints, uniform_changepoints(made.segmentation))
+    if config.sampling.variety == "wide":
+        rows[NARROW] = narrow
     references, refusals = {}, {}
     for name, make in rows.items():
         try:
@@ -107,7 +108,9 @@ def with_references(
         except RefusedError as error:
             refusals[name] = str(error)
     oracle = replay(made.encounter, fit, road.frame_id)
-    return replace(made, references=references, refusals=refusals, oracle=oracle)
+    asked = [name for name in ("target", "choose", "order") if getattr(request, name) != getattr(plain, name)]
+    apart = f"only the delivered set was drawn with {' and '.join(asked)} as asked" if asked else ""
+    return replace(made, references=references, refusals=refusals, oracle=oracle, apart=apart)
 
 
 def with_evaluation(made: GenerationResult, config: PipelineConfig) -> GenerationResult:

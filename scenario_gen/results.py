@@ -31,6 +31,7 @@ from scenario_gen.recordings.write import add_results
 from scenario_gen.report.page import ReportInput, write_report
 from scenario_gen.storage.config import BagConfig
 from scenario_gen.storage.writer import BagWriter
+from scenario_gen.types.evaluation import as_markdown
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.request import Request
 
@@ -69,9 +70,10 @@ def write_results(
 
 
 def _figures(case: GenerationResult) -> dict[str, Any]:
-    """Return a case's evaluation and coverage, its target, what the fitting lost and decided, and how routes were planned."""
+    """Return a case's E beside what it is compared with, who reacts to whom, its evaluation, and what the stages did."""
     vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
-    figures: dict[str, Any] = json.loads(case.evaluation.to_json())
+    said = {"similarity": case.similarity(), "reactions": case.reacting}
+    figures: dict[str, Any] = {**said, **json.loads(case.evaluation.to_json()), "adaptations": list(case.generated.adaptations)}
     fit = {} if case.fit is None else case.fit.figures()
     coverage = {} if case.coverage is None else case.coverage.document()
     reached = {} if case.generated.reached is None else case.generated.reached.figures()
@@ -94,7 +96,12 @@ def write_evaluation(folder: Path, cases: Sequence[GenerationResult], bag: Path,
 
 def as_table(cases: Sequence[GenerationResult]) -> str:
     """Return the figures of all cases as Markdown."""
-    return "\n\n".join(case.evaluation.to_markdown() for case in cases)
+    return "\n\n".join(f"{case.evaluation.to_markdown()}\n{_reactions(case)}" for case in cases)
+
+
+def _reactions(case: GenerationResult) -> str:
+    said = case.reacting["sentences"]
+    return "\n".join(["Who reacts to whom in the template:", "", *(f"- {as_markdown(line)}" for line in said)]) if said else ""
 
 
 def _is_generated(folder: Path) -> bool:

@@ -15,20 +15,31 @@
 """The arms of a case: what the segmenter's changepoints are measured against, made by the same chain."""
 
 from dataclasses import replace
+from io import StringIO
 import json
 from pathlib import Path
+import re
 
+from markupsafe import escape
 import numpy as np
 import pytest
+from reaction_scenes import answering, lane_encounter, wander
+from rich.console import Console
 
-from scenario_gen.evaluation import EvaluationConfig
+from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.report.page import render, ReportInput
+from scenario_gen.report.summary import summary
+from scenario_gen.results import write_results
+from scenario_gen.sampling import SamplingConfig
 from scenario_gen.types.generation import NARROW, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.reaction import NOT_KEPT
+from scenario_gen.types.request import Request
 
 QUICK = EvaluationConfig(resamples=50)
+WORDS = {"without": WITHOUT, "uniform": UNIFORM, "narrow": NARROW, "replayed": ORACLE}
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +53,7 @@ def case(encounter):
 
 
 def test_every_arm_has_its_row_and_its_account(case):
-    assert [row.name for row in case.evaluation.rows] == ["template", WITH, WITHOUT, NARROW, UNIFORM, ORACLE]
+    assert [row.name for row in case.evaluation.rows] == ["template", WITH, WITHOUT, UNIFORM, NARROW, ORACLE]
     assert len(case.references[UNIFORM].scenarios) == 4 and not case.refusals
     accepted = case.evaluation.value(UNIFORM, "acceptance")
     assert accepted == pytest.approx(1.0 - sum(case.references[UNIFORM].refused.values()) / case.references[UNIFORM].candidates)
@@ -64,3 +75,74 @@ def test_it_can_be_left_out_and_changes_nothing_else(encounter, case):
     rows = [{row["name"]: row for row in json.loads(one.evaluation.to_json())["rows"]} for one in (plain, case)]
     assert set(rows[1]) - set(rows[0]) == {UNIFORM}
     assert all(rows[0][name] == rows[1][name] for name in rows[0])
+
+
+def test_what_is_compared_is_drawn_with_the_same_freedom(case):
+    for name in (WITHOUT, UNIFORM):
+        sizes = {scenario.vehicles[0].length for scenario in case.references[name].scenarios}
+        assert len(sizes) > 1, f"{name}: preset wide draws sizes"
+    assert len({scenario.vehicles[0].length for scenario in case.references[NARROW].scenarios}) == 1
+    assert case.compared == (WITH, WITHOUT, UNIFORM)
+
+
+def test_the_first_figures_that_anybody_sees_are_those_of_the_delivered_set(case, tmp_path):
+    write_results(tmp_path, [case], seed=3, title="", quality=(), provenance={})
+    (figures,) = json.loads((tmp_path / "evaluation.json").read_text())["cases"]
+    assert next(iter(figures)) == "similarity" and next(iter(figures["similarity"]["compared"])) == WITH
+    delivered = evaluate_scenarios(case.encounter, {WITH: case.generated}, config=QUICK).value(WITH, "e_position")
+    assert figures["similarity"]["compared"][WITH]["e_position"] == pytest.approx(delivered, rel=1e-5)
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(summary([case]))
+    said = next(line for line in console.export_text().splitlines() if "E position" in line)
+    words = [f"{word} {case.evaluation.value(row, 'e_position'):.3f}" for word, row in WORDS.items()]
+    assert said.split() == f"E position {delivered:.3f} | {words[0]}, {words[1]} ({words[2]}, {words[3]})".split()
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    cell = re.search(r'<td class="(good|bad)">([\d.]+)<small', page)
+    assert float(cell[2]) == pytest.approx(delivered, rel=5e-3)
+    assert (cell[1] == "good") == (case.best("e_position") == WITH)
+
+
+def test_a_set_with_a_target_is_not_compared_with_sets_without_it(encounter):
+    config = PipelineConfig(evaluation=QUICK)
+    made = generate(encounter, "t_intersection", config, count=2, seed=3, request=Request(order="free"))
+    assert made.compared == (WITH,) and "order" in made.apart
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(summary([made]))
+    assert "nothing is compared: only the delivered set was drawn with order as asked" in console.export_text()
+
+
+def test_who_reacts_to_whom_is_said_in_terminal_page_and_figures(case, encounter, tmp_path):
+    said = "vehicle 2 slows down for vehicle 1 to pass and leaves 0.4 s after"
+    config = PipelineConfig(evaluation=QUICK, sampling=SamplingConfig(reactions="none"))
+    free = generate(encounter, "t_intersection", config, count=2, seed=3)
+    for made, kept in ((case, True), (free, False)):
+        write_results(tmp_path, [made], seed=3, title="", quality=(), provenance={})
+        console = Console(width=200, record=True, file=StringIO())
+        console.print(summary([made]))
+        sentence = said if kept else f"{said}: the scenarios are not held to it"
+        assert sentence in [line.strip() for line in console.export_text().splitlines()]
+        page = (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert said in page and ("are held to it" in page) == kept and ("are not held to it" in page) != kept
+        (figures,) = json.loads((tmp_path / "evaluation.json").read_text())["cases"]
+        assert figures["reactions"]["sentences"] == [sentence]
+        (edge,) = figures["reactions"]["edges"]
+        assert (edge["who"], edge["whom"], edge["kept"]) == ("2", "1", kept) and edge["lag"] == pytest.approx(0.4, abs=0.05)
+
+
+def test_the_figures_of_a_reaction_that_the_road_does_not_keep_are_said(tmp_path):
+    """A follower that is asked to start much nearer to its leader than it ever drove."""
+    leader = wander(np.random.default_rng(3), 200)
+    lane, config = lane_encounter(leader, answering(leader, 1.2, 0.9)), PipelineConfig(evaluation=QUICK)
+    x, y, yaw, _ = generate(lane, "corridor", config, count=1, seed=3).fit.asked.start[1].tolist()
+    asked = Request(starts=f"2: {x + 13.0:.2f} {y:.2f} {yaw:.3f}")
+    made = generate(lane, "corridor", config, count=2, seed=3, request=asked)
+    (sentence,) = [said for said in made.generated.adaptations if "reaction" in said]
+    assert sentence.startswith(f"{NOT_KEPT}: vehicle 2: drives ") and made.generated.reactions == ()
+    write_results(tmp_path, [made], seed=3, title="", quality=(), provenance={})
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(summary([made]))
+    text = console.export_text()
+    assert sentence in text and "1.5 s behind, and answers its speed after 1.2 s: the scenarios are not held to it" in text
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count(str(escape(sentence))) > 1 and "are not held to it" in page  # beside the reaction, and in accounts
+    assert json.loads((tmp_path / "evaluation.json").read_text())["cases"][0]["adaptations"] == list(made.generated.adaptations)

@@ -64,7 +64,7 @@ def assert_sound(case: GenerationResult) -> None:
 
 def assert_nearer(case: GenerationResult, figure: str) -> None:
     """Scenarios with changepoints are more like the template than those without."""
-    with_, without = case.evaluation.value(case.similar_row, figure), case.evaluation.value(WITHOUT, figure)
+    with_, without = case.evaluation.value(case.row, figure), case.evaluation.value(WITHOUT, figure)
     if without >= 0.03:
         assert with_ < without, f"{figure}: {with_:.3f} with, {without:.3f} without changepoints on {case.road.name}"
 

@@ -30,6 +30,9 @@ from scenario_gen import exact
 from scenario_gen.arrays import Bools, Floats, frozen
 from scenario_gen.errors import InputError
 from scenario_gen.kernels import F, F1, F2, F3, kernel, OUT3
+from scenario_gen.template.answers import conflict_of, lag_behind
+from scenario_gen.types.names import tokens
+from scenario_gen.types.reaction import yielders_of
 from scenario_gen.types.scenario import Scenario
 
 CELL = 0.1  # seconds of a certified clock that are taken together
@@ -49,7 +52,7 @@ class Certified:
         cells: (N, K, 8) of each cell of the clock: the box that holds the footprint throughout (centre x, y [m], cos and sin of
             its yaw, half length, half width [m], radius [m]), and the way driven [m] at its start.
         order: (N, N, K) `order[i, j, k]`: clock [s] that vehicle i may not pass while the clock of j is in cell k, unless that
-            of j is there, too; inf if nothing is in its way.
+            of j is there, too; inf if nothing is in its way. It holds back who waits for j in the template, too.
         spans: (N, 2) clocks [s] at which each vehicle comes onto the scene and at which its certified motion ends.
         leaves: (N,) whether it leaves the scene then; who stands at the scenario's end stays.
     """
@@ -94,8 +97,26 @@ def certified(scenario: Scenario, ego: int | str) -> Certified:
     spans = frozen(time[scenario.present])
     fill_cells(time, motion, half, spans, CELL, cells)
     fill_order(cells, CELL, order)
+    named = scenario.facts.get("reactions", "")
+    for who, whom in yielders_of(named, tokens(ids)) if named else ():
+        if ego not in (who, whom):
+            _keep_waiting(scenario, who, whom, order[who, whom])
     leaves = np.asarray((speed[:, -1] >= STANDS) | (spans[:, 1] < time[-1]))
     return Certified(scenario, ego, motion, half, frozen(cells), frozen(order), spans, leaves)
+
+
+def _keep_waiting(scenario: Scenario, who: int, whom: int, order: Floats) -> None:
+    """Lower the `order` (K,) of a yielder and the one it waits for: until that one has cleared it does not leave.
+
+    Its clock is held where that one clears, or where it leaves, if that is earlier. So its lag behind the clearing stays.
+    """
+    conflict = conflict_of(scenario, who, whom)
+    if conflict is None or conflict.second != who:
+        return
+    cleared = conflict.exit_first
+    held = np.floor(min(cleared, cleared + lag_behind(scenario, conflict)) / CELL) * CELL
+    before = np.arange(len(order)) * CELL < cleared
+    order[before] = np.minimum(order[before], held)
 
 
 @kernel(inline=True)

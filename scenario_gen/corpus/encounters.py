@@ -37,6 +37,7 @@ from scenario_gen.logs.raw import Observations, RawLog, Segment
 from scenario_gen.logs.read import encounters_of
 from scenario_gen.logs.tables import EPOCH_NS
 from scenario_gen.recordings.tracks import tracks_bytes, tracks_of
+from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.encounter import Encounter
 
 ROW = {  # what is read of a row, and of which kinds it is
@@ -145,6 +146,7 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         "name": encounter.name,
         "source": source,
         "kind": pairs[0][3],
+        "reactions": json.dumps(reactions_of(encounter).document([vehicle.id for vehicle in encounter.vehicles])),
         "kinds": json.dumps({f"{encounter.vehicles[i].id} {encounter.vehicles[j].id}": kind for _, i, j, kind, _ in pairs}),
         "vehicles": [vehicle.id for vehicle in encounter.vehicles],
         "count": len(encounter.vehicles),
@@ -167,7 +169,7 @@ def write_encounters(target: Path, rows: Sequence[Mapping[str, Any]], account: M
 
     text, number = pa.string(), pa.float64()
     kinds = {
-        **dict.fromkeys(("name", "source", "kind", "kinds"), text),
+        **dict.fromkeys(("name", "source", "kind", "kinds", "reactions"), text),
         "vehicles": pa.list_(text),
         **dict.fromkeys(("count", "start_ns"), pa.int64()),
         **dict.fromkeys(("seconds", "gap", "distance", "travel", "lat", "lon"), number),

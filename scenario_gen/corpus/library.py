@@ -43,12 +43,15 @@ from scenario_gen.folders import Kind, replaced_folder
 from scenario_gen.segmentation.estimator import USUAL_R_HAT
 from scenario_gen.segmentation.library import assign, build_library, PrimitiveLibrary
 from scenario_gen.segmentation.segmenter import DEFAULT, SegmentationConfig
+from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.reaction import FOLLOW, YIELD
 
 LIBRARY = Kind("primitive library")
 NAME, SEGMENTS, PAGE, SUMMARY = "library.json", "segments", "library.html", "summary.json"
 SHORTEST = 2.0  # s that a pair must be there together
 EXAMPLES = 2
+VERBS = {FOLLOW: "follows", YIELD: "yields"}
 SHARED = replace(DEFAULT, sampler=replace(DEFAULT.sampler, weight=0.1))
 """Accelerations are over a window of 1 s, so ten samples of 0.1 s say as much as one. With the weight of a half, at which one
 encounter's changepoints are found best, states multiply with the hours: 118 of 181 recorded pairs, and two seeds differ."""
@@ -212,10 +215,11 @@ def assign_table(task: AssignTask) -> None:
             found = assign(pair, library, task.config)
             rows.append({
                 "encounter": row["name"], "kind": row["kind"], "pair": pair.name, "seconds": pair.duration,
+                "reactions": json.dumps(reactions_of(pair).document([vehicle.id for vehicle in pair.vehicles])),
                 "changepoints": found.segmentation.changepoints.tolist(), "primitives": found.primitives.tolist(),
             })  # fmt: skip
     ints = pa.list_(pa.int64())
-    kinds: dict[str, Any] = {**dict.fromkeys(("encounter", "kind", "pair"), pa.string()), "seconds": pa.float64()}
+    kinds: dict[str, Any] = {**dict.fromkeys(("encounter", "kind", "pair", "reactions"), pa.string()), "seconds": pa.float64()}
     schema = pa.schema([*kinds.items(), ("changepoints", ints), ("primitives", ints)])
     with arriving(task.target) as part:
         parquet.write_table(pa.Table.from_pylist(rows, schema=schema), part, compression="zstd")
@@ -242,14 +246,18 @@ def _write_page(
     segments: Counter[int] = Counter()
     follows: Counter[tuple[int, int]] = Counter()
     kinds: dict[int, Counter[str]] = {}
+    reactions: dict[int, Counter[str]] = {}
     examples: dict[int, list[tuple[str, tuple[int, int]]]] = {}
     for row in rows:
         pair = pairs[row["pair"]]
+        found = reactions_of(pair).edges
+        answers = {f"the {('first', 'second')[edge.who]} {VERBS[edge.kind]}" for edge in found} or {"nobody reacts"}
         edges = [0, *row["changepoints"], len(pair.time)]
         for primitive, (begin, end) in zip(row["primitives"], pairwise(edges), strict=True):
             seconds[primitive] += end - begin
             segments[primitive] += 1
             kinds.setdefault(primitive, Counter())[row["kind"]] += 1
+            reactions.setdefault(primitive, Counter()).update(answers)
             if len(examples.setdefault(primitive, [])) < EXAMPLES:
                 examples[primitive].append((row["pair"], (begin, end)))
         follows.update(pairwise(row["primitives"]))
@@ -261,6 +269,7 @@ def _write_page(
         lines = [
             f"{count} segments, {100.0 * seconds[k] / total:.1f} % of the time, {seconds[k] * dt / count:.1f} s each",
             "in " + ", ".join(f"{n} × {kind}" for kind, n in kinds[k].most_common(4)),
+            "; ".join(f"{said} in {n} of them" for said, n in reactions[k].most_common()),
             "followed by " + (", ".join(f"{to} ({n} ×)" for n, to in after) or "nothing"),
             *(f"{name}, {begin * dt:.1f} to {end * dt:.1f} s" for name, (begin, end) in examples[k]),
         ]

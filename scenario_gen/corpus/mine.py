@@ -55,6 +55,7 @@ from scenario_gen.folders.scratch import sweep_tree
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.read import is_bag, is_spmd, is_table
 from scenario_gen.parameters import flatten
+from scenario_gen.template.reactions import reactions_of
 
 ARCHIVE, PAGE = "archive.json", "encounters.html"
 ACCOUNT = {  # of a range of text: what was left out, by file; rows by hour
@@ -165,11 +166,13 @@ def _write_gallery(path: Path, out: Path, made: Mined) -> None:
             if made.encounters > MOST_DRAWN and shown[row["kind"]] >= MOST_DRAWN // len(KINDS):
                 continue
             shown[row["kind"]] += 1
+            encounter = encounter_of(row)
             lines = [
                 f"{row['count']} vehicles, {row['seconds']:.1f} s, nearest {row['distance']:.1f} m, gap {row['gap']:.1f} m",
                 ", ".join(f"{pair}: {kind}" for pair, kind in json.loads(row["kinds"]).items()),
+                *reactions_of(encounter).sentences([vehicle.id for vehicle in encounter.vehicles]),
             ]
-            cards.append({"title": f"{row['kind']}: {row['name']}", "lines": lines, "pictures": [sketch(encounter_of(row))]})
+            cards.append({"title": f"{row['kind']}: {row['name']}", "lines": lines, "pictures": [sketch(encounter)]})
     first, *rest = made.lines()
     write_page(path, "Encounters mined", first, cards, rest)
 

@@ -123,6 +123,9 @@ def gram(rows: Floats) -> Floats:
     return np.asarray(np.triu(out[0]) + np.triu(out[0], 1).T)
 
 
+_TINY = 1e-290  # square of the length of a column that is nothing but rounding of rounding; 2 over less is infinite
+
+
 @kernel(OUT2, OUT2, OUT1, OUTI1, B)
 def _householder(columns: Floats, reflectors: Floats, scale: Floats, order: Ints, pivot: bool) -> None:
     """Factorise a matrix given by its columns (n, m), in place; with `pivot` the longest column that is left comes next."""
@@ -143,7 +146,7 @@ def _householder(columns: Floats, reflectors: Floats, scale: Floats, order: Ints
         length = np.sqrt(_dot(v[k:], v[k:]))
         v[k] += length if v[k] >= 0.0 else -length
         square = _dot(v[k:], v[k:])
-        scale[k] = 2.0 / square if square > 0.0 else 0.0
+        scale[k] = 2.0 / square if square > _TINY else 0.0
         for j in range(k, n):
             factor = scale[k] * _dot(v[k:], columns[j, k:])
             for i in range(k, m):

@@ -159,6 +159,6 @@ def answer_request(
     result = made.generated
     provenance = parameter_texts(config) | versions() | hashes
     stopped = cancelled() and len(result.scenarios) < result.requested
-    summary = request_summary(result, request, node, config.seed, provenance, cancelled=stopped)
+    summary = request_summary(result, request, node, config.seed, provenance, cancelled=stopped, reactions=made.reacting)
     out.close(result, summary)
     return made, summary

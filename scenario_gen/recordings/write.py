@@ -97,7 +97,8 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
         yield INFO, encode_info(entry, stamp), logged
         yield "markers", scenario_markers(scenario, stamp), logged
         logged += SCENARIO_STEP_NS
-    summary = request_summary(result.generated, request, "/gp_sampler", result.seed, {**result.provenance, **hashes})
+    provenance = {**result.provenance, **hashes}
+    summary = request_summary(result.generated, request, "/gp_sampler", result.seed, provenance, reactions=result.reacting)
     yield INFO, encode_info(summary, stamp), logged
 
 

@@ -22,14 +22,14 @@ from typing import Any
 from scenario_gen.folders import write_text
 from scenario_gen.report.data import case_data
 from scenario_gen.report.html import render_page
-from scenario_gen.types.evaluation import Evaluation, Interval
-from scenario_gen.types.generation import GenerationResult, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.evaluation import formatted, Interval
+from scenario_gen.types.generation import ERRORS, GenerationResult, NARROW, ORACLE, UNIFORM, WITHOUT
+from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.route import Route, routes_in_words
 from scenario_gen.types.scenario import ScenarioSet
 
 SIGNIFICANT = 0.03
 """Below this, E without changepoints leaves nothing to gain and the case is not counted."""
-ERRORS = ("e_position", "e_speed", "e_heading")
 MAX_SAMPLES = 50
 """Scenarios of each arm that a page draws; the figures count all."""
 
@@ -98,11 +98,11 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "k": len(case.segmentation.changepoints),
         "remark": case.segmentation.remark(duration),
         "rate": len(case.segmentation.changepoints) / duration,
-        "errors": {
-            (arm, key): _found(evaluation, case.similar_row if arm == WITH else arm, key)
-            for arm in (WITH, WITHOUT, UNIFORM, ORACLE)
-            for key in ERRORS
-        },
+        "errors": {key: _errors(case, key) for key in ERRORS},
+        "best": {key: case.best(key) for key in ERRORS},
+        "reactions": case.reacting,
+        "not_kept": [said for said in case.generated.adaptations if said.startswith(NOT_KEPT)],
+        "outdone": case.similarity()["said"],
         "segments": [
             {"from": bounds[k], "to": bounds[k + 1], "label": int(case.segmentation.labels[start]), "text": text}
             for k, (start, text) in enumerate(
@@ -127,9 +127,16 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
     }
 
 
-def _found(evaluation: Evaluation, row: str, metric: str) -> Interval | None:
-    found = evaluation.row(row)
-    return found.values.get(metric) if found else None
+def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
+    """E of the delivered set, and what stands below it: each with its words and whether it is the best of what is compared."""
+    best = case.best(metric)
+    words = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "preset narrow", ORACLE: "replayed"}
+    found = {row: formatted(Interval(case.evaluation.value(row, metric)), "") for row in words if case.evaluation.row(row)}
+    return {
+        "own": formatted(Interval(case.evaluation.value(case.row, metric)), ""),
+        "kind": "" if not best else "good" if best == case.row else "bad",
+        "beside": [(f"{value} {words[row]}", row == best) for row, value in found.items() if value != "–"],
+    }
 
 
 def _causes(made: ScenarioSet) -> list[tuple[str, int]]:
@@ -140,17 +147,19 @@ def _causes(made: ScenarioSet) -> list[tuple[str, int]]:
 
 
 def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the page's first sentence in figures: how many were accepted, and where changepoints brought E down."""
-    better: dict[str, list[bool]] = {key: [] for key in ERRORS}
-    for view in views:
-        for key, found in better.items():
-            one, other = view["errors"][WITH, key], view["errors"][WITHOUT, key]
-            if one is not None and other is not None and other.value >= SIGNIFICANT:
-                found.append(one.value < other.value)
+    """Return the page's first sentences in figures: how many were accepted, and where E is below what it is compared with."""
+    better: dict[str, dict[str, tuple[int, int]]] = {}
+    for row, words in ((WITHOUT, "without changepoints"), (UNIFORM, "with as many evenly spaced ones")):
+        cases = [view["case"] for view in views if row in view["case"].compared]
+        for key, what in ERRORS.items():
+            pairs = [(case.evaluation.value(case.row, key), case.evaluation.value(row, key)) for case in cases]
+            known = [one < other for one, other in pairs if other >= SIGNIFICANT]
+            if known:
+                better.setdefault(words, {})[what] = (sum(known), len(known))
     sets = [view["case"].generated for view in views]
     return {
         "published": sum(view["case"].published for view in views),
         "requested": sum(made.requested for made in sets),
         "candidates": sum(made.candidates for made in sets),
-        **{key.removeprefix("e_"): (sum(found), len(found)) for key, found in better.items()},
+        "better": better,
     }

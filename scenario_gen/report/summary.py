@@ -23,9 +23,12 @@ from rich.text import Text
 
 from scenario_gen.errors import printable
 from scenario_gen.types.evaluation import formatted, Interval
-from scenario_gen.types.generation import GenerationResult, WITH, WITHOUT
+from scenario_gen.types.generation import ERRORS, GenerationResult, NARROW, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.route import routes_in_words
 from scenario_gen.types.scenario import Cause
+
+SHORT = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "narrow", ORACLE: "replayed"}
 
 
 def summary(cases: Sequence[GenerationResult]) -> RenderableType:
@@ -38,7 +41,11 @@ def summary(cases: Sequence[GenerationResult]) -> RenderableType:
     return Group(
         *lines,
         Text(f"refused candidates: {causes}" if causes else "no candidate was refused"),
-        Text("K: changepoints. E: distance to the template with | without changepoints, lower is nearer.", style="dim"),
+        Text(
+            "K: changepoints. E: distance of the delivered set to the template, lower is nearer; after | of sets drawn likewise, "
+            "without changepoints and with K evenly spaced; in brackets, not compared: preset narrow, the template replayed.",
+            style="dim",
+        ),
     )
 
 
@@ -53,11 +60,7 @@ def _case(case: GenerationResult) -> list[Text]:
     figures = Text.assemble(
         "  ",
         (f"{len(made.scenarios)}/{made.requested} valid", "green" if complete else "red"),
-        f" of {made.candidates}  K {len(case.segmentation.changepoints)}  E position ",
-        _errors(case, "e_position"),
-        "  speed ",
-        _errors(case, "e_speed"),
-        *(("  heading ", _errors(case, "e_heading")) if found and "e_heading" in found.values else ()),
+        f" of {made.candidates}  K {len(case.segmentation.changepoints)}"
         f"  order {order if order == '–' else order + ' %'}{measured}",
     )
     kept = [] if found is None else _not_kept(found.values)
@@ -68,9 +71,15 @@ def _case(case: GenerationResult) -> list[Text]:
     planned = routes_in_words(case.routes)
     if planned:
         figures.append(f"  routes: {planned}")
+    similar = [_errors(case, metric) for metric in ERRORS if found and metric in found.values]
+    kept += case.similarity()["said"]
+    kept += [said for said in made.adaptations if said.startswith(NOT_KEPT)]
+    reactions = case.reacting["sentences"]
     return [
         title,
         figures,
+        *(Text(f"  {printable(line)}") for line in reactions),
+        *similar,
         *(Text(f"  {printable(line)}", style="yellow") for line in (*lost, *kept, *routes, *([remark] if remark else []))),
     ]
 
@@ -87,7 +96,18 @@ def _not_kept(values: Mapping[str, Interval]) -> list[str]:
 
 
 def _errors(case: GenerationResult, metric: str) -> Text:
-    """E with and without changepoints; green where changepoints bring it down."""
-    values = [case.evaluation.value(row, metric) for row in (case.similar_row, WITHOUT)]
-    one, other = (f"{value:.3f}" if math.isfinite(value) else "–" for value in values)
-    return Text(f"{one} | {other}", style="green" if values[0] < values[1] else "")
+    """E of the delivered set, of those it is compared with and of those beside it; the best of the compared is green."""
+    compared, best, value = case.compared, case.best(metric), case.evaluation.value
+    text = Text(f"  E {ERRORS[metric]} ")
+    text.append(_figure(value(case.row, metric)), style="bold green" if best == case.row else "bold")
+    for k, row in enumerate(compared[1:]):
+        text.append(" | " if k == 0 else ", ").append(f"{SHORT[row]} ")
+        text.append(_figure(value(row, metric)), style="green" if best == row else "")
+    beside = [row for row in SHORT if row not in compared and case.evaluation.row(row) is not None]
+    if beside:
+        text.append(f" ({', '.join(f'{SHORT[row]} {_figure(value(row, metric))}' for row in beside)})", style="dim")
+    return text
+
+
+def _figure(value: float) -> str:
+    return f"{value:.3f}" if math.isfinite(value) else "–"

@@ -23,10 +23,11 @@ import numpy as np
 from scenario_gen.errors import InputError
 from scenario_gen.evaluation import coverage_of, evaluate_scenarios, EvaluationConfig
 from scenario_gen.recordings.read import Namespace, NO_ENTRY, read_recording, SCENARIOS
-from scenario_gen.review.validation import Reference
+from scenario_gen.review.validation import kept_reactions, Reference
 from scenario_gen.storage.bag import within
 from scenario_gen.storage.config import BagConfig
 from scenario_gen.template.interaction import find_conflicts, find_waits, orders_asked
+from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.ego import together
 from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.generation import GenerationResult, WITHOUT
@@ -56,6 +57,7 @@ def bag_results(
 def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | None, seed: int) -> GenerationResult:
     encounter, segmentation, road = namespace.encounter, namespace.segmentation, namespace.road
     fit, routes = namespace.fit
+    graph = reactions_of(encounter)
     scenarios = tuple(namespace.scenario(k)[1] for k in range(len(namespace.hashes)))
     counts = CheckCounts.of_verdicts(_verdicts(namespace, scenarios, limits))
     evaluation = evaluate_scenarios(
@@ -80,7 +82,12 @@ def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | Non
     if witness is not None:
         first, last = (np.array([*witness.position[0, k], witness.heading[0, k], witness.speed[0, k]]) for k in (0, -1))
         ego = EgoSlot(witness.vehicles[0], first, last)
-    generated = ScenarioSet(len(scenarios), scenarios, counts.candidates, Counter(counts.refused), _left_out(namespace), ego)
+    names = [vehicle.id for vehicle in encounter.vehicles]
+    held = [kept_reactions(encounter, names, namespace.entry(k)) for k in range(len(scenarios))]
+    generated = ScenarioSet(
+        len(scenarios), scenarios, counts.candidates, Counter(counts.refused), _left_out(namespace), ego,
+        reactions=tuple(edge for edge in graph.edges if all(edge in kept for kept in held)), graph=graph,
+    )  # fmt: skip
     return GenerationResult(
         encounter,
         segmentation,
@@ -102,19 +109,20 @@ def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Lim
     conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
     waits = find_waits(encounter) if namespace.segmentation.changepoints.size else ()
     names = tuple(vehicle.id for vehicle in encounter.vehicles)
-    checkers: dict[tuple[str, ...], Checker] = {}
+    checkers: dict[tuple[object, ...], Checker] = {}
     verdicts: list[Verdict] = []
     for k, one in enumerate(scenarios):
         entry = namespace.entry(k)
         map_hash = entry.map_hash if entry else None
         scenario = together(one)
         order = entry.order if entry else "keep"
-        key = (map_hash or "", order, *(vehicle.id for vehicle in scenario.vehicles))
+        reactions = kept_reactions(encounter, names, entry)
+        key = (map_hash or "", order, *reactions, *(vehicle.id for vehicle in scenario.vehicles))
         if key not in checkers:
             road = namespace.road
             if namespace.roads_differ:
                 road = namespace.road_of(entry, encounter.start_ns) if map_hash else None
-            reference = Reference(road, names, tuple(conflicts), waits, orders_asked(conflicts, order))
+            reference = Reference(road, names, tuple(conflicts), waits, orders_asked(conflicts, order), reactions)
             checkers[key] = reference.checker(scenario, limits, None)
         verdicts += checkers[key].check([scenario])
     return verdicts

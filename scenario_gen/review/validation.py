@@ -22,6 +22,7 @@ with its witness, all are checked together. Where there are entries, a scenario 
 published; one without any entry is counted, and checked as far as that goes.
 """
 
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -33,10 +34,11 @@ from scenario_gen.storage.config import BagConfig
 from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, orders_asked, Wait
 from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.ego import together
+from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.names import tokens
 from scenario_gen.types.reaction import Reaction
 from scenario_gen.types.road import Road
-from scenario_gen.types.scenario import BoundaryStates, Scenario
+from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario
 from scenario_gen.validity import Checker, Limits
 
 UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
@@ -58,7 +60,7 @@ class Validation:
     """What was found in one namespace: `found` by cause; `left_out` says what could not be checked, and of how many scenarios.
 
     `unaccounted` scenarios have no entry on `scenarios/info`, though others have; they are valid if nothing else is wrong.
-    `missing` says which requests are not there whole.
+    `missing` says which requests are not there whole, `proven` how many scenarios keep each reaction that their entries name.
     """
 
     namespace: str
@@ -68,6 +70,7 @@ class Validation:
     found: dict[str, Found] = field(default_factory=dict)
     left_out: dict[str, int] = field(default_factory=dict)
     missing: tuple[str, ...] = ()
+    proven: Counter[str] = field(default_factory=Counter)
 
     def add(self, index: int, violations: Sequence[tuple[str, str]], left_out: Collection[str]) -> None:
         """Count one scenario with its violations (cause, sentence)."""
@@ -169,7 +172,17 @@ def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
             continue
         wrong += [(violation.cause.value, violation.message) for violation in verdict.violations]
         result.add(k, wrong, (*silent, *checkers[key].not_applicable))
+        broken = {violation.vehicles for violation in verdict.violations if violation.cause == Cause.REACTION}
+        ids = tokens(vehicle.id for vehicle in scenario.vehicles)
+        for edge in checkers[key].reactions:
+            result.proven[edge.words(ids)] += (edge.who, edge.whom) not in broken
     return result
+
+
+def kept_reactions(encounter: Encounter, names: Sequence[str], entry: ScenarioEntry | None) -> tuple[Reaction, ...]:
+    """Return the reactions of a template, whose vehicles have these names, that an entry says its scenario keeps."""
+    kept = entry.facts.get("reactions", "").split("; ") if entry else []
+    return tuple(edge for edge in reactions_of(encounter).edges if edge.name(names) in kept) if any(kept) else ()
 
 
 def _altered(k: int, sha256: str, entry: ScenarioEntry) -> str:
@@ -196,7 +209,6 @@ def _reference(namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is
     if segmentation is not None:
         waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
-    kept = entry.facts.get("reactions", "").split("; ") if entry else []
-    reactions = tuple(edge for edge in reactions_of(encounter).edges if edge.name(names) in kept) if any(kept) else ()
+    reactions = kept_reactions(encounter, names, entry)
     first = orders_asked(conflicts, entry.order if entry else "keep")
     return Reference(road, names, tuple(conflicts), waits, first, reactions)

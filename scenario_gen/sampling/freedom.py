@@ -40,6 +40,7 @@ _CARS = 3.2, 5.4  # m: a vehicle of such a length gets the size of another car
 _RAMP = 6.0  # s, over which an own clock leaves the shared one where states are asked
 _RAMP_SHARE = 1.0 / 3.0  # of the duration, or of a way, that this takes at most
 _TAPER = 30.0  # m, over which a vehicle goes to its place in the lane
+_MADE_UP = 0.5 * (1.0 - SHORTEST_SHARE) / 1.875  # s of a wait for each second left, made up for at half the pace that is free
 _LEAST_STAND, _SHORTER = 1.5, 0.3  # s that are left of a wait, and share by which it is shorter at most: clocks run forward
 _LEAST_SHARE = 0.5  # of a speed, that is left while acceleration dies away
 FADES, _LEAST_FADES = 0.7, 0.4  # s, in which it does
@@ -96,8 +97,9 @@ class OwnClock:
     Attributes:
         shift: (G,) seconds at template times, of one second's shift: 1, but 0 where states are asked.
         pace: (G,) the same of a pace slower by 1.
-        waits: (W, G) the same of one second more in each wait.
+        waits: (W, G) the same of one second more in each wait; where an end state is asked it is made up for until the end.
         shift_rate, pace_rate, wait_rates: their derivatives.
+        made_up: (W, G) the part of `wait_rates` that makes up for a wait.
         sigma: (2 + W,) standard deviations of shift [s], pace and waits [s].
         low, high: (W,) bounds [s] of a wait's.
         bound: standard deviations at which all are cut.
@@ -109,6 +111,7 @@ class OwnClock:
     shift_rate: Floats
     pace_rate: Floats
     wait_rates: Floats
+    made_up: Floats
     sigma: Floats
     low: Floats
     high: Floats
@@ -133,21 +136,29 @@ class OwnClock:
                 value, rate = _smooth_step(since / ramp)
                 shift, shift_rate = shift * value, shift_rate * value + shift * sign * rate / ramp
         about = nominal.time - 0.5 * nominal.time[-1]
-        steps = [_smooth_step((grid - a) / (b - a)) for a, b in rests]
         length = np.array([b - a for a, b in rests])
-        none = np.zeros((0, len(grid)))
-        most = config.freedom * config.wait_sigma
-        shortest = np.maximum(np.minimum(_SHORTER * length, length - _LEAST_STAND), 0.0)
+        left = np.array([grid[-1] - b if asked[1] else np.inf for _, b in rests])  # s, to make up for a wait
+        waits, rates, made_up = (np.zeros((len(rests), len(grid))) for _ in range(3))
+        for k, (a, b) in enumerate(rests):
+            waits[k], rates[k] = _smooth_step((grid - a) / (b - a))
+            rates[k] /= b - a
+            if np.isfinite(left[k]):
+                value, rate = _smooth_step((grid[-1] - grid) / max(left[k], 1e-9))
+                waits[k], rates[k], made_up[k] = waits[k] * value, rates[k] * value, -waits[k] * rate / max(left[k], 1e-9)
+                rates[k] += made_up[k]
+        most = np.minimum(config.freedom * config.wait_sigma, _MADE_UP * left)
+        shortest = np.minimum(np.maximum(np.minimum(_SHORTER * length, length - _LEAST_STAND), 0.0), _MADE_UP * left)
         return cls(
             shift,
             about * shift,
-            np.array([value for value, _ in steps]) if steps else none,
+            waits,
             shift_rate,
             about * shift_rate + nominal.rate * shift,
-            np.array([rate / (b - a) for (_, rate), (a, b) in zip(steps, rests, strict=True)]) if steps else none,
+            rates,
+            made_up,
             np.array([config.arrival_sigma, config.pace_sigma, *(config.wait_sigma for _ in rests)]),
             -np.minimum(shortest, most),
-            np.full(len(rests), most),
+            most,
             config.freedom,
         )
 
@@ -161,7 +172,8 @@ class OwnClock:
         off = scale * self.sigma * cut(z, self.bound)
         waits = np.clip(off[:, 2:], self.low, self.high)
         rate = off[:, :1] * self.shift_rate + off[:, 1:2] * self.pace_rate
-        room = np.where(rate < 0.0, shared.rate - SHORTEST_SHARE * nominal.rate, LONGEST_SHARE * nominal.rate - shared.rate)
+        runs = shared.rate + exact.matmul(waits, self.made_up)
+        room = np.where(rate < 0.0, runs - SHORTEST_SHARE * nominal.rate, LONGEST_SHARE * nominal.rate - runs)
         damped = np.clip((np.maximum(room, 0.0) / np.maximum(np.abs(rate), 1e-9)).min(axis=1), 0.0, 1.0)[:, None]
         time = shared.time + damped * (off[:, :1] * self.shift + off[:, 1:2] * self.pace) + exact.matmul(waits, self.waits)
         return Clock(shared.grid, time, shared.rate + damped * rate + exact.matmul(waits, self.wait_rates))

@@ -44,6 +44,7 @@ from scenario_gen.sampling.sampler import (
 )
 from scenario_gen.template.interaction import Wait
 from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
@@ -129,7 +130,7 @@ def sample_scenarios(
         loop = _Loop(sampler, judge, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
         loop.aim, loop.measures = aim, measures
         loop.run_request(config.attempts, diverse=request.choose == "diverse")
-        lost = [f"on this road a reaction is not kept: {said}" for said in judge.lost.values()]
+        lost = [f"{NOT_KEPT}: {said}" for said in judge.lost.values()]
         sentences = (*prepared.adaptations, *lost, *loop.adaptations)
         made = ScenarioSet(
             count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot, loop.reached, loop.chosen_from, kept,

@@ -16,6 +16,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+import math
+from typing import Any
 
 from scenario_gen.errors import InputError
 from scenario_gen.types.coverage import Coverage
@@ -30,6 +32,9 @@ from scenario_gen.types.segmentation import Segmentation
 WITH, WITHOUT, UNIFORM, ORACLE = "with changepoints", "without changepoints", "uniform changepoints", "oracle"
 NARROW = "with changepoints, narrow"
 """Names of the rows of an evaluation: what was generated, and what it is measured against."""
+ERRORS = {"e_position": "position", "e_speed": "speed", "e_heading": "heading"}
+"""The figures of likeness, and what they are of."""
+_WORDS = {WITHOUT: "no changepoints at all keep", UNIFORM: "evenly spaced changepoints keep"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,13 +50,14 @@ class GenerationResult:
         generated: the valid scenarios, and the account of every candidate.
         seed: of the request.
         evaluation: of `generated`, `references` and `oracle`; without rows if they were not evaluated.
-        references: sets made with other changepoints, by row: WITHOUT is the paper's ablation, UNIFORM as many evenly spaced,
-            NARROW the same changepoints where `generated` is of preset `wide`, for E compares sets of one preset.
+        references: sets to measure `generated` against, by row: WITHOUT is the paper's ablation, UNIFORM has as many changepoints
+            evenly spaced, both drawn as `generated` is; NARROW has the same changepoints and preset `narrow`.
         refusals: why a reference is missing, by row.
         oracle: the fitted template replayed.
         row: name of the evaluation's row of `generated`.
         provenance: what is needed to make it again: log hashes, versions, parameters.
         coverage: what `generated` covers, None if it was not measured.
+        apart: what `generated` was asked for and the references were not (a target, a choice, an order): they are not compared.
         valid: how many of those scenarios are valid, where all of a bag's are shown; None: all of them are.
     """
 
@@ -70,11 +76,47 @@ class GenerationResult:
     provenance: Mapping[str, str] = field(default_factory=dict)
     valid: int | None = None
     coverage: Coverage | None = None
+    apart: str = ""
 
     @property
-    def similar_row(self) -> str:
-        """Row of the set whose E is held against the references': all with preset `narrow`."""
-        return NARROW if NARROW in self.references else self.row
+    def compared(self) -> tuple[str, ...]:
+        """Rows whose E may be compared: that of `generated` first, then the references drawn with the same freedom."""
+        return (self.row, *(name for name in (WITHOUT, UNIFORM) if name in self.references and not self.apart))
+
+    def best(self, metric: str) -> str:
+        """Return the compared row with the least figure, that of `generated` where they are equal; "" if there is none."""
+        found = {row: self.evaluation.value(row, metric) for row in self.compared}
+        known = [row for row, value in found.items() if math.isfinite(value)]
+        return min(known, key=found.__getitem__) if len(known) > 1 else ""
+
+    def outdone(self) -> tuple[str, ...]:
+        """Return a sentence for each reference that is more like the template than what was generated, by a thousandth."""
+        said = []
+        for row in self.compared[1:]:
+            better = []
+            for metric, what in ERRORS.items():
+                own, other = (self.evaluation.value(one, metric) for one in (self.row, row))
+                if math.isfinite(own - other) and round(other, 3) < round(own, 3):
+                    better.append(f"E {what} {other:.3f} against {own:.3f}")
+            if better:
+                said.append(f"{_WORDS[row]} it better here: {', '.join(better)}")
+        return tuple(said)
+
+    def similarity(self) -> dict[str, Any]:
+        """Return E of `generated` and of the rows beside it, by row, which is the best one, and what is said of it."""
+
+        def figures(row: str) -> dict[str, float | None]:
+            values = {metric: self.evaluation.value(row, metric) for metric in ERRORS}
+            return {metric: float(f"{value:.6g}") if math.isfinite(value) else None for metric, value in values.items()}
+
+        rows = [row.name for row in self.evaluation.rows]
+        beside = [row for row in (WITHOUT, UNIFORM, NARROW, ORACLE) if row in rows and row not in self.compared]
+        return {
+            "compared": {row: figures(row) for row in self.compared if row in rows},
+            "beside": {row: figures(row) for row in beside},
+            "best": {metric: best for metric in ERRORS if (best := self.best(metric))},
+            "said": [*self.outdone(), *([f"nothing is compared: {self.apart}"] if self.apart else [])],
+        }
 
     def placed(self) -> tuple[Road, Fit]:
         """Return road and fit.
@@ -90,6 +132,12 @@ class GenerationResult:
     def title(self) -> str:
         """Encounter and road, as a heading."""
         return f"{self.encounter.name} on {self.road.name}" if self.road else self.encounter.name
+
+    @property
+    def reacting(self) -> dict[str, Any]:
+        """Who reacts to whom in the template, and what the scenarios keep of it, as a document."""
+        made, ids = self.generated, [vehicle.id for vehicle in self.encounter.vehicles]
+        return {"edges": [], "cut": [], "sentences": []} if made.graph is None else made.graph.document(ids, made.reactions)
 
     @property
     def published(self) -> int:

@@ -16,9 +16,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 FOLLOW, YIELD = "follow", "yield"
 DOUBTFUL = 0.5  # confidence below which an edge is said to be doubtful
+_FOLLOWS, _YIELDS = " follows ", " yields to "  # of names
+NOT_KEPT = "on this road a reaction is not kept"  # begins the sentence of a set's adaptations that gives the figures
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ class Reaction:
 
     def name(self, ids: Sequence[str]) -> str:
         """Return who reacts to whom, by the vehicles' ids: as it is named in an entry of `scenarios/info`."""
-        return f"{ids[self.who]} {'follows' if self.kind == FOLLOW else 'yields to'} {ids[self.whom]}"
+        return f"{ids[self.who]}{_FOLLOWS if self.kind == FOLLOW else _YIELDS}{ids[self.whom]}"
 
     def words(self, ids: Sequence[str]) -> str:
         """Return the reaction in words, with the vehicles' ids."""
@@ -69,14 +72,19 @@ class Reaction:
             verb = "waits for" if self.stands else "slows down for"
             when = f"{self.lag:.1f} s after" if self.lag >= 0.0 else f"{-self.lag:.1f} s before it has"
             said = f"{who} {verb} {whom} to pass and leaves {when}"
-        return f"{said} (doubtful)" if self.confidence < DOUBTFUL else said
+        return f"{said} (doubtful)" if self.doubtful else said
 
-    def document(self, ids: Sequence[str]) -> dict[str, str | float]:
+    @property
+    def doubtful(self) -> bool:
+        """Whether the record tells it from none, but hardly."""
+        return self.confidence < DOUBTFUL
+
+    def document(self, ids: Sequence[str]) -> dict[str, str | float | bool]:
         """Return the reaction as a flat document, with the vehicles' ids and the words."""
         return {
             "kind": self.kind, "who": ids[self.who], "whom": ids[self.whom], "lag": round(self.lag, 3),
             "gain": round(self.gain, 3), "residual": round(self.residual, 3), "confidence": round(self.confidence, 3),
-            "words": self.words(ids),
+            "doubtful": self.doubtful, "words": self.words(ids),
         }  # fmt: skip
 
 
@@ -94,8 +102,23 @@ class ReactionGraph:
     order: tuple[int, ...]
     cut: tuple[Reaction, ...] = ()
 
-    def sentences(self, ids: Sequence[str]) -> tuple[str, ...]:
-        """Return what is said of the graph, one sentence an edge."""
-        said = [edge.words(ids) for edge in self.edges]
+    def sentences(self, ids: Sequence[str], kept: Sequence[Reaction] | None = None) -> tuple[str, ...]:
+        """Return what is said of the graph, one sentence an edge; which edges are not among those `kept` is said, too."""
+        free = "" if kept is None else ": the scenarios are not held to it"
+        said = [edge.words(ids) if edge in (kept or ()) else f"{edge.words(ids)}{free}" for edge in self.edges]
         said += [f"{edge.words(ids)}: left out, for it closes a circle of reactions" for edge in self.cut]
         return tuple(said) or ("nobody is seen to react to anybody",)
+
+    def document(self, ids: Sequence[str], kept: Sequence[Reaction] | None = None) -> dict[str, Any]:
+        """Return the graph as a document: edges, those that were cut, sentences; and of each edge whether it is `kept`."""
+        return {
+            "edges": [edge.document(ids) | ({} if kept is None else {"kept": edge in kept}) for edge in self.edges],
+            "cut": [edge.document(ids) for edge in self.cut],
+            "sentences": list(self.sentences(ids, kept)),
+        }
+
+
+def yielders_of(names: str, ids: Sequence[str]) -> tuple[tuple[int, int], ...]:
+    """Return (who, whom) of the yielding reactions that an entry names ("2 yields to 1; 3 follows 2"), of vehicles `ids`."""
+    pairs = [name.split(_YIELDS) for name in names.split("; ") if _YIELDS in name]
+    return tuple((ids.index(who), ids.index(whom)) for who, whom in pairs if who in ids and whom in ids)

@@ -24,7 +24,7 @@ import numpy as np
 from scenario_gen.arrays import Bools, canonical_heading, canonical_poses, Floats, frozen, Ints
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
-from scenario_gen.types.reaction import Reaction
+from scenario_gen.types.reaction import Reaction, ReactionGraph
 from scenario_gen.types.target import Reached
 
 FACTS = ("weight", "target.", "order", "passing_order", "reactions")
@@ -176,7 +176,7 @@ class ScenarioSet:
     vehicle that was left out for a planner under test, if one was; each scenario then has its witness.
     The scenarios of a large set are not in memory but drawn again whenever they are looked at. `reached` says what sampling
     towards a target came to, `chosen` from how many valid candidates the set was chosen (0: as they were drawn).
-    `reactions` are those of the template that every scenario keeps.
+    `graph` says who reacts to whom in the template (None: nobody looked), `reactions` are those that every scenario keeps.
     """
 
     requested: int
@@ -188,6 +188,7 @@ class ScenarioSet:
     reached: Reached | None = None
     chosen: int = 0
     reactions: tuple[Reaction, ...] = ()
+    graph: ReactionGraph | None = None
 
     @property
     def acceptance(self) -> float:

@@ -321,27 +321,27 @@ class Checker:
         limits = self.limits
         met = {(c.second, c.first): c for c in conflicts if c is not None}
         for edge in self.reactions:
+            who, whom = scenario.vehicles[edge.who].id, scenario.vehicles[edge.whom].id
             if edge.kind == FOLLOW:
                 gaps = time_gaps(scenario, edge.who, edge.whom)
                 low, high = (1.0 - limits.headway_share) * edge.headway[0], (1.0 + limits.headway_share) * edge.headway[2]
                 if len(gaps) and (gaps.min() < low or gaps.max() > high):
                     message = (
-                        f"vehicle {edge.who}: drives {gaps.min():.2f} to {gaps.max():.2f} s behind vehicle {edge.whom}; its own "
+                        f"vehicle {who}: drives {gaps.min():.2f} to {gaps.max():.2f} s behind vehicle {whom}; its own "
                         f"driver's gaps allow {low:.2f} to {high:.2f} s"
                     )
                     yield Violation(Cause.REACTION, 0.0, (edge.who, edge.whom), message)
                 continue
             conflict = met.get((edge.who, edge.whom))
             if conflict is None:
-                message = f"vehicle {edge.who}: does not come behind vehicle {edge.whom}, for which it waits in the template"
+                message = f"vehicle {who}: does not come behind vehicle {whom}, for which it waits in the template"
                 yield Violation(Cause.REACTION, 0.0, (edge.who, edge.whom), message)
                 continue
             lag = lag_behind(scenario, conflict)
             low, high = min(edge.lag, 0.0) - limits.anticipation, max(edge.lag, 0.0) + limits.patience
             if not low <= lag <= high:
                 message = (
-                    f"vehicle {edge.who}: leaves {lag:.2f} s after vehicle {edge.whom} has cleared; "
-                    f"allowed are {low:.2f} to {high:.2f} s"
+                    f"vehicle {who}: leaves {lag:.2f} s after vehicle {whom} has cleared; allowed are {low:.2f} to {high:.2f} s"
                 )
                 yield Violation(Cause.REACTION, conflict.exit_first + lag, (edge.who, edge.whom), message)
 

@@ -14,12 +14,15 @@
 
 """The library: pairs in canonical order, segments that are shared, agreement as scikit-learn counts it, and the page."""
 
+import json
+
 import numpy as np
 import pytest
 
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.library import adjusted_rand, build, pair_encounters
 from scenario_gen.segmentation.library import PrimitiveLibrary
+from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.encounter import Encounter, Vehicle
 
 pytestmark = pytest.mark.xdist_group("corpus")
@@ -61,5 +64,10 @@ def test_a_library_of_a_corpus(corpus):
     for row in rows:
         assert len(row["primitives"]) == len(row["changepoints"]) + 1 and max(row["primitives"]) < len(library.means)
         assert all(0 < point < len(pairs[row["pair"]].time) for point in row["changepoints"])
+        assert json.loads(row["reactions"])["edges"] == [
+            edge.document([vehicle.id for vehicle in pairs[row["pair"]].vehicles])
+            for edge in reactions_of(pairs[row["pair"]]).edges
+        ]
     page = (out / "library" / "library.html").read_text()
+    assert "the second follows in" in page and "nobody reacts in" in page
     assert library.descriptions[0] in page and "<svg" in page and "<script" not in page

@@ -34,6 +34,7 @@ from scenario_gen.errors import InputError
 from scenario_gen.folders import sha256_of
 from scenario_gen.folders.claim import claim
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.template.reactions import reactions_of
 
 pytestmark = pytest.mark.xdist_group("corpus")  # one archive for all
 
@@ -68,6 +69,16 @@ def test_an_encounter_of_the_corpus_is_an_encounter(corpus):
         encounter = encounter_of(row)
         assert encounter.name == row["name"] and encounter.duration == row["seconds"] and len(encounter.vehicles) == row["count"]
         assert encounter.origin == (row["lat"], row["lon"])
+
+
+def test_who_reacts_to_whom_stands_in_table_and_page(corpus):
+    page, kinds = (corpus[0] / "encounters.html").read_text(), {}
+    for row in rows_of(tables_of(corpus[0])):
+        found = json.loads(row["reactions"])
+        assert found["edges"] == [edge.document(row["vehicles"]) for edge in reactions_of(encounter_of(row)).edges]
+        assert all(sentence in page for sentence in found["sentences"])
+        kinds.setdefault(row["kind"], []).append([edge["kind"] for edge in found["edges"]])
+    assert ["follow"] in kinds["following"] and not any("follow" in found for found in kinds["opposing"])
 
 
 def test_ranges_and_whole_files_give_the_same_rows(archive, tmp_path):

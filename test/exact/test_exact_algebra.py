@@ -70,6 +70,14 @@ def test_qr_is_a_factorisation(m, n, full, pivot, seed):
     assert not np.tril(r, -1).any()
 
 
+@pytest.mark.parametrize("tiny", [1e-156, 3e-162, 5e-320])
+def test_columns_whose_square_is_hardly_a_number_count_as_none(tiny):
+    a = np.concatenate([np.eye(6, 2), np.full((6, 3), tiny)], axis=1)
+    q, r, _ = exact.qr(a)
+    assert q @ r == pytest.approx(a, abs=1e-150)
+    assert q.T @ q == pytest.approx(np.eye(5), abs=1e-12)
+
+
 def test_least_squares():
     a, b = RANDOM.normal(size=(20, 6)), RANDOM.normal(size=(20, 2))
     assert exact.lstsq(a, b) == pytest.approx(np.linalg.lstsq(a, b, rcond=None)[0], abs=1e-12)

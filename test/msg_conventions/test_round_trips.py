@@ -207,7 +207,14 @@ def test_reports():
     fit = _fit(template, np.array([0, 7, 20, 39]))
     asked = BoundaryStates(np.ones((2, 4)), np.zeros((2, 4)))
     entry = _entry(sent.scenarios[0], b"bytes", asked=asked, about={"road": "straight"})
-    summary = scenario_info.request_summary(sent, "r1", "/gp_sampler", 7)
+    edge = {"kind": "yield", "words": "b waits for a", "lag": 1.4, "confidence": 0.9, "kept": True}
+    cut = {"kind": "follow", "words": "a follows b (doubtful)", "lag": 1.0, "confidence": 0.4}
+    reactions = {"edges": [edge], "cut": [cut], "sentences": ["b waits for a"]}
+    summary = scenario_info.request_summary(sent, "r1", "/gp_sampler", 7, reactions=reactions)
+    assert summary.reactions == (edge, cut) and not any(key.startswith("reaction") for key in summary.provenance)
+    damaged = replace(summary, status=replace(summary.status, values={**summary.values, "reaction.0": "{"}))
+    with pytest.raises(InputError, match=r"reaction\."):
+        _ = damaged.reactions
     statuses = (entry.status, *fits.fit_statuses(fit, "/planner"), summary.status)
     data = diagnostics.encode_diagnostics(statuses, 5)
     assert diagnostics.decode_diagnostics(data) == (5, statuses)

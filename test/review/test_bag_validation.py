@@ -29,6 +29,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.nearest import attempt
 from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.recordings.read import read_recording
 from scenario_gen.recordings.write import result_messages, write_recording
 from scenario_gen.review.evaluation import bag_results
 from scenario_gen.review.regenerate import regenerate_scenario
@@ -102,9 +103,18 @@ def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
     made = attempt(encounter, segment(encounter, config.segmentation, 7), road, config, Request(), count=4, seed=7)
     assert [edge.name("12") for edge in made.generated.reactions] == ["2 yields to 1"]
     bag = write_recording(tmp_path / "b", {"/here": made})
-    assert validate_bag(bag)[0].found == {}
+    (kept,) = validate_bag(bag)
+    (edge,) = made.generated.reactions
+    assert kept.found == {} and kept.proven == {edge.words("12"): 4}
     (found,) = validate_bag(bag, Limits(anticipation=0.0, patience=0.0))
     assert set(found.found) == {"reaction"}
+    assert found.proven == {edge.words("12"): 4 - found.found["reaction"].count}
+    (measured,) = bag_results(bag)  # evaluate holds them to the same
+    assert measured.published == 4 and measured.generated.reactions == (edge,)
+    assert measured.reacting["edges"] == [edge.document("12") | {"kept": True}]
+    assert bag_results(bag, limits=Limits(anticipation=0.0, patience=0.0))[0].generated.refused["reaction"] >= 1
+    (summary,) = read_recording(bag).namespaces["/here"].summaries
+    assert summary.reactions == tuple(made.reacting["edges"])
     assert "has cleared; allowed are" in found.found["reaction"].message
 
 

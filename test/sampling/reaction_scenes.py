@@ -63,3 +63,21 @@ def crossing(wait_until, speed=8.0, seconds=20.0):
     heading = np.stack([np.zeros(len(time)), np.full(len(time), 0.5 * np.pi)])
     speeds = np.stack([np.full(len(time), speed), own])
     return Encounter("crossing", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, heading, speeds)
+
+
+def platoon(count, rows=200, seed=3):
+    """So many vehicles on the x axis, each 20 m behind the one before it, whose speed it answers after 1.2 s."""
+    speeds = [wander(np.random.default_rng(seed), rows)]
+    for _ in range(1, count):
+        speeds.append(answering(speeds[-1], 1.2, 0.9))
+    position = np.stack([along(speed, 20.0 * (count - 1 - k)) for k, speed in enumerate(speeds)])
+    vehicles = tuple(Vehicle(str(k + 1)) for k in range(count))
+    return Encounter("platoon", vehicles, 0, 100_000_000, position, np.zeros((count, rows)), np.stack(speeds))
+
+
+def led_crossing(wait_until=8.0):
+    """The crossing, with vehicle 3 20 m ahead of vehicle 1."""
+    two = crossing(wait_until)
+    rows = {name: np.concatenate([getattr(two, name), getattr(two, name)[:1]]) for name in ("heading", "speed")}
+    position = np.concatenate([two.position, two.position[:1] + np.array([20.0, 0.0])])
+    return Encounter("led", (*two.vehicles, Vehicle("3")), 0, two.dt_ns, position, rows["heading"], rows["speed"])

@@ -59,7 +59,7 @@ def test_a_yielder_leaves_neither_before_the_other_has_cleared_nor_long_after(la
     assert (found == []) == kept
     if not kept:
         assert found[0].vehicles == (1, 0)
-        assert "after vehicle 0 has cleared" in found[0].message
+        assert "vehicle 2: leaves" in found[0].message and "after vehicle 1 has cleared" in found[0].message
 
 
 def test_the_bounds_of_a_lag_are_parameters():

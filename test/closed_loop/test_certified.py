@@ -1,0 +1,141 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Reactions among the others in closed loop: who waits for another goes on waiting, whatever the ego does to that one."""
+
+from dataclasses import replace
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lengths import LONG
+import numpy as np
+import pytest
+from reaction_scenes import led_crossing, platoon
+
+from benchmarks._driving_worlds import Anything, draw_scenario, Witness
+from scenario_gen.closed_loop.certified import CELL, certified
+from scenario_gen.closed_loop.ego import Command, Pose
+from scenario_gen.closed_loop.simulation import ClosedLoop
+from scenario_gen.closed_loop.verdict import judge
+from scenario_gen.nearest import attempt
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.roads import build_road
+from scenario_gen.segmentation import segment
+from scenario_gen.template.answers import conflict_of, lag_behind, time_gaps
+from scenario_gen.types.ego import together, with_witness
+from scenario_gen.types.request import Request
+
+CONFIG = PipelineConfig()
+FAR = Pose(1e4, 1e4, 0.0, 0.0)
+
+
+class Slower:
+    """Drives straight on at a share of its first speed."""
+
+    def __init__(self, share):
+        self.share = share
+
+    def reset(self, task):
+        self.speed = self.share * float(task.start[3])
+
+    def act(self, seen):
+        return Command(max(min(self.speed - seen.ego.speed, 2.0), -3.0), 0.0)
+
+
+def generated(encounter, count):
+    road, segmentation = build_road("corridor", encounter, CONFIG.road), segment(encounter, CONFIG.segmentation, 1)
+    return attempt(encounter, segmentation, road, CONFIG, Request(), count=count, seed=1).generated
+
+
+@pytest.fixture(scope="module")
+def led():
+    """Vehicle 2 waits for vehicle 1, which follows vehicle 3."""
+    made = generated(led_crossing(), 4)
+    assert {edge.name("123") for edge in made.reactions} == {"2 yields to 1", "1 follows 3"}
+    return made.scenarios
+
+
+@pytest.mark.parametrize("share", [0.6, 0.3])
+@pytest.mark.parametrize("slot", [False, True])
+def test_a_yielder_among_the_others_waits_for_one_that_the_ego_holds_up(led, share, slot):
+    """The ego is the one ahead: as a vehicle of the scenario, and in its slot with the witness beside it."""
+    early = 0
+    for scenario in led:
+        driven = together(with_witness(scenario, 2)) if slot else scenario
+        own = lag_behind(driven, conflict_of(driven, 1, 0))
+        for facts, kept in ((driven.facts, True), ({}, False)):
+            loop = ClosedLoop(replace(driven, facts=facts), "3")
+            motion = loop.drive(Slower(share)).motion
+            conflict = conflict_of(motion, 1, 0)
+            assert conflict.second == 1
+            lag = lag_behind(motion, conflict)
+            if kept:
+                assert conflict.exit_first > conflict_of(driven, 1, 0).exit_first + 1.0, "the ego did hold it up"
+                assert own - 0.2 <= lag <= own + 0.5
+            else:
+                early += lag < own - 0.4
+    assert early > 0, "without the reaction somebody goes early"
+
+
+def test_it_waits_for_nobody_when_all_drive_as_certified(led):
+    for scenario in led:
+        last = len(scenario.time) - 1
+        drive = ClosedLoop(scenario, "3").drive(Witness(scenario, 2), lambda state, last=last: state.step >= last)
+        assert np.abs(drive.motion.position - scenario.position).max() < 1e-6
+
+
+def test_followers_among_the_others_keep_their_distance_to_one_that_the_ego_holds_up():
+    made = generated(platoon(4), 3)
+    assert len(made.reactions) == 3
+    for scenario in made.scenarios:
+        for share in (0.7, 0.4):
+            motion = ClosedLoop(scenario, "1").drive(Slower(share)).motion
+            for edge in made.reactions[1:]:
+                assert time_gaps(motion, edge.who, edge.whom).min() > 0.5 * edge.headway[0]
+
+
+def test_only_reactions_among_the_others_hold_back(led):
+    scenario = led[0]
+    free = [certified(replace(scenario, facts={}), ego).order for ego in range(3)]
+    held = [certified(scenario, ego).order for ego in range(3)]
+    assert [np.array_equal(a, b) for a, b in zip(free, held, strict=True)] == [True, True, False]
+    changed = np.argwhere((held[2] != free[2]).any(axis=2)).tolist()
+    assert changed == [[1, 0]]
+    conflict = conflict_of(scenario, 1, 0)
+    before = np.arange(held[2].shape[2]) * CELL < conflict.exit_first
+    assert (held[2][1, 0][before] <= conflict.exit_first).all() and np.array_equal(held[2][1, 0][~before], free[2][1, 0][~before])
+    assert (np.diff(held[2][1, 0][np.isfinite(held[2][1, 0])]) >= 0.0).all(), "a limit never falls"
+
+
+@settings(max_examples=2000 if LONG else 40)
+@given(st.integers(0, 10**9))
+def test_nobody_waits_for_ever_and_nobody_meets_with_reactions_either(seed):
+    """Every second one at a conflict of a drawn scenario yields to the first."""
+    scenario = draw_scenario(seed)
+    ego, ids = seed % len(scenario.vehicles), [vehicle.id for vehicle in scenario.vehicles]
+    found = [conflict_of(scenario, a, b) for b in range(len(ids)) for a in range(b)]
+    names = "; ".join(f"{ids[c.second]} yields to {ids[c.first]}" for c in found if c is not None)
+    loop = ClosedLoop(replace(scenario, facts={"reactions": names}), ego)
+    anything, steps = Anything(seed), len(scenario.time) // 2
+    assert judge(loop, loop.drive(anything, lambda state: state.step >= steps)).among_others == 0
+    state = loop.start()
+    anything.reset(loop.task())
+    for _ in range(40):
+        state = loop.step(state, anything.act(loop.observe(state)))
+    others = [i for i in range(len(ids)) if i != ego]
+    for _ in range(3000):
+        state = loop.step(state, FAR)
+        if (state.clock[others] >= scenario.time[-1]).all():
+            return
+    raise AssertionError(f"clocks {state.clock} stand still at rates {state.rate}")

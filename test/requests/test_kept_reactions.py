@@ -1,0 +1,128 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Requests of every kind keep the reactions of the template: an ego slot, late arrivals, groups, targets, choices."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from reaction_scenes import answering, crossing, lane_encounter, platoon, wander
+
+from scenario_gen.evaluation.interaction import following, yielding
+from scenario_gen.nearest import attempt
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.recordings.write import write_recording
+from scenario_gen.review.validation import validate_bag
+from scenario_gen.roads import build_road
+from scenario_gen.segmentation import segment
+from scenario_gen.types.ego import together
+from scenario_gen.types.reaction import FOLLOW
+from scenario_gen.types.request import Request
+from scenario_gen.validity import Limits
+
+CONFIG = PipelineConfig()
+LANE = lane_encounter(LEADER := wander(np.random.default_rng(3), 200), answering(LEADER, 1.2, 0.9))
+
+
+def late(encounter, who, sample):
+    """The encounter with one vehicle there only from a sample on."""
+    present = encounter.present.copy()
+    present[who, 0] = sample
+    return replace(encounter, present=present)
+
+
+def made(encounter, request=Request(), count=30):
+    road, segmentation = build_road("corridor", encounter, CONFIG.road), segment(encounter, CONFIG.segmentation, 1)
+    return attempt(encounter, segmentation, road, CONFIG, request, count=count, seed=1)
+
+
+def wholes(result):
+    """The scenarios with their witnesses, vehicles in the template's order."""
+    ids = [vehicle.id for vehicle in result.encounter.vehicles]
+    found = []
+    for scenario in map(together, result.generated.scenarios):
+        rows = [[vehicle.id for vehicle in scenario.vehicles].index(known) for known in ids]
+        arrays = {name: getattr(scenario, name)[rows] for name in ("position", "heading", "speed", "acceleration", "present")}
+        found.append(replace(scenario, vehicles=tuple(scenario.vehicles[row] for row in rows), **arrays))
+    return found
+
+
+def assert_kept(result, names):
+    """Every scenario names these reactions; followers are as fast as their leaders, at their own gaps; no yielder is early."""
+    ids, scenarios = [vehicle.id for vehicle in result.encounter.vehicles], wholes(result)
+    edges = result.generated.reactions
+    assert [edge.name(ids) for edge in edges] == names
+    assert {scenario.facts["reactions"] for scenario in scenarios} == {"; ".join(names)}
+    for edge in edges:
+        if edge.kind == FOLLOW:
+            seen = following(edge, result.encounter, scenarios)
+            assert seen.slope > 0.75 and 0.65 < seen.gaps[0] < seen.gaps[1] < 1.35 and seen.own > 0.05
+        else:
+            seen = yielding(edge, scenarios)
+            assert seen.early == 0.0 and seen.spread > 0.0
+
+
+@pytest.mark.parametrize("ego", ["1", "2"])
+def test_an_ego_slot_before_a_follower_or_behind_a_leader(ego, tmp_path):
+    """The follower answers the witness in the slot before it; a witness in the slot behind answers the leader."""
+    result = made(LANE, Request(ego=ego))
+    assert all(scenario.witness.vehicles[0].id == ego for scenario in result.generated.scenarios)
+    assert_kept(result, ["2 follows 1"])
+    bag = write_recording(tmp_path / "bag", result)
+    (found,) = validate_bag(bag)
+    assert found.found == {} and list(found.proven.values()) == [30]  # proven with the witness, from the bag alone
+    (strict,) = validate_bag(bag, Limits(headway_share=0.01))
+    assert set(strict.found) == {"reaction"}
+
+
+def test_an_ego_slot_inside_a_platoon():
+    assert_kept(made(platoon(4), Request(ego="2"), count=40), ["2 follows 1", "3 follows 2", "4 follows 3"])
+
+
+@pytest.mark.parametrize("who", [0, 1])
+def test_a_late_arrival_that_follows_or_is_followed(who):
+    result = made(late(LANE, who, 60))
+    assert {int(scenario.present[who, 0]) > 0 for scenario in result.generated.scenarios} == {True}
+    assert_kept(result, ["2 follows 1"])
+
+
+def test_a_group_of_three_and_what_the_first_does_differently_comes_back_in_the_last():
+    result = made(platoon(3))
+    assert_kept(result, ["2 follows 1", "3 follows 2"])
+    speeds = np.array([one.speed.mean(axis=1) for one in result.generated.scenarios])
+    assert np.corrcoef(speeds[:, 0], speeds[:, 2])[0, 1] > 0.8
+
+
+@pytest.mark.parametrize("request_", [Request(target="pet=0.5..1.5"), Request(choose="diverse")], ids=["target", "diverse"])
+def test_a_target_and_a_choice(request_):
+    result = made(crossing(8.0), request_, count=12)
+    assert_kept(result, ["2 yields to 1"])
+    if request_.target:
+        (edge,) = result.generated.reactions
+        assert yielding(edge, wholes(result)).mean < edge.lag - 0.5, "the range asks for less than the template's"
+
+
+def test_an_ego_slot_of_who_goes_first_or_waits():
+    for ego in ("1", "2"):
+        result = made(crossing(8.0), Request(ego=ego))
+        assert_kept(result, ["2 yields to 1"])
+        assert result.generated.candidates < 40, "who waits longer makes up for it, so asked ends are met"
+        assert yielding(result.generated.reactions[0], wholes(result)).spread > 0.4
+
+
+def test_asked_states_keep_them_too():
+    result = made(LANE)
+    x, y, yaw, _ = result.fit.asked.start[1].tolist()
+    assert_kept(made(LANE, Request(starts=f"2: {x + 1.0:.2f} {y:.2f} {yaw:.3f}")), ["2 follows 1"])

@@ -1,0 +1,74 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which set stands first, with what it is compared, and what is said where a reference does better."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scenario_gen.types.evaluation import Evaluation, Interval, Row
+from scenario_gen.types.generation import GenerationResult, NARROW, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.scenario import ScenarioSet
+
+
+def result(**figures):
+    """A result whose rows have these (E position, E speed); of references there are those that are given."""
+    names = {"own": WITH, "without": WITHOUT, "uniform": UNIFORM, "narrow": NARROW, "oracle": ORACLE}
+    rows = [
+        Row(names[key], 1, {"e_position": Interval(position), "e_speed": Interval(speed)})
+        for key, (position, speed) in figures.items()
+    ]
+    references = {names[key]: ScenarioSet(1, (), 1) for key in figures if key in ("without", "uniform", "narrow")}
+    evaluation = replace(Evaluation.empty(), rows=tuple(rows))
+    return GenerationResult(None, None, None, None, (), evaluation=evaluation, references=references)
+
+
+FIVE = {"own": (0.1, 0.2), "without": (0.3, 0.4), "uniform": (0.08, 0.2), "narrow": (0.01, 0.02), "oracle": (0.001, 0.002)}
+
+
+def test_the_delivered_set_stands_first_and_only_what_is_drawn_likewise_is_compared():
+    similar = result(**FIVE).similarity()
+    assert list(similar["compared"]) == [WITH, WITHOUT, UNIFORM]
+    assert similar["compared"][WITH] == {"e_position": 0.1, "e_speed": 0.2, "e_heading": None}
+    assert list(similar["beside"]) == [NARROW, ORACLE]  # nearer, and no match for it: they have less freedom, or none
+
+
+def test_a_reference_that_does_better_is_said_with_both_figures():
+    made = result(**FIVE)
+    assert made.best("e_position") == UNIFORM
+    assert made.outdone() == ("evenly spaced changepoints keep it better here: E position 0.080 against 0.100",)
+    assert made.best("e_speed") == WITH, "equal is not better"
+    worse = result(own=(0.1, 0.2), without=(0.05, 0.1)).outdone()
+    assert worse == ("no changepoints at all keep it better here: E position 0.050 against 0.100, E speed 0.100 against 0.200",)
+
+
+def test_what_does_not_show_in_three_digits_is_not_said():
+    assert result(own=(0.1001, 0.2), without=(0.1, 0.3)).outdone() == ()
+
+
+@pytest.mark.parametrize("missing", [{"own": (np.nan, np.nan)}, {"without": (np.nan, np.nan), "uniform": (np.nan, np.nan)}])
+def test_where_there_is_no_figure_nothing_is_best(missing):
+    made = result(**{**{key: FIVE[key] for key in ("own", "without")}, **missing})
+    assert made.outdone() == () and made.best("e_heading") == ""
+    assert made.similarity()["said"] == []
+
+
+def test_what_was_asked_of_the_delivered_set_alone_takes_it_out_of_the_comparison():
+    made = replace(result(**FIVE), apart="only the delivered set was drawn with target as asked")
+    similar = made.similarity()
+    assert list(similar["compared"]) == [WITH] and list(similar["beside"]) == [WITHOUT, UNIFORM, NARROW, ORACLE]
+    assert similar["best"] == {}
+    assert similar["said"] == ["nothing is compared: only the delivered set was drawn with target as asked"]

@@ -1,0 +1,61 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How reactions are put in words and documents."""
+
+from scenario_gen.types.reaction import FOLLOW, Reaction, ReactionGraph, YIELD, yielders_of
+
+SURE = Reaction(YIELD, 1, 0, 1.4, 1.0, 0.6, 0.9, 3.0, 9.0, stands=True)
+DOUBTFUL = Reaction(FOLLOW, 2, 1, 1.2, 0.8, 1.5, 0.4, 0.0, 20.0, (0.9, 1.3, 2.0))
+CUT = Reaction(FOLLOW, 0, 2, 0.8, 0.5, 1.0, 0.35, 0.0, 9.0, (1.0, 1.5, 2.0))
+GRAPH = ReactionGraph((SURE, DOUBTFUL), (0, 1, 2), (CUT,))
+IDS = ("a", "b", "c")
+
+
+def test_every_edge_has_a_sentence_and_what_is_doubtful_or_cut_says_so():
+    assert GRAPH.sentences(IDS) == (
+        "vehicle b waits for vehicle a to pass and leaves 1.4 s after",
+        "vehicle c follows vehicle b, 1.3 s behind, and answers its speed after 1.2 s (doubtful)",
+        "vehicle a follows vehicle c, 1.5 s behind, and answers its speed after 0.8 s (doubtful): left out, "
+        "for it closes a circle of reactions",
+    )
+
+
+def test_who_leaves_before_the_other_has_passed_is_said_to():
+    early = Reaction(YIELD, 1, 0, -0.3, 1.0, 0.6, 0.9, 3.0, 9.0)
+    assert early.words(IDS) == "vehicle b slows down for vehicle a to pass and leaves 0.3 s before it has"
+
+
+def test_edges_that_scenarios_do_not_keep_are_said():
+    kept, free, cut = GRAPH.sentences(IDS, [SURE])
+    assert "held" not in kept and "held" not in cut
+    assert free.endswith("(doubtful): the scenarios are not held to it")
+
+
+def test_the_document_has_lag_strength_own_part_and_confidence():
+    document = GRAPH.document(IDS, [DOUBTFUL])
+    assert [edge["kept"] for edge in document["edges"]] == [False, True]
+    assert document["edges"][1] == {
+        "kind": "follow", "who": "c", "whom": "b", "lag": 1.2, "gain": 0.8, "residual": 1.5, "confidence": 0.4,
+        "doubtful": True, "words": DOUBTFUL.words(IDS), "kept": True,
+    }  # fmt: skip
+    assert [edge["who"] for edge in document["cut"]] == ["a"]
+    assert document["sentences"] == list(GRAPH.sentences(IDS, [DOUBTFUL]))
+
+
+def test_the_names_of_yielders_are_read_back():
+    names = "; ".join(edge.name(IDS) for edge in (SURE, DOUBTFUL))
+    assert names == "b yields to a; c follows b"
+    assert yielders_of(names, IDS) == ((1, 0),)
+    assert yielders_of(names, ("c", "b")) == () and yielders_of("", IDS) == ()
