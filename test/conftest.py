@@ -26,6 +26,8 @@ from lengths import DATA, LONG
 import pytest
 from skips import MAY_SKIP, NO_RECORDS
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when numpy is loaded; threads of several workers wait for one another
+
 JUDGES = ("made", pytest.param("recorded", marks=pytest.mark.recorded))
 """By what a test is run: what the tests make themselves, always; what was recorded, where `-m recorded` asks for it."""
 
