@@ -37,6 +37,7 @@ from scenario_gen.types.scenario import BoundaryStates
 CATALOGUE = ((3.60, 1.62), (4.05, 1.75), (4.25, 1.79), (4.46, 1.83), (4.63, 1.83), (4.69, 1.85), (4.77, 1.88), (4.96, 1.93))
 """Length and width [m] of cars, each as likely: our choice of typical ones, from a city car to a large saloon."""
 _CARS = 3.2, 5.4  # m: a vehicle of such a length gets the size of another car
+_GROWS = 0.5  # of its least gap in the template, by which a vehicle is longer at most: cars stand close in a queue
 _RAMP = 6.0  # s, over which an own clock leaves the shared one where states are asked
 _RAMP_SHARE = 1.0 / 3.0  # of the duration, or of a way, that this takes at most
 _TAPER = 30.0  # m, over which a vehicle goes to its place in the lane
@@ -264,6 +265,7 @@ def freedom_of(
     freed: Floats,
     asked: Bools,
     ahead: Floats,
+    gap: float,
     config: SamplingConfig,
 ) -> Freedom:
     """Return what is free of a vehicle.
@@ -276,6 +278,7 @@ def freedom_of(
         freed: (2, 2) metres and m/s by which its start and end may differ from what is given.
         asked: (2,) whether start and end states are asked of any vehicle.
         ahead: (2,) metres of free road straight on before its route and behind it.
+        gap: metres of its least gap to any other vehicle in the template.
         config: the standard deviations.
     """
     place = np.ones(len(arc))
@@ -283,6 +286,7 @@ def freedom_of(
         if freed[end, 0] == 0.0:
             place = place * _smooth_step(since / max(min(_TAPER, _RAMP_SHARE * float(arc[-1])), 1e-9))[0]
     still = len(arc) == 1 or freed[:, 0].min() == 0.0
+    sizes = np.array([size for size in CATALOGUE if size[0] - vehicle.length <= max(_GROWS * gap, 0.0)]).reshape(-1, 2)
     other_size = config.sizes == "catalogue" and _CARS[0] <= vehicle.length <= _CARS[1] and not still
     return Freedom(
         OwnClock.of(nominal, rests, (bool(asked[0]), bool(asked[1])), config),
@@ -290,7 +294,7 @@ def freedom_of(
         config.place_sigma,
         np.where(freed[:, 1] > 0.0, config.end_speed_sigma, 0.0),
         config.freedom,
-        np.array(CATALOGUE) if other_size else np.zeros((0, 2)),
+        sizes if other_size else np.zeros((0, 2)),
         np.where(asked, 0.0, ahead),
     )
 
