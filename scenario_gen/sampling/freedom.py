@@ -43,7 +43,7 @@ _RAMP_SHARE = 1.0 / 3.0  # of the duration, or of a way, that this takes at most
 _TAPER = 30.0  # m, over which a vehicle goes to its place in the lane
 _LEAST_STAND, _SHORTER = 1.5, 0.3  # s that are left of a wait, and share by which it is shorter at most: clocks run forward
 _LEAST_SHARE = 0.5  # of a speed, that is left while acceleration dies away
-FADES, _LEAST_FADES = 0.7, 0.4  # s, in which it does
+FADES, _LEAST_FADES = 0.5, 0.2  # s, in which it does, without a jolt: its jerk begins at 0
 EASES = 4.0  # m, in which curvature does
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 MOST_ONWARD = 4.0  # s, for which a vehicle drives straight on before or behind its route
@@ -222,12 +222,13 @@ def onward(state: Floats, bend: Floats, since: Floats, sign: float) -> Floats:
     x, y, yaw, speed, acceleration = (column[:, None] for column in state.T)
     gains, fades = sign * acceleration, _fades(state, sign)[:, None]
     left = exact.exp(-since / fades)
-    driven = speed * since + gains * fades * (since - fades * (1.0 - left))
+    driven = speed * since + gains * fades * (2.0 * since - 3.0 * fades + (3.0 * fades + since) * left)
     out = np.empty((*since.shape, 5))
     turned, along, aside = _eased(sign * bend[:, None], driven)
     cos, sin = exact.cos(yaw), exact.sin(yaw)
     out[..., 0], out[..., 1] = x + sign * (along * cos - aside * sin), y + sign * (along * sin + aside * cos)
-    out[..., 2], out[..., 3], out[..., 4] = yaw + turned, speed + gains * fades * (1.0 - left), acceleration * left
+    out[..., 2], out[..., 3] = yaw + turned, speed + gains * (2.0 * fades - (2.0 * fades + since) * left)
+    out[..., 4] = acceleration * (1.0 + since / fades) * left
     return out
 
 
@@ -247,12 +248,12 @@ def _eased(bend: Floats, driven: Floats) -> tuple[Floats, Floats, Floats]:
 def _fades(state: Floats, sign: float) -> Floats:
     """Seconds (S,) in which the acceleration of vehicles in states (S, 5) dies away: before they stand."""
     loses = np.maximum(-sign * state[:, 4], 1e-9)
-    return np.minimum(FADES, np.maximum(_LEAST_SHARE * state[:, 3] / loses, 1e-6))
+    return np.minimum(FADES, np.maximum(0.5 * _LEAST_SHARE * state[:, 3] / loses, 1e-6))
 
 
 def seconds_onward(state: Floats, ahead: float, sign: float) -> Floats:
     """Return for how long (S,) [s] vehicles in states (S, 5) can drive on within `ahead` metres; 0 if only with a jerk."""
-    fastest = state[:, 3] + np.maximum(sign * state[:, 4], 0.0) * FADES
+    fastest = state[:, 3] + 2.0 * np.maximum(sign * state[:, 4], 0.0) * FADES
     seconds = np.minimum(ahead / np.maximum(fastest, 1e-3), MOST_ONWARD)
     return np.where(_fades(state, sign) < _LEAST_FADES, 0.0, seconds)
 

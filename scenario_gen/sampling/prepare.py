@@ -248,7 +248,7 @@ def _freedom(
     drive: _Drive, model: VehicleModel, nominal: Clock, freed: Floats, tied: Bools, road: Road, gap: float, config: SamplingConfig
 ) -> Freedom:
     """What preset `wide` frees of a vehicle, that came so near [m] to others in the template."""
-    fastest = drive.speed[[0, -1]] + config.freedom * config.end_speed_sigma + config.max_acceleration * FADES
+    fastest = drive.speed[[0, -1]] + config.freedom * config.end_speed_sigma + 2.0 * config.max_acceleration * FADES
     ahead = road_ahead(drive.path, drive.vehicle, road, MOST_ONWARD * fastest)
     return freedom_of(drive.vehicle, drive.path.arc, nominal, drive.rests, freed, tied, ahead, gap, config)
 
