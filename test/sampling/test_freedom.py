@@ -171,6 +171,7 @@ def test_who_drives_on_does_so_smoothly(speed, acceleration, bend, sign):
     assert np.diff(found[:, 3]) / 0.005 * sign == pytest.approx(0.5 * (found[1:, 4] + found[:-1, 4]), abs=0.02)
     heading = np.arctan2(*(sign * np.diff(found[:, :2], axis=0))[:, ::-1].T)
     assert np.abs(np.angle(np.exp(1j * (heading - found[1:, 2])))).max() < 0.02
+    assert abs(found[1, 4] - found[0, 4]) < 1e-3 * abs(acceleration) + 1e-9  # no jolt
     assert np.abs(found[-1, 4]) < abs(acceleration) * np.exp(-2.0 / FADES) + 1e-9
 
 
