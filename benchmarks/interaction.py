@@ -171,7 +171,7 @@ def _measured(name: str, encounter: Encounter, road_name: str, count: int, varie
                     other += _windows(one, a, scenarios[(k + APART) % len(scenarios)], b)
                 case.recorded_pairs += _windows(encounter, a, encounter, b)
     signals = [Signals.of(vars(one)) for one in scenarios]
-    case.recorded_singles = list(windows(Signals.of(vars(encounter))))
+    case.recorded_singles = list(windows(Signals.of(vars(encounter) | {"time": encounter.time})))
     case.pairs = _some(case.together + case.apart, RATIO * len(case.recorded_pairs))
     case.singles = _some([row for one in signals for row in windows(one)], RATIO * len(case.recorded_singles))
     case.figures["displacement"] = displacement(signals[:20])
