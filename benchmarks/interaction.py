@@ -28,34 +28,44 @@ import math
 from pathlib import Path
 import sys
 from time import process_time
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from benchmarks._naturalness_classifier import windows
 from benchmarks._naturalness_cuts import cuts, recorded
+from benchmarks._naturalness_motion import displacement, Signals
 from benchmarks._size import sized
 from benchmarks.naturalness import DATA
 from benchmarks.row import Row
 from scenario_gen.arrays import Floats
 from scenario_gen.errors import ScenarioGenError
 from scenario_gen.evaluation.interaction import following, ghosts, pair_windows, yielding
+from scenario_gen.evaluation.measures import measure
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.nearest import attempt
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.segmentation import segment
+from scenario_gen.template.answers import Motion
 from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.reaction import FOLLOW
 from scenario_gen.types.request import Request
-from scenario_gen.types.scenario import Scenario
 
 COUNT = sized(30, quick=4)
 LOGS = sized(None, quick=1)
 SEED, APART = 7, 7  # of a set; how far apart two scenarios are that a mixed pair is of
 RESAMPLES = sized(1000, quick=20)
 FOLDS = 5
+RATIO = 4  # generated windows for each recorded one
+_TOLD_APART: tuple[tuple[str, str, str, Literal["higher", "lower"], float | None], ...] = (
+    ("AUC, pairs with an edge against mixed ones", "together", "mixed", "higher", 0.62),
+    ("AUC, pairs without an edge against mixed ones", "apart", "apart_mixed", "higher", None),
+    ("AUC, pairs against recorded ones", "pairs", "recorded_pairs", "lower", 0.6),
+    ("AUC, vehicles against recorded ones", "singles", "recorded_singles", "lower", 0.62),
+)
 _FIGURES = 3  # of an edge, at least, for an interval
 
 
@@ -67,6 +77,8 @@ class Case:
         figures: a flat document.
         together, mixed: windows of pairs with an edge, of one scenario and of two.
         apart, apart_mixed: the same of pairs without one.
+        pairs, recorded_pairs: windows of all pairs, generated (at most `RATIO` for each recorded one) and recorded.
+        singles, recorded_singles: the same of single vehicles.
     """
 
     figures: dict[str, Any]
@@ -74,6 +86,10 @@ class Case:
     mixed: list[Floats]
     apart: list[Floats]
     apart_mixed: list[Floats]
+    pairs: list[Floats]
+    recorded_pairs: list[Floats]
+    singles: list[Floats]
+    recorded_singles: list[Floats]
 
 
 def run(
@@ -114,7 +130,7 @@ def _measured(name: str, encounter: Encounter, road_name: str, count: int, varie
     graph, ids = reactions_of(encounter), [vehicle.id for vehicle in encounter.vehicles]
     config = PipelineConfig()
     config = replace(config, sampling=replace(config.sampling, variety=variety))
-    case = Case({"name": name, "road": road_name, "edges": [edge.document(ids) for edge in graph.edges]}, [], [], [], [])
+    case = Case({"name": name, "road": road_name, "edges": [edge.document(ids) for edge in graph.edges]}, *([] for _ in range(8)))
     try:
         road, segmentation = build_road(road_name, encounter, config.road), segment(encounter, config.segmentation, SEED)
         begun = process_time()
@@ -153,10 +169,26 @@ def _measured(name: str, encounter: Encounter, road_name: str, count: int, varie
                 for k, one in enumerate(scenarios):
                     kept += _windows(one, a, one, b)
                     other += _windows(one, a, scenarios[(k + APART) % len(scenarios)], b)
+                case.recorded_pairs += _windows(encounter, a, encounter, b)
+    signals = [Signals.of(vars(one)) for one in scenarios]
+    case.recorded_singles = list(windows(Signals.of(vars(encounter) | {"time": encounter.time})))
+    case.pairs = _some(case.together + case.apart, RATIO * len(case.recorded_pairs))
+    case.singles = _some([row for one in signals for row in windows(one)], RATIO * len(case.recorded_singles))
+    case.figures["displacement"] = displacement(signals[:20])
+    if all(edge.kind == FOLLOW for edge in graph.edges):
+        arrivals, pets = (np.array([measure(one, name) for one in scenarios]) for name in ("arrival_gap", "pet"))
+        if np.isfinite(arrivals).any() and np.isfinite(pets).any():
+            case.figures |= {"arrival": float(np.nanstd(arrivals)), "pet": float(np.nanmax(pets) - np.nanmin(pets))}
     return case
 
 
-def _windows(one: Scenario, a: int, other: Scenario, b: int) -> list[Floats]:
+def _some(rows: list[Floats], most: int) -> list[Floats]:
+    """Return so many rows at most, drawn without putting them back."""
+    chosen = np.random.default_rng(0).permutation(len(rows))[:most]
+    return [rows[k] for k in np.sort(chosen).tolist()]
+
+
+def _windows(one: Motion, a: int, other: Motion, b: int) -> list[Floats]:
     """Windows of a vehicle of one scenario beside a vehicle of another one, both from the scenario's start."""
     first = max(int(one.present[a, 0]), int(other.present[b, 0]))
     last = min(int(one.present[a, 1]), int(other.present[b, 1])) + 1
@@ -196,13 +228,21 @@ def _rows(found: Sequence[Case]) -> list[Row]:
     drives = [(case, case.figures) for case in good if case.figures["clean drives"]]
     row("drives with ghost braking, clean ones", drives, _ratio("ghosts", "clean drives"), "share", "lower", 0.04)
     row("acceptance, median", [(case, case.figures) for case in good], _median("acceptance"), "share", "higher", None)
-    for label, kept, other, target in (
-        ("AUC, pairs with an edge against mixed ones", "together", "mixed", 0.62),
-        ("AUC, pairs without an edge against mixed ones", "apart", "apart_mixed", None),
-    ):
+    free = [(case, case.figures) for case in good if "arrival" in case.figures]
+    row("standard deviation of the arrival gap, nobody waits, median", free, _median("arrival"), "s", "higher", 0.8)
+    row("range of PET, nobody waits, median", free, _median("pet"), "s", "higher", 3.0)
+    row(
+        "displacement without the clock, median",
+        [(case, case.figures) for case in good],
+        _median("displacement"),
+        "m",
+        "higher",
+        1.0,
+    )
+    for label, kept, other, better, target in _TOLD_APART:
         area = _told_apart([(getattr(case, kept), getattr(case, other)) for case in good])
         if area is not None:
-            rows.append(Row(label, area[0], "", "higher", target, f"{area[1]:.3f} to {area[2]:.3f}"))
+            rows.append(Row(label, area[0], "", better, target, f"{area[1]:.3f} to {area[2]:.3f}"))
     return rows
 
 

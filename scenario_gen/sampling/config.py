@@ -34,7 +34,7 @@ class SamplingConfig(Parameters):
     arrival_sigma: float = parameter(
         1.5, "wide: standard deviation of each vehicle's own shift in time against the others", unit="s", low=0.0, high=10.0
     )
-    pace_sigma: float = parameter(0.04, "wide: standard deviation of each vehicle's own pace, as a share", low=0.0, high=0.2)
+    pace_sigma: float = parameter(0.06, "wide: standard deviation of each vehicle's own pace, as a share", low=0.0, high=0.2)
     wait_sigma: float = parameter(1.0, "wide: standard deviation of the length of each wait", unit="s", low=0.0, high=10.0)
     end_speed_sigma: float = parameter(0.4, "wide: standard deviation of start and end speeds", unit="m/s", low=0.0, high=5.0)
     place_sigma: float = parameter(0.2, "wide: standard deviation of the place in the lane", unit="m", low=0.0, high=2.0)

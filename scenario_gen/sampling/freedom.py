@@ -37,13 +37,14 @@ from scenario_gen.types.scenario import BoundaryStates
 CATALOGUE = ((3.60, 1.62), (4.05, 1.75), (4.25, 1.79), (4.46, 1.83), (4.63, 1.83), (4.69, 1.85), (4.77, 1.88), (4.96, 1.93))
 """Length and width [m] of cars, each as likely: our choice of typical ones, from a city car to a large saloon."""
 _CARS = 3.2, 5.4  # m: a vehicle of such a length gets the size of another car
+_GROWS = 0.5  # of its least gap in the template, by which a vehicle is longer at most: cars stand close in a queue
 _RAMP = 6.0  # s, over which an own clock leaves the shared one where states are asked
 _RAMP_SHARE = 1.0 / 3.0  # of the duration, or of a way, that this takes at most
 _TAPER = 30.0  # m, over which a vehicle goes to its place in the lane
 _MADE_UP = 0.5 * (1.0 - SHORTEST_SHARE) / 1.875  # s of a wait for each second left, made up for at half the pace that is free
 _LEAST_STAND, _SHORTER = 1.5, 0.3  # s that are left of a wait, and share by which it is shorter at most: clocks run forward
 _LEAST_SHARE = 0.5  # of a speed, that is left while acceleration dies away
-FADES, _LEAST_FADES = 0.7, 0.4  # s, in which it does
+FADES, _LEAST_FADES = 0.5, 0.2  # s, in which it does, without a jolt: its jerk begins at 0
 EASES = 4.0  # m, in which curvature does
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
 MOST_ONWARD = 4.0  # s, for which a vehicle drives straight on before or behind its route
@@ -233,12 +234,13 @@ def onward(state: Floats, bend: Floats, since: Floats, sign: float) -> Floats:
     x, y, yaw, speed, acceleration = (column[:, None] for column in state.T)
     gains, fades = sign * acceleration, _fades(state, sign)[:, None]
     left = exact.exp(-since / fades)
-    driven = speed * since + gains * fades * (since - fades * (1.0 - left))
+    driven = speed * since + gains * fades * (2.0 * since - 3.0 * fades + (3.0 * fades + since) * left)
     out = np.empty((*since.shape, 5))
     turned, along, aside = _eased(sign * bend[:, None], driven)
     cos, sin = exact.cos(yaw), exact.sin(yaw)
     out[..., 0], out[..., 1] = x + sign * (along * cos - aside * sin), y + sign * (along * sin + aside * cos)
-    out[..., 2], out[..., 3], out[..., 4] = yaw + turned, speed + gains * fades * (1.0 - left), acceleration * left
+    out[..., 2], out[..., 3] = yaw + turned, speed + gains * (2.0 * fades - (2.0 * fades + since) * left)
+    out[..., 4] = acceleration * (1.0 + since / fades) * left
     return out
 
 
@@ -258,12 +260,12 @@ def _eased(bend: Floats, driven: Floats) -> tuple[Floats, Floats, Floats]:
 def _fades(state: Floats, sign: float) -> Floats:
     """Seconds (S,) in which the acceleration of vehicles in states (S, 5) dies away: before they stand."""
     loses = np.maximum(-sign * state[:, 4], 1e-9)
-    return np.minimum(FADES, np.maximum(_LEAST_SHARE * state[:, 3] / loses, 1e-6))
+    return np.minimum(FADES, np.maximum(0.5 * _LEAST_SHARE * state[:, 3] / loses, 1e-6))
 
 
 def seconds_onward(state: Floats, ahead: float, sign: float) -> Floats:
     """Return for how long (S,) [s] vehicles in states (S, 5) can drive on within `ahead` metres; 0 if only with a jerk."""
-    fastest = state[:, 3] + np.maximum(sign * state[:, 4], 0.0) * FADES
+    fastest = state[:, 3] + 2.0 * np.maximum(sign * state[:, 4], 0.0) * FADES
     seconds = np.minimum(ahead / np.maximum(fastest, 1e-3), MOST_ONWARD)
     return np.where(_fades(state, sign) < _LEAST_FADES, 0.0, seconds)
 
@@ -276,6 +278,7 @@ def freedom_of(
     freed: Floats,
     asked: Bools,
     ahead: Floats,
+    gap: float,
     config: SamplingConfig,
 ) -> Freedom:
     """Return what is free of a vehicle.
@@ -288,6 +291,7 @@ def freedom_of(
         freed: (2, 2) metres and m/s by which its start and end may differ from what is given.
         asked: (2,) whether start and end states are asked of any vehicle.
         ahead: (2,) metres of free road straight on before its route and behind it.
+        gap: metres of its least gap to any other vehicle in the template.
         config: the standard deviations.
     """
     place = np.ones(len(arc))
@@ -295,6 +299,7 @@ def freedom_of(
         if freed[end, 0] == 0.0:
             place = place * _smooth_step(since / max(min(_TAPER, _RAMP_SHARE * float(arc[-1])), 1e-9))[0]
     still = len(arc) == 1 or freed[:, 0].min() == 0.0
+    sizes = np.array([size for size in CATALOGUE if size[0] - vehicle.length <= max(_GROWS * gap, 0.0)]).reshape(-1, 2)
     other_size = config.sizes == "catalogue" and _CARS[0] <= vehicle.length <= _CARS[1] and not still
     return Freedom(
         OwnClock.of(nominal, rests, (bool(asked[0]), bool(asked[1])), config),
@@ -302,7 +307,7 @@ def freedom_of(
         config.place_sigma,
         np.where(freed[:, 1] > 0.0, config.end_speed_sigma, 0.0),
         config.freedom,
-        np.array(CATALOGUE) if other_size else np.zeros((0, 2)),
+        sizes if other_size else np.zeros((0, 2)),
         np.where(asked, 0.0, ahead),
     )
 

@@ -43,6 +43,7 @@ from scenario_gen.sampling.speed_profile.stops import least_shares, lengthened, 
 from scenario_gen.sampling.time_warp import Clock, TimeWarp
 from scenario_gen.template.interaction import Wait, WAIT_SPEED
 from scenario_gen.template.reactions import reactions_of
+from scenario_gen.template.separation import least_gaps
 from scenario_gen.template.tracks import clean_tracks, Track
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.reaction import FOLLOW, ReactionGraph
@@ -235,9 +236,9 @@ def prepare(
     warp = TimeWarp(clock_of(clock.grid, stretch * clock.rate), config, least_shares(clock.grid, waits))
     vehicles = [_model(d, road, *mean, config, sentences) for d, mean in zip(drives, found, strict=True)]
     if config.variety == "wide":
-        tied = (asked.freed[..., 0] == 0.0).any(axis=0)
+        tied, gaps = (asked.freed[..., 0] == 0.0).any(axis=0), least_gaps(encounter).tolist()
         vehicles = [
-            replace(v, freedom=_freedom(drive, v, warp.nominal, asked.freed[n], tied, road, config))
+            replace(v, freedom=_freedom(drive, v, warp.nominal, asked.freed[n], tied, road, gaps[n], config))
             for n, (v, drive) in enumerate(zip(vehicles, drives, strict=True))
         ]
     reactions = kept_reactions(encounter, config, order)
@@ -257,12 +258,12 @@ def kept_reactions(encounter: Encounter, config: SamplingConfig, order: str = "k
 
 
 def _freedom(
-    drive: _Drive, model: VehicleModel, nominal: Clock, freed: Floats, tied: Bools, road: Road, config: SamplingConfig
+    drive: _Drive, model: VehicleModel, nominal: Clock, freed: Floats, tied: Bools, road: Road, gap: float, config: SamplingConfig
 ) -> Freedom:
-    """What preset `wide` frees of a vehicle."""
-    fastest = drive.speed[[0, -1]] + config.freedom * config.end_speed_sigma + config.max_acceleration * FADES
+    """What preset `wide` frees of a vehicle, that came so near [m] to others in the template."""
+    fastest = drive.speed[[0, -1]] + config.freedom * config.end_speed_sigma + 2.0 * config.max_acceleration * FADES
     ahead = road_ahead(drive.path, drive.vehicle, road, MOST_ONWARD * fastest)
-    return freedom_of(drive.vehicle, drive.path.arc, nominal, drive.rests, freed, tied, ahead, config)
+    return freedom_of(drive.vehicle, drive.path.arc, nominal, drive.rests, freed, tied, ahead, gap, config)
 
 
 def _slowed(drives: Sequence[_Drive], grid: Floats, config: SamplingConfig) -> tuple[Clock, list[str]]:

@@ -224,13 +224,18 @@ def own_paths(encounter: Encounter) -> Separation:
 
 
 @once_per_encounter
-def least_gap(encounter: Encounter) -> float:
-    """Return the least gap [m] of any two vehicles while both are there, negative if they overlap; inf if never two are."""
+def least_gaps(encounter: Encounter) -> Floats:
+    """Return the least gap (N,) [m] of each vehicle to any other, negative if they overlap; inf if it is never beside one."""
     poses = np.concatenate([encounter.position, encounter.heading[..., None]], axis=-1)
-    least = np.inf
+    least = np.full(len(poses), np.inf)
     for a, b in combinations(range(len(poses)), 2):
         common = together(encounter.present, a, b)
         if common.stop > common.start:
             gap, _ = footprint_gap(encounter.vehicles[a], poses[a, common], encounter.vehicles[b], poses[b, common])
-            least = min(least, float(gap.min()))
-    return least
+            least[[a, b]] = np.minimum(least[[a, b]], float(gap.min()))
+    return frozen(least)
+
+
+def least_gap(encounter: Encounter) -> float:
+    """Return the least gap [m] of any two vehicles while both are there, negative if they overlap; inf if never two are."""
+    return float(least_gaps(encounter).min(initial=np.inf))

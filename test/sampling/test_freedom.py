@@ -25,9 +25,10 @@ from sampling_scenes import scene
 from scenario_gen.exact import random as exact_random
 from scenario_gen.sampling import freed_states, sample_scenarios, SamplingConfig
 from scenario_gen.sampling.candidates import Scale
-from scenario_gen.sampling.freedom import CATALOGUE, cut, FADES, onward, OwnClock, seconds_onward
+from scenario_gen.sampling.freedom import CATALOGUE, cut, FADES, freedom_of, onward, OwnClock, seconds_onward
 from scenario_gen.sampling.pace import clock_of
 from scenario_gen.sampling.prepare import prepare
+from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.request import Request
 from scenario_gen.validity import Checker
 
@@ -134,10 +135,18 @@ def test_a_start_off_its_bounds_is_refused():
     assert any("from what was asked" in v.message for verdict in verdicts for v in verdict.violations)
 
 
+@pytest.mark.parametrize(("gap", "longest"), [(np.inf, 4.96), (1.0, 4.46), (0.4, 4.05), (0.0, 3.6), (-0.3, 3.6)])
+def test_who_stands_close_to_another_one_does_not_become_longer_than_half_the_gap(gap, longest):
+    car, arc, none = Vehicle("1", 4.0, 1.8), np.arange(20.0), np.zeros(2)
+    made = freedom_of(car, arc, NOMINAL, [], np.ones((2, 2)), none.astype(np.bool_), none, gap, SamplingConfig())
+    assert made.sizes[:, 0].max() == longest
+
+
 def test_sizes_are_those_of_the_catalogue():
     model, some = batch(200)
     sizes = {(one.length, one.width) for one in some.drawn[0].vehicles}
-    assert sizes == set(CATALOGUE)
+    assert sizes == {tuple(size) for size in model.vehicles[0].freedom.sizes.tolist()} <= set(CATALOGUE)
+    assert len(sizes) > 4
     assert {one.id for one in some.drawn[0].vehicles} == {"a"}
     _, same = batch(20, sizes="recorded")
     assert {(one.length, one.width) for one in same.drawn[0].vehicles} == {
@@ -161,6 +170,7 @@ def test_who_drives_on_does_so_smoothly(speed, acceleration, bend, sign):
     assert np.diff(found[:, 3]) / 0.005 * sign == pytest.approx(0.5 * (found[1:, 4] + found[:-1, 4]), abs=0.02)
     heading = np.arctan2(*(sign * np.diff(found[:, :2], axis=0))[:, ::-1].T)
     assert np.abs(np.angle(np.exp(1j * (heading - found[1:, 2])))).max() < 0.02
+    assert abs(found[1, 4] - found[0, 4]) < 1e-3 * abs(acceleration) + 1e-9  # no jolt
     assert np.abs(found[-1, 4]) < abs(acceleration) * np.exp(-2.0 / FADES) + 1e-9
 
 

@@ -1,0 +1,46 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How near vehicles come to one another."""
+
+import numpy as np
+import pytest
+
+from scenario_gen.template.separation import least_gap, least_gaps
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.presence import ALWAYS
+
+TIME = 0.1 * np.arange(30)
+
+
+def queue(*places, present=ALWAYS):
+    """Vehicles of 4 m by 2 m that drive along x at 5 m/s, so many metres ahead of the first one's place."""
+    way = np.column_stack([5.0 * TIME, np.zeros(len(TIME))])
+    position = np.stack([way + np.array([x, 0.0]) for x in places])
+    count = len(places)
+    vehicles = tuple(Vehicle(str(n), 4.0, 2.0) for n in range(count))
+    return Encounter(
+        "queue", vehicles, 0, 100_000_000, position, np.zeros((count, 30)), np.full((count, 30), 5.0), present=present
+    )
+
+
+def test_the_least_gap_of_each_is_to_its_nearest():
+    encounter = queue(0.0, 4.4, 10.0, 30.0)
+    assert least_gaps(encounter) == pytest.approx([0.4, 0.4, 1.6, 16.0])
+    assert least_gap(encounter) == pytest.approx(0.4)
+
+
+def test_gaps_of_two_that_never_meet_and_of_two_in_one_place():
+    assert least_gap(queue(0.0, 5.0, present=np.array([[0, 9], [20, 29]]))) == np.inf
+    assert (least_gaps(queue(0.0, 1.0)) < 0.0).all()
