@@ -29,7 +29,10 @@ from scenario_gen.types.request import Request
 
 Advance = Callable[[str, int, int], None]
 """Told how far a case is: its name, scenarios so far, scenarios wanted."""
-OPTIONS = {"starts:='": "--start '", "goals:='": "--goal '", "sampling.max_stretch:=": "--set sampling.max_stretch="}
+OPTIONS = {
+    "starts:='": "--start '", "goals:='": "--goal '", "sampling.max_stretch:=": "--set sampling.max_stretch=",
+    "fitting.allow=": "--allow ",
+}  # fmt: skip
 """Parameters of nodes, as the nearest possible request names them, and the command line's options for them."""
 
 

@@ -133,6 +133,9 @@ def generate(
     order: Annotated[
         str, typer.Option(help="who goes first: keep (as in the template), free, swap (the other one at the closest crossing)")
     ] = "keep",
+    allow: Annotated[
+        str, typer.Option(help="lost_conflict: take a place on the road where vehicles that meet in the template do not")
+    ] = "",
     obstacle: Annotated[
         list[str] | None,
         typer.Option(help="something in the way, 'x y yaw length width' on the road, e.g. a parked car; repeatable"),
@@ -148,7 +151,7 @@ def generate(
     cases, refusals = generate_folder(
         out,
         [(log, road)],
-        obstructed(configured(parameter_file, assignments), obstacle),
+        obstructed(configured(parameter_file, [*(assignments or []), *([f"fitting.allow={allow}"] if allow else [])]), obstacle),
         count=count,
         seed=seed,
         encounters=encounter or [],

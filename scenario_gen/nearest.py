@@ -15,7 +15,7 @@
 """The nearest request that is possible: what an impossible one is answered with, each suggestion tried out before it is made."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -27,7 +27,8 @@ from scenario_gen.checked import sample_checked
 from scenario_gen.config import PipelineConfig
 from scenario_gen.curve import Curve
 from scenario_gen.errors import RefusedError, ScenarioGenError
-from scenario_gen.fitting import fit_template
+from scenario_gen.fitting import fit_template, LostConflictError
+from scenario_gen.roads import build_road, BUILT_IN
 from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room
 from scenario_gen.roads.ways import draw_route
 from scenario_gen.routing import plan_routes
@@ -43,6 +44,7 @@ from scenario_gen.types.road import Road
 from scenario_gen.types.segmentation import Segmentation
 
 BISECTIONS = 7
+_NAMED = 2  # roads that keep an encounter
 ENOUGH = 10  # valid scenarios by which a request counts as possible, if not fewer are wanted
 _FAR_ENDS = (1.0, 0.75, 0.5, 0.25)  # shares of a way at which a bisection may begin
 _STRETCHES = (0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -112,6 +114,7 @@ def nearest_if_impossible(
     """Answer a refusal in the body with the nearest requests that are possible; none if it was cancelled.
 
     Raises:
+        LostConflictError: a conflict of the template would be lost; it names roads that keep it.
         ImpossibleError: the asked states cannot be met; it says why, and what nearby can be.
         RefusedError: as the body, where no states were asked for.
     """
@@ -119,12 +122,27 @@ def nearest_if_impossible(
         yield
     except TargetError:  # the states are not what is impossible
         raise
+    except LostConflictError as error:
+        kept = roads_that_keep(encounter, segmentation, config)
+        raise LostConflictError(f"{error}. Nearest possible: {' or '.join(f'road {name}' for name in kept)}") from error
     except RefusedError as error:
         if not request.moves:
             raise
         search = _Search(encounter, segmentation, road, config, request, seed, min(count, ENOUGH), cancelled)
         found = tuple(search.run())
         raise ImpossibleError(str(error), () if search.cancelled() else found) from error
+
+
+def roads_that_keep(encounter: Encounter, segmentation: Segmentation, config: PipelineConfig) -> list[str]:
+    """Names of the built-in roads that the template fits with all its conflicts, two at most; else `corridor`, its own road."""
+    found: list[str] = []
+    for name in BUILT_IN:
+        with suppress(RefusedError):
+            fit_template(encounter, segmentation, build_road(name, encounter, config.road), replace(config.fitting, allow=""))
+            found.append(name)
+        if len(found) == _NAMED:
+            break
+    return found or ["corridor"]
 
 
 def plan(

@@ -23,7 +23,7 @@ from scenario_gen.config import PipelineConfig
 from scenario_gen.errors import RefusedError
 from scenario_gen.evaluation import coverage_of, evaluate, MEASURED, replay, uniform_changepoints, without_changepoints
 from scenario_gen.nearest import attempt, nearest_if_impossible, plan
-from scenario_gen.roads import build_road
+from scenario_gen.roads import road_and_template
 from scenario_gen.sampling import Progress
 from scenario_gen.segmentation import segment
 from scenario_gen.template.size import refuse_too_large
@@ -51,7 +51,8 @@ def generate(
 
     Args:
         encounter: the template.
-        road: the target, of `build_road`, or the name or path that this takes.
+        road: the target, of `build_road`, or the name or path that this takes; a template of right-hand traffic is mirrored on
+            a map of left-hand traffic, and the other way round.
         config: the parameters of every stage.
         count: valid scenarios wanted.
         seed: of all randomness.
@@ -66,7 +67,7 @@ def generate(
     refuse_too_large(encounter)
     request.ego_of(encounter)  # refused at once if there is no such vehicle
     if isinstance(road, str):
-        road = build_road(road, encounter, config.road)
+        road, encounter = road_and_template(road, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)
     with nearest_if_impossible(encounter, segmentation, road, config, request, count=count, seed=seed):
         planned = plan(encounter, segmentation, road, config, request, seed)

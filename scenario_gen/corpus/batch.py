@@ -44,7 +44,7 @@ from scenario_gen.folders.scratch import sweep_tree
 from scenario_gen.nearest import attempt
 from scenario_gen.recordings.provenance import parameter_texts, versions
 from scenario_gen.recordings.write import add_results, scenario_bytes
-from scenario_gen.roads import build_road
+from scenario_gen.roads import build_road, road_and_template
 from scenario_gen.segmentation import segment
 from scenario_gen.storage.writer import BagWriter
 from scenario_gen.template.size import refuse_too_large
@@ -242,7 +242,7 @@ def _case(row: Mapping[str, Any], table: Path, namespace: str, task: PartTask) -
     try:
         encounter = encounter_of(row, table)
         refuse_too_large(encounter)
-        road = build_road(task.road, encounter, task.config.road)
+        road, encounter = road_and_template(task.road, encounter, task.config.road)
         segmentation = segment(encounter, task.config.segmentation, seed)
         made = attempt(encounter, segmentation, road, task.config, Request(), count=task.count, seed=seed)
     except (RefusedError, InputError) as error:

@@ -16,6 +16,7 @@
 
 from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.fitting.fit import fit_template
+from scenario_gen.fitting.kept import LostConflictError
 from scenario_gen.types.fit import Fit, FittedVehicle
 
-__all__ = ["Fit", "FittedVehicle", "FittingConfig", "fit_template"]
+__all__ = ["Fit", "FittedVehicle", "FittingConfig", "LostConflictError", "fit_template"]

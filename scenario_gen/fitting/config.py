@@ -28,6 +28,11 @@ class FittingConfig(Parameters):
         "how the template is placed: its own frame, along the road's lanes, through its junction, or searched for on the map",
         choices=("auto", "identity", "lanes", "junction", "search"),
     )
+    allow: str = parameter(
+        "",
+        "what a fit may lose: nothing, or lost_conflict: vehicles that meet in the template do not on the road",
+        choices=("", "lost_conflict"),
+    )
     scale_low: float = parameter(0.8, "smallest scale s of eq 9 that is accepted", low=0.01, high=1.0)
     scale_high: float = parameter(1.25, "largest scale s of eq 9 that is accepted", low=1.0, high=1000.0)
     max_move: float = parameter(3.0, "farthest that an anchor or a path may be moved", unit="m", low=0.0, high=100.0)

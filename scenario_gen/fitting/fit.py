@@ -15,6 +15,7 @@
 """One door to the fitting: which way of placing a template is tried on which road."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 import math
 
@@ -27,6 +28,7 @@ from scenario_gen.fitting.config import FittingConfig
 from scenario_gen.fitting.finish import finish
 from scenario_gen.fitting.given import place_given, place_in_own_frame
 from scenario_gen.fitting.junction import has_lanes, place_at_junction
+from scenario_gen.fitting.kept import refuse_lost_conflicts
 from scenario_gen.fitting.lanes import place_along_lanes
 from scenario_gen.fitting.placement import Placement
 from scenario_gen.fitting.search import place_by_search
@@ -67,6 +69,7 @@ def fit_template(
         max_speed: [m/s] that no asked state may exceed.
 
     Raises:
+        LostConflictError: the best place on the road loses a conflict of the template, and `config.allow` does not name that.
         RefusedError: it does not fit, or a state that is asked for cannot be had; the message says why, with figures.
         InputError: `starts` and `goals` disagree with the encounter, or a vehicle that is named does not exist.
     """
@@ -75,7 +78,11 @@ def fit_template(
     if starts is not None or goals is not None:
         placement, given = place_given(encounter, road, config, starts, goals)
         return finish(encounter, segmentation, road, placement, config, given)
-    return finish(encounter, segmentation, road, _place(encounter, road.cleared, config), config)
+    placement = _place(encounter, road.cleared, config)
+    fit = finish(encounter, segmentation, road, placement, config)
+    if not config.allow and not placement.at_home:
+        refuse_lost_conflicts(fit.lost, road.name)
+    return fit
 
 
 def _fit_asked(
@@ -93,7 +100,7 @@ def _fit_asked(
 @lru_cache(maxsize=1)  # changepoints have no part in it: the references have the same
 def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement:
     if config.placement == "identity":
-        return place_in_own_frame(encounter, road, config)[0]
+        return replace(place_in_own_frame(encounter, road, config)[0], at_home=True)
     tracks = clean_tracks(encounter)
     ways: dict[str, Callable[[tuple[Track, ...], Road, FittingConfig], Placement]] = {
         "lanes": place_along_lanes,
@@ -111,6 +118,7 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         own, share = place_in_own_frame(encounter, road, config)
     except RefusedError as error:
         reasons.append(f"in its own frame, {error}")
+    own = None if own is None else replace(own, at_home=True)
     if own is not None and share >= _AT_HOME:
         return own
     if has_lanes(road) or len(arms_of(road)) > 1:

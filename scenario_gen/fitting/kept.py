@@ -31,11 +31,29 @@ from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Loss
 from scenario_gen.types.road import Road
 
+CONFLICT, FOLLOWING = "conflict", "following"  # kinds of losses
 _LONG = 1.0  # s side by side that count
 _NEAREST, _FARTHEST = 1.0, 6.0  # metres sideways between centres of two vehicles that are beside each other
 _LANES_DIFFER = 1.5  # metres by which they may be farther apart on a road, whose lanes are all of one width
 _SAME_WAY = np.radians(30.0)
 _ENOUGH = 0.5  # share of that time in which they are beside each other on the road, on the same side
+
+
+class LostConflictError(RefusedError):
+    """Vehicles that meet in the template would not on the road: its encounter is lost."""
+
+
+def refuse_lost_conflicts(lost: Iterable[Loss], road: str) -> None:
+    """Refuse a fit on which vehicles whose paths cross or merge in the template do not meet; who follows whom is only said.
+
+    Raises:
+        LostConflictError: one is; it names the vehicles, and how it can be had all the same.
+    """
+    gone = [loss.said for loss in lost if loss.kind == CONFLICT]
+    if gone:
+        raise LostConflictError(
+            f"road {road} has no place that keeps the encounter: {'; '.join(gone)}; fitting.allow=lost_conflict takes it as it is"
+        )
 
 
 def refuse_lost_turns(tracks: tuple[Track, ...], placed: tuple[Track, ...], road: str) -> None:
@@ -61,14 +79,21 @@ def _otherwise(turn: float) -> str:
 
 def count_lost(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> int:
     """How many of the template's conflicts a placement has not, or in another order, each counted twice, and new ones."""
-    time = np.arange(len(tracks[0].progress), dtype=np.float64)
-    vehicles = tuple(track.vehicle for track in tracks)
-    before, after = (
-        _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2]))
-        for poses in (np.stack([track.poses for track in some]) for some in (tracks, placed))
-    )
+    before, after = (_meetings(some) for some in (tracks, placed))
     gone = [pair for pair, conflict in before.items() if pair not in after or after[pair].first != conflict.first]
     return 2 * len(gone) + len(after.keys() - before.keys())
+
+
+def _meetings(tracks: tuple[Track, ...]) -> dict[tuple[int, int], Conflict]:
+    """The conflicts of some motion, by the vehicles."""
+    time, poses = np.arange(len(tracks[0].progress), dtype=np.float64), np.stack([track.poses for track in tracks])
+    return _by_pair(find_conflicts(tuple(track.vehicle for track in tracks), time, poses[..., :2], poses[..., 2]))
+
+
+def keeps_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> bool:
+    """Whether all whose paths cross or merge in the template meet on the road."""
+    before, after = (_meetings(some) for some in (tracks, placed))
+    return {pair for pair, conflict in before.items() if not conflict.following} <= after.keys()
 
 
 def find_unused(road: Road, used: Iterable[Floats]) -> tuple[Loss, ...]:
@@ -117,8 +142,9 @@ def _lost_conflicts(encounter: Encounter, poses: Floats) -> list[Loss]:
     for pair in sorted(before.keys() | after.keys()):
         a, b = (vehicles[k].id for k in pair)
         if pair not in after:
-            kind = "follow each other" if before[pair].following else "have crossing or merging paths"
-            lost.append(Loss("conflict", (a, b), f"vehicles {a} and {b} {kind} in the template, and do not meet on this road"))
+            kind = FOLLOWING if before[pair].following else CONFLICT
+            what = "follow each other" if before[pair].following else "have crossing or merging paths"
+            lost.append(Loss(kind, (a, b), f"vehicles {a} and {b} {what} in the template, and do not meet on this road"))
         elif pair not in before:
             lost.append(
                 Loss("new conflict", (a, b), f"vehicles {a} and {b} come into conflict on this road, not in the template")

@@ -47,6 +47,7 @@ class Placement:
         moved: (N,) metres by which whole paths were shifted to keep vehicles apart.
         notes: what was decided, in sentences.
         unused: arms of the road that nobody uses.
+        at_home: the template is in its own frame, on the road that it was recorded on.
     """
 
     tracks: tuple[Track, ...]
@@ -55,6 +56,7 @@ class Placement:
     moved: Floats
     notes: tuple[str, ...]
     unused: tuple[Loss, ...] = ()
+    at_home: bool = False
 
 
 def check_scale(scale: float, what: str, config: FittingConfig) -> None:

@@ -21,6 +21,7 @@ import numpy as np
 from scenario_gen.arrays import frozen
 from scenario_gen.errors import RefusedError
 from scenario_gen.fitting.config import FittingConfig
+from scenario_gen.fitting.kept import keeps_conflicts
 from scenario_gen.fitting.placement import max_repair, Placement, separated
 from scenario_gen.roads.vector.match import Course
 from scenario_gen.roads.vector.place import laid, placements
@@ -29,11 +30,13 @@ from scenario_gen.types.lanes import LaneNetwork
 from scenario_gen.types.road import Road
 
 _SCALES = (1.0, 0.9, 1.1, 0.8, 1.2)
-_TRIED = 12  # placements that are looked at cell by cell
+_TRIED, _MORE = 12, 40  # placements that are looked at cell by cell; of those that lose a conflict, more
 
 
 def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> Placement:
-    """Lay a template on a road's lanes at the best place where all have room.
+    """Lay a template on a road's lanes at the best place where all have room and meet as in the template.
+
+    Where no place keeps every conflict, the best of those that lose one.
 
     Raises:
         RefusedError: there is none; says why not.
@@ -41,10 +44,10 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
     network = road.lanes
     if network is None:
         raise RefusedError(f"road {road.name} has no lanes")
-    reason = ""
+    reason, second = "", None
     scales = [scale for scale in _SCALES if config.scale_low <= scale <= config.scale_high]
     for tried, (one, scale) in enumerate(placements(network, tracks, scales=scales)):
-        if tried == _TRIED:
+        if tried >= (_TRIED if second is None else _MORE):
             break
         n = len(tracks)
         notes = [*network.notes, *(_note(c, t, network) for c, t in zip(one.courses, tracks, strict=True))]
@@ -63,7 +66,11 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
         except RefusedError as error:
             reason = reason or str(error)
             continue
-        return placement
+        if keeps_conflicts(tracks, placement.tracks):
+            return placement
+        second = second or placement
+    if second is not None:
+        return second
     raise RefusedError(f"the template does not fit the lanes of road {road.name}: {reason}")
 
 

@@ -55,7 +55,7 @@ TRAINING_PERIOD = 1.0
 ITERATIONS = 3000
 END_SPEEDS, KNOTS = (1.0, 0.75, 0.5, 0.25, 0.0), (0.5, None, 0.3, 0.7, 0.1, 0.9)
 """Shares of the asked end speeds, and places of a primitive's knot, that are tried in this order until a speed profile exists."""
-FITTING = FittingConfig(scale_low=0.01, scale_high=1000.0, max_move=100.0, clearance=0.0)
+FITTING = FittingConfig(allow="lost_conflict", scale_low=0.01, scale_high=1000.0, max_move=100.0, clearance=0.0)
 PLANNING = PlanningConfig(iterations=ITERATIONS, drivable=False, rrt_star_connect=PAPER)
 UNLIMITED = SamplingConfig(max_speed=1e6, max_acceleration=1e6, max_deceleration=1e6, max_lateral_acceleration=1e6)
 
@@ -93,7 +93,7 @@ def place(encounter: Encounter, segmentation: Segmentation) -> tuple[Road, Float
     for name in ROADS:
         try:
             metric = draw(name, layout_for(name, clean_tracks(encounter), RoadConfig()), RoadConfig())
-            fit = fit_template(encounter, segmentation, metric)
+            fit = fit_template(encounter, segmentation, metric, FittingConfig(allow="lost_conflict"))
         except RefusedError as error:
             reasons.append(f"{name}: {error}")
             continue

@@ -14,6 +14,7 @@
 
 """One door to every road: built-in, drawn around the template, or read from a map."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,7 @@ from scenario_gen.roads.shaped import (
 from scenario_gen.roads.vector.read import is_vector_map, READERS, vector_road
 from scenario_gen.template.frenet import main_line, to_frenet
 from scenario_gen.template.separation import own_paths
+from scenario_gen.template.side import mirrored, traffic_side
 from scenario_gen.template.tracks import clean_tracks, Track
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.road import Road
@@ -58,6 +60,46 @@ def build_road(name_or_path: str, encounter: Encounter | None = None, config: Ro
         RefusedError: `corridor`, and the recorded vehicles overlap so far that they cannot be told apart.
     """
     return with_obstacles(_bare_road(name_or_path, encounter, config), read_obstacles(config.obstacles))
+
+
+def road_and_template(name_or_path: str, encounter: Encounter, config: RoadConfig = RoadConfig()) -> tuple[Road, Encounter]:
+    """Return the road, and the template as it drives there: mirrored on a map whose traffic keeps to the other side.
+
+    A template in which nobody meets an oncoming vehicle counts as of right-hand traffic.
+
+    Args:
+        name_or_path: as `build_road` takes it.
+        encounter: the template.
+        config: how a road is drawn.
+
+    Raises:
+        InputError, RefusedError: as `build_road`.
+    """
+    road: Road | None = None
+    refusal: RefusedError | None = None
+    try:
+        road = build_road(name_or_path, encounter, config)
+    except RefusedError as error:
+        if not is_vector_map(name_or_path):
+            raise
+        refusal = error
+    if road is not None and not _on_other_side(encounter, road):
+        return road, encounter
+    other = mirrored(encounter)
+    with suppress(RefusedError):
+        there = build_road(name_or_path, other, config)
+        if _on_other_side(encounter, there):
+            return there, other
+    if road is None:
+        assert refusal is not None
+        raise refusal
+    return road, encounter
+
+
+def _on_other_side(encounter: Encounter, road: Road) -> bool:
+    """Whether a map's traffic keeps to the other side of the road than the template's."""
+    side = road.lanes.traffic_side if road.lanes is not None else ""
+    return side not in ("", traffic_side(encounter) or "right")
 
 
 def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfig) -> Road:

@@ -68,7 +68,8 @@ class Loss:
     """Something of the template's interaction that the fitted motion has not, or has otherwise.
 
     Attributes:
-        kind: "turn", "conflict", "new conflict", "order", "beside" or "arm" (an arm of the road that nobody uses).
+        kind: "turn", "conflict" (paths that cross or merge), "following", "new conflict", "order", "beside" or "arm" (an arm
+            of the road that nobody uses).
         vehicles: ids of whom it concerns.
         said: a sentence, with figures.
     """

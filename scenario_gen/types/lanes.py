@@ -14,6 +14,7 @@
 
 """The lanes of a vector map: their borders, what follows what, where one may change, how fast."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 import math
@@ -22,6 +23,8 @@ import numpy as np
 
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.errors import InputError
+
+_ONCOMING = -0.9  # cosine between directions of traffic
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +110,33 @@ class LaneNetwork:
         return tuple(k for k, lane in enumerate(self.lanes) if not lane.successors)
 
     @cached_property
+    def traffic_side(self) -> str:
+        """Return "right" or "left": on which side of the road traffic drives; "" where no lane has an oncoming one beside it.
+
+        In right-hand traffic the oncoming lane has the same left border.
+        """
+        left, right = (_shared([getattr(lane, side) for lane in self.lanes]) for side in ("left", "right"))
+        return "right" if left > right else "left" if right > left else ""
+
+    @cached_property
     def box(self) -> Floats:
         """(2, 2) metres: lowest and highest x, y of all borders."""
         points = np.concatenate([lane.outline for lane in self.lanes])
         return frozen(np.stack((points.min(axis=0), points.max(axis=0))))
+
+
+def _shared(borders: Sequence[Floats]) -> int:
+    """How many points of borders (M, 2) [m] have another border that runs the other way in their square metre."""
+    there: dict[tuple[int, int], list[Floats]] = {}
+    count = 0
+    for border in borders:
+        step = np.gradient(border, axis=0)
+        step = step / np.maximum(np.sqrt(np.square(step).sum(axis=1)), 1e-9)[:, None]
+        own: dict[tuple[int, int], Floats] = {}
+        for cell, direction in zip(np.floor(border).astype(np.int64).tolist(), step, strict=True):
+            own[cell[0], cell[1]] = direction
+        for place, direction in own.items():
+            others = there.setdefault(place, [])
+            count += any(float((other * direction).sum()) < _ONCOMING for other in others)
+            others.append(direction)
+    return count

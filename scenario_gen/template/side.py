@@ -1,0 +1,56 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""On which side of the road a template drives, and its mirror image."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from scenario_gen import exact
+from scenario_gen.arrays import wrap_angle
+from scenario_gen.types.encounter import Encounter
+
+_OPPOSITE = np.radians(150.0)  # between headings, at least
+_ABREAST = 6.0  # m ahead or behind
+_BESIDE = (1.5, 8.0)  # m sideways
+_MOVES = 2.0  # m/s
+
+
+def traffic_side(encounter: Encounter) -> str:
+    """Return "right" or "left", on which oncoming vehicles pass each other; "" where none do.
+
+    In right-hand traffic an oncoming vehicle passes on one's left.
+    """
+    votes = 0
+    for a in range(len(encounter.vehicles)):
+        both = encounter.there[a] & encounter.there & (encounter.speed[a] > _MOVES) & (encounter.speed > _MOVES)
+        offset = encounter.position - encounter.position[a]
+        cos, sin = exact.cos(encounter.heading[a]), exact.sin(encounter.heading[a])
+        ahead, left = offset[..., 0] * cos + offset[..., 1] * sin, offset[..., 1] * cos - offset[..., 0] * sin
+        passing = both & (np.abs(wrap_angle(encounter.heading - encounter.heading[a])) > _OPPOSITE) & (np.abs(ahead) < _ABREAST)
+        passing &= (np.abs(left) > _BESIDE[0]) & (np.abs(left) < _BESIDE[1])
+        votes += int(np.sign(left[passing]).sum())
+    return "right" if votes > 0 else "left" if votes < 0 else ""
+
+
+def mirrored(encounter: Encounter) -> Encounter:
+    """Return the encounter with left and right exchanged; it has no place on the globe."""
+    return replace(
+        encounter,
+        name=f"{encounter.name} mirrored",
+        position=encounter.position * np.array([1.0, -1.0]),
+        heading=-encounter.heading,
+        origin=None,
+    )

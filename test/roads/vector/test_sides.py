@@ -1,0 +1,55 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""On which side a map's traffic drives, and templates that come from the other side."""
+
+import map_builders
+import numpy as np
+import pytest
+
+from scenario_gen.roads import build_road, road_and_template
+from scenario_gen.template.side import mirrored
+from scenario_gen.types.encounter import Encounter, Vehicle
+
+
+def oncoming(side):
+    """Two vehicles that pass each other, each 1.75 m on its own side of the middle: 1 for the right."""
+    time = np.arange(81) * 0.1
+    way = 10.0 * time - 40.0
+    position = np.stack([np.column_stack([sign * way, np.full(81, -1.75 * side * sign)]) for sign in (1.0, -1.0)])
+    heading = np.stack([np.zeros(81), np.full(81, np.pi)])
+    return Encounter("o", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, heading, np.full((2, 81), 10.0))
+
+
+@pytest.fixture(params=["right", "left"])
+def crossroads(request, tmp_path, monkeypatch):
+    """A map, and the side on which its traffic drives."""
+    plain = map_builders.lanes()
+    if request.param == "left":
+        image = {k: ([(x, -y) for x, y in right], [(x, -y) for x, y in left], after) for k, (left, right, after) in plain.items()}
+        monkeypatch.setattr(map_builders, "lanes", lambda: image)
+    path = tmp_path / "crossroads.osm"
+    path.write_text(map_builders.lanelet2())
+    return str(path), request.param
+
+
+def test_a_template_is_mirrored_on_a_map_of_the_other_side(crossroads):
+    path, side = crossroads
+    assert build_road(path).lanes.traffic_side == side
+    for own, encounter in (("right", oncoming(1.0)), ("left", oncoming(-1.0))):
+        road, driven = road_and_template(path, encounter)
+        assert road.lanes.traffic_side == side
+        if own == side:
+            assert driven is encounter
+        else:
+            assert driven.name == "o mirrored" and np.array_equal(driven.position, mirrored(encounter).position)

@@ -1,0 +1,58 @@
+# Copyright 2026 The scenario_gen authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""On which side a template drives, and its mirror image."""
+
+import numpy as np
+import pytest
+
+from scenario_gen.template.side import mirrored, traffic_side
+from scenario_gen.types.encounter import Encounter, Vehicle
+
+
+def oncoming(side):
+    """Two vehicles that pass each other, each on its own `side` of the road: 1 for the right."""
+    time = np.arange(101) * 0.1
+    there, back = (
+        np.column_stack([10.0 * time - 50.0, np.full(101, -1.75 * side)]),
+        np.column_stack([50.0 - 10.0 * time, np.full(101, 1.75 * side)]),
+    )
+    heading = np.stack([np.zeros(101), np.full(101, np.pi)])
+    return Encounter("o", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, np.stack([there, back]), heading, np.full((2, 101), 10.0))
+
+
+@pytest.mark.parametrize(("side", "name"), [(1.0, "right"), (-1.0, "left")])
+def test_the_side_is_that_on_which_oncoming_vehicles_pass(side, name):
+    assert traffic_side(oncoming(side)) == name
+    assert traffic_side(mirrored(oncoming(side))) == {"right": "left", "left": "right"}[name]
+
+
+def test_who_passes_nobody_has_no_side():
+    one = oncoming(1.0)
+    same = Encounter(
+        "f",
+        one.vehicles,
+        0,
+        100_000_000,
+        one.position[[0, 0]] + np.array([[[0.0, 0.0]], [[20.0, 0.0]]]),
+        one.heading[[0, 0]],
+        one.speed,
+    )
+    assert traffic_side(same) == ""
+
+
+def test_a_mirror_image_of_a_mirror_image_is_the_template():
+    one = oncoming(1.0)
+    twice = mirrored(mirrored(one))
+    assert np.array_equal(twice.position, one.position) and np.allclose(np.cos(twice.heading), np.cos(one.heading))
+    assert mirrored(one).name == "o mirrored" and np.array_equal(mirrored(one).speed, one.speed)
