@@ -133,9 +133,7 @@ def generate(
     order: Annotated[
         str, typer.Option(help="who goes first: keep (as in the template), free, swap (the other one at the closest crossing)")
     ] = "keep",
-    allow: Annotated[
-        str, typer.Option(help="lost_conflict: take a place on the road where vehicles that meet in the template do not")
-    ] = "",
+    allow: Annotated[str, typer.Option(help="lost_conflict: a place where vehicles that meet in the template do not")] = "",
     obstacle: Annotated[
         list[str] | None,
         typer.Option(help="something in the way, 'x y yaw length width' on the road, e.g. a parked car; repeatable"),
