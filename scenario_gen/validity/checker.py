@@ -368,11 +368,11 @@ class Checker:
         waits = self.waits or ()
         for i in sorted({wait.vehicle for wait in waits}):
             asked = [wait for wait in waits if wait.vehicle == i]
-            if self._never_moves(i, asked[0].start, scenario):
-                if self._slow(scenario, i, self.limits.stand_speed) != [tuple(scenario.present[i].tolist())]:
-                    k = int(np.argmax(scenario.speed[i]))
-                    message = f"vehicle {i}: waits throughout in the template, but reaches {scenario.speed[i, k]:.3f} m/s"
-                    yield Violation(Cause.STOP_NOT_KEPT, float(scenario.time[k]), (i,), message)
+            throughout = [tuple(scenario.present[i].tolist())]
+            if self._never_moves(i, asked[0].start, scenario) and self._slow(scenario, i, self.limits.stand_speed) != throughout:
+                k = int(np.argmax(scenario.speed[i]))
+                message = f"vehicle {i}: waits throughout in the template, but reaches {scenario.speed[i, k]:.3f} m/s"
+                yield Violation(Cause.STOP_NOT_KEPT, float(scenario.time[k]), (i,), message)
                 continue
             standing = [wait for wait in asked if not wait.creeps]
             for wanted, limit, verb in ((standing, self.limits.stand_speed, "stands"), (asked, self.limits.creep_speed, "waits")):

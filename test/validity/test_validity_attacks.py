@@ -90,6 +90,8 @@ def test_who_stands_in_the_way_does_not_vanish(present, ends):
     late = replace(encounter, present=np.array([[20, 80], [0, 100]]))
     own = Checker.of_template(late, open_road(), asked, find_waits(late), FREE)
     assert not own.check([replace(template, present=np.array([[10, 90], [0, 100]]))])[0].violations, "who comes late may"
+    (verdict,) = own.check([replace(template, present=np.array([[20, 21], [0, 100]]))])
+    assert [violation.cause for violation in verdict.violations] == [Cause.STOP_NOT_KEPT], "but it waits"
 
 
 @pytest.mark.parametrize("rows", [[[0.9, 50.7], [51, 100]], [[np.nan, 50], [51, 100]], [["0", "50"], ["51", "100"]]])
