@@ -73,7 +73,13 @@ class Recheck:
         self.edges = shapely.STRtree(_segments(lines))
         time = encounter.time
         self.template = Scenario(
-            encounter.vehicles, time, encounter.position, encounter.heading, encounter.speed, 0.0 * encounter.speed
+            encounter.vehicles,
+            time,
+            encounter.position,
+            encounter.heading,
+            encounter.speed,
+            0.0 * encounter.speed,
+            present=encounter.present,
         )
         self.orders = {pair: order for pair, order in _orders(self.template) if order}
         self.waits = _waits(encounter) if has_changepoints else [(0, 0)] * len(encounter.vehicles)
@@ -84,7 +90,8 @@ class Recheck:
         account.scenarios += len(scenarios)
         account.vehicles += n * len(scenarios)
         lanes = Lanes.of(scenarios)
-        account.instants += self._roads(lanes, n, account) + self._pairs(lanes, n, account)
+        longer = Lanes.of(scenarios, self.limits.presence_margin)
+        account.instants += self._roads(lanes, n, account) + self._pairs(longer, n, account)
         for scenario in scenarios:
             self._states(scenario, account)
             self._passing(scenario, account)
@@ -106,12 +113,13 @@ class Recheck:
                     lanes.boxes(lane[open_], time[open_]), all_matches=False, return_distance=True
                 )
                 gap[open_[at]] = left
-            near = (gap <= TOUCH) | (time == 0.0)  # an edge may be touched; who starts inside and crosses none stays inside
+            # an edge may be touched; who starts inside and crosses none stays inside
+            near = (gap <= TOUCH) | (time == lanes.begin[lane])
             out = np.zeros(len(lane), dtype=np.bool_)
             out[near] = ~shapely.covers(self.area, lanes.boxes(lane[near], time[near], TOUCH))
             return gap, out
 
-        bad, looked = advance(len(lanes.end), lanes.end, paces, distance)
+        bad, looked = advance(lanes.begin, lanes.end, paces, distance)
         for lane in np.flatnonzero(bad).tolist():
             account.add("off_road", f"vehicle {lane % n} of scenario {lane // n} of the batch")
         return looked
@@ -132,7 +140,8 @@ class Recheck:
                 gap = shapely.distance(lanes.boxes(task * n + a, time), lanes.boxes(task * n + b, time))
                 return gap, gap <= 0.0
 
-            bad, more = advance(count, lanes.end[a::n], paces, distance)
+            both = np.maximum(lanes.begin[a::n], lanes.begin[b::n]), np.minimum(lanes.end[a::n], lanes.end[b::n])
+            bad, more = advance(*both, paces, distance)
             looked += more
             for task in np.flatnonzero(bad).tolist():
                 account.add("overlap", f"vehicles {a} and {b} of scenario {task} of the batch")
@@ -231,7 +240,7 @@ def _orders(s: Scenario, only: Any = None) -> Iterator[tuple[tuple[int, int], in
 
 def _order(s: Scenario, a: int, b: int, step: float | None = None) -> int | None:
     """The order of one pair; None without a conflict. Entries too near to each other are looked at more closely."""
-    time, poses = _sampled(s, (a, b), step)
+    time, poses = zip(*(_sampled(s, v, step) for v in (a, b)), strict=True)
     moved = [_distinct(p, COARSE if step is None else FINE) for p in poses]
     boxes = [
         boxes_at(p[m], np.repeat([[0.5 * v.length - TOUCH, 0.5 * v.width - TOUCH]], len(m), axis=0))
@@ -240,7 +249,7 @@ def _order(s: Scenario, a: int, b: int, step: float | None = None) -> int | None
     i, j = shapely.STRtree(boxes[1]).query(boxes[0], predicate="intersects")
     if not len(i):
         return None
-    times = [time[m] for m in moved]
+    times = [t[m] for t, m in zip(time, moved, strict=True)]
     lead = _lead(poses[0][moved[0]], poses[1][moved[1]], times, (i, j), max(s.vehicles[a].length, s.vehicles[b].length))
     if lead:
         return lead
@@ -253,13 +262,14 @@ def _order(s: Scenario, a: int, b: int, step: float | None = None) -> int | None
     return 1 if entry[0] < entry[1] else -1
 
 
-def _sampled(s: Scenario, pair: tuple[int, int], step: float | None) -> tuple[Floats, list[Floats]]:
-    """Times (M,) and the poses (M, 3) of both vehicles."""
+def _sampled(s: Scenario, v: int, step: float | None) -> tuple[Floats, Floats]:
+    """Times (M,) and poses (M, 3) of a vehicle while it is there."""
+    first, last = s.present[v]
     if step is None:
-        return s.time, [np.column_stack([s.position[v], s.heading[v]]) for v in pair]
-    time = np.arange(0.0, s.time[-1], step)
-    lanes = Lanes.of([s])
-    return time, [lanes.poses(np.full(len(time), v), time) for v in pair]
+        own = slice(first, last + 1)
+        return s.time[own], np.column_stack([s.position[v, own], s.heading[v, own]])
+    time = np.arange(s.time[first], s.time[last], step)
+    return time, Lanes.of([s]).poses(np.full(len(time), v), time)
 
 
 def _distinct(poses: Floats, apart: float) -> Ints:
@@ -294,7 +304,8 @@ def _waits(encounter: Encounter) -> list[tuple[int, int]]:
     """
     reach = round(0.25 / encounter.dt)
     counts = []
-    for speed in encounter.speed:
+    for row, (first, last) in zip(encounter.speed, encounter.present, strict=True):
+        speed = row[first : last + 1]
         padded = np.pad(speed, reach, mode="edge")
         smooth = np.convolve(padded, np.full(2 * reach + 1, 1.0 / (2 * reach + 1)), mode="valid")
         slow = np.concatenate([[0], (smooth < 0.5).astype(np.int64), [0]])
@@ -308,10 +319,12 @@ def _waits(encounter: Encounter) -> list[tuple[int, int]]:
 
 def _stands(s: Scenario, v: int, limit: float) -> list[float]:
     """Lengths [s] of the stretches in which speed and displacement stay below `limit` [m/s]."""
-    way = np.hypot(*np.diff(s.position[v], axis=0).T) / np.diff(s.time)
-    slow = (s.speed[v, 1:] < limit) & (s.speed[v, :-1] < limit) & (way < limit)
+    there = slice(s.present[v, 0], s.present[v, 1] + 1)
+    time, speed = s.time[there], s.speed[v, there]
+    way = np.hypot(*np.diff(s.position[v, there], axis=0).T) / np.diff(time)
+    slow = (speed[1:] < limit) & (speed[:-1] < limit) & (way < limit)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], slow.astype(np.int64), [0]])))
-    return [float(s.time[b] - s.time[a]) for a, b in edges.reshape(-1, 2).tolist()]
+    return [float(time[b] - time[a]) for a, b in edges.reshape(-1, 2).tolist()]
 
 
 def batches(scenarios: Sequence[Scenario], size: int = 400) -> Iterator[Sequence[Scenario]]:

@@ -15,7 +15,8 @@
 """Conservative advancement over many motions at once: a step is as long as the distance left, divided by the fastest approach.
 
 Written for the independent re-check; it shares no line with the checker. Motions are those that `Scenario` defines: position the
-cubic Hermite interpolant, heading linear between samples.
+cubic Hermite interpolant, heading linear between samples. A vehicle that comes or goes within a scenario drove on an arc before
+and drives on along one afterwards.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,6 +32,7 @@ from scenario_gen.types.scenario import Scenario
 RESOLUTION = 1e-3  # s, the shortest step
 SLOT = 1e3  # s, longer than any scenario: lane n has the times n * SLOT ...
 WAY = 2e4  # m, longer than any way
+ROUNDING = 1e-9  # s, instants are whole nanoseconds
 TOUCH = 1e-6  # m, a footprint is shrunk by this before it is compared with the road, whose edge it may touch
 
 
@@ -40,32 +42,36 @@ class Lanes:
 
     Attributes:
         key: (S,) time of each sample plus its lane's slot, ascending.
-        end: (L,) s.
+        begin, end: (L,) s, from when to when the vehicle is there.
         pose: (S, 3) x, y, yaw; velocity: (S, 2) m/s.
         half: (L, 2) half lengths and widths [m].
     """
 
     key: Floats
+    begin: Floats
     end: Floats
     pose: Floats
     velocity: Floats
     half: Floats
 
     @classmethod
-    def of(cls, scenarios: Sequence[Scenario]) -> "Lanes":
-        """All vehicles of all scenarios, scenario by scenario."""
+    def of(cls, scenarios: Sequence[Scenario], margin: float = 0.0) -> "Lanes":
+        """All vehicles of all scenarios, scenario by scenario; each is there for `margin` [s] longer, up to an instant."""
         key: list[Floats] = []
-        end: list[float] = []
+        there: list[tuple[float, float]] = []
         pose, velocity, half = [], [], []
         for s in scenarios:
             for n, vehicle in enumerate(s.vehicles):
-                key.append(s.time + SLOT * len(end))
-                end.append(float(s.time[-1]))
-                yaw = s.heading[n]
-                pose.append(np.column_stack([s.position[n], yaw]))
+                key.append(s.time + SLOT * len(there))
+                came, went = s.time[s.present[n]]
+                before, after = s.time[s.time <= came - margin + ROUNDING], s.time[s.time >= went + margin - ROUNDING]
+                there.append((float(np.append(s.time[0], before)[-1]), float(np.append(after, s.time[-1])[0])))
+                pose.append(_driven_on(s, n))
+                yaw = pose[-1][:, 2]
                 velocity.append(s.speed[n][:, None] * np.column_stack([np.cos(yaw), np.sin(yaw)]))
                 half.append((0.5 * vehicle.length, 0.5 * vehicle.width))
-        return cls(np.concatenate(key), np.array(end), np.concatenate(pose), np.concatenate(velocity), np.array(half))
+        begin, end = np.array(there).T
+        return cls(np.concatenate(key), begin, end, np.concatenate(pose), np.concatenate(velocity), np.array(half))
 
     def _interval(self, lane: Ints, time: Floats) -> tuple[Ints, Floats, Floats]:
         """First sample of the interval that holds each time, its length [s], and the share of it that has passed."""
@@ -97,6 +103,19 @@ class Lanes:
     def turning(self) -> Floats:
         """(S - 1,) rad/s."""
         return np.asarray(np.abs(np.diff(self.pose[:, 2])) / np.diff(self.key))
+
+
+def _driven_on(s: Scenario, n: int) -> Floats:
+    """Poses (T, 3) of a vehicle; outside of its presence it keeps the speed and the rate of turn of its first or last step."""
+    first, last = s.present[n].tolist()
+    pose = np.column_stack([s.position[n], s.heading[n]])
+    for end, inner, beyond in ((first, first + 1, slice(first)), (last, last - 1, slice(last + 1, None))):
+        since = s.time[beyond] - s.time[end]
+        rate = (pose[inner, 2] - pose[end, 2]) / (s.time[inner] - s.time[end])
+        turned = np.expm1(1j * rate * since) / (1j * rate) if rate else since  # the integral of exp(i rate t)
+        way = s.speed[n, end] * np.exp(1j * pose[end, 2]) * turned
+        pose[beyond] = pose[end] + np.column_stack([way.real, way.imag, rate * since])
+    return pose
 
 
 def boxes_at(poses: Floats, half: Floats) -> Any:
@@ -139,19 +158,21 @@ class Paces:
         return np.where(beyond, end + 1.0, later)
 
 
-def advance(count: int, end: Floats, paces: Paces, distance: Callable[[Ints, Floats], tuple[Floats, Bools]]) -> tuple[Bools, int]:
-    """Advance `count` tasks from 0 to `end` (count,) [s].
+def advance(
+    begin: Floats, end: Floats, paces: Paces, distance: Callable[[Ints, Floats], tuple[Floats, Bools]]
+) -> tuple[Bools, int]:
+    """Advance tasks from `begin` to `end` (L,) [s].
 
     Args:
-        count: tasks.
+        begin: where each starts; one that starts after its end has nothing to look at.
         end: where each is done.
         paces: bounds of approach.
         distance: of tasks (M,) at times (M,): metres left, and whether there is a violation at that very instant.
 
     Returns:
-        (count,) True where a violation was found, and the number of instants looked at.
+        (L,) True where a violation was found, and the number of instants looked at.
     """
-    bad, time, open_, looked = np.zeros(count, dtype=np.bool_), np.zeros(count), np.arange(count), 0
+    bad, time, open_, looked = np.zeros(len(end), dtype=np.bool_), begin.copy(), np.flatnonzero(begin <= end), 0
     while len(open_):
         left, violated = distance(open_, time[open_])
         looked += len(open_)

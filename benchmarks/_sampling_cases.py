@@ -78,7 +78,7 @@ def cases() -> Iterator[Prepared | str]:
     for path in sorted((DATA / "trajectories").glob("*/encounter_*.csv"))[:LOGS]:
         encounter = read_log(path).encounters[0]
         segmentation = segment(encounter)
-        conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
+        conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
         waits = find_waits(encounter)
         for road_name in ROADS:
             name = path.stem.removeprefix("encounter_")[:32]

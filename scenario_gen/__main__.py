@@ -37,6 +37,7 @@ def command() -> None:
     except MissingExtraError as error:
         sys.exit(f"error: {error}")
 
+    sys.warnoptions.append("ignore:resource_tracker")  # of the processes of a killed one: it removes what they left, and says so
     sweep_beside(sys.argv[1:])  # what killed commands left
     run()
 

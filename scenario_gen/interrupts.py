@@ -122,6 +122,23 @@ def uninterrupted() -> Iterator[None]:
         _leave(_pending)
 
 
+@contextmanager
+def starting() -> Iterator[None]:
+    """Let processes that are started inside hear no Ctrl-C, which a terminal sends to them, too: it is for this one, afterwards.
+
+    They are deaf to it before their first line; what they load meanwhile would end in a traceback.
+    """
+    from multiprocessing import resource_tracker
+
+    with uninterrupted():
+        resource_tracker.ensure_running()  # it unblocks Ctrl-C when it begins, and else begins with the first process
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _leave(number: int) -> None:
     signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # a second Ctrl-C does not disturb this
     for clean_up in reversed(_endings):

@@ -143,7 +143,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if not item.get_closest_marker("long")]
-    for item in items:
+    for item in items if config.pluginmanager.hasplugin("xdist") else ():
         if not item.get_closest_marker("spread"):
             needed = getattr(item, "fixturenames", ())  # items of launch_testing and other plugins need not have any
             item.add_marker(pytest.mark.xdist_group("browser" if "browser" in needed else item.path.stem))

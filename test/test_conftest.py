@@ -60,7 +60,9 @@ def pytest_collect_file(file_path, parent):
 """
 
 
-@pytest.mark.parametrize("words", [(), ("-n", "2", "--dist", "loadgroup")], ids=["alone", "two workers"])
+@pytest.mark.parametrize(
+    "words", [("-p", "no:xdist", "--strict-markers"), ("-n", "2", "--dist", "loadgroup")], ids=["alone", "two workers"]
+)
 def test_items_of_other_plugins_need_no_fixture_names(tmp_path, words):
     for name in ("conftest.py", "lengths.py", "skips.py"):
         (tmp_path / name).write_text(Path(__file__).with_name(name).read_text())

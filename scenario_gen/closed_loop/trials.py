@@ -31,7 +31,7 @@ from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
 from scenario_gen.errors import InputError, ScenarioGenError
 from scenario_gen.evaluation.bootstrap import wilson
-from scenario_gen.interrupts import end_with_parent
+from scenario_gen.interrupts import end_with_parent, starting
 from scenario_gen.parameters import parameter, Parameters
 from scenario_gen.recordings.read import INFO, read_recording, ScenarioEntry, SCENARIOS, WITNESS
 from scenario_gen.storage.bag import within
@@ -197,7 +197,9 @@ def run_trials(
     with ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent) as pool:
         try:
             at_once = min(max(len(tasks) // workers, 1), 4)
-            return _gathered(pool.map(_run, tasks, chunksize=at_once), outcomes, len(trials), progress)
+            with starting():
+                results = pool.map(_run, tasks, chunksize=at_once)
+            return _gathered(results, outcomes, len(trials), progress)
         except BrokenProcessPool as error:
             raise InputError(
                 f"a process that drove the planner has ended after {len(outcomes)} of {len(tasks)} drives: it crashed, called "

@@ -25,6 +25,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from hashlib import sha256
 from itertools import islice
 import json
@@ -41,6 +42,7 @@ from scenario_gen.evaluation.motion import at_period
 from scenario_gen.folders import sha256_of, write_text
 from scenario_gen.folders.claim import alone
 from scenario_gen.folders.scratch import sweep_tree
+from scenario_gen.interrupts import ending
 from scenario_gen.nearest import attempt
 from scenario_gen.recordings.provenance import parameter_texts, versions
 from scenario_gen.recordings.write import add_results, scenario_bytes
@@ -144,7 +146,7 @@ def run_batch(
         "parameters": parameter_texts(config),
     }
     out.mkdir(parents=True, exist_ok=True)
-    with alone(out), spread(workers, scheduler, told) as go:
+    with alone(out), ending(partial(sweep_tree, out)), spread(workers, scheduler, told) as go:
         _agree(out, document)
         sweep_tree(out)
         return summary(

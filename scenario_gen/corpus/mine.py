@@ -25,6 +25,7 @@ A file that is there is done, so a run that was killed goes on where it was.
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 import json
 from pathlib import Path
@@ -52,6 +53,7 @@ from scenario_gen.errors import InputError, needs
 from scenario_gen.folders import write_text
 from scenario_gen.folders.claim import alone
 from scenario_gen.folders.scratch import sweep_tree
+from scenario_gen.interrupts import ending
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.read import is_bag, is_spmd, is_table
 from scenario_gen.parameters import flatten
@@ -134,7 +136,7 @@ def mine(
     messages, logs, others = inventory(archives)
     check_out(out, archives)
     out.mkdir(parents=True, exist_ok=True)
-    with alone(out), spread(workers, scheduler, told) as go:
+    with alone(out), ending(partial(sweep_tree, out)), spread(workers, scheduler, told) as go:
         _agree(out, messages, logs, config)
         sweep_tree(out)
         log_tasks = [

@@ -19,17 +19,21 @@ distribution, nothing else: it holds no state that a killed run would lose.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, ExitStack
+from contextlib import contextmanager, ExitStack, suppress
+from functools import partial
 import logging
+import multiprocessing
 import os
 from pathlib import Path
 import shutil
+import tempfile
 import time
 import traceback
 from typing import Any, TypeVar
 
 from scenario_gen.errors import InputError, needs
 from scenario_gen.folders import naming, scratch, sync
+from scenario_gen.interrupts import ending, starting
 
 Task = TypeVar("Task")
 Told = Callable[[int, int, str], None]
@@ -151,14 +155,28 @@ def _guarded(function: Callable[[Any], Any], task: Any) -> str:
 @contextmanager
 def _client(workers: int, scheduler: str) -> Iterator[Any]:
     """A client of a cluster on this machine, or of one that runs."""
-    import dask
-    from distributed import Client, LocalCluster
+    from distributed import Client
 
     if scheduler:
         with Client(scheduler) as client:
             yield client
         return
+    with ExitStack() as stack:
+        place = stack.enter_context(scratch(Path(tempfile.gettempdir())))
+        with starting():
+            cluster = stack.enter_context(_cluster(workers, place))
+            stack.enter_context(ending(partial(_end, cluster)))
+        yield stack.enter_context(Client(cluster))
+
+
+@contextmanager
+def _cluster(workers: int, place: Path) -> Iterator[Any]:
+    """Processes of this machine, which may write intermediate files to `place`."""
+    import dask
+    from distributed import LocalCluster
+
     settings = {
+        "temporary-directory": str(place),
         "distributed.scheduler.allowed-failures": 10,
         "distributed.worker.daemon": True,
         "distributed.worker.profile.enabled": False,
@@ -166,11 +184,15 @@ def _client(workers: int, scheduler: str) -> Iterator[Any]:
         "distributed.nanny.pre-spawn-environ": WORKERS,
     }
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # a worker that dies is said here, by its tasks
-    with (
-        dask.config.set(settings),
-        LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", memory_limit=0
-        ) as cluster,
-        Client(cluster) as client,
-    ):
-        yield client
+    sizes = {"n_workers": workers, "threads_per_worker": 1, "memory_limit": 0}
+    with dask.config.set(settings), LocalCluster(**sizes, processes=True, dashboard_address="127.0.0.1:0") as cluster:
+        yield cluster
+
+
+def _end(cluster: Any) -> None:
+    """End the processes of a cluster at once, so that they write nothing more, and nobody starts them again."""
+    cluster.loop.add_callback(cluster.loop.stop)
+    for process in multiprocessing.active_children():
+        process.kill()
+        with suppress(ChildProcessError):  # Dask was told already, and else is to be told: it fails where another takes the news
+            os.waitid(os.P_PID, process.pid or 0, os.WEXITED | os.WNOWAIT)

@@ -36,6 +36,7 @@ import time
 from scenario_gen.errors import InputError
 from scenario_gen.folders.disk import discard, is_gone, naming
 from scenario_gen.folders.marker import is_marked, objection
+from scenario_gen.interrupts import ending
 
 PREFIX, GUARD = ".scenario_gen-", ".scenario_gen.lock"
 OWNER, NEW, OLD = "owner.json", "new", "old"
@@ -128,7 +129,8 @@ def alone(parent: Path, patience: float = PATIENCE) -> Iterator[None]:
         if os.fstat(descriptor).st_size:
             raise InputError(f"{path} is needed as a lock, but has a content; move it away")
         try:
-            yield
+            with ending(path.unlink):
+                yield
         finally:
             with suppress(OSError):
                 path.unlink()

@@ -69,7 +69,7 @@ def sweep(folder: Path) -> None:
     """Remove what killed processes left in a folder; what cannot be removed, or is in the hands of another, stays."""
     with suppress(OSError, InputError):
         with os.scandir(folder) as found:
-            left = any(entry.name.startswith(PREFIX) for entry in found)
+            left = any(entry.name.startswith(PREFIX) or entry.name == GUARD for entry in found)
         if left:
             with alone(folder, patience=0.0):
                 settle(folder / GUARD)

@@ -31,6 +31,7 @@ from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.ego import together
 from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.generation import GenerationResult, WITHOUT
+from scenario_gen.types.presence import at_ends
 from scenario_gen.types.scenario import EgoSlot, Scenario, ScenarioSet, Verdict
 from scenario_gen.validity import Checker, Limits
 
@@ -122,7 +123,8 @@ def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Lim
             road = namespace.road
             if namespace.roads_differ:
                 road = namespace.road_of(entry, encounter.start_ns) if map_hash else None
-            reference = Reference(road, names, tuple(conflicts), waits, orders_asked(conflicts, order), reactions)
+            first, ends = orders_asked(conflicts, order), at_ends(encounter.present, len(encounter.time))
+            reference = Reference(road, names, tuple(conflicts), waits, first, reactions, ends=ends)
             checkers[key] = reference.checker(scenario, limits, None)
         verdicts += checkers[key].check([scenario])
     return verdicts

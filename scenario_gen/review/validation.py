@@ -27,6 +27,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from scenario_gen.arrays import Bools
 from scenario_gen.errors import InputError
 from scenario_gen.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS, WITNESS
 from scenario_gen.storage.bag import within
@@ -36,6 +37,7 @@ from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.ego import together
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.names import tokens
+from scenario_gen.types.presence import at_ends
 from scenario_gen.types.reaction import Reaction
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario
@@ -88,7 +90,8 @@ class Reference:
     """What the scenarios of one stamp are held against.
 
     `first` says who must go first at each conflict, by index in `template`, None for anyone; nothing: as in the template.
-    `reactions` are those of the template that the entry says are kept.
+    `reactions` are those of the template that the entry says are kept. `ends` (N, 2) says who of `template` is there at its first
+    and last instant.
     """
 
     road: Road | None
@@ -97,6 +100,7 @@ class Reference:
     waits: tuple[Wait, ...] | None
     first: tuple[int | None, ...] = ()
     reactions: tuple[Reaction, ...] = ()
+    ends: Bools | None = None
 
     def checker(self, scenario: Scenario, limits: Limits | None, asked: BoundaryStates | None) -> Checker:
         """Return the checker of scenarios with this one's vehicles, of which `asked` was asked."""
@@ -110,7 +114,8 @@ class Reference:
         first = [None if one is None else at[one] for one in (asked_first[k] for k in known)]
         waits = None if self.waits is None else [replace(w, vehicle=at[w.vehicle]) for w in self.waits if w.vehicle in at]
         edges = [replace(e, who=at[e.who], whom=at[e.whom]) for e in self.reactions if {e.who, e.whom} <= set(at)]
-        return Checker(self.road, asked, conflicts, waits, limits, first, edges)
+        ends = None if self.ends is None else self.ends[list(at)]
+        return Checker(self.road, asked, conflicts, waits, limits, first, edges, ends)
 
 
 def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = BagConfig()) -> tuple[Validation, ...]:
@@ -211,4 +216,5 @@ def _reference(namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
     reactions = kept_reactions(encounter, names, entry)
     first = orders_asked(conflicts, entry.order if entry else "keep")
-    return Reference(road, names, tuple(conflicts), waits, first, reactions)
+    ends = at_ends(encounter.present, len(encounter.time))
+    return Reference(road, names, tuple(conflicts), waits, first, reactions, ends)

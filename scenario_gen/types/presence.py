@@ -61,9 +61,15 @@ def _sealed(array: Ints) -> Ints:
     return array
 
 
+def at_ends(present: Ints, samples: int) -> Bools:
+    """Return (N, 2) whether each vehicle is there at the first and at the last of T `samples`, of presence (N, 2)."""
+    there: Bools = present == (0, samples - 1)
+    return there
+
+
 def always(present: Ints, samples: int) -> bool:
     """Return whether everybody (N, 2) is there at all T `samples`."""
-    return bool((present[:, 0] == 0).all() and (present[:, 1] == samples - 1).all())
+    return bool(at_ends(present, samples).all())
 
 
 def held(values: Floats, present: Ints) -> Floats:

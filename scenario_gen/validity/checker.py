@@ -20,14 +20,14 @@ from itertools import combinations
 import numpy as np
 
 from scenario_gen import exact
-from scenario_gen.arrays import Floats, runs
+from scenario_gen.arrays import Bools, Floats, runs
 from scenario_gen.errors import InputError
 from scenario_gen.roads.clearance import clearance_in_cells
 from scenario_gen.roads.vector.ground import drives_against
 from scenario_gen.template.answers import conflict_of, lag_behind, time_gaps
 from scenario_gen.template.interaction import Conflict, find_conflicts, orders_asked, Wait
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.presence import together
+from scenario_gen.types.presence import at_ends, together
 from scenario_gen.types.reaction import FOLLOW, Reaction
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, Verdict, Violation
@@ -57,6 +57,7 @@ class Checker:
         limits: Limits | None = None,
         first: Sequence[int | None] | None = None,
         reactions: Sequence[Reaction] = (),
+        ends: Bools | None = None,
     ) -> None:
         """Prepare for many scenarios of one request.
 
@@ -69,7 +70,10 @@ class Checker:
             first: who must go first at each of them, by index, None for anyone (`orders_asked`); a conflict whose order is
                 not the template's must be there.
             reactions: of the template, which every scenario keeps.
+            ends: (N, 2) whether each vehicle is there at the template's first and last instant, as it then must be at the
+                scenario's; None if that is not known.
         """
+        self.ends = ends
         self._first = tuple(conflict.first for conflict in conflicts or ()) if first is None else tuple(first)
         self.road, self.asked, self.conflicts, self.waits = road, asked, conflicts, waits
         self.limits, self.reactions = limits or Limits(), tuple(reactions)
@@ -105,7 +109,8 @@ class Checker:
         """
         conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
         own = (limits or Limits()).for_template(encounter)
-        return cls(road, asked, conflicts, waits, own, orders_asked(conflicts, order), reactions)
+        ends = at_ends(encounter.present, len(encounter.time))
+        return cls(road, asked, conflicts, waits, own, orders_asked(conflicts, order), reactions, ends)
 
     @property
     def not_applicable(self) -> tuple[str, ...]:
@@ -137,6 +142,7 @@ class Checker:
         control = np.empty((n, t - 1, 4, 2))
         control_points(time, scenario.position, heading, scenario.speed, control)
         violations = [
+            *self._ends(scenario),
             *self._boundary_states(scenario),
             *self._dynamics(scenario),
             *self._overlaps(scenario, control, half),
@@ -161,7 +167,7 @@ class Checker:
         if self.road is not None and scenario.frame_id != self.road.frame_id:
             raise InputError(f"{where} is in frame {scenario.frame_id!r}, its road in {self.road.frame_id!r}")
         known = () if self.asked is None else (self.asked.start, self.asked.end, self.asked.freed)
-        counts = sorted({len(states) for states in known} - {n})
+        counts = sorted({len(states) for states in (*known, *(() if self.ends is None else (self.ends,)))} - {n})
         if counts:
             raise InputError(f"{where} has {n} vehicle(s), but states were asked for {counts[0]}")
         indices = [i for c in self.conflicts or () for i in (c.first, c.second)] + [w.vehicle for w in self.waits or ()]
@@ -171,6 +177,19 @@ class Checker:
             raise InputError(
                 f"{where} has {n} vehicle(s), but the template's waits, conflicts and reactions name vehicle {strangers[0]}"
             )
+
+    def _ends(self, scenario: Scenario) -> Iterator[Violation]:
+        """Vehicles that come or go within the scenario, though the template has them from its start or to its end.
+
+        Who stands could else vanish at once: its first and last state are as asked, and nobody meets it.
+        """
+        if self.ends is None or scenario.all_present:
+            return
+        for i, k in np.argwhere(self.ends & ~at_ends(scenario.present, len(scenario.time))).tolist():
+            what, where = ("goes", "to its end") if k else ("comes", "from its start on")
+            time = float(scenario.time[scenario.present[i, k]])
+            message = f"vehicle {i}: {what} at {time:.3f} s; the template has it {where}"
+            yield Violation(Cause.BOUNDARY_STATE, time, (i,), message)
 
     def _boundary_states(self, scenario: Scenario) -> Iterator[Violation]:
         if self.asked is None:
@@ -349,11 +368,11 @@ class Checker:
         waits = self.waits or ()
         for i in sorted({wait.vehicle for wait in waits}):
             asked = [wait for wait in waits if wait.vehicle == i]
-            if self._never_moves(i, asked[0].start, scenario):
-                if self._slow(scenario, i, self.limits.stand_speed) != [tuple(scenario.present[i].tolist())]:
-                    k = int(np.argmax(scenario.speed[i]))
-                    message = f"vehicle {i}: waits throughout in the template, but reaches {scenario.speed[i, k]:.3f} m/s"
-                    yield Violation(Cause.STOP_NOT_KEPT, float(scenario.time[k]), (i,), message)
+            throughout = [tuple(scenario.present[i].tolist())]
+            if self._never_moves(i, asked[0].start, scenario) and self._slow(scenario, i, self.limits.stand_speed) != throughout:
+                k = int(np.argmax(scenario.speed[i]))
+                message = f"vehicle {i}: waits throughout in the template, but reaches {scenario.speed[i, k]:.3f} m/s"
+                yield Violation(Cause.STOP_NOT_KEPT, float(scenario.time[k]), (i,), message)
                 continue
             standing = [wait for wait in asked if not wait.creeps]
             for wanted, limit, verb in ((standing, self.limits.stand_speed, "stands"), (asked, self.limits.creep_speed, "waits")):

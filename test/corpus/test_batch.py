@@ -108,6 +108,26 @@ def test_a_killed_run_with_two_processes_ends_with_the_same_bytes(batch, corpus,
     assert digests(out) == digests(batch[0]) and made.lines() == batch[1].lines()
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_a_batch_of_two_processes_that_is_ended_leaves_only_what_is_done(corpus, tmp_path, number):
+    """By Ctrl-C in a terminal, which all processes get, at once; after SIGKILL with the next command."""
+    out, own = tmp_path / "out", os.environ | {"TMPDIR": str(tmp_path)}
+    words = [sys.executable, "-m", "scenario_gen", "batch", str(corpus[0]), "--out", str(out), "--count", "200"]
+    words += ["--roads", ",".join(ROADS), "--workers", "2"]
+    pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(words, start_new_session=True, env=own, preexec_fn=interruptible, **pipes) as run:  # noqa: PLW1509
+        while run.poll() is None and not list(out.rglob(".scenario_gen-*/new/*")):
+            time.sleep(0.01)
+        assert run.poll() is None, "it ended before it could be stopped"
+        os.kill(run.pid, number) if number == signal.SIGKILL else os.killpg(run.pid, number)
+        said = run.stderr.read()  # up to the end of the last process
+    assert said.strip() == ("" if number == signal.SIGKILL else "stopped by SIGINT")
+    if number == signal.SIGKILL:
+        subprocess.run([*words[:3], "validate", str(out)], env=own, capture_output=True, check=False)
+    assert not list(tmp_path.rglob(".scenario_gen*")) and [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
 @pytest.mark.parametrize(
     ("inside", "said"), [("", "of which it would"), ("batch", "of which it would"), ("archive.json", "is a file")]
 )

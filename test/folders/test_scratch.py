@@ -15,13 +15,17 @@
 """Scratch folders: gone at the end, of the living kept, of the dead swept, wherever a command may have left them."""
 
 from contextlib import suppress
+import multiprocessing
 import os
+import signal
+import subprocess
 
 import pytest
 
 from scenario_gen.folders import scratch
-from scenario_gen.folders.claim import alone, claim, PREFIX
+from scenario_gen.folders.claim import alone, claim, GUARD, PREFIX
 from scenario_gen.folders.scratch import sweep, sweep_beside
+from scenario_gen.interrupts import leave, starting
 
 
 def left(folder):
@@ -65,6 +69,47 @@ def test_who_looks_through_a_folder_is_not_waited_for(tmp_path):
         assert len(left(tmp_path)) == 1
     sweep(tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("number", "stays"), [(signal.SIGINT, False), (signal.SIGKILL, True)])
+def test_the_lock_of_a_folder_goes_with_who_holds_it(tmp_path, number, stays):
+    """By Ctrl-C at once, after SIGKILL with the next command; one that is held, or has a content, stays."""
+    pid = os.fork()
+    if not pid:
+        try:
+            signal.signal(signal.SIGINT, leave)
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+            with alone(tmp_path):
+                os.kill(os.getpid(), number)
+        finally:
+            os._exit(1)
+    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == (-number if stays else 128 + number)
+    lock = tmp_path / GUARD
+    assert lock.exists() == stays
+    sweep(tmp_path)
+    assert not lock.exists()
+    with alone(tmp_path):
+        sweep(tmp_path)
+        assert lock.exists()
+    lock.write_text("somebody's own")
+    sweep(tmp_path)
+    assert lock.exists()
+
+
+def test_what_is_started_hears_no_ctrl_c():
+    def said():
+        run = subprocess.run(["sh", "-c", "kill -INT $$; echo deaf"], capture_output=True, text=True, check=False)
+        return run.stdout
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
+    try:
+        with starting():
+            context = multiprocessing.get_context("spawn")
+            context.Semaphore()  # which needs the tracker that unblocks it
+            assert said() == "deaf\n"
+        assert said() == ""
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.parametrize("words", [["{}"], ["--out", "{}"], ["--out={}"], ["x", "{}/bag"], ["\0", "{}/"]])

@@ -54,6 +54,7 @@ HEADROOM = 3 << 30  # bytes of address space that an execution may ask for: more
 SILENT = 60.0  # s of CPU without progress after which the child hangs outside of Python
 ASLEEP = 600.0  # s without progress after which one hangs that does not even work
 BATCH = 5000  # executions of one child
+SAVED = 30.0  # s after which a child makes room for the next, and progress is kept: who is stopped loses no more
 
 Mutator = Callable[[random.Random, bytes, Sequence[bytes]], bytes]
 
@@ -186,8 +187,13 @@ def over_time(_signal: int, _frame: object) -> None:
     raise OverTimeError(f"more than {SECONDS:g} s")
 
 
-def child(target: Target, seeds: Sequence[bytes], first: int, last: int, progress: mmap.mmap, pipe: int) -> None:
-    """Execute inputs `first` to before `last`; write the number of each before it runs, and failures to the pipe."""
+def child(
+    target: Target, seeds: Sequence[bytes], first: int, last: int, until: float, parent: int, progress: mmap.mmap, pipe: int
+) -> None:
+    """Execute inputs `first` to before `last`, or up to a time, or while the parent lives.
+
+    The number of each is written before it runs, and of the one to go on at; failures go to the pipe.
+    """
     warnings.simplefilter("ignore")
     os.fsync = lambda _: None  # slow, and nothing here outlives the machine
     gc.freeze()  # to look for garbage in what the parent has loaded would copy all of it
@@ -209,7 +215,9 @@ def child(target: Target, seeds: Sequence[bytes], first: int, last: int, progres
                 out.flush()
                 if peak() > most:  # it stays: a new child has its own
                     return
-        progress[:8] = struct.pack("<q", last)
+            progress[:8] = struct.pack("<q", number + 1)
+            if time.monotonic() > until or os.getppid() != parent:
+                return
 
 
 def batch(target: Target, seeds: Sequence[bytes], first: int, last: int, until: float) -> Iterator[tuple[int, str, str] | int]:
@@ -221,17 +229,17 @@ def batch(target: Target, seeds: Sequence[bytes], first: int, last: int, until: 
     progress = mmap.mmap(-1, 8)
     progress[:8] = struct.pack("<q", first)
     reading, writing = os.pipe()
-    pid = os.fork()
+    parent, pid = os.getpid(), os.fork()
     if pid == 0:
         code = 1
         try:
             os.close(reading)
-            child(target, seeds, first, last, progress, writing)
+            child(target, seeds, first, last, until, parent, progress, writing)
             code = 0
         finally:
             os._exit(code)
     os.close(writing)
-    status, died = watch(pid, progress, until)
+    status, died = watch(pid, progress)
     number = int(struct.unpack("<q", progress[:8])[0])
     with os.fdopen(reading) as lines:
         found = [json.loads(line) for line in lines if line.endswith("\n")]
@@ -253,7 +261,7 @@ def cpu_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def watch(pid: int, progress: mmap.mmap, until: float) -> tuple[int, str]:
+def watch(pid: int, progress: mmap.mmap) -> tuple[int, str]:
     """Wait for a child; return its status, and what killed it, if that was its input.
 
     Silence is measured in CPU time of the child, so that a busy machine is no hang; one that sleeps is waited for longer.
@@ -266,13 +274,10 @@ def watch(pid: int, progress: mmap.mmap, until: float) -> tuple[int, str]:
         now = time.monotonic()
         if progress[:8] != seen:
             seen, since, worked = progress[:8], now, cpu_seconds(pid)
-            hangs, over = False, now > until
-        else:
-            hangs = over = cpu_seconds(pid) - worked > SILENT or now - since > ASLEEP
-        if over:
+        elif cpu_seconds(pid) - worked > SILENT or now - since > ASLEEP:
             os.kill(pid, signal.SIGKILL)
             os.waitpid(pid, 0)
-            return status, "hangs in native code" if hangs else ""
+            return status, "hangs in native code"
         time.sleep(0.01)
 
 
@@ -295,7 +300,7 @@ def fuzz(target: Target, state: Path, executions: int, seconds: float, seeds: Se
     while record.executions < executions and record.seconds < seconds:
         started = time.monotonic()
         last = min(record.executions + BATCH, executions)
-        for found in batch(target, seeds, record.executions, last, started + seconds - record.seconds):
+        for found in batch(target, seeds, record.executions, last, started + min(seconds - record.seconds, SAVED)):
             if isinstance(found, int):
                 record.executions = found
                 continue

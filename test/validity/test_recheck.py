@@ -16,14 +16,17 @@
 
 from dataclasses import replace
 
-from motions import open_road, road_of, scenario_of, straight, wander
+from lengths import LONG
+from motions import FREE, open_road, road_of, scenario_of, straight, wander
 import numpy as np
 from oracle import boxes_at, drivable_area
 import pytest
 import shapely
+from test_validity_presence import overlaps, random_case
 
 from benchmarks._recheck import Account, Recheck
 from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.presence import ALWAYS
 from scenario_gen.types.scenario import BoundaryStates
 
 TIME = np.arange(101) * 0.1
@@ -36,7 +39,9 @@ def crossing(delay=3.0):
 
 
 def recheck_of(scenario, road=None, changepoints=True):
-    encounter = Encounter("t", scenario.vehicles, 0, 100_000_000, scenario.position, scenario.heading, scenario.speed)
+    encounter = Encounter(
+        "t", scenario.vehicles, 0, 100_000_000, scenario.position, scenario.heading, scenario.speed, present=scenario.present
+    )
     ends = (np.column_stack([scenario.position[:, k], scenario.heading[:, k], scenario.speed[:, k]]) for k in (0, -1))
     return Recheck(encounter, road or open_road(), BoundaryStates(*ends), changepoints)
 
@@ -119,3 +124,35 @@ def test_it_agrees_with_brute_force_on_random_motions():
         assert account.found["off_road"] == sum(off)
         agreed += meet + sum(off)
     assert agreed > 5, "some of them do collide or leave the road"
+
+
+@pytest.mark.parametrize(("comes", "clear"), [(42, False), (60, False), (62, True)])
+def test_nobody_stands_where_another_one_has_just_vanished(comes, clear):
+    scenario = scenario_of([straight(0.0, 0.0, 0.0, 0.0, TIME), straight(1.0, 0.0, 0.2, 0.0, TIME)], TIME)
+    scenario = replace(scenario, present=np.array([[0, 40], [comes, 100]]))
+    account = found(recheck_of(scenario), scenario)
+    assert account.found == ({} if clear else {"overlap": 1})
+
+
+def test_who_is_not_there_is_in_nobody_s_way():
+    """The second comes where the first drove long ago; before, it neither stands there nor is it first, and it does not wait."""
+    scenario = scenario_of([straight(-40.0, 0.0, 0.0, 10.0, TIME), straight(-20.0, -20.0, np.pi / 2, 4.0, TIME)], TIME)
+    late = replace(scenario, present=np.array([[0, 100], [40, 100]]))
+    recheck = recheck_of(late)
+    account = found(recheck, late)
+    assert (account.found, account.orders, recheck.orders) == ({}, 1, {(0, 1): 1})
+    standing = scenario_of([straight(-40.0, 9.0, 0.0, 0.0, TIME), straight(-20.0, -20.0, np.pi / 2, 4.0, TIME)], TIME)
+    short = recheck_of(replace(standing, present=np.array([[50, 55], [0, 100]])))
+    assert short.waits == [(0, 0), (0, 0)], "half a second is no wait"
+
+
+def test_it_agrees_with_brute_force_on_who_comes_and_goes():
+    met, seeds = 0, range(500) if LONG else (2, 3, 6, 8)  # of these four the margin decides three
+    for seed in seeds:
+        scenario, limits = random_case(seed)
+        recheck = recheck_of(replace(scenario, present=ALWAYS))
+        recheck.limits = replace(FREE, presence_margin=limits.presence_margin)
+        expected = len(overlaps(scenario, limits))
+        assert found(recheck, scenario).found["overlap"] == expected, seed
+        met += expected > 0
+    assert 0.25 * len(seeds) <= met <= 0.9 * len(seeds)

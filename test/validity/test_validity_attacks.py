@@ -21,8 +21,8 @@ import numpy as np
 import pytest
 
 from scenario_gen.errors import InputError
-from scenario_gen.template.interaction import Conflict, Wait
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.template.interaction import Conflict, find_waits, Wait
+from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Cause
 from scenario_gen.validity import Checker, checker, Limits
 from scenario_gen.validity.dynamics import LARGEST
@@ -74,6 +74,24 @@ def test_a_wait_or_a_conflict_of_nobody_is_refused(index):
         causes(passing(), waits=[Wait(index, 2.0, 8.0)])
     with pytest.raises(InputError, match=f"name vehicle {index}"):
         causes(passing(), conflicts=[Conflict(0, index, False, 1.0, 2.0, 3.0)])
+
+
+@pytest.mark.parametrize(("present", "ends"), [([0, 1], "goes"), ([99, 100], "comes"), ([50, 51], "comes")])
+def test_who_stands_in_the_way_does_not_vanish(present, ends):
+    """Its first and last state are as asked, it never moves, and it is gone when the other one drives through its place."""
+    template = scenario_of([straight(0, 0, 0, 0.0, TIME), straight(-25, 9, 0, 5.0, TIME)], TIME)
+    names = (template.vehicles, 0, 100_000_000, template.position, template.heading, template.speed)
+    encounter, asked = Encounter("t", *names), BoundaryStates(states(template, 0), states(template, -1))
+    own = Checker.of_template(encounter, open_road(), asked, find_waits(encounter), FREE)
+    assert not own.check([template])[0].violations
+    (verdict,) = own.check([replace(template, present=np.array([present, [0, 100]]))])
+    assert Cause.BOUNDARY_STATE in {violation.cause for violation in verdict.violations}
+    assert f"vehicle 0: {ends} at {0.1 * present[ends == 'goes']:.3f} s" in verdict.violations[0].message
+    late = replace(encounter, present=np.array([[20, 80], [0, 100]]))
+    own = Checker.of_template(late, open_road(), asked, find_waits(late), FREE)
+    assert not own.check([replace(template, present=np.array([[10, 90], [0, 100]]))])[0].violations, "who comes late may"
+    (verdict,) = own.check([replace(template, present=np.array([[20, 21], [0, 100]]))])
+    assert [violation.cause for violation in verdict.violations] == [Cause.STOP_NOT_KEPT], "but it waits"
 
 
 @pytest.mark.parametrize("rows", [[[0.9, 50.7], [51, 100]], [[np.nan, 50], [51, 100]], [["0", "50"], ["51", "100"]]])

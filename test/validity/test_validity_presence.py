@@ -93,12 +93,16 @@ def test_a_pair_that_nothing_looks_at_is_refused(monkeypatch):
         assert found == [Cause.OVERLAP] and "were not compared" in verdict.violations[0].message
 
 
-def random_case(seed):
-    """Two to five wandering or standing boxes, each there for a part of an uneven time; spans of 0, 1, 2 and more in common."""
+def random_case(seed, group=0):
+    """Two to five wandering or standing boxes, each there for a part of an uneven time; spans of 0, 1, 2 and more in common.
+
+    Or a `group` of so many, on as much more room.
+    """
     rng = np.random.default_rng(seed)
-    n = int(rng.integers(2, 6))
+    n = group or int(rng.integers(2, 6))
+    room = 3.0 * group or 12.0
     time = np.concatenate(([0.0], np.cumsum(rng.choice([0.1, 0.3, 1.0]) * rng.uniform(0.5, 1.5, 12))))
-    tracks = [wander(rng, time, 12.0, rng.choice([0.0, 12.0], p=[0.2, 0.8])) for _ in range(n)]
+    tracks = [wander(rng, time, room, rng.choice([0.0, 12.0], p=[0.2, 0.8])) for _ in range(n)]
     vehicles = tuple(Vehicle(str(i), *rng.uniform((1.5, 0.5), (12.0, 2.6))) for i in range(n))
     present = np.array([np.sort(rng.choice(len(time), 2, replace=False)) for _ in range(n)])
     if rng.random() < 0.5:  # the second comes about when the first goes
@@ -108,9 +112,9 @@ def random_case(seed):
     return replace(scenario_of(tracks, time, vehicles), present=present), replace(FREE, presence_margin=margin)
 
 
-def compare(seed):
+def compare(seed, group=0):
     """Assert that checker and oracle agree about overlaps; return (valid, spans in common of 0, 1, 2 and more samples)."""
-    scenario, limits = random_case(seed)
+    scenario, limits = random_case(seed, group)
     _, verdict = causes(scenario, road=None, limits=limits)
     refused = {violation.vehicles: violation for violation in verdict.violations if violation.cause is Cause.OVERLAP}
     pairs = {tuple(map(int, re.findall(r"\d+", found.split(" at ")[0]))) for found in overlaps(scenario, limits)}
@@ -131,6 +135,11 @@ def overlaps(scenario, limits):
 @settings(max_examples=1000 if LONG else 40)
 def test_checker_and_oracle_agree_on_who_comes_and_goes(seed):
     compare(seed)
+
+
+def test_checker_and_oracle_agree_on_groups_of_nine():
+    for seed in range(600 if LONG else 4):
+        compare(seed, 9)
 
 
 def test_the_random_cases_are_of_every_kind():
