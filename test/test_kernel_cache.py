@@ -45,6 +45,7 @@ def quarter(x):
 SERVER = """
 import os, sys, importlib.util
 import scenario_gen.kernels
+sys.dont_write_bytecode = True  # what is written twice in a second has the same stamp
 def load(name, path):
     spec = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)
