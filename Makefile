@@ -78,6 +78,7 @@ licences: $(TEST)
 	$(BIN)/python test/packaging/licences.py
 
 install: $(READY)
+	$(BIN)/python -m scenario_gen.compiling
 
 # The core first: with it the kernels of the stages are compiled, once for this user, while pip installs the rest.
 STAGES := exact template segmentation roads fitting routing sampling validity evaluation
@@ -92,11 +93,12 @@ $(RUN): requirements/core.lock requirements/run.lock requirements/ros.lock setup
 
 $(READY): $(RUN) requirements/extras.lock
 	$(LOCKED) -r requirements/extras.lock
-	$(BIN)/python -m scenario_gen.compiling
 	@touch $(READY)
 
 $(TEST): $(READY) requirements/test.lock requirements/ros-test.lock
-	$(LOCKED) -r requirements/test.lock $(if $(SOURCED),,-r requirements/ros-test.lock)
+	$(BIN)/python -m scenario_gen.compiling & kernels=$$!; \
+	$(LOCKED) -r requirements/test.lock $(if $(SOURCED),,-r requirements/ros-test.lock); \
+	installed=$$?; wait $$kernels && exit $$installed
 	@touch $(TEST)
 
 # The report's tests drive Chromium, package.xml is checked by xmllint; where they are missing and cannot be installed here, those tests
