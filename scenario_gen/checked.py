@@ -21,6 +21,7 @@ from scenario_gen.sampling import Cancelled, freed_states, kept_reactions, OnVal
 from scenario_gen.template.interaction import Wait, waits_to_keep
 from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types.lanes import MIRRORED
 from scenario_gen.types.request import Request
 from scenario_gen.validity import Checker, Limits
 
@@ -64,4 +65,6 @@ def sample_checked(
         encounter, planned.segmentation, road, planned.routes, fit.asked, check, sampling, count=count, seed=planned.seed,
         waits=waits, request=request, progress=progress, cancelled=cancelled, found=found, measures=MEASURES,
     )  # fmt: skip
-    return replace(planned, fit=fit, generated=replace(generated, graph=reactions_of(encounter)))
+    turned = [note for note in (road.lanes.notes if road.lanes is not None else ()) if note.startswith(MIRRORED)]
+    said = (*turned, *generated.adaptations)
+    return replace(planned, fit=fit, generated=replace(generated, adaptations=said, graph=reactions_of(encounter)))

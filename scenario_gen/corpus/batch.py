@@ -39,6 +39,7 @@ from scenario_gen.documents import read_json
 from scenario_gen.errors import InputError, needs, RefusedError
 from scenario_gen.evaluation.criticality import criticality
 from scenario_gen.evaluation.motion import at_period
+from scenario_gen.fitting import LostConflictError
 from scenario_gen.folders import sha256_of, write_text
 from scenario_gen.folders.claim import alone
 from scenario_gen.folders.scratch import sweep_tree
@@ -55,6 +56,7 @@ from scenario_gen.types.request import Request
 
 BATCH = "batch.json"
 TEMPLATES = 10  # of one task
+LOST_CONFLICT = "lost conflict"  # the cause of every case whose encounter is lost, whatever the road
 
 
 @dataclass(frozen=True)
@@ -248,7 +250,8 @@ def _case(row: Mapping[str, Any], table: Path, namespace: str, task: PartTask) -
         segmentation = segment(encounter, task.config.segmentation, seed)
         made = attempt(encounter, segmentation, road, task.config, Request(), count=task.count, seed=seed)
     except (RefusedError, InputError) as error:
-        cause = str(error).partition(":")[0] if isinstance(error, RefusedError) else "input"
+        said = LOST_CONFLICT if isinstance(error, LostConflictError) else str(error).partition(":")[0]
+        cause = said if isinstance(error, RefusedError) else "input"
         return case | {"cause": _cause(cause), "why": str(error)}, None
     generated = made.generated
     facts = {"template": row["name"], "roads": task.road, "seed": str(seed), "count": str(task.count)}

@@ -34,6 +34,7 @@ from scenario_gen.storage.bag import bag_topics, BagMessage, within
 from scenario_gen.storage.config import BagConfig
 from scenario_gen.storage.writer import atomic_bag
 from scenario_gen.template.interaction import waits_to_keep
+from scenario_gen.template.side import mirrored
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.request import Request
@@ -233,7 +234,8 @@ def _from_log(log: Path, recorded: Encounter, summary: RequestSummary, seed: int
         is_missing = "is not there" if not own else f"has sha256 {own}: it is another file, or was changed"
         raise InputError(f"{log} {is_missing}; the bag was made from {there}")
     config = read_parameters(LogConfig(), summary.values, "log.", what)
-    same = [e for e in read_log(log, config).encounters if e.start_ns == recorded.start_ns and same_tracks(e, recorded)]
+    images = (each for e in read_log(log, config).encounters if e.start_ns == recorded.start_ns for each in (e, mirrored(e)))
+    same = [e for e in images if same_tracks(e, recorded)]
     if not same:
         raise InputError(f"{log}: no encounter in it is the one on the bag's tracks, though the file is the same")
     return same[0], segment(same[0], read_parameters(SegmentationConfig(), summary.values, "segmentation.", what), seed)

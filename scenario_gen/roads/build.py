@@ -15,6 +15,7 @@
 """One door to every road: built-in, drawn around the template, or read from a map."""
 
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,7 @@ from scenario_gen.template.separation import own_paths
 from scenario_gen.template.side import mirrored, traffic_side
 from scenario_gen.template.tracks import clean_tracks, Track
 from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.lanes import MIRRORED
 from scenario_gen.types.road import Road
 
 
@@ -88,8 +90,9 @@ def road_and_template(name_or_path: str, encounter: Encounter, config: RoadConfi
     other = mirrored(encounter)
     with suppress(RefusedError):
         there = build_road(name_or_path, other, config)
-        if _on_other_side(encounter, there):
-            return there, other
+        if there.lanes is not None and _on_other_side(encounter, there):
+            said = f"{MIRRORED}: traffic on road {there.name} keeps to the {there.lanes.traffic_side}"
+            return replace(there, lanes=replace(there.lanes, notes=(said, *there.lanes.notes))), other
     if road is None:
         assert refusal is not None
         raise refusal

@@ -24,6 +24,7 @@ import numpy as np
 from scenario_gen.arrays import Floats, frozen
 from scenario_gen.errors import InputError
 
+MIRRORED = "the template is mirrored"  # begins the note of a map whose traffic keeps to the other side than the template's
 _ONCOMING = -0.9  # cosine between directions of traffic
 
 

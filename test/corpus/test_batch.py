@@ -23,11 +23,13 @@ import time
 import pytest
 from refusing import refuse
 
-from scenario_gen.corpus.batch import run_batch, seed_of, tokens_of
+from scenario_gen.corpus import batch as batches
+from scenario_gen.corpus.batch import LOST_CONFLICT, run_batch, seed_of, tokens_of
 from scenario_gen.corpus.encounters import rows_of
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
 from scenario_gen.corpus.tasks import spread
 from scenario_gen.errors import InputError, ScenarioGenError
+from scenario_gen.fitting import LostConflictError
 from scenario_gen.folders import sha256_of
 from scenario_gen.recordings.read import read_recording
 
@@ -167,6 +169,17 @@ def test_a_road_that_is_none_is_an_error_at_once(corpus, tmp_path):
     with pytest.raises(InputError, match="nowhere"):
         run_batch(corpus[0], ["straight", "nowhere"], tmp_path / "out", count=1, templates=1)
     assert not (tmp_path / "out").exists()
+
+
+def test_lost_encounters_are_counted_under_one_cause(corpus, tmp_path, monkeypatch):
+    def lost(encounter, segmentation, road, *_, **__):
+        raise LostConflictError(f"road {road.name} has no place that keeps the encounter: vehicles 1 and 2 do not meet")
+
+    monkeypatch.setattr(batches, "attempt", lost)
+    made = run_batch(corpus[0], ROADS, tmp_path / "out", count=1, templates=2, workers=1)
+    assert made.failures == {LOST_CONFLICT: 4} and not made.failed
+    cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))
+    assert {case["why"].split()[1] for case in cases} == set(ROADS)
 
 
 def test_names_and_seeds():

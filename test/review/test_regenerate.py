@@ -16,9 +16,11 @@
 
 from dataclasses import replace
 
+import map_builders
 import pytest
 
 from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics
+from msg_conventions.scenario_info import ADAPTATION
 from msg_conventions.scenarios import digest
 from msg_conventions.topics import topic_entry
 from scenario_gen.errors import InputError, ScenarioGenError
@@ -26,6 +28,7 @@ from scenario_gen.evaluation import EvaluationConfig
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.recordings.read import read_recording
 from scenario_gen.recordings.write import write_recording
 from scenario_gen.results import provenance_of
 from scenario_gen.review.regenerate import regenerate_scenario, write_regenerated
@@ -34,6 +37,7 @@ from scenario_gen.sampling import SamplingConfig
 from scenario_gen.storage.bag import read_messages
 from scenario_gen.storage.metadata import qos_yaml
 from scenario_gen.storage.writer import atomic_bag
+from scenario_gen.types.lanes import MIRRORED
 from scenario_gen.types.request import Request
 
 LOG, ROAD, SEED = bundled("b"), "t_intersection", 7
@@ -50,6 +54,34 @@ def bag(tmp_path_factory):
         case = generate(encounter, ROAD, config, count=3, seed=SEED, request=request)
         runs[f"/{name}"] = replace(case, provenance=provenance_of([LOG], SEED, 3, [ROAD], config, request))
     return write_recording(tmp_path_factory.mktemp("regenerate") / "bag", runs)
+
+
+@pytest.fixture(scope="module")
+def mirrored_bag(tmp_path_factory):
+    """Of a template of right-hand traffic on a map of left-hand traffic."""
+    folder = tmp_path_factory.mktemp("mirrored")
+    road = folder / "crossroads.osm"
+    image = {  # of the crossroads: left and right exchanged, borders too
+        name: ([(x, -y) for x, y in right], [(x, -y) for x, y in left], after)
+        for name, (left, right, after) in map_builders.lanes().items()
+    }
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(map_builders, "lanes", lambda: image)
+        road.write_text(map_builders.lanelet2())
+    log = bundled("a")
+    (encounter,) = read_log([log]).encounters
+    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False), sampling=SamplingConfig(variety="narrow"))
+    case = generate(encounter, str(road), config, count=2, seed=SEED)
+    provenance = provenance_of([log], SEED, 2, [str(road)], config, Request())
+    return write_recording(folder / "bag", {"/left": replace(case, provenance=provenance)}), log
+
+
+def test_a_mirrored_template_says_so_and_comes_again_from_the_log(mirrored_bag):
+    bag, log = mirrored_bag
+    (summary,) = read_recording(bag).namespaces["/left"].summaries
+    assert summary.values[f"{ADAPTATION}0"].startswith(MIRRORED)
+    data = published(bag, "/left")[0]
+    assert regenerate_scenario(bag, 0).data == regenerate_scenario(bag, 0, log=log).data == data
 
 
 def published(bag, namespace):

@@ -20,6 +20,7 @@ import pytest
 from scenario_gen.roads import build_road, road_and_template
 from scenario_gen.template.side import mirrored
 from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.lanes import MIRRORED
 
 
 def oncoming(side):
@@ -50,6 +51,7 @@ def test_a_template_is_mirrored_on_a_map_of_the_other_side(crossroads):
         road, driven = road_and_template(path, encounter)
         assert road.lanes.traffic_side == side
         if own == side:
-            assert driven is encounter
+            assert driven is encounter and not any(note.startswith(MIRRORED) for note in road.lanes.notes)
         else:
+            assert road.lanes.notes[0] == f"{MIRRORED}: traffic on road {road.name} keeps to the {side}"
             assert driven.name == "o mirrored" and np.array_equal(driven.position, mirrored(encounter).position)
