@@ -58,9 +58,9 @@ def test_two_to_eight_vehicles(count):
 
 
 @pytest.fixture(scope="module")
-def tight(data):
-    """A recorded left turn on a T-intersection: its bends are driven just below the lateral limits set here."""
-    (log,) = (data / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn_*.csv")
+def tight(made_data):
+    """A left turn on a T-intersection: its bends are driven just below the lateral limits set here."""
+    (log,) = (made_data / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn_*.csv")
     encounter = read_log(log).encounters[0]
     config = SamplingConfig(
         variety="narrow", lateral_sigma=0.3, observation_sigma=0.3, longitudinal_sigma=0.5, time_sigma=2.0, bend_acceleration=2.0
@@ -73,7 +73,6 @@ def limited(chain, lateral, **sampling):
     return replace(chain, limits=limits, sampling=replace(chain.sampling, **sampling))
 
 
-@pytest.mark.data
 def test_variance_adapts_where_validity_is_hard(tight):
     """Few candidates at full variance keep to the limit; with smaller deviations the set is had, and it is said."""
     made = answer(limited(tight, 1.65), Request(), count=30).generated
@@ -84,7 +83,6 @@ def test_variance_adapts_where_validity_is_hard(tight):
     assert made.candidates == len(made.scenarios) + made.refused.total()
 
 
-@pytest.mark.data
 def test_a_short_set_says_how_many_and_why(tight):
     made = answer(limited(tight, 1.6, attempts=3), Request(), count=80).generated
     assert 0 < len(made.scenarios) < made.requested == 80
