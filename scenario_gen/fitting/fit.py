@@ -15,7 +15,6 @@
 """One door to the fitting: which way of placing a template is tried on which road."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import lru_cache
 import math
 
@@ -100,7 +99,7 @@ def _fit_asked(
 @lru_cache(maxsize=1)  # changepoints have no part in it: the references have the same
 def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement:
     if config.placement == "identity":
-        return replace(place_in_own_frame(encounter, road, config)[0], at_home=True)
+        return place_in_own_frame(encounter, road, config)[0]
     tracks = clean_tracks(encounter)
     ways: dict[str, Callable[[tuple[Track, ...], Road, FittingConfig], Placement]] = {
         "lanes": place_along_lanes,
@@ -118,7 +117,6 @@ def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement
         own, share = place_in_own_frame(encounter, road, config)
     except RefusedError as error:
         reasons.append(f"in its own frame, {error}")
-    own = None if own is None else replace(own, at_home=True)
     if own is not None and share >= _AT_HOME:
         return own
     if has_lanes(road) or len(arms_of(road)) > 1:

@@ -52,6 +52,7 @@ def place_in_own_frame(encounter: Encounter, road: Road, config: FittingConfig) 
         manoeuvre=tuple("wait" if track.still else "own path" for track in separation.tracks),
         moved=separation.moved,
         notes=(f"placed on road {road.name} in the template's own frame", *separation.notes),
+        at_home=True,
     )
     return placement, float(np.mean(shares))
 

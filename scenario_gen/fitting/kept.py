@@ -15,6 +15,7 @@
 """Is the manoeuvre kept? Turns, conflicts, who goes first and who is beside whom, of template and fit, over whole paths."""
 
 from collections.abc import Iterable
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -84,6 +85,7 @@ def count_lost(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> int:
     return 2 * len(gone) + len(after.keys() - before.keys())
 
 
+@lru_cache(maxsize=2)  # of one template many places are looked at
 def _meetings(tracks: tuple[Track, ...]) -> dict[tuple[int, int], Conflict]:
     """The conflicts of some motion, by the vehicles."""
     time, poses = np.arange(len(tracks[0].progress), dtype=np.float64), np.stack([track.poses for track in tracks])

@@ -246,7 +246,7 @@ def prepare(
 
 
 def kept_reactions(encounter: Encounter, config: SamplingConfig, order: str = "keep") -> ReactionGraph | None:
-    """Return the reactions of the template that scenarios keep; None where there are none, or nothing is freed.
+    """Return the reactions of the template that scenarios keep; None where there are none, or none is to be kept.
 
     Where an `order` other than the template's is asked for, nobody is made to wait for anybody.
     """
