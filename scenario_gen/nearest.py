@@ -122,12 +122,12 @@ def nearest_if_impossible(
         yield
     except TargetError:  # the states are not what is impossible
         raise
-    except LostConflictError as error:
-        kept = roads_that_keep(encounter, segmentation, config)
-        raise LostConflictError(f"{error}. Nearest possible: {' or '.join(f'road {name}' for name in kept)}") from error
     except RefusedError as error:
         if not request.moves:
-            raise
+            if not isinstance(error, LostConflictError):
+                raise
+            kept = " or ".join(f"road {name}" for name in roads_that_keep(encounter, segmentation, config))
+            raise LostConflictError(f"{error}. Nearest possible: {kept}") from error
         search = _Search(encounter, segmentation, road, config, request, seed, min(count, ENOUGH), cancelled)
         found = tuple(search.run())
         raise ImpossibleError(str(error), () if search.cancelled() else found) from error

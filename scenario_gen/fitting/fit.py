@@ -93,6 +93,8 @@ def _fit_asked(
     placement, given = place_given(encounter, road, config, starts, goals, base)
     fit = finish(encounter, segmentation, road, placement, config, given)
     refuse_misfits(fit, starts, goals)
+    if not config.allow:
+        refuse_lost_conflicts(fit.lost, road.name)
     return fit
 
 

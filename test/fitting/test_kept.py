@@ -59,6 +59,16 @@ def test_a_lost_crossing_is_refused_and_can_be_allowed(place):
     assert [loss.kind for loss in taken.lost] == ["conflict"]
 
 
+def test_asked_states_that_lose_a_crossing_are_refused_and_can_be_allowed(place):
+    place(apart(CROSSING, 0.0))
+    ends = {name: apart(CROSSING, 120.0).tracks[1].curve.points[k] for name, k in (("starts", 0), ("goals", -1))}
+    request = Request(**{name: f"2: {x:.2f} {y:.2f} {yaw:.4f}" for name, (x, y, yaw) in ends.items()})
+    with pytest.raises(LostConflictError, match=r"fitting\.allow=lost_conflict"):
+        fit_template(CROSSING, SEGMENTATION, OPEN, request=request)
+    taken = fit_template(CROSSING, SEGMENTATION, OPEN, FittingConfig(allow="lost_conflict"), request=request)
+    assert [loss.kind for loss in taken.lost] == ["conflict"]
+
+
 def test_what_is_kept_or_at_home_is_not_refused(place):
     place(apart(CROSSING, 1.0))
     assert not fit_template(CROSSING, SEGMENTATION, OPEN).lost
