@@ -78,15 +78,15 @@ licences: $(TEST)
 	$(BIN)/python test/packaging/licences.py
 
 install: $(READY)
-	$(BIN)/python -m scenario_gen.compiling
+	$(BIN)/python -m scenario_gen.numerics.compiling
 
 # The core first: with it the kernels of the stages are compiled, once for this user, while pip installs the rest.
-STAGES := exact template segmentation roads fitting routing sampling validity evaluation
+STAGES := numerics template roads method
 $(RUN): requirements/core.lock requirements/run.lock requirements/ros.lock setup.py
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(not (3, 11) <= v <= (3, 13) and f"Python {v[0]}.{v[1]} found; 3.11, 3.12 or 3.13 is needed: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(if $(SOURCED),--system-site-packages) .venv
 	$(LOCKED) -r requirements/core.lock
-	$(BIN)/python -m scenario_gen.compiling $(STAGES) & kernels=$$!; \
+	$(BIN)/python -m scenario_gen.numerics.compiling $(STAGES) & kernels=$$!; \
 	$(LOCKED) -r requirements/run.lock $(if $(SOURCED),,-r requirements/ros.lock) && $(PIP) --no-build-isolation --editable .; \
 	installed=$$?; wait $$kernels && exit $$installed
 	@touch $(RUN)
@@ -96,7 +96,7 @@ $(READY): $(RUN) requirements/extras.lock
 	@touch $(READY)
 
 $(TEST): $(READY) requirements/test.lock requirements/ros-test.lock
-	$(BIN)/python -m scenario_gen.compiling & kernels=$$!; \
+	$(BIN)/python -m scenario_gen.numerics.compiling & kernels=$$!; \
 	$(LOCKED) -r requirements/test.lock $(if $(SOURCED),,-r requirements/ros-test.lock); \
 	installed=$$?; wait $$kernels && exit $$installed
 	@touch $(TEST)

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Build rules for colcon (ament_python) and pip alike; tool settings are in pyproject.toml."""
 
@@ -55,7 +44,7 @@ setup(
     maintainer_email="scenario_gen@users.noreply.github.com",
     python_requires=">=3.11,<3.14",
     packages=find_packages(include=["scenario_gen*", "msg_conventions*"]),
-    package_data={NAME: ["py.typed", "resources/*", "resources/**/*", "report/assets/*", "nodes/*.xml"]},
+    package_data={NAME: ["py.typed", "*.pyi", "resources/*", "resources/**/*", "output/report/assets/*", "ros/plumbing/*.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -69,7 +58,7 @@ setup(
     entry_points={
         "console_scripts": [
             "scenario-gen = scenario_gen.__main__:main",
-            *(f"{node} = scenario_gen.nodes.start:{node}" for node in NODES),
+            *(f"{node} = scenario_gen.ros.plumbing.start:{node}" for node in NODES),
         ],
     },
 )

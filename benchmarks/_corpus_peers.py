@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """A template on a road by a chain of peers: jax-moseq, OMPL, scikit-learn's Gaussian processes.
 
@@ -28,11 +17,11 @@ import warnings
 import numpy as np
 
 from benchmarks._segmentation_peers import installed, jax_moseq
-from scenario_gen.config import PipelineConfig
-from scenario_gen.nearest import attempt
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.nearest import attempt
+from scenario_gen.method.segmentation import segment
+from scenario_gen.method.segmentation.features import driving_features
 from scenario_gen.roads import build_road
-from scenario_gen.segmentation import segment
-from scenario_gen.segmentation.features import driving_features
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Lock-step over DDS: how many times faster than real time a planner of one command per step drives, and a period's spread."""
 
@@ -24,8 +13,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from benchmarks._messages_processes import environment, nodes
-from scenario_gen.nodes.domain import free_domain
-from scenario_gen.recordings.write import write_recording
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.ros.plumbing.domain import free_domain
 from scenario_gen.types.generation import GenerationResult
 
 Result = TypeVar("Result")
@@ -64,7 +53,7 @@ def _calls(domain: int, steps: int, pid: int) -> tuple[float, float]:
     from std_srvs.srv import Trigger
 
     from msg_conventions.driving import encode_twist
-    from scenario_gen.nodes.topics import create_publisher
+    from scenario_gen.ros.plumbing.topics import create_publisher
 
     def work(node: Any, spin: Callable[[Any], None]) -> tuple[float, float]:
         publisher, client = create_publisher(node, "ego/cmd_vel"), node.create_client(Trigger, "/traffic/step")
@@ -86,7 +75,7 @@ def _calls(domain: int, steps: int, pid: int) -> tuple[float, float]:
 
 
 def _periods(domain: int, periods: int) -> float:
-    from scenario_gen.nodes.topics import create_subscription
+    from scenario_gen.ros.plumbing.topics import create_subscription
 
     def work(node: Any, spin: Callable[[Any], None]) -> float:
         at: list[float] = []

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Drives before CommonRoad's programs, in the environment that `make judges` installs: its collision checker, its planner."""
 
@@ -25,16 +14,16 @@ import numpy as np
 
 from benchmarks.bridges import judged
 from benchmarks.row import Row
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REPLAY
 from scenario_gen.closed_loop.ego import Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, State, Task
 from scenario_gen.closed_loop.trials import Outcome, rates, Trial
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.errors import RefusedError
-from scenario_gen.exchange.cases import Case, Exported
-from scenario_gen.exchange.commonroad import write_commonroad
-from scenario_gen.exchange.config import ExportConfig
-from scenario_gen.exchange.road_lanes import lane_map_of
+from scenario_gen.output.exchange.cases import Case, Exported
+from scenario_gen.output.exchange.commonroad import write_commonroad
+from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.road_lanes import lane_map_of
 from scenario_gen.types.ego import split_off
 
 STEP = 0.1  # s, of both

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Certified scenarios of a few vehicles that cross, follow and wait, drawn from a seed; and egos that do anything."""
 
@@ -18,12 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenario_gen.arrays import Floats
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.simulation import Observation, Task
+from scenario_gen.method.validity import Checker
+from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import Scenario
-from scenario_gen.validity import Checker
 
 PERIOD = 0.1
 Motion = tuple[Floats, Floats, Floats]  # positions (T, 2) [m], yaw (T,) [rad], speed (T,) [m/s]

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Figure 5 of the paper as numbers: every recorded encounter and the three bundled cases, on two or three roads each."""
 
@@ -22,16 +11,16 @@ import re
 from time import process_time
 
 from benchmarks._size import sized
-from scenario_gen.config import PipelineConfig
-from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.evaluation import evaluate_scenarios, replay
-from scenario_gen.evaluation.references import linear_changepoints, uniform_changepoints, without_changepoints
+from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.logs import read_log
-from scenario_gen.nearest import attempt
-from scenario_gen.report.page import render, ReportInput
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.evaluation import evaluate_scenarios, replay
+from scenario_gen.method.evaluation.references import linear_changepoints, uniform_changepoints, without_changepoints
+from scenario_gen.method.nearest import attempt
+from scenario_gen.method.sampling import SamplingConfig
+from scenario_gen.method.segmentation import segment
+from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.roads import build_road
-from scenario_gen.sampling import SamplingConfig
-from scenario_gen.segmentation import segment
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation
 from scenario_gen.types.generation import GenerationResult, ORACLE, UNIFORM, WITH, WITHOUT

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """One large request through real processes into a bag: what is lost, what it costs, and how large the processes become."""
 
@@ -21,8 +10,8 @@ from typing import Any
 from benchmarks._messages_processes import nodes
 from benchmarks._size import sized
 from benchmarks.row import Row
+from scenario_gen.bags.storage.bag import bag_topics
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.storage.bag import bag_topics
 
 COUNT = sized(100_000, quick=30)
 MOST = 1024.0  # MiB

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Processes of the messages benchmark: the suite's nodes, a publisher, a caller; each on a ROS domain of its own.
 
@@ -28,7 +17,7 @@ import subprocess
 import sys
 import time
 
-from scenario_gen.nodes.domain import this_host_only
+from scenario_gen.ros.plumbing.domain import this_host_only
 
 
 def environment(domain: int) -> dict[str, str]:
@@ -70,7 +59,7 @@ def nodes(folder: Path, domain: int, arguments: Mapping[str, Sequence[str]]) -> 
     ]
     (folder / "suite.json").write_text(json.dumps(specification), encoding="utf-8")
     process = subprocess.Popen(
-        [sys.executable, "-m", "scenario_gen.nodes.forked", str(folder / "suite.json")],
+        [sys.executable, "-m", "scenario_gen.ros.plumbing.forked", str(folder / "suite.json")],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -98,7 +87,7 @@ def publish(topic: str, size: int, count: int, rate: float) -> None:
     from std_msgs.msg import String
 
     from msg_conventions.cdr import CdrWriter
-    import scenario_gen.nodes  # noqa: F401  (what the wheels need)
+    import scenario_gen.ros.nodes  # noqa: F401  (what the wheels need)
 
     rclpy.init()
     node = rclpy.create_node("benchmark_publisher")

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Generation for the naturalness benchmark: recorded and generated motion of one encounter on some roads, as plain arrays.
 
@@ -106,7 +95,7 @@ def made_by(jobs: Sequence[Job], checkout: Path | None = None) -> Iterator[Made]
 
 def run(job: Job) -> Iterator[Made]:
     """Read the encounter and put it on each of its roads."""
-    from scenario_gen.errors import ScenarioGenError
+    from scenario_gen.base.errors import ScenarioGenError
     from scenario_gen.logs import LogConfig, read_log
 
     whole: Any = {"whole": True} if "whole" in {one.name for one in fields(LogConfig)} else {}  # so older versions cut
@@ -124,8 +113,8 @@ def run(job: Job) -> Iterator[Made]:
 
 def generated(name: str, encounter: Any, road: str, count: int, *, own: bool, variety: str = "narrow") -> Made:
     """Put one encounter on one road."""
-    from scenario_gen.errors import ScenarioGenError
-    from scenario_gen.evaluation import EvaluationConfig
+    from scenario_gen.base.errors import ScenarioGenError
+    from scenario_gen.method.evaluation import EvaluationConfig
     from scenario_gen.pipeline import generate, PipelineConfig
 
     config: Any = PipelineConfig(evaluation=EvaluationConfig(resamples=10))

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Measures of motion per vehicle: jerk, changes of sign, extrema of speed, lateral acceleration and yaw rate, turns.
 
@@ -24,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.arrays import Floats
+from scenario_gen.numerics.arrays import Floats
 
 DT = 0.1
 ACCELERATION_BAND, YAW_BAND = 0.1, 0.01  # m/s², rad/s: below it a value has no sign

@@ -1,16 +1,6 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Roads with something in the way, and OMPL's RRTConnect in Dubins space as the peer on them.
 
 Half of the roads have two to five parked cars at random places and angles, half are slaloms of walls that leave 2.6 to 4 m. OMPL
@@ -26,13 +16,13 @@ import numpy as np
 from ompl import base, geometric, util
 
 from benchmarks._planning_maps import road_of
-from scenario_gen.arrays import Floats
-from scenario_gen.errors import RefusedError
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.routing.search.planner import Budget
+from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect
+from scenario_gen.method.routing.search.sweep import blocked_before, curve_length, SWEEP
+from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads.clearance import clearance_in_cells, footprint_fits, to_cells
 from scenario_gen.roads.obstacles import Obstacle, with_obstacles
-from scenario_gen.routing.search.planner import Budget
-from scenario_gen.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect
-from scenario_gen.routing.search.sweep import blocked_before, curve_length, SWEEP
 from scenario_gen.types.road import Road
 
 LENGTH, WIDTH, WALL = 80.0, 8.0, 1.0  # [m]

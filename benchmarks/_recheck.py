@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Is what was published valid? Asked again of an independent checker, on every recorded encounter and road.
 
@@ -30,11 +19,11 @@ import shapely
 
 from benchmarks._recheck_motion import advance, boxes_at, Lanes, Paces, SLOT, TOUCH
 from benchmarks._sampling_cases import cases, Prepared
-from scenario_gen.arrays import Bools, Floats, Ints
+from scenario_gen.method.validity import Limits
+from scenario_gen.numerics.arrays import Bools, Floats, Ints
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Scenario
-from scenario_gen.validity import Limits
 
 ALIKE = 0.5  # rad, headings of vehicles on the same path
 FOLLOWING = 3.0  # vehicle lengths of shared path that are following

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The chain up to the sampler over every recorded encounter and several roads."""
 
@@ -22,17 +11,18 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks._size import sized
-from scenario_gen.arrays import Floats
-from scenario_gen.errors import ScenarioGenError
-from scenario_gen.evaluation import replay
-from scenario_gen.evaluation.distributions import compare, QUANTITIES, values_of
-from scenario_gen.evaluation.motion import at_count, at_period
-from scenario_gen.fitting import fit_template
+from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import read_log
+from scenario_gen.method.evaluation import replay
+from scenario_gen.method.evaluation.distributions import compare, QUANTITIES, values_of
+from scenario_gen.method.evaluation.motion import at_count, at_period
+from scenario_gen.method.fitting import fit_template
+from scenario_gen.method.routing import plan_routes
+from scenario_gen.method.sampling import sample_scenarios, SamplingConfig
+from scenario_gen.method.segmentation import segment
+from scenario_gen.method.validity import Checker
+from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads import build_road
-from scenario_gen.routing import plan_routes
-from scenario_gen.sampling import sample_scenarios, SamplingConfig
-from scenario_gen.segmentation import segment
 from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, pair_conflict, Wait
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit
@@ -40,7 +30,6 @@ from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import Scenario, ScenarioSet, Verdict
 from scenario_gen.types.segmentation import Segmentation
-from scenario_gen.validity import Checker
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 LOGS = sized(None, quick=1)

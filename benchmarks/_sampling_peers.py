@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Gaussian-process regression against scikit-learn and against a dense float64 reference.
 
@@ -26,8 +15,8 @@ import scipy.linalg
 
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.arrays import Floats
-from scenario_gen.sampling.gp import Features, Observations, Regression, squared_exponential
+from scenario_gen.method.sampling.gp import Features, Observations, Regression, squared_exponential
+from scenario_gen.numerics.arrays import Floats
 
 SIZES = ((200, 500, 40.0), (1000, 2000, 1000.0))  # points seen, points asked, target ratio
 SAMPLES = 50

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """One `generate` by its parts, in this process: `python -m benchmarks._warm_parts LOG OUT` ends with a line of JSON.
 
@@ -25,7 +14,7 @@ from typing import Any
 
 STARTED = process_time()
 PARTS = {  # by the module that calls them
-    "scenario_gen.batch": {"read_log": "read", "write_results": "figures"},
+    "scenario_gen.cli.batch": {"read_log": "read", "write_results": "figures"},
     "scenario_gen.pipeline": {
         "build_road": "road",
         "segment": "segment",
@@ -34,7 +23,7 @@ PARTS = {  # by the module that calls them
         "with_references": "references",
         "with_evaluation": "evaluate",
     },
-    "scenario_gen.results": {"add_results": "bag", "write_report": "page"},
+    "scenario_gen.output.results": {"add_results": "bag", "write_report": "page"},
 }
 spent: dict[str, list[float]] = {}
 _inside: list[list[float]] = []
@@ -65,7 +54,7 @@ def imports() -> None:
 
     from numba.core.caching import Cache
 
-    import scenario_gen.cli  # noqa: F401 - as the command does
+    import scenario_gen.cli.commands  # noqa: F401 - as the command does
 
     Cache._load_overload = timed(Cache._load_overload, "kernels")
     for module, functions in PARTS.items():
@@ -78,7 +67,7 @@ def main() -> None:
     """Generate as a user does."""
     log, out, count = sys.argv[1:]
     timed(imports, "imports")()
-    from scenario_gen.cli import app
+    from scenario_gen.cli.commands import app
 
     sys.argv[1:] = ["generate", log, "--road", "four_way", "--count", count, "--seed", "7", "--out", out]
     try:

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Bridges: exported scenarios before other people's programs, and back again. The judges are installed by `make judges`."""
 
@@ -31,17 +20,17 @@ import numpy as np
 
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.batch import generate_all
-from scenario_gen.demo import ROADS
-from scenario_gen.exchange.cases import Case, Exported, read_cases
-from scenario_gen.exchange.commonroad import write_commonroad
-from scenario_gen.exchange.config import ExportConfig
-from scenario_gen.exchange.export import export_bag
-from scenario_gen.exchange.importing import read_scenario_file
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.cli.batch import generate_all
+from scenario_gen.cli.demo import ROADS
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
+from scenario_gen.output.exchange.cases import Case, Exported, read_cases
+from scenario_gen.output.exchange.commonroad import write_commonroad
+from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.export import export_bag
+from scenario_gen.output.exchange.importing import read_scenario_file
 from scenario_gen.pipeline import PipelineConfig
-from scenario_gen.recordings.write import write_recording
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.scenario import Scenario
 

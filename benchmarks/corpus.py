@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Corpus: what mining finds, what it costs, batches by one and two processes and through SIGKILLs, the library.
 
@@ -38,18 +27,18 @@ from benchmarks._corpus_peers import costs, missing
 from benchmarks._corpus_primitives import f1, planted_encounter, score
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.arrays import Ints
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.base.folders import sha256_of
 from scenario_gen.corpus.batch import seed_of
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.library import adjusted_rand, labels_of, pair_encounters, SHARED
 from scenario_gen.corpus.mine import mine
 from scenario_gen.corpus.synthetic import Planted, read_planted
-from scenario_gen.errors import RefusedError
-from scenario_gen.folders import sha256_of
 from scenario_gen.logs.tables import COLUMNS
-from scenario_gen.segmentation import segment
-from scenario_gen.segmentation.library import assign, build_library, PrimitiveLibrary
+from scenario_gen.method.segmentation import segment
+from scenario_gen.method.segmentation.library import assign, build_library, PrimitiveLibrary
+from scenario_gen.numerics.arrays import Ints
 from scenario_gen.types.encounter import Encounter
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Closed loop: what planners come to, the witness as ego, egos that do anything, throughput, lock-step over DDS.
 
@@ -33,14 +22,14 @@ from benchmarks._driving_worlds import Anything, draw_scenario, Witness
 from benchmarks._sampling_cases import cases, Prepared
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.arrays import Floats
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, REPLAY
 from scenario_gen.closed_loop.ego import Pose
 from scenario_gen.closed_loop.results import as_json
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, State
 from scenario_gen.closed_loop.trials import Outcome, rates, run_trials, Trial
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.evaluation.bootstrap import wilson
+from scenario_gen.method.evaluation.bootstrap import wilson
+from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types.generation import GenerationResult
 
 PLANNERS = "scenario_gen.closed_loop.planners"

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Evaluation: DTW beside dtaidistance, the feature matrix beside scipy, the report's cost, and figure 5 as numbers.
 
@@ -31,7 +20,7 @@ from scipy.spatial.distance import cdist
 from benchmarks._figure5 import LINEAR, measure, Measured, SEEDS
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.evaluation import dtw_distance, feature_matrix
+from scenario_gen.method.evaluation import dtw_distance, feature_matrix
 from scenario_gen.types.generation import UNIFORM, WITH, WITHOUT
 
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """A stranger's first hour: `make demo` and `make test` on a clone with nothing beside it, empty caches, by part.
 
@@ -60,7 +49,7 @@ def run() -> list[Row]:
         parts["test: packages and the other kernels"] = make(".venv/.test")
         installed.append(_installed(clone, "after make test"))
         parts["test: ruff, mypy, pytest"] = make("test", PYTEST_ADDOPTS=f"--junitxml={results}")
-        alone = sized(("-m", "scenario_gen.compiling"), quick=("--version",))
+        alone = sized(("-m", "scenario_gen.numerics.compiling"), quick=("--version",))
         python = str(clone / ".venv" / "bin" / "python") if not DRY else sys.executable
         apart = {"all kernels, by themselves": step(python, *alone, NUMBA_CACHE_DIR=str(place / "kernels"))}
         totals = {f"make {name}": _sum(parts, name) for name in ("demo", "test")}

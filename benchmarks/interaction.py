@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Interaction: do generated vehicles drive with one another? Figures of docs/interaction.md, on each encounter's own road.
 
@@ -38,16 +27,16 @@ from benchmarks._naturalness_motion import displacement, Signals
 from benchmarks._size import sized
 from benchmarks.naturalness import DATA
 from benchmarks.row import Row
-from scenario_gen.arrays import Floats
-from scenario_gen.errors import ScenarioGenError
-from scenario_gen.evaluation.interaction import following, ghosts, pair_windows, yielding
-from scenario_gen.evaluation.measures import measure
+from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.nearest import attempt
+from scenario_gen.method.evaluation.interaction import following, ghosts, pair_windows, yielding
+from scenario_gen.method.evaluation.measures import measure
+from scenario_gen.method.nearest import attempt
+from scenario_gen.method.segmentation import segment
+from scenario_gen.numerics.arrays import Floats
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
-from scenario_gen.segmentation import segment
 from scenario_gen.template.answers import Motion
 from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.encounter import Encounter

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Messages: encoding against rclpy (CPU time), and what goes through real processes over DDS (wall time)."""
 
@@ -33,10 +22,10 @@ from benchmarks._size import sized
 from benchmarks.row import Row
 from msg_conventions.paths import encode_path
 from msg_conventions.scenarios import decode_scenario, encode_scenario
-from scenario_gen.arrays import Floats
+from scenario_gen.bags.storage.bag import bag_topics
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.nodes.domain import free_domain, this_host_only
-from scenario_gen.storage.bag import bag_topics
+from scenario_gen.numerics.arrays import Floats
+from scenario_gen.ros.plumbing.domain import free_domain, this_host_only
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import Scenario
 

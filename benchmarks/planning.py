@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Planning: RRT*-Connect against the true optimum and against OMPL's planners, in one process, seeds interleaved, CPU time.
 
@@ -34,15 +23,15 @@ from benchmarks._planning_maps import clutter, enters_blocked, lane, optimum, re
 from benchmarks._planning_obstructed import CAR, dubins_length, first_path, obstructed, rrt_connect
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.arrays import Floats
-from scenario_gen.errors import RefusedError
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.routing import plan_routes, PlanningConfig
+from scenario_gen.method.routing.search.ompl.solve import PLANNERS, solve
+from scenario_gen.method.routing.search.planner import Budget, BudgetSpentError, path_length, plan_with_retry, Query
+from scenario_gen.method.routing.search.pose_planner import PoseRrtStarConnect
+from scenario_gen.method.routing.search.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig
+from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads.clearance import clearance_in_cells, distance_transform
 from scenario_gen.roads.connectivity import common_component, component_at, components
-from scenario_gen.routing import plan_routes, PlanningConfig
-from scenario_gen.routing.search.ompl.solve import PLANNERS, solve
-from scenario_gen.routing.search.planner import Budget, BudgetSpentError, path_length, plan_with_retry, Query
-from scenario_gen.routing.search.pose_planner import PoseRrtStarConnect
-from scenario_gen.routing.search.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.road import Road

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Sampling: the Gaussian process against its peers, throughput, and acceptance, diversity and realism on recorded data."""
 
@@ -22,15 +11,15 @@ from benchmarks import _sampling_peers
 from benchmarks._sampling_cases import arrival_spread, cases, displacement, displacement_at_instants, divergences, Prepared
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.arrays import Floats
-from scenario_gen.sampling import sample_scenarios
+from scenario_gen.method.sampling import sample_scenarios
+from scenario_gen.method.validity import Checker
+from scenario_gen.numerics.arrays import Floats
 from scenario_gen.template.interaction import find_conflicts
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates
 from scenario_gen.types.segmentation import Segmentation
-from scenario_gen.validity import Checker
 
 COUNT = sized(200, quick=4)  # scenarios per recorded encounter and road
 SCENARIOS = sized(2000, quick=16)  # whose throughput is measured

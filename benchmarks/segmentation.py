@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Segmentation: speed and accuracy on sequences with known states, on labelled recordings, and online, beside the peers.
 
@@ -34,10 +23,10 @@ from benchmarks._segmentation_data import driving, gaussian_hmm, Labelled, with_
 from benchmarks._segmentation_scores import changes, f1, hamming, smoother
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.arrays import Floats, Ints
-from scenario_gen.segmentation import OnlineSegmenter, SamplerConfig, segment, segment_series, SegmentationConfig
-from scenario_gen.segmentation.hdp_hmm.chain import TRACE
-from scenario_gen.segmentation.hdp_hmm.config import GAUSSIAN_DOF
+from scenario_gen.method.segmentation import OnlineSegmenter, SamplerConfig, segment, segment_series, SegmentationConfig
+from scenario_gen.method.segmentation.hdp_hmm.chain import TRACE
+from scenario_gen.method.segmentation.hdp_hmm.config import GAUSSIAN_DOF
+from scenario_gen.numerics.arrays import Floats, Ints
 
 SEEDS = range(9101, sized(9113, quick=9102))
 SEEDS_OF_A = range(9101, sized(9141, quick=9102))  # short sequences, so more of them
@@ -80,8 +69,8 @@ def _first_call() -> Row:
     parts = {
         "numpy": "import numpy",
         "numba": "import numpy, numba",
-        "all imports": "import numpy, scenario_gen.segmentation",
-        "first answer": "import numpy, scenario_gen.segmentation as s; s.segment_series(numpy.eye(50)[:, :2])",
+        "all imports": "import numpy, scenario_gen.method.segmentation",
+        "first answer": "import numpy, scenario_gen.method.segmentation as s; s.segment_series(numpy.eye(50)[:, :2])",
     }
     spent = {name: float(np.median([_fresh(code) for _ in range(sized(3, quick=1))])) for name, code in parts.items()}
     text = "CPU after: " + ", ".join(f"{name} {seconds:.2f} s" for name, seconds in spent.items())

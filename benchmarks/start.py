@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Start and end of the nodes, as separate processes and composed: with kernels in the cache and without, and at a load of 16.
 
@@ -31,8 +20,8 @@ from benchmarks._messages_processes import environment
 from benchmarks._size import sized
 from benchmarks.messages import _Client, _done
 from benchmarks.row import Row
-from scenario_gen.nodes.domain import free_domain, this_host_only
-from scenario_gen.storage.bag import read_messages
+from scenario_gen.bags.storage.bag import read_messages
+from scenario_gen.ros.plumbing.domain import free_domain, this_host_only
 
 NODES = ("evaluator", "gp_sampler", "planner", "segmenter", "road_server", "log_player")[sized(0, quick=5) :]
 LOAD = sized(16, quick=1)
@@ -93,7 +82,7 @@ def _active(client: _Client, nodes: Sequence[str]) -> None:
 def _start(
     name: str, folder: Path, domain: int, which: list[list[str]], target: float | None, peer: str, *, cold: bool = False
 ) -> list[Row]:
-    commands = [["-m", "scenario_gen.nodes.start", *words] for words in which]
+    commands = [["-m", "scenario_gen.ros.plumbing.start", *words] for words in which]
     with tempfile.TemporaryDirectory() as cache, _Client(domain) as client:
         variables = {"NUMBA_CACHE_DIR": cache} if cold else {}
         started = time.monotonic()
@@ -130,8 +119,8 @@ def _peer(folder: Path, domain: int) -> str:
 def _exit(folder: Path, domain: int, peer: str) -> list[Row]:
     """End the nodes and a recorder as launch does, beside busy loops."""
     bag = folder / "bag"
-    commands = [["-m", "scenario_gen.nodes.start", node] for node in NODES]
-    record = ["-m", "scenario_gen.nodes.start", "recorder", "--ros-args", "-p", f"bag:={bag}", "-p", "topics:=.*"]
+    commands = [["-m", "scenario_gen.ros.plumbing.start", node] for node in NODES]
+    record = ["-m", "scenario_gen.ros.plumbing.start", "recorder", "--ros-args", "-p", f"bag:={bag}", "-p", "topics:=.*"]
     with _running(folder, domain, [*commands, record]) as processes, _Client(domain) as client:
         _active(client, NODES)
         while not list(bag.glob("*.mcap")):

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Throughput of the checker and of the conflict finder, CPU time of one core; published scenarios checked again independently."""
 
@@ -22,12 +11,12 @@ import numpy as np
 from benchmarks._recheck import recheck_published
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.arrays import Floats
+from scenario_gen.method.validity import Checker
+from scenario_gen.numerics.arrays import Floats
 from scenario_gen.template.interaction import find_conflicts, Wait
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Scenario
-from scenario_gen.validity import Checker
 
 Drive = tuple[float, float, float, float]  # x [m], y [m], yaw [rad], speed [m/s]
 

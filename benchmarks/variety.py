@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Variety: how far the scenarios of crossing encounters spread, and whether targets, orders and choices are met.
 
@@ -37,19 +26,19 @@ from benchmarks._sampling_cases import displacement
 from benchmarks._size import sized
 from benchmarks.naturalness import DATA
 from benchmarks.row import Row
-from scenario_gen.errors import RefusedError, ScenarioGenError
-from scenario_gen.evaluation.measures import features, measure, MEASURES
-from scenario_gen.fitting import fit_template
+from scenario_gen.base.errors import RefusedError, ScenarioGenError
 from scenario_gen.logs import read_log
+from scenario_gen.method.evaluation.measures import features, measure, MEASURES
+from scenario_gen.method.fitting import fit_template
+from scenario_gen.method.routing import plan_routes
+from scenario_gen.method.sampling import freed_states, sample_scenarios, SamplingConfig
+from scenario_gen.method.segmentation import segment
+from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
-from scenario_gen.routing import plan_routes
-from scenario_gen.sampling import freed_states, sample_scenarios, SamplingConfig
-from scenario_gen.segmentation import segment
 from scenario_gen.template.interaction import waits_to_keep
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import Scenario, ScenarioSet
 from scenario_gen.types.target import read_targets
-from scenario_gen.validity import Checker
 
 CASES = (
     "lanker-2_13-1", "cats-4", "cats-5", "cats-7", "lanker-2_15-3", "lanker-2_8-1", "c_opposite_v2_v4_utc35195",

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """(Encounter, Segmentation) ⇄ `changepoints` and `posterior`.
 
@@ -33,7 +22,7 @@ from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.diagnostics import Level, Status
 from msg_conventions.tracks import encode_samples, FRAME
 from msg_conventions.trajectory import Trajectory
-from scenario_gen.errors import InputError
+from scenario_gen.base.errors import InputError
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
 

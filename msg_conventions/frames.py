@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Coordinate frames ⇄ tf2_msgs/TFMessage: `/tf`, of the vehicles that the player moves, and `/tf_static`.
 
@@ -22,7 +11,7 @@ from collections.abc import Sequence
 
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.roads import pose_rows, poses_of
-from scenario_gen.arrays import Floats
+from scenario_gen.numerics.arrays import Floats
 
 TYPE = "tf2_msgs/msg/TFMessage"
 

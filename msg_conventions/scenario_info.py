@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """`scenarios/info` (diagnostic_msgs/DiagnosticArray): an entry for each scenario, then a summary of its request.
 
@@ -32,9 +21,9 @@ from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, 
 from msg_conventions.ego import ego_values
 from msg_conventions.hashes import MAP_HASH, TEMPLATE_HASH
 from msg_conventions.scenarios import digest, encode_scenario, messages_of
-from scenario_gen.arrays import Floats
-from scenario_gen.documents import parse_json
-from scenario_gen.errors import guarded, InputError
+from scenario_gen.base.documents import parse_json
+from scenario_gen.base.errors import guarded, InputError
+from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.request import ORDERS
 from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, FACTS, Scenario, ScenarioSet

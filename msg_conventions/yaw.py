@@ -1,24 +1,13 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Headings as quaternions (0, 0, sin(yaw/2), cos(yaw/2)), and back to the same number."""
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Floats
-from scenario_gen.errors import InputError
+from scenario_gen.base.errors import InputError
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats
 
 TWO_PI = 2.0 * np.pi
 SHORTEST, LARGEST = 0.5, 2.0  # length, and part, of a quaternion, which should have length 1

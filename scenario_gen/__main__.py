@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The executable `scenario-gen`. It sets the signals first, so that Ctrl-C and SIGTERM end it without a traceback at any time."""
 
@@ -21,8 +10,8 @@ import signal
 import sys
 import threading
 
-from scenario_gen.errors import MissingExtraError, needs
-from scenario_gen.interrupts import leave, SIGNALS
+from scenario_gen.base.errors import MissingExtraError, needs
+from scenario_gen.base.interrupts import leave, SIGNALS
 
 
 def command() -> None:
@@ -32,8 +21,8 @@ def command() -> None:
             signal.signal(number, leave)
     try:
         needs("cli", "rich", "typer")
-        from scenario_gen.cli import main as run
-        from scenario_gen.folders.scratch import sweep_beside
+        from scenario_gen.base.folders.scratch import sweep_beside
+        from scenario_gen.cli.commands import main as run
     except MissingExtraError as error:
         sys.exit(f"error: {error}")
 

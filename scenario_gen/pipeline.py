@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The whole method on one screen: an encounter and a road in, valid new scenarios and their evaluation out."""
 
@@ -18,14 +7,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from scenario_gen.checked import sample_checked
-from scenario_gen.config import PipelineConfig
-from scenario_gen.errors import RefusedError
-from scenario_gen.evaluation import coverage_of, evaluate, MEASURED, replay, uniform_changepoints, without_changepoints
-from scenario_gen.nearest import attempt, nearest_if_impossible, plan
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.checked import sample_checked
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.evaluation import coverage_of, evaluate, MEASURED, replay, uniform_changepoints, without_changepoints
+from scenario_gen.method.nearest import attempt, nearest_if_impossible, plan
+from scenario_gen.method.sampling import Progress
+from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import road_and_template
-from scenario_gen.sampling import Progress
-from scenario_gen.segmentation import segment
 from scenario_gen.template.size import refuse_too_large
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.generation import GenerationResult, NARROW, UNIFORM, WITHOUT

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The shape of the house: stages import only what stands before them, rclpy only in the nodes, nothing local leaks out."""
 
@@ -27,48 +16,12 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "scenario_gen"
 
-# The data flow, first to last; modules of one tuple may import each other.
-ORDER = (
-    (
-        "errors",
-        "documents",
-        "markup",
-        "arrays",
-        "cancelling",
-        "interrupts",
-        "folders",
-        "kernels",
-        "kernel_cache",
-        "compiling",
-        "parameters",
-        "terminal",
-    ),
-    ("exact",),
-    ("types",),
-    ("geodesy", "curve", "storage"),
-    ("recordings",),
-    ("logs",),
-    ("template",),
-    ("segmentation",),
-    ("roads",),
-    ("fitting",),
-    ("routing",),
-    ("sampling",),
-    ("validity",),
-    ("evaluation",),
-    ("config",),
-    ("checked",),
-    ("nearest",),
-    ("pipeline",),
-    ("report",),
-    ("review", "exchange"),
-    ("results", "reproduce"),
-    ("closed_loop",),
-    ("batch",),
-    ("corpus",),
-    ("nodes", "demo", "cli", "cli_corpus", "__main__"),
-)
-RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
+# The data flow, first to last: a room is a folder of scenario_gen, a stage a folder or a module of scenario_gen/method.
+ROOMS = ("base", "numerics", "types", "bags", "logs", "template", "roads", "method", "pipeline")
+ORDER = (*ROOMS, "output", "closed_loop", "corpus", "ros", "cli", "__main__")
+STAGES = ("segmentation", "fitting", "routing", "sampling", "validity", "evaluation", "config", "checked", "nearest")
+RANK = {name: rank for rank, name in enumerate(ORDER)}
+STAGE_RANK = {name: rank for rank, name in enumerate(STAGES)}
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])
 
 
@@ -89,33 +42,47 @@ def imported(path: Path) -> set[str]:
     return names
 
 
-def stage(path: Path) -> str:
-    """Return the stage a file of scenario_gen belongs to."""
+def room(path: Path) -> str:
+    """Return the room a file of scenario_gen belongs to: a folder, or a module of the root."""
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
-def test_every_stage_has_a_place_in_the_order():
-    assert {stage(path) for path in PACKAGE.rglob("*.py")} - {"__init__"} <= set(RANK)
+def stage(path: Path) -> str:
+    """Return the stage a file of scenario_gen/method belongs to."""
+    return path.relative_to(PACKAGE / "method").parts[0].removesuffix(".py")
 
 
-def test_a_stage_imports_only_what_stands_before_it():
-    for path in (path for path in PYTHON_FILES if PACKAGE in path.parents and stage(path) != "__init__"):
+def test_every_room_and_stage_has_a_place_in_the_order():
+    assert {room(path) for path in PACKAGE.rglob("*.py")} - {"__init__"} == set(ORDER)
+    assert {stage(path) for path in (PACKAGE / "method").rglob("*.py")} - {"__init__"} == set(STAGES)
+
+
+def test_a_room_imports_only_what_stands_before_it():
+    for path in (path for path in PYTHON_FILES if PACKAGE in path.parents and room(path) != "__init__"):
         for name in imported(path):
             parts = name.split(".")
             if parts[0] == "scenario_gen" and len(parts) > 1 and parts[1] in RANK:
-                assert RANK[parts[1]] <= RANK[stage(path)], f"{path} imports {name}"
+                assert RANK[parts[1]] <= RANK[room(path)], f"{path} imports {name}"
 
 
-FOUNDATION = ("types", "errors", "arrays", "exact", "documents")  # of scenario_gen, for the conventions
+def test_a_stage_of_the_method_imports_only_what_stands_before_it():
+    for path in (PACKAGE / "method").rglob("*.py"):
+        for name in imported(path):
+            parts = name.split(".")
+            if parts[:2] == ["scenario_gen", "method"] and len(parts) > 2:
+                assert STAGE_RANK[parts[2]] <= STAGE_RANK[stage(path)], f"{path} imports {name}"
 
 
-def test_the_conventions_stand_on_the_types_and_below_recordings_and_nodes():
-    """Messages are made and read by recordings and nodes alone, and know of nothing but the types."""
+FOUNDATION = ("base", "numerics", "types")  # of scenario_gen, for the conventions
+
+
+def test_the_conventions_stand_on_the_types_and_below_bags_and_nodes():
+    """Bags and nodes alone make and read messages, which know of nothing but the types."""
     for path in PYTHON_FILES:
         names = [name.split(".") for name in imported(path)]
         if PACKAGE not in path.parents:
             assert {parts[1] for parts in names if parts[0] == "scenario_gen" and len(parts) > 1} <= set(FOUNDATION), path
-        elif stage(path) not in ("recordings", "nodes"):
+        elif room(path) not in ("bags", "ros"):
             assert "msg_conventions" not in {parts[0] for parts in names}, path
 
 
@@ -164,14 +131,14 @@ def test_no_modules_and_no_folders_import_each_other_in_a_circle():
 
 def test_rclpy_is_imported_only_in_the_nodes():
     for path in PYTHON_FILES:
-        if PACKAGE / "nodes" not in path.parents:
+        if PACKAGE / "ros" not in path.parents:
             assert not {name for name in imported(path) if name.split(".")[0] == "rclpy"}, path
 
 
 def test_the_command_line_loads_no_library_before_a_command_needs_it():
     """Else `scenario-gen --help` takes seconds."""
     heavy = {"numpy", "scipy", "numba", "pandas", "shapely", "plotly", "jinja2", "rosbags", "yaml", "duckdb", "distributed"}
-    program = "import sys, scenario_gen.__main__, scenario_gen.cli; print(*sys.modules)"
+    program = "import sys, scenario_gen.__main__, scenario_gen.cli.commands; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     assert not heavy & set(loaded)
 

@@ -1,16 +1,6 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Sets of any size: scenarios drawn again instead of kept, indices for any number of candidates, memory that stays."""
 
 from collections import Counter
@@ -28,18 +18,18 @@ import pytest
 from rich.console import Console
 
 from scenario_gen import pipeline
-from scenario_gen.errors import InputError
-from scenario_gen.evaluation import EvaluationConfig, MEASURED
-from scenario_gen.evaluation.evaluate import measured
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.recordings.write import write_recording
-from scenario_gen.report.page import render, ReportInput
-from scenario_gen.report.summary import summary
+from scenario_gen.method.evaluation import EvaluationConfig, MEASURED
+from scenario_gen.method.evaluation.evaluate import measured
+from scenario_gen.method.sampling import regenerate, sample, sampler
+from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, index_of, LEVEL_SIZE, LEVELS, place_of
+from scenario_gen.method.segmentation import segment
+from scenario_gen.output.report.page import render, ReportInput
+from scenario_gen.output.report.summary import summary
 from scenario_gen.roads import build_road
-from scenario_gen.sampling import regenerate, sample, sampler
-from scenario_gen.sampling.sampler import BLOCK, DIRECTED, index_of, LEVEL_SIZE, LEVELS, place_of
-from scenario_gen.segmentation import segment
 from scenario_gen.template.interaction import waits_to_keep
 from scenario_gen.types.generation import UNIFORM, WITH, WITHOUT
 from scenario_gen.types.request import Request

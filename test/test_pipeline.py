@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The arms of a case: what the segmenter's changepoints are measured against, made by the same chain."""
 
@@ -26,14 +15,14 @@ import pytest
 from reaction_scenes import answering, lane_encounter, wander
 from rich.console import Console
 
-from scenario_gen.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
+from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
+from scenario_gen.method.sampling import SamplingConfig
+from scenario_gen.output.report.page import render, ReportInput
+from scenario_gen.output.report.summary import summary
+from scenario_gen.output.results import write_results
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.report.page import render, ReportInput
-from scenario_gen.report.summary import summary
-from scenario_gen.results import write_results
-from scenario_gen.sampling import SamplingConfig
 from scenario_gen.types.generation import NARROW, ORACLE, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.request import Request

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The main job on hard encounters, made or recorded: valid new scenarios on at least two roads, re-checked by independent means.
 
@@ -24,9 +13,9 @@ import numpy as np
 from oracle import oracle_violations
 import pytest
 
-from scenario_gen.errors import RefusedError
-from scenario_gen.evaluation import EvaluationConfig
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
+from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.template.interaction import find_conflicts, find_waits
 from scenario_gen.types.generation import GenerationResult, WITHOUT

@@ -1,26 +1,15 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """One step of the closed loop, compiled: where the ego is on its witness' path, how the others react, where all are then."""
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at
 from scenario_gen.closed_loop.others import react
-from scenario_gen.kernels import B, B1, F, F1, F2, F3, I, kernel, OUT2, OUTB1
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics.kernels import B, B1, F, F1, F2, F3, I, kernel, OUT2, OUTB1
 
 WINDOW = 5.0  # metres beyond what the ego has moved in which its place on the witness' path is looked for
 BESIDE = 1.5  # metres beside that path at which the ego has left it

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """What is known of a scenario before it is driven: its motion by the clock of its certificate, and the order of its events.
 
@@ -26,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, frozen
-from scenario_gen.errors import InputError
-from scenario_gen.kernels import F, F1, F2, F3, kernel, OUT3
+from scenario_gen.base.errors import InputError
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats, frozen
+from scenario_gen.numerics.kernels import F, F1, F2, F3, kernel, OUT3
 from scenario_gen.template.answers import conflict_of, lag_behind
 from scenario_gen.types.names import tokens
 from scenario_gen.types.reaction import yielders_of

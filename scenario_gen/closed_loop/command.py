@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The work of `scenario-gen drive`: a bag and a planner's name in, a folder of verdicts out."""
 
@@ -19,11 +8,11 @@ from dataclasses import dataclass, field
 import os
 from pathlib import Path
 
+from scenario_gen.base.folders import replaced_folder
+from scenario_gen.base.parameters import assigned
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.results import DRIVEN, JSON, JUNIT, PAGE, write_drives
 from scenario_gen.closed_loop.trials import Bars, broken_bars, Outcome, Rate, rates, read_trials, run_trials, Trial
-from scenario_gen.folders import replaced_folder
-from scenario_gen.parameters import assigned
 
 OverDds = Callable[[Sequence[Trial], str, ClosedLoopConfig, Callable[[int, int], None]], list[Outcome]]
 WORST = 5  # drives that the terminal names

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """A Gymnasium environment over the closed loop: `pip install 'scenario_gen[gym,bags]'`.
 
@@ -30,15 +19,15 @@ from gymnasium.spaces import Box
 import numpy as np
 import numpy.typing as npt
 
-from scenario_gen import exact
-from scenario_gen.arrays import Floats
+from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import read_trials, Trial
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.curve import Curve
-from scenario_gen.errors import InputError
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics.curve import Curve
 
 OTHERS = 8  # nearest others that are seen
 AHEAD = np.array((5.0, 10.0, 15.0, 20.0, 30.0, 40.0))  # metres along the route at which it is seen

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The road around the ego as a grid, with the other vehicles in it: what a planner of obstacles asks for."""
 
@@ -18,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.arrays import Bools, Floats
+from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.certified import fill_box
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
-from scenario_gen.errors import InputError
-from scenario_gen.kernels import B1, F1, F2, I, kernel, OUTB2
+from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics.kernels import B1, F1, F2, I, kernel, OUTB2
 
 REACH = 30.0  # metres from the ego to each side of the grid
 

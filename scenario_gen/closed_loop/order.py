@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The order of events of the certified execution, kept without exception: nobody comes to a place before its turn.
 
@@ -19,8 +8,8 @@ Why nobody meets and nobody waits in a circle: docs/closed_loop.md.
 
 import numpy as np
 
-from scenario_gen.arrays import Bools, Floats
-from scenario_gen.kernels import kernel
+from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics.kernels import kernel
 
 PARTS = 4  # of a step, in each of which the order is proven
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The others in one step: how fast each clock runs, so that they stay clear of the ego and never meet each other.
 
@@ -25,11 +14,11 @@ things slow it down, the strongest counts:
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at
 from scenario_gen.closed_loop.order import keep_order, limit
-from scenario_gen.kernels import kernel
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics.kernels import kernel
 
 FORESEEN = 5.0  # seconds that a vehicle looks ahead
 AHEAD = 60.0  # metres of its path that it looks along for who is ahead

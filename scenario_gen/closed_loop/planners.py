@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Planners of our own, to start from and to compare with: one that keeps its distance, and one that looks at nobody."""
 
@@ -19,10 +8,10 @@ import math
 
 import numpy as np
 
-from scenario_gen import exact
 from scenario_gen.closed_loop.ego import Command, EgoState
 from scenario_gen.closed_loop.simulation import Observation, Task
-from scenario_gen.curve import Curve
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.curve import Curve
 
 SPEED_GAIN = 1.0  # 1/s, acceleration per m/s that is missing
 

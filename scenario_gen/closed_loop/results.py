@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """What a test of a planner leaves: JSON, JUnit's XML and a page, in one folder; the same drives give the same bytes."""
 
@@ -23,14 +12,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from scenario_gen.base.errors import printable
+from scenario_gen.base.folders import write_text
+from scenario_gen.base.folders.marker import Kind
+from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.trials import Outcome, Rate, rates, Trial
-from scenario_gen.errors import printable
-from scenario_gen.folders import write_text
-from scenario_gen.folders.marker import Kind
-from scenario_gen.parameters import flatten
-from scenario_gen.report.data import FRAME_PERIOD, MAX_FRAMES, pack, road_data, states
-from scenario_gen.report.html import render_page
+from scenario_gen.output.report.data import FRAME_PERIOD, MAX_FRAMES, pack, road_data, states
+from scenario_gen.output.report.html import render_page
 
 JSON, JUNIT, PAGE = "drives.json", "junit.xml", "drives.html"
 DRIVEN = Kind("driven")

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The closed loop: a certified scenario, an ego in the place of one of its vehicles, and one step after the other.
 
@@ -24,13 +13,13 @@ from typing import Protocol
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats
+from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.advance import advance, at_goal, overlaps
 from scenario_gen.closed_loop.certified import CELL, Certified, certified
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, TEMPLATE
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
-from scenario_gen.errors import InputError
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.road import Road

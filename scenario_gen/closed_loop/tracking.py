@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """What a body is to do so that it drives as others ask: at a speed and a yaw rate, or along poses with times."""
 
@@ -18,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Floats
 from scenario_gen.closed_loop.ego import Command, EgoState
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats
 
 SLOWEST = 0.5  # m/s below which a yaw rate is taken as that of this speed: a car does not turn on the spot
 CATCH_UP = 0.5  # 1/s, speed per metre that the ego is behind

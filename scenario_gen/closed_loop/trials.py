@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Many drives of one planner: from a bag or from scenarios, in parallel, with the same results for any number of workers."""
 
@@ -26,16 +15,16 @@ from pathlib import Path
 import sys
 from typing import Any
 
+from scenario_gen.bags.recordings.read import INFO, read_recording, ScenarioEntry, SCENARIOS, WITNESS
+from scenario_gen.bags.storage.bag import within
+from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.interrupts import end_with_parent, starting
+from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
-from scenario_gen.errors import InputError, ScenarioGenError
-from scenario_gen.evaluation.bootstrap import wilson
-from scenario_gen.interrupts import end_with_parent, starting
-from scenario_gen.parameters import parameter, Parameters
-from scenario_gen.recordings.read import INFO, read_recording, ScenarioEntry, SCENARIOS, WITNESS
-from scenario_gen.storage.bag import within
-from scenario_gen.storage.config import BagConfig
+from scenario_gen.method.evaluation.bootstrap import wilson
 from scenario_gen.types.ego import together
 from scenario_gen.types.evaluation import Interval
 from scenario_gen.types.names import token

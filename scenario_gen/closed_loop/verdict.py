@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The verdict on one drive: what went wrong, when and by whose doing, and how close it was."""
 
@@ -22,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
-from scenario_gen.evaluation.geometry import footprint_distance, time_to_collision
-from scenario_gen.evaluation.motion import Motion
+from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
+from scenario_gen.method.evaluation.motion import Motion
+from scenario_gen.method.validity import collision as apart
+from scenario_gen.method.validity import containment as inside
+from scenario_gen.method.validity.dynamics import control_points
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats
 from scenario_gen.roads.clearance import clearance_in_cells, footprint_fits
 from scenario_gen.template.interaction import find_conflicts
 from scenario_gen.types.road import Road
-from scenario_gen.validity import collision as apart
-from scenario_gen.validity import containment as inside
-from scenario_gen.validity.dynamics import control_points
 
 PARTS = 200  # of a step, to which the beginning of a contact is told
 RESOLUTION = 1e-6  # seconds; what cannot be told apart over such an interval counts as a contact

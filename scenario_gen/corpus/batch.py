@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """`batch`: templates × roads × samples. A task makes all scenarios of a few templates on one road, and writes three things.
 
@@ -32,24 +21,24 @@ import json
 from pathlib import Path
 from typing import Any
 
-from scenario_gen.config import PipelineConfig
+from scenario_gen.bags.recordings.provenance import parameter_texts, versions
+from scenario_gen.bags.recordings.write import add_results, scenario_bytes
+from scenario_gen.bags.storage.writer import BagWriter
+from scenario_gen.base.documents import read_json
+from scenario_gen.base.errors import InputError, needs, RefusedError
+from scenario_gen.base.folders import sha256_of, write_text
+from scenario_gen.base.folders.claim import alone
+from scenario_gen.base.folders.scratch import sweep_tree
+from scenario_gen.base.interrupts import ending
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.tasks import arriving, check_out, spread, Told
-from scenario_gen.documents import read_json
-from scenario_gen.errors import InputError, needs, RefusedError
-from scenario_gen.evaluation.criticality import criticality
-from scenario_gen.evaluation.motion import at_period
-from scenario_gen.fitting import LostConflictError
-from scenario_gen.folders import sha256_of, write_text
-from scenario_gen.folders.claim import alone
-from scenario_gen.folders.scratch import sweep_tree
-from scenario_gen.interrupts import ending
-from scenario_gen.nearest import attempt
-from scenario_gen.recordings.provenance import parameter_texts, versions
-from scenario_gen.recordings.write import add_results, scenario_bytes
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.evaluation.criticality import criticality
+from scenario_gen.method.evaluation.motion import at_period
+from scenario_gen.method.fitting import LostConflictError
+from scenario_gen.method.nearest import attempt
+from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road, road_and_template
-from scenario_gen.segmentation import segment
-from scenario_gen.storage.writer import BagWriter
 from scenario_gen.template.size import refuse_too_large
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.request import Request

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Encounters kept by the thousand: tables in which each is a row, with its tracks as the bytes that a bag would hold.
 
@@ -26,17 +15,17 @@ from typing import Any
 
 import numpy as np
 
+from scenario_gen.bags.recordings.tracks import tracks_bytes, tracks_of
+from scenario_gen.base.documents import parse_json, shown
+from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import Found, label
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.documents import parse_json, shown
-from scenario_gen.errors import guarded, InputError, needs
 from scenario_gen.logs import read_log
 from scenario_gen.logs.raw import Observations, RawLog, Segment
 from scenario_gen.logs.read import encounters_of
 from scenario_gen.logs.tables import EPOCH_NS
-from scenario_gen.recordings.tracks import tracks_bytes, tracks_of
 from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.encounter import Encounter
 

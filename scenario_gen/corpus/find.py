@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """`find`: the scenarios of a batch as a database: a condition in SQL; what it finds as a bag, as a page, or made again."""
 
@@ -19,15 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scenario_gen.bags.recordings.write import add_message
+from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.bags.storage.writer import atomic_bag
+from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.folders import replaced_folder
 from scenario_gen.corpus.messages import database, quoted
-from scenario_gen.errors import InputError, ScenarioGenError
-from scenario_gen.folders import replaced_folder
-from scenario_gen.recordings.write import add_message
-from scenario_gen.results import EVALUATED, write_evaluation
-from scenario_gen.review.evaluation import bag_results
-from scenario_gen.review.regenerate import regenerate_scenario, Regenerated
-from scenario_gen.storage.config import BagConfig
-from scenario_gen.storage.writer import atomic_bag
+from scenario_gen.output.results import EVALUATED, write_evaluation
+from scenario_gen.output.review.evaluation import bag_results
+from scenario_gen.output.review.regenerate import regenerate_scenario, Regenerated
 
 MEMORY = 500  # MiB
 COLUMNS = ("template", "kind", "road", "vehicles", "index", "seconds", "distance", "ttc", "pet", "speed", "braking")

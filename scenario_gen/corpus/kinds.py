@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """What two vehicles have to do with each other: following, merging, turning, crossing, opposing.
 
@@ -29,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, wrap_angle
-from scenario_gen.kernels import F1, F2, kernel, OUTB1
 from scenario_gen.logs.groups import LAG
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats, wrap_angle
+from scenario_gen.numerics.kernels import F1, F2, kernel, OUTB1
 
 KINDS = ("following", "merging", "turning", "crossing", "opposing", "other")
 BESIDE, ALIKE = 2.5, np.radians(30.0)  # m, rad: on the same path

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """`library`: one library of primitives for all encounters of a corpus, by pairs of vehicles.
 
@@ -32,17 +21,17 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.arrays import Ints
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.folders import Kind, replaced_folder
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.kinds import Motion, space_time_gap
 from scenario_gen.corpus.page import sketch, write_page
 from scenario_gen.corpus.tasks import arriving, spread, Told
-from scenario_gen.errors import InputError
-from scenario_gen.folders import Kind, replaced_folder
-from scenario_gen.segmentation.estimator import USUAL_R_HAT
-from scenario_gen.segmentation.library import assign, build_library, PrimitiveLibrary
-from scenario_gen.segmentation.segmenter import DEFAULT, SegmentationConfig
+from scenario_gen.method.segmentation.estimator import USUAL_R_HAT
+from scenario_gen.method.segmentation.library import assign, build_library, PrimitiveLibrary
+from scenario_gen.method.segmentation.segmenter import DEFAULT, SegmentationConfig
+from scenario_gen.numerics.arrays import Ints
 from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.reaction import FOLLOW, YIELD

@@ -1,23 +1,12 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """An hour of messages -> which vehicles meet: candidates by a join of half-second bins, then every 0.1 s of those.
 
 Vehicles are not sampled at the same instants, so nothing is joined by exact time. All messages of a vehicle in a half second give
 one row, driven on to the middle of it with its speed and heading. Rows of the same half second meet in cells as wide as the
 proximity and what a vehicle drives in between: each looks into its own cell and into half of those around it. The database only
-proposes: what decides is computed from the messages with `scenario_gen.exact`.
+proposes: what decides is computed from the messages with `scenario_gen.numerics.exact`.
 """
 
 from dataclasses import dataclass
@@ -28,14 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, Ints, runs
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap, unwrapped
 from scenario_gen.corpus.messages import database, HOUR, quoted
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.kernels import F, F1, I, I1, kernel, OUT2, OUTI1
 from scenario_gen.logs.groups import APART, LAG, shortest, ticks, windows
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats, Ints, runs
+from scenario_gen.numerics.kernels import F, F1, I, I1, kernel, OUT2, OUTI1
 
 BIN = 500_000  # µs
 FASTEST = 35.0  # m/s: what a vehicle drives in a bin widens the cells

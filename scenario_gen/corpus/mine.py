@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """`mine`: an archive -> a corpus of encounters. Four stages of tasks, each writing files that the next one reads.
 
@@ -31,6 +20,13 @@ import json
 from pathlib import Path
 from typing import Any
 
+from scenario_gen.base.documents import COUNT, read_json
+from scenario_gen.base.errors import InputError, needs
+from scenario_gen.base.folders import write_text
+from scenario_gen.base.folders.claim import alone
+from scenario_gen.base.folders.scratch import sweep_tree
+from scenario_gen.base.interrupts import ending
+from scenario_gen.base.parameters import flatten
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import (
     account_of,
@@ -48,15 +44,8 @@ from scenario_gen.corpus.meetings import HourTask, overlap, search_hours
 from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
 from scenario_gen.corpus.page import sketch, write_page
 from scenario_gen.corpus.tasks import arriving, check_out, spread, Told
-from scenario_gen.documents import COUNT, read_json
-from scenario_gen.errors import InputError, needs
-from scenario_gen.folders import write_text
-from scenario_gen.folders.claim import alone
-from scenario_gen.folders.scratch import sweep_tree
-from scenario_gen.interrupts import ending
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.read import is_bag, is_spmd, is_table
-from scenario_gen.parameters import flatten
 from scenario_gen.template.reactions import reactions_of
 
 ARCHIVE, PAGE = "archive.json", "encounters.html"

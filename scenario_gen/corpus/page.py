@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Pages about many encounters: what was mined, and the primitives of a library; they open offline and run no script."""
 
@@ -21,8 +10,8 @@ from typing import Any
 from markupsafe import Markup
 import numpy as np
 
-from scenario_gen.folders import write_text
-from scenario_gen.report.html import render_page
+from scenario_gen.base.folders import write_text
+from scenario_gen.output.report.html import render_page
 from scenario_gen.types.encounter import Encounter
 
 WIDTH, HEIGHT, BORDER = 240.0, 160.0, 12.0  # px

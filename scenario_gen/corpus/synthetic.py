@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Synthetic archives in the format of the Safety Pilot, of any size, whose encounters are known: for tests and benchmarks.
 
@@ -28,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Floats, Ints
-from scenario_gen.errors import InputError, needs
-from scenario_gen.folders import Kind, replaced_folder, write_text
-from scenario_gen.parameters import parameter, Parameters
+from scenario_gen.base.errors import InputError, needs
+from scenario_gen.base.folders import Kind, replaced_folder, write_text
+from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats, Ints
 
 TRUTH = "synthetic.json"
 SYNTHETIC = Kind("synthetic archive")

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Tasks: pure functions that each write one file, mapped over processes; what is done is what is there.
 
@@ -31,9 +20,9 @@ import time
 import traceback
 from typing import Any, TypeVar
 
-from scenario_gen.errors import InputError, needs
-from scenario_gen.folders import naming, scratch, sync
-from scenario_gen.interrupts import ending, starting
+from scenario_gen.base.errors import InputError, needs
+from scenario_gen.base.folders import naming, scratch, sync
+from scenario_gen.base.interrupts import ending, starting
 
 Task = TypeVar("Task")
 Told = Callable[[int, int, str], None]
@@ -139,7 +128,7 @@ def spread(workers: int = 1, scheduler: str = "", told: Told = lambda *_: None) 
 
 def _guarded(function: Callable[[Any], Any], task: Any) -> str:
     """Run one task; an error of its own input is a sentence, and does not end the others."""
-    from scenario_gen.errors import said, ScenarioGenError
+    from scenario_gen.base.errors import said, ScenarioGenError
 
     try:
         function(task)

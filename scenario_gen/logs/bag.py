@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """rosbag2 bags, MCAP and SQLite: per-vehicle fixes and speeds, odometry, or tracks that are encounters already."""
 
@@ -22,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from scenario_gen.errors import InputError
+from scenario_gen.bags.recordings.samples import decode_sample, decode_tracks, FIX, ODOMETRY, TRACKS, TWIST
+from scenario_gen.bags.recordings.tracked import decode_tracked, TRACKED, VEHICLES
+from scenario_gen.bags.storage.bag import open_bag
+from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, RawLog, Rows, Segment
-from scenario_gen.recordings.samples import decode_sample, decode_tracks, FIX, ODOMETRY, TRACKS, TWIST
-from scenario_gen.recordings.tracked import decode_tracked, TRACKED, VEHICLES
-from scenario_gen.storage.bag import open_bag
-from scenario_gen.storage.config import BagConfig
 from scenario_gen.types.encounter import Encounter
 
 USED = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED)

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Cleaning: what cannot be true is dropped and counted; what is left is in order of time, in metres."""
 
@@ -20,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, Ints
-from scenario_gen.errors import InputError
-from scenario_gen.geodesy import local_frame
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig, picked
+from scenario_gen.logs.geodesy import local_frame
 from scenario_gen.logs.raw import Observations, RawLog
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats, Ints
 
 LATEST_NS = 2**62  # years 1823 to 2116: so the difference of any two stamps fits in 64 bits
 SLOWEST = 5.0  # s between fixes: a slower source says nothing of how a vehicle drives, or its unit of time is another one

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Which column of a table holds which quantity, and in which unit: by option, or by name and suffix."""
 
@@ -19,7 +8,7 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
-from scenario_gen.errors import InputError
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import listed
 
 # Names a quantity goes by, the preferred one first; a clock that all files share is preferred to one that starts with the file.

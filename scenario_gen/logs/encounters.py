@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """From clean tracks to smooth pieces: cut at long gaps, relocations and reversals."""
 
@@ -19,13 +8,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, runs
 from scenario_gen.logs.cleaning import FASTEST, JUMP_SLACK, select, SLOWEST
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats, runs
 
 TURNED = np.radians(120.0)  # who drives off from a stop this far from where it came from has reversed, or turned on the spot
 MOST_TICKS = 100_000  # of a piece: smoothing takes 3 kB for each

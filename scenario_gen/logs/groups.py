@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Who is together: groups of vehicles and the time that each is there.
 
@@ -30,10 +19,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Floats, runs
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats, runs
 
 MOST = 0.6  # with `whole`, a vehicle that is there for less of the time is left out; for more, it shortens the time
 EDGE = 1.0  # s by which a group is rather shortened than joined late or left early

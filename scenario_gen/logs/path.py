@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The path a vehicle drove: a penalised spline by distance driven, through its fixes and along its recorded headings.
 
@@ -25,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from scenario_gen import exact
-from scenario_gen.arrays import Floats, Ints, wrap_angle
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats, Ints, wrap_angle
 
 KNOT = 1.0  # m between knots
 MARGIN = 5.0  # m of path beyond both ends, for fixes that lie there

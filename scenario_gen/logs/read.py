@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """From a path to encounters: choose the reader, clean, smooth, cut."""
 
@@ -23,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from scenario_gen.errors import guarded, InputError, needs, reading
+from scenario_gen.bags.storage.files import files_of
+from scenario_gen.base.errors import guarded, InputError, needs, reading
 from scenario_gen.logs.adapters import commonroad
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.cleaning import clean, Drops
@@ -33,7 +23,6 @@ from scenario_gen.logs.groups import distances, find_groups, Group
 from scenario_gen.logs.quality import Dropped, EncounterQuality, find_overlaps, Quality, VehicleQuality
 from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
-from scenario_gen.storage.files import files_of
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.presence import cut
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Reconciling positions with measured speeds: a vehicle moves forward along a smooth path.
 
@@ -28,13 +17,13 @@ import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, Ints, runs, wrap_angle
-from scenario_gen.errors import InputError
-from scenario_gen.exact.sparse import Columns
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.path import fit_path, Headings, headings_of, MOVES, Path, straight_path
 from scenario_gen.logs.raw import Observations
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats, Ints, runs, wrap_angle
+from scenario_gen.numerics.exact.sparse import Columns
 
 STANDS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
 STILL = 0.1  # m/s: below this it is not on its way to or from standing

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Fixes and speeds as they come → samples on the common clock, and the log that they amount to.
 
@@ -23,13 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenario_gen.arrays import Floats
-from scenario_gen.errors import InputError
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs.cleaning import clean, RELOCATED
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import longest_bridge
 from scenario_gen.logs.raw import natural, Observations, RawLog, Rows, Segment
 from scenario_gen.logs.smoothing import speed_of_fixes
+from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types.encounter import Vehicle
 
 WINDOW_NS = 3_000_000_000  # of the past that is cleaned again for every sample: enough to tell a jump from a new place

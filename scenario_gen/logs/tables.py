@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Tables: CSV or Parquet with named columns, and the headerless files of the Safety Pilot Model Deployment (SPMD)."""
 
@@ -22,11 +11,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from scenario_gen.arrays import Floats, Ints
-from scenario_gen.errors import guarded, InputError, needs
+from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.logs.columns import Column, find_columns
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, LONGEST_HEADER, Observations, RawLog, Segment
+from scenario_gen.numerics.arrays import Floats, Ints
 
 LONGEST = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
 LONGEST_NUMBER = 300  # characters

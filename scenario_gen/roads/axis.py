@@ -1,21 +1,10 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The dividing line of a main road that is shaped to its template's bends."""
 
-from scenario_gen.curve import Curve
-from scenario_gen.errors import RefusedError
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.shaped import bends, main_axis
 from scenario_gen.template.frenet import main_line, to_frenet

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The built-in roads: how large each must be for a template, how it is drawn, and the corridor around a template's own paths."""
 
@@ -19,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from PIL import Image, ImageDraw
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, wrap_angle
-from scenario_gen.errors import RefusedError
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats, wrap_angle
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.template.frenet import FrenetTracks, to_frenet
 from scenario_gen.template.path_crossing import path_crossing

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Distance to the nearest obstacle, whether discs and footprints have room, and the nearest pose that has."""
 
@@ -18,9 +7,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats
-from scenario_gen.kernels import B2, F, F2, kernel, OUT2, OUTB1
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics.kernels import B2, F, F2, kernel, OUT2, OUTB1
 from scenario_gen.types.road import Road
 
 CONTACT = 1e-9  # [cells] what lies nearer than this touches

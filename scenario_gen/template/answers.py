@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """How a reaction shows in a motion, recorded or generated: when a yielder leaves, how far behind its leader a follower drives."""
 
@@ -18,8 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Floats, Ints
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats, Ints
 from scenario_gen.template.interaction import Conflict, pair_conflict, WAIT_SPEED
 from scenario_gen.types.encounter import Vehicle
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """A template along one road, in path coordinates: a reference line, and every vehicle's station, offset and lanes.
 
@@ -22,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
-from scenario_gen.curve import Curve
-from scenario_gen.errors import RefusedError
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
+from scenario_gen.numerics.curve import Curve
 from scenario_gen.template.manoeuvre import turn_of
 from scenario_gen.template.tracks import presence_of, smoothing_spline, Track
 

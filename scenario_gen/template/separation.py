@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The template on its own ground, pulled apart where a record (or a road) has vehicles too close."""
 
@@ -20,10 +9,10 @@ from itertools import combinations
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Floats, frozen
-from scenario_gen.curve import Curve
-from scenario_gen.errors import RefusedError
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.numerics.curve import Curve
 from scenario_gen.template.tracks import clean_tracks, presence_of, Track
 from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
 from scenario_gen.types.presence import together

@@ -1,21 +1,10 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """What a vehicle's footprint says of its body: where its rear axle is, what kind it is, how high; for formats that ask."""
 
-from scenario_gen import exact
-from scenario_gen.arrays import Floats
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types.encounter import Vehicle
 
 REAR_AXLE = 0.3  # of the length, from the footprint's centre back: 1.44 m of a car of 4.8 m

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Presence: from which to which sample each vehicle of an encounter or a scenario is there.
 
@@ -20,8 +9,8 @@ last value there, which says nothing of where it is. So whoever looks at a motio
 
 import numpy as np
 
-from scenario_gen.arrays import Bools, Floats, Ints
-from scenario_gen.errors import InputError
+from scenario_gen.base.errors import InputError
+from scenario_gen.numerics.arrays import Bools, Floats, Ints
 
 ALWAYS: Ints = np.zeros((0, 2), dtype=np.int64)  # the default of a field `present`: everybody is there throughout
 ALWAYS.setflags(write=False)

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """A route: the geometry one vehicle drives, without time."""
 
@@ -19,7 +8,7 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from scenario_gen.arrays import canonical_poses, Floats, frozen, frozen_ints, Ints
+from scenario_gen.numerics.arrays import canonical_poses, Floats, frozen, frozen_ints, Ints
 
 FAR_OFF = 1.5
 """Metres between a route and its fitted path from which on it is said."""

@@ -1,28 +1,17 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """How close vehicles come, as figures of one scenario, and the range of one that a request asks for."""
 
 from dataclasses import dataclass
 import math
 
-from scenario_gen.errors import InputError
+from scenario_gen.base.errors import InputError
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.names import vehicle_index
 
 UNITS = {"pet": "s", "ttc": "s", "gap": "m", "arrival_gap": "s", "closing_speed": "m/s"}
-"""The figures that a target can be set on, with their units; `scenario_gen.evaluation.measures` defines them."""
+"""The figures that a target can be set on, with their units; `scenario_gen.method.evaluation.measures` defines them."""
 Pair = tuple[int, int]  # of vehicle indices
 _FORM = "NAME=LOW..HIGH or NAME[a,b]=LOW..HIGH"
 _EXAMPLE = "pet=0.5..1.5; ttc[1,2]=1..2"

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Reactions among the others in closed loop: who waits for another goes on waiting, whatever the ego does to that one."""
 
@@ -28,10 +17,10 @@ from scenario_gen.closed_loop.certified import CELL, certified
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.nearest import attempt
+from scenario_gen.method.nearest import attempt
+from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
-from scenario_gen.segmentation import segment
 from scenario_gen.template.answers import conflict_of, lag_behind, time_gaps
 from scenario_gen.types.ego import together, with_witness
 from scenario_gen.types.request import Request

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The core of the closed loop: the witness passes, the others keep their order whatever the ego does, nobody waits for ever."""
 
@@ -24,12 +13,12 @@ import numpy as np
 import pytest
 
 from benchmarks._driving_worlds import Anything, as_scenario, draw_scenario, PERIOD, Witness
+from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.certified import certified
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.errors import InputError
 
 EXAMPLES = 10_000 if LONG else 60
 FAR = Pose(1e4, 1e4, 0.0, 0.0)

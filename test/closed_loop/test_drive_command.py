@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The command `drive`: a bag and a planner in, verdicts and an exit code out."""
 
@@ -26,13 +15,13 @@ from bag_examples import hand_made_run
 import pytest
 from typer.testing import CliRunner
 
-from scenario_gen.cli import app
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.base.errors import InputError
+from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.command import drive_bag
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.results import as_junit
 from scenario_gen.closed_loop.trials import find_planner, read_trials
-from scenario_gen.errors import InputError
-from scenario_gen.recordings.write import write_recording
 
 PLANNER = "scenario_gen.closed_loop.planners:IdmFollower"
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Verdicts against cases made by hand, where the answer is known."""
 
@@ -23,6 +12,7 @@ import pytest
 
 from benchmarks._driving_worlds import as_scenario, PERIOD
 from benchmarks.drive import seen_at
+from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.planners import ConstantSpeed, IdmFollower
@@ -30,7 +20,6 @@ from scenario_gen.closed_loop.results import as_json, as_junit, as_page
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.trials import Bars, broken_bars, find_planner, rates, run_trials, Trial
 from scenario_gen.closed_loop.verdict import judge, Runner
-from scenario_gen.errors import InputError
 from scenario_gen.types.road import Road
 
 TIME = np.arange(150) * PERIOD

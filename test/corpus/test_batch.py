@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Batches: the same bytes by whomever, found again by what they are, made again alone; a killed run loses and doubles nothing."""
 
@@ -23,15 +12,15 @@ import time
 import pytest
 from refusing import refuse
 
+from scenario_gen.bags.recordings.read import read_recording
+from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.folders import sha256_of
 from scenario_gen.corpus import batch as batches
 from scenario_gen.corpus.batch import LOST_CONFLICT, run_batch, seed_of, tokens_of
 from scenario_gen.corpus.encounters import rows_of
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
 from scenario_gen.corpus.tasks import spread
-from scenario_gen.errors import InputError, ScenarioGenError
-from scenario_gen.fitting import LostConflictError
-from scenario_gen.folders import sha256_of
-from scenario_gen.recordings.read import read_recording
+from scenario_gen.method.fitting import LostConflictError
 
 pytestmark = pytest.mark.xdist_group("corpus")
 ROADS = ("corridor", "straight")

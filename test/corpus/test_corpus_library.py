@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The library: pairs in canonical order, segments that are shared, agreement as scikit-learn counts it, and the page."""
 
@@ -21,7 +10,7 @@ import pytest
 
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.library import adjusted_rand, build, pair_encounters
-from scenario_gen.segmentation.library import PrimitiveLibrary
+from scenario_gen.method.segmentation.library import PrimitiveLibrary
 from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.encounter import Encounter, Vehicle
 

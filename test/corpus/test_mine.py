@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Mining: planted encounters are found and no others, rows left out are counted, the work can be cut off anywhere."""
 
@@ -21,6 +10,9 @@ from hypothesis import given, strategies
 import numpy as np
 import pytest
 
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.folders import sha256_of
+from scenario_gen.base.folders.claim import claim
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.grouping import group, label, Meeting
@@ -30,9 +22,6 @@ from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.mine import mine
 from scenario_gen.corpus.synthetic import read_planted
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.errors import InputError
-from scenario_gen.folders import sha256_of
-from scenario_gen.folders.claim import claim
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.template.reactions import reactions_of
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The example drives among the vehicles of the node `traffic`, and stops for what is in its way."""
 
@@ -26,14 +15,14 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "test" / "nodes"))
+sys.path.insert(0, str(ROOT / "test" / "ros"))
 EXAMPLE = ROOT / "examples" / "ego_consumer.py"
 ROUTE = np.column_stack([np.arange(0.0, 60.0, 0.5), np.zeros(120), np.zeros(120)])
 
 
 @pytest.fixture(scope="module")
 def example():
-    import scenario_gen.nodes  # noqa: F401  (what the wheels need)
+    import scenario_gen.ros.nodes  # noqa: F401  (what the wheels need)
 
     specification = importlib.util.spec_from_file_location("ego_consumer", EXAMPLE)
     module = importlib.util.module_from_spec(specification)
@@ -70,8 +59,8 @@ def test_it_drives_a_scenario_in_lock_step(tmp_path):
 
     from msg_conventions.diagnostics import decode_diagnostics
     from scenario_gen import generate, read_log
-    from scenario_gen.nodes.domain import free_domain
-    from scenario_gen.recordings.write import write_recording
+    from scenario_gen.bags.recordings.write import write_recording
+    from scenario_gen.ros.plumbing.domain import free_domain
 
     (encounter,) = read_log(RESOURCES / "synthetic_c").encounters
     bag = write_recording(tmp_path / "bag", generate(encounter, "straight", count=1, seed=7))

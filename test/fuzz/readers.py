@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Which modules take files or messages of others apart, found by walking the sources; and which target is for which."""
 
@@ -27,19 +16,19 @@ OF_TARGETS = {
     "parquet": ("logs/parquet.py",),
     "argoverse2": ("logs/adapters/tracks.py",),
     "commonroad_log": ("logs/adapters/commonroad.py",),
-    "mcap_log": ("recordings/samples.py", "recordings/tracked.py", "storage/bag.py"),
-    "sqlite_log": ("storage/sqlite.py",),
-    "mcap_reader": ("storage/mcap.py", "storage/records.py"),
-    "metadata": ("storage/files.py", "documents.py"),
-    "reindex": ("storage/reindex.py", "storage/metadata.py"),
-    "import_openscenario": ("exchange/importing.py", "exchange/xml.py"),
+    "mcap_log": ("bags/recordings/samples.py", "bags/recordings/tracked.py", "bags/storage/bag.py"),
+    "sqlite_log": ("bags/storage/sqlite.py",),
+    "mcap_reader": ("bags/storage/mcap.py", "bags/storage/records.py"),
+    "metadata": ("bags/storage/files.py", "base/documents.py"),
+    "reindex": ("bags/storage/reindex.py", "bags/storage/metadata.py"),
+    "import_openscenario": ("output/exchange/importing.py", "output/exchange/xml.py"),
     "map": ("roads/nav2.py",),
     "vector_map_osm": ("roads/vector/lanelet2.py",),
     "vector_map_xodr": ("roads/vector/opendrive.py",),
     "vector_map_xml": ("roads/vector/commonroad.py",),
-    "parameters": ("parameters.py",),
-    "library": ("segmentation/library.py",),
-    "evaluation_json": ("evaluation/compare.py", "types/evaluation.py"),
+    "parameters": ("base/parameters.py",),
+    "library": ("method/segmentation/library.py",),
+    "evaluation_json": ("method/evaluation/compare.py", "types/evaluation.py"),
     "batch": ("corpus/find.py",),
     "corpus": ("corpus/encounters.py",),
     "archive": ("corpus/messages.py",),
@@ -60,19 +49,20 @@ OWN = {  # modules that parse, but no file that a user is given by others, and w
     "corpus/mine.py": "its own intermediate tables, which are written whole or not at all",
     "corpus/meetings.py": "its own intermediate tables, likewise",
     "corpus/synthetic.py": "the truth of the archive that it wrote",
-    "exchange/export.py": "bytes for a digest",
-    "folders/claim.py": "what is none is no claim: test/folders",
-    "folders/marker.py": "what is none is no marker: test/folders",
-    "kernel_cache.py": "source files of the package, for a digest",
-    "kernels.py": "source files of the package, to see which have kernels",
-    "report/html.py": "assets of the package",
-    "reproduce/page.py": "whether a folder is an earlier result: anything else is none",
-    "results.py": "whether a folder is an earlier result: anything else is none",
-    "storage/definitions.py": "definitions of messages that ROS 2 has installed",
+    "output/exchange/export.py": "bytes for a digest",
+    "base/folders/claim.py": "what is none is no claim: test/base/folders",
+    "base/folders/marker.py": "what is none is no marker: test/base/folders",
+    "numerics/kernel_cache.py": "source files of the package, for a digest",
+    "numerics/kernels.py": "source files of the package, to see which have kernels",
+    "__init__.py": "its own stub, for the public names",
+    "output/report/html.py": "assets of the package",
+    "output/reproduce/page.py": "whether a folder is an earlier result: anything else is none",
+    "output/results.py": "whether a folder is an earlier result: anything else is none",
+    "bags/storage/definitions.py": "definitions of messages that ROS 2 has installed",
 }
 
 
 def parsing_modules() -> set[str]:
     """Return the modules outside of the nodes that call what parses, by their paths in their packages."""
-    files = [(path, package) for package in PACKAGES for path in package.rglob("*.py") if "nodes" not in path.parts]
+    files = [(path, package) for package in PACKAGES for path in package.rglob("*.py") if "ros" not in path.parts]
     return {str(path.relative_to(package)) for path, package in files if PARSING.search(path.read_text(encoding="utf-8"))}

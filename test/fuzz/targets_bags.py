@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The readers of bags, maps, parameters and JSON as targets."""
 
@@ -36,24 +25,24 @@ from msg_conventions import trajectory
 from msg_conventions.roads import decode_map, encode_map, MAP_TYPE
 from msg_conventions.topics import topic_entry
 from msg_conventions.trajectory import TYPE as TRAJECTORY_TYPE
-from scenario_gen.errors import ScenarioGenError
-from scenario_gen.evaluation import compare, comparison_table, EvaluationConfig, read_evaluations
+from scenario_gen.bags.recordings.read import read_recording, read_scenario_set
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.bags.storage.metadata import qos_yaml
+from scenario_gen.bags.storage.reindex import reindex
+from scenario_gen.bags.storage.writer import BagWriter
+from scenario_gen.base.errors import ScenarioGenError
+from scenario_gen.base.parameters import assigned, flatten, loaded
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.parameters import assigned, flatten, loaded
+from scenario_gen.method.evaluation import compare, comparison_table, EvaluationConfig, read_evaluations
+from scenario_gen.method.segmentation import assign, build_library, PrimitiveLibrary
+from scenario_gen.output.results import provenance_of
+from scenario_gen.output.review.evaluation import bag_results
+from scenario_gen.output.review.regenerate import regenerate_scenario
+from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.recordings.read import read_recording, read_scenario_set
-from scenario_gen.recordings.write import write_recording
-from scenario_gen.results import provenance_of
-from scenario_gen.review.evaluation import bag_results
-from scenario_gen.review.regenerate import regenerate_scenario
-from scenario_gen.review.validation import validate_bag
 from scenario_gen.roads import build_road
-from scenario_gen.segmentation import assign, build_library, PrimitiveLibrary
-from scenario_gen.storage.bag import bag_topics, read_messages
-from scenario_gen.storage.metadata import qos_yaml
-from scenario_gen.storage.reindex import reindex
-from scenario_gen.storage.writer import BagWriter
 
 CONFIG = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False))
 PARTED = b"\n# ---- image ----\n"  # a map as one input: its YAML, this, and its image

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Public recordings, scenario files and the tables of a corpus as targets; several files are one input, with names between."""
 
@@ -34,11 +23,11 @@ from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import account_of, encounter_of, row_of, rows_of, tables_of, write_encounters
 from scenario_gen.corpus.find import coverage_lines, find
 from scenario_gen.corpus.messages import parse_range, ranges
-from scenario_gen.exchange.commonroad import write_commonroad
-from scenario_gen.exchange.importing import import_file
-from scenario_gen.exchange.openscenario import write_openscenario
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
+from scenario_gen.output.exchange.commonroad import write_commonroad
+from scenario_gen.output.exchange.importing import import_file
+from scenario_gen.output.exchange.openscenario import write_openscenario
 
 FILE = re.compile(rb"\n\x00FILE ([\w./=-]+)\x00\n")  # begins a file of an input of several
 WAYS: dict[str, Sequence[Mutator]] = {

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The readers of logs as targets: tables in text and Parquet, basic safety messages, bags in MCAP and SQLite."""
 
@@ -32,13 +21,13 @@ from msg_conventions.autoware import AutowareEncoder
 from msg_conventions.ego import encode_state
 from msg_conventions.tracks import encode_tracks
 from msg_conventions.trajectory import TYPE as TRACKS
-from scenario_gen.errors import ScenarioGenError
+from scenario_gen.bags.recordings.samples import FIX, ODOMETRY, TWIST
+from scenario_gen.bags.recordings.tracked import store, TRACKED
+from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams
 from scenario_gen.logs.bag import read_streams, read_tracked, read_tracks, Topic, USED
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.logs.tables import COLUMNS
-from scenario_gen.recordings.samples import FIX, ODOMETRY, TWIST
-from scenario_gen.recordings.tracked import store, TRACKED
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.scenario import Scenario
 

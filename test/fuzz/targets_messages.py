@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The decoders of messages as targets, one per type; and what is made of their texts."""
 
@@ -50,8 +39,8 @@ from msg_conventions.streams import decode_fix, decode_speed, encode_fix, encode
 from msg_conventions.topics import FIX_TYPE, TWIST_TYPE
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from msg_conventions.trajectory import TYPE as TRAJECTORY_TYPE
-from scenario_gen.recordings.template import decode_template
-from scenario_gen.recordings.write import result_messages
+from scenario_gen.bags.recordings.template import decode_template
+from scenario_gen.bags.recordings.write import result_messages
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import EgoSlot
 

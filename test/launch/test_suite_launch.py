@@ -1,21 +1,10 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The launch file as `ros2 launch` runs it: real launch, real processes; the suite comes up, generates, records and ends cleanly.
 
 It runs where a Jazzy is sourced and this package is built (`colcon test` after `colcon build`); elsewhere
-test/nodes/test_launching.py runs the launch file with stand-ins.
+test/ros/test_launching.py runs the launch file with stand-ins.
 """
 
 import os
@@ -26,7 +15,7 @@ import unittest
 import pytest
 from skips import NO_LAUNCH
 
-from scenario_gen.storage.bag import bag_topics
+from scenario_gen.bags.storage.bag import bag_topics
 
 launch_testing = pytest.importorskip("launch_testing", reason=NO_LAUNCH)
 actions = pytest.importorskip("launch.actions", reason=NO_LAUNCH)

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Public recordings: small files written to their definitions give the positions, speeds, headings and sizes that went in."""
 
@@ -21,7 +10,7 @@ import pandas as pd
 from pyarrow import parquet
 import pytest
 
-from scenario_gen.errors import InputError, UnforeseenError
+from scenario_gen.base.errors import InputError, UnforeseenError
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.logs.adapters import tracks
 from scenario_gen.logs.adapters.formats import FORMATS
@@ -126,7 +115,7 @@ def tracked(folder):
     """Write a bag of autoware_perception_msgs/TrackedObjects."""
     from rosbags.rosbag2 import StoragePlugin, Writer
 
-    from scenario_gen.recordings.tracked import LABELS, store, TRACKED
+    from scenario_gen.bags.recordings.tracked import LABELS, store, TRACKED
 
     types = store().types
 

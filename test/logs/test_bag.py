@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Bags, MCAP and SQLite: streams per vehicle, odometry, tracks, and everything that can be wrong with them."""
 
@@ -23,9 +12,9 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from synthetic_cases import fix_message, nanoseconds_to_time, twist_message
 
 from msg_conventions.tracks import encode_tracks
-from scenario_gen.errors import InputError
+from scenario_gen.bags.recordings.samples import FIX, ODOMETRY, STORES, TWIST
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.recordings.samples import FIX, ODOMETRY, STORES, TWIST
 from scenario_gen.types.encounter import Encounter, Vehicle
 
 TRACKS = "trajectory_msgs/msg/MultiDOFJointTrajectory"

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Hashes that say which messages belong together."""
 
@@ -24,7 +13,7 @@ from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.hashes import decode_hashes, encode_hashes, hash_of, template_hashes
 from msg_conventions.roads import encode_map
 from msg_conventions.tracks import encode_tracks
-from scenario_gen.errors import InputError
+from scenario_gen.base.errors import InputError
 
 
 def test_a_road_of_the_same_geometry_differs_in_the_templates_hash_only():

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Messages of vehicles that arrive late or leave early: no phantoms, and the same scenario again."""
 
@@ -26,8 +15,8 @@ from msg_conventions.scenario_info import decode_info, encode_info, scenario_ent
 from msg_conventions.scenarios import decode_scenario, digest, encode_scenario, messages_of
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from msg_conventions.trajectory import decode, encode
-from scenario_gen.errors import InputError
-from scenario_gen.recordings.requests import RequestTracker
+from scenario_gen.bags.recordings.requests import RequestTracker
+from scenario_gen.base.errors import InputError
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Scenario
 

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Our bytes are those of rclpy and of rosbags, and decode there to the same values.
 
@@ -115,7 +104,7 @@ def test_a_consumer_reads_what_the_convention_says():
 
 def test_the_conventions_need_no_ros():
     code = (
-        "import sys, msg_conventions.topics, scenario_gen.recordings.write; "
+        "import sys, msg_conventions.topics, scenario_gen.bags.recordings.write; "
         "found = [m for m in sys.modules if m.split('.')[0] in ('rclpy', 'nav_msgs', 'trajectory_msgs')]; "
         "sys.exit(str(found) if found else 0)"
     )

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """What docstrings lack: python test/packaging/docstrings.py [FOLDER ...] lists it, one line each.
 
@@ -39,11 +28,11 @@ UNIT = re.compile(
     re.IGNORECASE,
 )
 WITHOUT_UNITS = (  # mathematics of any quantity
-    "scenario_gen/exact/",
-    "scenario_gen/segmentation/",
-    "scenario_gen/arrays.py",
-    "scenario_gen/sampling/gp.py",
-    *(f"scenario_gen/evaluation/{name}.py" for name in ("bootstrap", "dtw", "similarity")),
+    "scenario_gen/numerics/exact/",
+    "scenario_gen/method/segmentation/",
+    "scenario_gen/numerics/arrays.py",
+    "scenario_gen/method/sampling/gp.py",
+    *(f"scenario_gen/method/evaluation/{name}.py" for name in ("bootstrap", "dtw", "similarity")),
 )
 NOT_REPORTED = {"NotImplementedError", "AssertionError", "StopIteration", "KeyboardInterrupt", "SystemExit"}
 NO_UNIT = "no unit"

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """What colcon and pip install: the files they need say the same things."""
 
@@ -26,7 +15,7 @@ from licences import run_time
 import pytest
 from source_files import ROOT
 
-from scenario_gen import compiling, kernels
+from scenario_gen.numerics import compiling, kernels
 
 
 def test_package_xml_agrees_with_setup_py():
@@ -148,7 +137,7 @@ def test_colcon_builds_what_ros2_run_needs(colcon):
     assert {str(path.relative_to(ROOT)) for path in shared} <= {str(p.relative_to(share)) for p in share.rglob("*")}
     (packages,) = prefix.glob("lib/python3*/site-packages")
     assert (packages / "scenario_gen" / "resources" / "synthetic_a").is_dir()
-    assert (packages / "scenario_gen" / "nodes" / "loopback.xml").is_file()
+    assert (packages / "scenario_gen" / "ros" / "plumbing" / "loopback.xml").is_file()
     ran = subprocess.run(
         [sys.executable, prefix / "lib" / "scenario_gen" / "scenario-gen", "parameters"],
         cwd=base,
@@ -164,13 +153,13 @@ def test_what_colcon_installs_finds_the_kernels_that_are_compiled_already(colcon
     base, _, _ = colcon
     (packages,) = (base / "install" / "scenario_gen").glob("lib/python3*/site-packages")
     look = (
-        "from scenario_gen import compiling, kernels\nkernels.import_all()\nneeded = kernels.registered()\n"
+        "from scenario_gen.numerics import compiling, kernels\nkernels.import_all()\nneeded = kernels.registered()\n"
         "print(kernels.__file__, len(needed), *sorted(kernel.__name__ for kernel, _ in compiling.missing(needed)))"
     )
     environment = os.environ | {"PYTHONPATH": str(packages)}
     ran = subprocess.run([sys.executable, "-c", look], cwd=base, env=environment, check=True, capture_output=True, text=True)
     file, number, *missing = ran.stdout.split()
-    assert file == str(packages / "scenario_gen" / "kernels.py") and int(number) > 50
+    assert file == str(packages / "scenario_gen" / "numerics" / "kernels.py") and int(number) > 50
     kernels.import_all()
     own = [(kernel, types) for kernel, types in kernels.registered() if kernel.__module__.startswith("scenario_gen.")]
     assert len(own) == int(number)
@@ -180,7 +169,7 @@ def test_what_colcon_installs_finds_the_kernels_that_are_compiled_already(colcon
 def test_colcon_test_runs_pytest_and_reports(colcon):
     """A real colcon test, of what is quick: `colcon test` itself runs the whole suite, this test among it."""
     base, places, run = colcon
-    quick = [f"test/{name}.py" for name in ("packaging/test_copyright", "packaging/test_xmllint", "test_guard")]
+    quick = [f"test/{name}.py" for name in ("packaging/test_copyright", "packaging/test_xmllint", "base/test_guard")]
     tested = run("test", *places, "--return-code-on-test-failure", "--pytest-args", *quick)
     assert tested.returncode == 0, tested.stdout + tested.stderr
     result = run("test-result", "--test-result-base", base / "build", "--all")

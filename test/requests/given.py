@@ -1,30 +1,19 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """A segmented template on a road, and what comes of a request for it."""
 
 from dataclasses import dataclass, field
 
-from scenario_gen.config import PipelineConfig
-from scenario_gen.fitting import FittingConfig
-from scenario_gen.nearest import attempt, nearest_if_impossible
-from scenario_gen.routing import PlanningConfig
-from scenario_gen.sampling import SamplingConfig
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.fitting import FittingConfig
+from scenario_gen.method.nearest import attempt, nearest_if_impossible
+from scenario_gen.method.routing import PlanningConfig
+from scenario_gen.method.sampling import SamplingConfig
+from scenario_gen.method.validity import Limits
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.road import Road
 from scenario_gen.types.segmentation import Segmentation
-from scenario_gen.validity import Limits
 
 
 @dataclass(frozen=True, eq=False)

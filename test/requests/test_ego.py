@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """The ego slot: one vehicle is left out, and its own motion, certified together with the others, is the witness."""
 
@@ -21,16 +10,16 @@ import numpy as np
 import pytest
 
 from msg_conventions.scenarios import encode_scenario
-from scenario_gen.errors import RefusedError
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
+from scenario_gen.method.segmentation import segment
+from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
-from scenario_gen.segmentation import segment
 from scenario_gen.template.interaction import find_conflicts, waits_to_keep
 from scenario_gen.types.ego import together, with_witness
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import BoundaryStates, Scenario
-from scenario_gen.validity import Checker
 
 
 @pytest.mark.parametrize("ego", ["1", "2"])

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Requests of every kind keep the reactions of the template: an ego slot, late arrivals, groups, targets, choices."""
 
@@ -20,17 +9,17 @@ import numpy as np
 import pytest
 from reaction_scenes import answering, crossing, lane_encounter, platoon, wander
 
-from scenario_gen.evaluation.interaction import following, yielding
-from scenario_gen.nearest import attempt
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.method.evaluation.interaction import following, yielding
+from scenario_gen.method.nearest import attempt
+from scenario_gen.method.segmentation import segment
+from scenario_gen.method.validity import Limits
+from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import PipelineConfig
-from scenario_gen.recordings.write import write_recording
-from scenario_gen.review.validation import validate_bag
 from scenario_gen.roads import build_road
-from scenario_gen.segmentation import segment
 from scenario_gen.types.ego import together
 from scenario_gen.types.reaction import FOLLOW
 from scenario_gen.types.request import Request
-from scenario_gen.validity import Limits
 
 CONFIG = PipelineConfig()
 LANE = lane_encounter(LEADER := wander(np.random.default_rng(3), 200), answering(LEADER, 1.2, 0.9))

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """As many vehicles as there are, and what is said when not all scenarios can be had."""
 
@@ -21,14 +10,14 @@ import numpy as np
 import pytest
 
 from scenario_gen.logs import read_log
+from scenario_gen.method.sampling import SamplingConfig
+from scenario_gen.method.sampling.sample import LEVEL_SIZE
+from scenario_gen.method.segmentation import segment
+from scenario_gen.method.validity import Limits
 from scenario_gen.roads import build_road
-from scenario_gen.sampling import SamplingConfig
-from scenario_gen.sampling.sample import LEVEL_SIZE
-from scenario_gen.segmentation import segment
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import Cause
-from scenario_gen.validity import Limits
 
 
 def platoons(count):

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Targets, their proposals and weights, the order asked, and the choice that covers."""
 
@@ -20,16 +9,16 @@ from given import answer
 import numpy as np
 import pytest
 
-from scenario_gen.config import PipelineConfig
-from scenario_gen.errors import InputError
-from scenario_gen.evaluation.measures import features, figures_of, measure, MEASURES, most_critical
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.base.errors import InputError
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.evaluation.measures import features, figures_of, measure, MEASURES, most_critical
+from scenario_gen.method.sampling import sample_scenarios, SamplingConfig
+from scenario_gen.method.sampling.directed import TargetError
+from scenario_gen.output.results import provenance_of
+from scenario_gen.output.review.regenerate import regenerate_scenario
+from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate
-from scenario_gen.recordings.write import write_recording
-from scenario_gen.results import provenance_of
-from scenario_gen.review.regenerate import regenerate_scenario
-from scenario_gen.review.validation import validate_bag
-from scenario_gen.sampling import sample_scenarios, SamplingConfig
-from scenario_gen.sampling.directed import TargetError
 from scenario_gen.types.ego import together
 from scenario_gen.types.request import Request
 from scenario_gen.types.target import read_targets

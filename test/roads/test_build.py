@@ -1,23 +1,12 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Built-in roads and the corridor: lanes, entries, exits, sizes."""
 
 import numpy as np
 import pytest
 
-from scenario_gen.errors import InputError
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits

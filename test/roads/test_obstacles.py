@@ -1,16 +1,6 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Obstacles: text, cells by shapely, the way there and back in a map's message, and what is refused by name."""
 
 from hypothesis import given, settings
@@ -21,7 +11,7 @@ from shapely import affinity
 from shapely.geometry import box
 
 from msg_conventions.roads import decode_map, encode_map
-from scenario_gen.errors import InputError
+from scenario_gen.base.errors import InputError
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.obstacles import Obstacle, read_obstacles, with_obstacles
 

@@ -1,25 +1,14 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Roads shaped to a template: what it needs is there, what it cannot use is refused, and the fit keeps the manoeuvres."""
 
 import numpy as np
 import pytest
 
-from scenario_gen.curve import Curve
-from scenario_gen.errors import RefusedError
-from scenario_gen.fitting import fit_template
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.fitting import fit_template
+from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import build_road
 from scenario_gen.roads.arms import arms_of, ring_of
 from scenario_gen.types.encounter import Encounter, Vehicle

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Random SIGKILLs of the commands that write results, each onto an earlier result: that or the new one is whole afterwards.
 
@@ -36,8 +25,8 @@ import time
 from figures import Figure
 
 from scenario_gen.__main__ import command as main
-from scenario_gen.folders import replaced_folder
-from scenario_gen.folders.claim import PREFIX
+from scenario_gen.base.folders import replaced_folder
+from scenario_gen.base.folders.claim import PREFIX
 from scenario_gen.logs.synthetic import bundled
 
 COUNT = 100
@@ -93,8 +82,8 @@ class Target:
 
     def settle(self) -> None:
         """Do what the next run does first."""
-        from scenario_gen.results import EVALUATED, GENERATED
-        from scenario_gen.review.regenerate import REGENERATED
+        from scenario_gen.output.results import EVALUATED, GENERATED
+        from scenario_gen.output.review.regenerate import REGENERATED
 
         kind = next(kind for kind in (GENERATED, EVALUATED, REGENERATED) if kind.name == KINDS[self.command])
         try:

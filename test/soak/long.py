@@ -1,16 +1,6 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Long and large: memory over the number of scenarios, an encounter of 1,000 s, and one of 30 vehicles.
 
 `SCENARIO_GEN_SOAK_COUNT` is the larger set (100,000 unless given; a million takes about half an hour and 14 GB of disk). What has
@@ -36,7 +26,7 @@ FEW = 10_000
 GROWTH, PEAK = 0.2, 4.0  # kB for one scenario more; GB
 MEASURED = """
 import resource, sys
-from scenario_gen.cli import app
+from scenario_gen.cli.commands import app
 try:
     app(sys.argv[1:], standalone_mode=False)
 finally:

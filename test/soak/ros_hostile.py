@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Hostile messages on every input of every node, then clients that call every service: all nodes live, stay small, and say why.
 
@@ -41,10 +30,10 @@ from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.streams import decode_fix, decode_speed, encode_fix, encode_speed
 from msg_conventions.topics import topic_entry
 from msg_conventions.tracks import encode_tracks
-from scenario_gen.errors import ScenarioGenError
+from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import read_log
-from scenario_gen.nodes.domain import free_domain
-from scenario_gen.nodes.inputs import refuse_damaged
+from scenario_gen.ros.plumbing.domain import free_domain
+from scenario_gen.ros.plumbing.inputs import refuse_damaged
 
 MESSAGES = int(os.environ.get("SCENARIO_GEN_SOAK_MESSAGES", "10000"))
 MINUTES = float(os.environ.get("SCENARIO_GEN_SOAK_MINUTES", "30"))

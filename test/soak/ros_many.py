@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Large requests through real processes, and through a suite composed in one: nothing is lost, and no node grows.
 
@@ -32,8 +21,8 @@ from typing import Any
 from figures import Figure
 from suite_processes import Client, Processes, RESOURCES
 
-from scenario_gen.nodes.domain import free_domain
-from scenario_gen.storage.bag import bag_topics
+from scenario_gen.bags.storage.bag import bag_topics
+from scenario_gen.ros.plumbing.domain import free_domain
 
 COUNT = int(os.environ.get("SCENARIO_GEN_SOAK_COUNT", "100000"))
 COMPOSED = max(1, COUNT // 10)
@@ -87,7 +76,7 @@ def _composed(folder: Path, count: int) -> dict[str, Any]:
     words = [word for key, value in values.items() for word in ("-p", f"{key}:={value}")]
     with free_domain() as domain, _client(domain) as client, (folder / "log").open("w") as log:
         suite = subprocess.Popen(
-            [sys.executable, "-m", "scenario_gen.nodes.start", "suite", "--ros-args", *words],
+            [sys.executable, "-m", "scenario_gen.ros.plumbing.start", "suite", "--ros-args", *words],
             env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
             stdout=log,
             stderr=subprocess.STDOUT,

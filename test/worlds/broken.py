@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Files with the faults that once broke a reader, each made here from a small good one; laid out as the folder of those found.
 
@@ -37,8 +26,8 @@ from PIL import Image
 import pyarrow as pa
 from pyarrow import parquet
 
-from scenario_gen.recordings.write import write_recording
-from scenario_gen.segmentation import PrimitiveLibrary
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.method.segmentation import PrimitiveLibrary
 
 Make = Callable[[], bytes]
 LONG = "a" * 20_000

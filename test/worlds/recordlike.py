@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """A folder laid out as the recorded data is, made from seeds: a test reads either. Nothing in it was recorded.
 
@@ -30,7 +19,7 @@ from PIL import Image
 from rosbags.rosbag2 import StoragePlugin, Writer
 from synthetic_cases import coloured_noise, Drive, LANE, Leg, Phase, quarter, STORES
 
-from scenario_gen.geodesy import geodetic
+from scenario_gen.logs.geodesy import geodetic
 from scenario_gen.types.encounter import Vehicle
 
 EAST, NORTH, WEST, SOUTH = 0.0, np.pi / 2.0, np.pi, -np.pi / 2.0

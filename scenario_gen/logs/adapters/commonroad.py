@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """CommonRoad scenarios (XML, 2018b and 2020a): the dynamic obstacles' trajectories.
 
@@ -35,10 +24,10 @@ from pathlib import Path
 
 import numpy as np
 
-from scenario_gen.errors import InputError
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.markup import Element, read_xml
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
-from scenario_gen.markup import Element, read_xml
 
 KINDS = ("car", "truck", "bus", "taxi", "priorityvehicle")
 _SKIPPED = frozenset(("lanelet", "trafficSign", "trafficLight", "intersection", "planningProblem", "staticObstacle"))

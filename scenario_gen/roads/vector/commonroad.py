@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """CommonRoad maps, XML of versions 2018b and 2020a; its obstacles and planning problems are passed over.
 
@@ -22,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from scenario_gen.arrays import Floats
-from scenario_gen.errors import InputError
-from scenario_gen.markup import Element, finite, read_xml
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.markup import Element, finite, read_xml
+from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads.vector.network import Draft, network_of, refuse_too_many_lanes
 from scenario_gen.types.lanes import LaneNetwork
 

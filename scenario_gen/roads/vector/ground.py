@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Nobody drives against a lane: the directions in which each cell may be driven, and a vehicle's own part of the road."""
 
@@ -20,8 +9,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, wrap_angle
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats, wrap_angle
 from scenario_gen.roads.clearance import clearance_field, footprint_fits
 from scenario_gen.roads.vector.raster import covered
 from scenario_gen.types.encounter import Vehicle

@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Lanelet2 maps (.osm), of Lanelet2 itself and in Autoware's dialect.
 
@@ -26,11 +15,11 @@ import re
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Floats
-from scenario_gen.errors import InputError
-from scenario_gen.geodesy import local_frame
-from scenario_gen.markup import Element, finite, read_xml
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.markup import Element, finite, read_xml
+from scenario_gen.logs.geodesy import local_frame
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads.vector.network import Draft, network_of, refuse_too_long, refuse_too_many_lanes
 from scenario_gen.types.lanes import LaneNetwork
 

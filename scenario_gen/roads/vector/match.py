@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """A template on the lanes of a map: which chain of lanes each vehicle drives, and where on it the template begins.
 
@@ -26,9 +15,9 @@ import math
 
 import numpy as np
 
-from scenario_gen import exact
-from scenario_gen.arrays import Floats, wrap_angle
-from scenario_gen.curve import crossings, Curve
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats, wrap_angle
+from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.roads.vector.search import Spot
 from scenario_gen.template.path_crossing import path_crossing, PathCrossing
 from scenario_gen.template.tracks import Track

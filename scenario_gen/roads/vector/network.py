@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """From borders to lanes: cross-sections, junctions that a map does not name, and the part of a network inside a box."""
 
@@ -21,9 +10,9 @@ import math
 import numpy as np
 import shapely
 
-from scenario_gen import exact
-from scenario_gen.arrays import Bools, Floats, Ints, runs
-from scenario_gen.errors import InputError
+from scenario_gen.base.errors import InputError
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats, Ints, runs
 from scenario_gen.types.lanes import Lane, LaneNetwork
 
 _SECTION = 1.0  # metres between cross-sections at most

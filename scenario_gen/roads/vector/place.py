@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Where on a map a template goes: all ways of laying it on lanes, the best first, and the part of the map around one."""
 
@@ -22,9 +11,9 @@ from itertools import islice
 
 import numpy as np
 
-from scenario_gen.arrays import Floats, frozen
-from scenario_gen.cancelling import stop_if_cancelled
-from scenario_gen.errors import RefusedError
+from scenario_gen.base.cancelling import stop_if_cancelled
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.numerics.arrays import Floats, frozen
 from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.search import at_home, find_spots
 from scenario_gen.roads.vector.street import along_streets

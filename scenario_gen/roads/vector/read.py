@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """One door to vector maps: `map.osm`, `map.xodr` or `map.xml`, and which part of it, behind a `#`."""
 
@@ -19,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from scenario_gen.arrays import Floats, frozen
-from scenario_gen.documents import shown
-from scenario_gen.errors import InputError, of_system, reading
-from scenario_gen.markup import finite
+from scenario_gen.base.documents import shown
+from scenario_gen.base.errors import InputError, of_system, reading
+from scenario_gen.base.markup import finite
+from scenario_gen.numerics.arrays import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.vector.commonroad import read_commonroad
 from scenario_gen.roads.vector.lanelet2 import read_lanelet2

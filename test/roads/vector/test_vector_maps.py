@@ -1,16 +1,5 @@
-# Copyright 2026 The scenario_gen authors
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
 
 """Vector maps: the same crossroads in three formats is the same network, drawn as the same grid; parts of it; what is refused."""
 
@@ -21,11 +10,10 @@ from map_builders import ARM, at, FORMATS, HALF, lanelet2, lanes, LIMIT, opendri
 import numpy as np
 import pytest
 
-from scenario_gen import geodesy
-from scenario_gen.errors import InputError, RefusedError
-from scenario_gen.logs import read_log
+from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.markup import parse_xml
+from scenario_gen.logs import geodesy, read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.markup import parse_xml
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.vector.ground import along_lanes
 from scenario_gen.roads.vector.plan_view import reference_line
@@ -206,7 +194,7 @@ def test_a_broken_map_is_refused_with_its_name_and_place(tmp_path, suffix, text,
 
 
 def test_too_many_elements_are_refused(monkeypatch):
-    monkeypatch.setattr("scenario_gen.markup.MOST_ELEMENTS", 50)
+    monkeypatch.setattr("scenario_gen.base.markup.MOST_ELEMENTS", 50)
     with pytest.raises(InputError, match="more than 50 elements"):
         parse_xml(b"<a>" + b"<b/>" * 60 + b"</a>", "map")
 

@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+from scenario_gen.bags.recordings.read import read_recording as read_recording
+from scenario_gen.bags.recordings.write import write_recording as write_recording
+from scenario_gen.base.errors import (
+    InputError as InputError,
+    MissingExtraError as MissingExtraError,
+    RefusedError as RefusedError,
+    ScenarioGenError as ScenarioGenError,
+)
+from scenario_gen.logs import LogConfig as LogConfig, read_log as read_log
+from scenario_gen.logs.read import LogResult as LogResult
+from scenario_gen.logs.synthetic import bundled as bundled
+from scenario_gen.method.config import PipelineConfig as PipelineConfig
+from scenario_gen.method.evaluation.evaluate import (
+    evaluate as evaluate,
+    evaluate_scenarios as evaluate_scenarios,
+    EvaluationConfig as EvaluationConfig,
+)
+from scenario_gen.method.fitting import fit_template as fit_template, FittingConfig as FittingConfig
+from scenario_gen.method.routing import plan_routes as plan_routes, PlanningConfig as PlanningConfig
+from scenario_gen.method.sampling import sample_scenarios as sample_scenarios, SamplingConfig as SamplingConfig
+from scenario_gen.method.segmentation import segment as segment, SegmentationConfig as SegmentationConfig
+from scenario_gen.method.validity import Checker as Checker, Limits as Limits
+from scenario_gen.pipeline import generate as generate
+from scenario_gen.roads import build_road as build_road, RoadConfig as RoadConfig
+from scenario_gen.types.encounter import Encounter as Encounter, Vehicle as Vehicle
+from scenario_gen.types.evaluation import Evaluation as Evaluation
+from scenario_gen.types.fit import Fit as Fit
+from scenario_gen.types.generation import GenerationResult as GenerationResult
+from scenario_gen.types.request import Request as Request
+from scenario_gen.types.road import Road as Road
+from scenario_gen.types.route import Route as Route
+from scenario_gen.types.scenario import (
+    Cause as Cause,
+    Scenario as Scenario,
+    ScenarioSet as ScenarioSet,
+    Verdict as Verdict,
+    Violation as Violation,
+)
+from scenario_gen.types.segmentation import Segmentation as Segmentation
+
+__version__: str
+__all__: list[str]

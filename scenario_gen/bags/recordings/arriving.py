@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Scenarios as they arrive live: whatever comes first, their messages, their entry, or the witness of their ego."""
+
+from typing import TypeVar
+
+from msg_conventions.ego import WITNESS
+from msg_conventions.scenario_info import decode_info, INFO, ScenarioEntry
+from msg_conventions.scenarios import digest
+from scenario_gen.bags.recordings.of_scenarios import decode_with_witness
+from scenario_gen.bags.recordings.requests import Match, RequestTracker
+from scenario_gen.types.scenario import Scenario
+
+SCENARIOS = "scenarios"
+TOPICS = (SCENARIOS, INFO, WITNESS)
+MOST = 10_000  # witnesses, and scenarios without theirs, that are remembered; beyond, the oldest are forgotten
+Kept = TypeVar("Kept")
+Arrived = tuple[ScenarioEntry, int, Scenario]  # its entry, the template's stamp [ns], and itself, with its witness
+
+
+class ArrivingScenarios:
+    """Puts together what belongs to one scenario."""
+
+    def __init__(self) -> None:
+        self._tracker = RequestTracker(MOST)
+        self._entries: dict[str, ScenarioEntry] = {}  # by SHA-256, whole: the tracker keeps no texts
+        self._witnesses: dict[str, bytes] = {}  # by SHA-256
+        self._waiting: dict[str, tuple[ScenarioEntry, bytes]] = {}  # by SHA-256 of the witness that has not come
+        self.unmatched = 0  # messages of scenarios that have come, and did not make one whole
+
+    def take(self, topic: str, data: bytes) -> list[Arrived]:
+        """Take a message; return the scenarios that are whole with it.
+
+        Args:
+            topic: one of `TOPICS`.
+            data: its CDR bytes.
+
+        Raises:
+            InputError: it is damaged, or a scenario is.
+        """
+        if topic == WITNESS:
+            sha256 = digest(data)
+            _remember(self._witnesses, sha256, data)
+            waiting = self._waiting.pop(sha256, None)
+            return [] if waiting is None else self._whole(*waiting)
+        if topic == SCENARIOS:
+            self.unmatched += 1
+            return self._matched([self._tracker.add_scenario(digest(data), data)])
+        infos = decode_info(data)
+        for info in infos:
+            if isinstance(info, ScenarioEntry):
+                _remember(self._entries, info.sha256, info)
+        found = self._matched([self._tracker.add_info(info) for info in infos])
+        self._tracker.settle()
+        return found
+
+    def _matched(self, matches: list[Match | None]) -> list[Arrived]:
+        whole = [(match[1], match[2]) for match in matches if match is not None]
+        return [one for entry, data in whole for one in self._with_witness(self._entries.pop(entry.sha256, entry), data)]
+
+    def _with_witness(self, entry: ScenarioEntry, data: bytes) -> list[Arrived]:
+        if entry.witness and entry.witness not in self._witnesses:
+            _remember(self._waiting, entry.witness, (entry, data))
+            return []
+        return self._whole(entry, data)
+
+    def _whole(self, entry: ScenarioEntry, data: bytes) -> list[Arrived]:
+        self.unmatched -= len(entry.messages)
+        return [(entry, *decode_with_witness(data, entry, 0, self._witnesses.pop(entry.witness, None), SCENARIOS, WITNESS))]
+
+
+def _remember(kept: dict[str, Kept], key: str, value: Kept) -> None:
+    kept[key] = value
+    while len(kept) > MOST:
+        kept.pop(next(iter(kept)))

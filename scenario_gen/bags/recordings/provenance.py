@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What is needed to make a scenario again, as texts in the summary of its request: parameters and versions, out and in."""
+
+from collections.abc import Mapping
+from importlib import metadata
+import platform
+from typing import Any, TypeVar
+
+import yaml
+
+import scenario_gen
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.parameters import flatten, former_name, updated
+
+Config = TypeVar("Config")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions on which the last digit of a scenario may depend."""
+    own = {"scenario_gen": scenario_gen.__version__, "python": platform.python_version()}
+    return own | {name: metadata.version(name) for name in ("numpy", "scipy", "numba")}
+
+
+def parameter_texts(config: Any) -> dict[str, str]:
+    """Return {dotted name: text} of every parameter of a configuration; real numbers exact to the bit."""
+    return {name: str(value) for name, (_, value) in flatten(config).items()}
+
+
+def read_parameters(config: Config, texts: Mapping[str, str], prefix: str, what: str) -> Config:
+    """Return `config` with the values that `texts` has under `prefix`, e.g. "sampling.".
+
+    Raises:
+        InputError: a parameter is missing there, or its text is no such value; the message names `what`.
+    """
+    values: dict[str, Any] = {}
+    for name, (entry, _) in flatten(config).items():
+        text = texts.get(prefix + name, texts.get(prefix + former_name(name, entry)))
+        if text is None:
+            raise InputError(f"{what}: parameter {prefix}{name} is not there, so it cannot be made again")
+        kind = type(entry.default)
+        values[name] = text if kind is str else yaml.safe_load(text.lower()) if kind is bool else _number(kind, text)
+    return updated(config, values)
+
+
+def _number(kind: type, text: str) -> Any:
+    """The number that the text says; the text itself if it is none, for `updated` to refuse."""
+    try:
+        return kind(text)
+    except ValueError:
+        return text

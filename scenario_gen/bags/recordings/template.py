@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A template as its messages tell it: tracks, changepoints, road, fit and routes; and what the diagnostics say of it."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from msg_conventions.changepoints import decode_changepoints
+from msg_conventions.diagnostics import decode_diagnostics, TEMPLATE, template_of
+from msg_conventions.fits import anchor_stamps, decode_fit
+from msg_conventions.hashes import decode_hashes, hash_of
+from msg_conventions.lanes import TOPIC as LANES
+from msg_conventions.paths import decode_route
+from msg_conventions.roads import decode_map
+from msg_conventions.topics import vehicle_topic
+from msg_conventions.tracks import decode_tracks
+from scenario_gen.base.errors import InputError
+from scenario_gen.numerics.arrays import Ints
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.fit import Fit
+from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types.names import tokens
+from scenario_gen.types.route import Route
+
+
+def missing_topics(messages: Mapping[str, bytes]) -> list[str]:
+    """Return the topics without which `decode_template` cannot do and that are not among the messages.
+
+    Raises:
+        InputError: `tracks` is damaged.
+    """
+    needed = ["tracks", "changepoints", "map", "fit"]
+    if "tracks" in messages:
+        vehicles = decode_tracks(messages["tracks"]).vehicles
+        needed += [vehicle_topic(name, "route") for name in tokens(vehicle.id for vehicle in vehicles)]
+    return [topic for topic in needed if topic not in messages]
+
+
+def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
+    """Return the fitted template that the messages (by topic) describe; the road's entries, exits and lanes may be missing.
+
+    Of the fit it has the states asked, not what was decided for each vehicle, which the messages do not say.
+
+    Raises:
+        InputError: a message is damaged, in another frame than the map, or missing.
+    """
+    encounter = decode_tracks(messages["tracks"])
+    segmentation = decode_changepoints(messages["changepoints"], encounter)
+    _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"), messages.get(LANES))
+    _, frame, asked, poses = decode_fit(messages["fit"])
+    anchors = anchor_stamps(encounter, segmentation.changepoints)
+    if poses.shape[:2] != (len(encounter.vehicles), len(anchors)):
+        raise InputError(
+            f"fit: {poses.shape[0]} vehicles at {poses.shape[1]} points, where tracks and changepoints ask for "
+            f"{len(encounter.vehicles)} at {len(anchors)}"
+        )
+    routes = decode_routes(messages, encounter, anchors)
+    for topic, other, _ in routes:
+        if {frame, other} != {road.frame_id}:
+            raise InputError(f"{topic}: frame {other!r}, fit {frame!r} and map {road.frame_id!r} must be one and the same")
+    fit = Fit(encounter.vehicles, (), anchor_index(encounter, segmentation.changepoints), asked, ())
+    return GenerationResult(encounter, segmentation, road, fit, tuple(route for _, _, route in routes))
+
+
+def decode_routes(messages: Mapping[str, bytes], encounter: Encounter, anchors_ns: Sequence[int]) -> list[tuple[str, str, Route]]:
+    """Return topic, frame and route of every vehicle; `messages` are by topic, `anchors_ns` (K + 2,) the template's stamps.
+
+    Raises:
+        InputError: a route is missing or damaged.
+    """
+    found = []
+    for name in tokens(vehicle.id for vehicle in encounter.vehicles):
+        topic = vehicle_topic(name, "route")
+        if topic not in messages:
+            raise InputError(f"{topic} is missing, though tracks has a vehicle {name!r}")
+        found.append((topic, *decode_route(messages[topic], anchors_ns, topic)))
+    return found
+
+
+def lanes_beside(grid: bytes, maps: Iterable[bytes], lanes: Sequence[bytes], infos: Iterable[bytes]) -> bytes | None:
+    """Return the lanes that belong to a map: those that a `fit/info` names beside it; where none does, those of a bag of one map.
+
+    Args:
+        grid: the map's message.
+        maps: all of the bag.
+        lanes: all messages of `road/lanes`.
+        infos: all messages of `fit/info`.
+
+    Raises:
+        InputError: one of `infos` is damaged.
+    """
+    own = hash_of("map", grid)
+    for info in infos if lanes else ():
+        together = decode_hashes(info, "fit/info")
+        if together.get("map") == own:
+            return next((data for data in lanes if hash_of(LANES, data) == together.get(LANES)), None)
+    return lanes[-1] if lanes and len({hash_of("map", data) for data in maps}) == 1 else None
+
+
+def anchor_index(encounter: Encounter, changepoints: Ints) -> Ints:
+    """Return the samples (K + 2,) of start, changepoints and end."""
+    return np.array([0, *changepoints, encounter.speed.shape[1] - 1])
+
+
+def template_statuses(messages: Iterable[bytes], stamp_ns: int, nodes: str = "/") -> dict[str, Mapping[str, str]]:
+    """Return the key-values of diagnostics about one template, by subject ("/planner: fit" is "fit"); the last word counts.
+
+    Args:
+        messages: of /diagnostics.
+        stamp_ns: the template's stamp.
+        nodes: what the full names of the nodes begin with.
+    """
+    found: dict[str, Mapping[str, str]] = {}
+    for data in messages:
+        try:
+            stamp, statuses = decode_diagnostics(data)
+        except InputError:
+            continue
+        for status in statuses:
+            if template_of(status, stamp) == stamp_ns and status.name.startswith(nodes):
+                values = {key: value for key, value in status.values.items() if key != TEMPLATE}
+                found[status.name.partition(": ")[2]] = values
+    return found

@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A recording written: one generation as messages and as a bag: the bytes that the nodes publish, at stamps without a clock."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from msg_conventions.changepoints import encode_changepoints, encode_posterior, segmentation_status
+from msg_conventions.diagnostics import encode_diagnostics
+from msg_conventions.ego import ego_messages, WITNESS
+from msg_conventions.fits import anchor_stamps, encode_fit, fit_statuses
+from msg_conventions.hashes import encode_hashes, template_hashes
+from msg_conventions.lanes import encode_lanes
+from msg_conventions.lanes import TOPIC as LANES
+from msg_conventions.paths import encode_route
+from msg_conventions.pictures import encode_footprint, scenario_markers
+from msg_conventions.roads import encode_map, encode_poses
+from msg_conventions.scenario_info import encode_info, INFO, request_summary, scenario_entry
+from msg_conventions.scenarios import digest, encode_scenario, messages_of
+from msg_conventions.topics import topic_entry, vehicle_topic
+from msg_conventions.tracks import encode_tracks
+from scenario_gen.bags.recordings.read import SCENARIOS
+from scenario_gen.bags.storage.metadata import qos_yaml
+from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types.names import tokens
+from scenario_gen.types.scenario import Scenario
+
+SCENARIO_STEP_NS = 100_000_000  # scenarios are logged this far apart, so that a player shows one after the other
+
+
+def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tuple[str, bytes, int]]:
+    """Yield topic (without namespace), CDR bytes and log stamp [ns] of every message of a result, in order of the stamps.
+
+    Args:
+        result: all that one request made of one template on one road.
+        request: its id.
+
+    Raises:
+        InputError: its road or its fit is not known.
+    """
+    road, fit = result.placed()
+    encounter, stamp = result.encounter, result.encounter.start_ns
+    template = {
+        "tracks": encode_tracks(encounter),
+        "map": encode_map(road, stamp),
+        "road/entries": encode_poses(road.entries, road.frame_id, stamp),
+        "road/exits": encode_poses(road.exits, road.frame_id, stamp),
+    }
+    if road.lanes is not None:
+        template[LANES] = encode_lanes(road.lanes, road.frame_id, stamp)
+    hashes, infos = template_hashes(template), {"road/info": encode_hashes("road", template, stamp)}
+    template["changepoints"] = encode_changepoints(encounter, result.segmentation)
+    template["fit"] = encode_fit(encounter, fit, road.frame_id)
+    anchors = anchor_stamps(encounter, result.segmentation.changepoints)
+    names = tokens(vehicle.id for vehicle in encounter.vehicles)
+    for name, route in zip(names, result.routes, strict=True):
+        template[vehicle_topic(name, "route")] = encode_route(route, anchors, road.frame_id)
+    infos["fit/info"] = encode_hashes("fit", template, stamp)
+    for topic, data in (*template.items(), *infos.items()):
+        yield topic, data, stamp
+    yield "posterior", encode_posterior(encounter, result.segmentation), stamp
+    for name, vehicle in zip(names, encounter.vehicles, strict=True):
+        yield vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}"), stamp
+    statuses = (
+        segmentation_status(result.segmentation, "/segmenter", result.encounter.duration),
+        *fit_statuses(fit, "/planner", hashes, result.routes),
+    )
+    yield "diagnostics", encode_diagnostics(statuses, stamp), stamp
+    ego = result.generated.ego
+    for topic, data in () if ego is None else ego_messages(ego, road.frame_id, stamp):
+        yield topic, data, stamp
+    about = {"template": encounter.name, "road": road.name, **hashes}
+    logged = stamp
+    for scenario in result.generated.scenarios:
+        data = encode_scenario(scenario, stamp)
+        entry = scenario_entry(
+            scenario, data, request, "/gp_sampler", template=encounter.vehicles, asked=fit.asked, ego=ego, about=about
+        )
+        if scenario.witness is not None:
+            yield WITNESS, encode_scenario(scenario.witness, stamp), logged
+        for message in (data,) if scenario.all_present else messages_of(data):
+            yield SCENARIOS, message, logged
+        yield INFO, encode_info(entry, stamp), logged
+        yield "markers", scenario_markers(scenario, stamp), logged
+        logged += SCENARIO_STEP_NS
+    provenance = {**result.provenance, **hashes}
+    summary = request_summary(result.generated, request, "/gp_sampler", result.seed, provenance, reactions=result.reacting)
+    yield INFO, encode_info(summary, stamp), logged
+
+
+def write_recording(folder: Path, results: GenerationResult | Mapping[str, GenerationResult]) -> Path:
+    """Write one result, or several by namespace ("" or e.g. "/case_a"), to the bag `folder`, whole or not; return `folder`.
+
+    Same results, same bytes. A bag that this function wrote there earlier is replaced.
+
+    Raises:
+        InputError: the folder is there and is something else, or cannot be written; a road or a fit is not known.
+    """
+    with atomic_bag(folder) as bag:
+        add_results(bag, {"": results} if isinstance(results, GenerationResult) else results)
+    return folder
+
+
+def add_results(bag: BagWriter, results: Mapping[str, GenerationResult]) -> None:
+    """Write all messages of the results, by namespace, to a bag."""
+    for namespace, result in results.items():
+        for topic, data, stamp_ns in result_messages(result):
+            add_message(bag, f"{namespace}/{topic}", data, stamp_ns)
+
+
+def add_message(bag: BagWriter, name: str, data: bytes, stamp_ns: int) -> None:
+    """Write a message of one of the suite's topics, by its full name, to a bag."""
+    kind, quality = topic_entry(name.lstrip("/"))  # in a bag of ours the diagnostics are a latched topic of the namespace
+    bag.add_topic(name, kind, qos_yaml(quality))
+    bag.write(name, data, stamp_ns)
+
+
+def scenario_bytes(scenario: Scenario, encounter: Encounter) -> tuple[bytes, str]:
+    """Return the CDR bytes of a scenario of that template, and their SHA-256."""
+    data = encode_scenario(scenario, encounter.start_ns)
+    return data, digest(data)
+
+
+def same_tracks(one: Encounter, other: Encounter) -> bool:
+    """Say whether two encounters are the same message."""
+    return encode_tracks(one) == encode_tracks(other)

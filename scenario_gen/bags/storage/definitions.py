@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Definitions and hashes of types: Jazzy's from rosbags, Autoware's by definition, others from an installed package.
+
+Those of our own bags are kept in `resources/definitions.json`, as rosbags gives them: it reads seven releases of ROS for them.
+"""
+
+from functools import cache
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from scenario_gen.bags.storage.autoware import DEFINITIONS
+from scenario_gen.base.errors import InputError
+
+KEPT = Path(__file__).resolve().parents[2] / "resources" / "definitions.json"
+
+
+@cache
+def type_store() -> Any:
+    """Return rosbags' store of Jazzy's types and Autoware's, which decodes messages of them."""
+    from rosbags.typesys import get_types_from_msg, get_typestore, Stores  # slow to import
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for kind, text in DEFINITIONS.items():
+        store.register(get_types_from_msg(text, kind))
+    return store
+
+
+def _register_installed(kind: str) -> None:
+    """Read `kind`, and what it is made of, from the share folders of AMENT_PREFIX_PATH."""
+    package, _, name = kind.partition("/msg/")
+    prefixes = [Path(p) for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
+    paths = [prefix / "share" / package / "msg" / f"{name}.msg" for prefix in prefixes]
+    found = next((path for path in paths if path.is_file()), None)
+    if found is None:
+        raise InputError(
+            f"message type {kind} is unknown: no {package}/msg/{name}.msg on AMENT_PREFIX_PATH; source its workspace"
+        )
+    from rosbags.typesys import get_types_from_msg
+
+    store = type_store()
+    types = get_types_from_msg(found.read_text(encoding="utf-8"), kind)
+    for _constants, fields in types.values():
+        for _field, (node, what) in fields:
+            inner = what[0][1] if node.name in ("ARRAY", "SEQUENCE") else what
+            if isinstance(inner, str) and inner not in store.fielddefs:
+                _register_installed(inner)
+    store.register(types)
+
+
+@cache
+def kept() -> dict[str, tuple[str, str]]:
+    """Return what `definition` returns of the types that `resources/definitions.json` has."""
+    document = json.loads(KEPT.read_text(encoding="utf-8"))
+    return {kind: (entry["text"], entry["hash"]) for kind, entry in document.items()}
+
+
+@cache
+def definition(kind: str) -> tuple[str, str]:
+    """Return the full ros2msg definition text of a type, nested types included, and its RIHS01 hash (REP 2011).
+
+    Raises:
+        InputError: the type is neither a standard one nor installed.
+    """
+    if kind in kept():
+        return kept()[kind]
+    store = type_store()
+    if kind not in store.fielddefs:
+        _register_installed(kind)
+    text, _ = store.generate_msgdef(kind, ros_version=2)
+    return text, store.hash_rihs01(kind)

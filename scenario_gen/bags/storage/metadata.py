@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""rosbag2's metadata.yaml, version 9, and QoS profiles: as it writes them, and as any version of it wrote them."""
+
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
+from typing import Any
+
+import yaml
+
+from scenario_gen.bags.storage.files import LOST
+from scenario_gen.base.documents import parse_yaml
+from scenario_gen.base.errors import InputError
+from scenario_gen.types.qos import Quality
+
+VERSION = 9
+TIMES = ("deadline", "lifespan", "liveliness_lease_duration")
+NAMED = ("history", "reliability", "durability", "liveliness")
+FOREVER = {"sec": 9223372036, "nsec": 854775807}  # rmw's infinite duration
+
+
+class _PlainDumper(yaml.SafeDumper):  # type: ignore[misc]
+    """No anchors: rosbag2's YAML reader does not want them."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+@dataclass
+class TopicInfo:
+    """What the metadata says of one topic; `qos` is a YAML list of profiles."""
+
+    name: str
+    type: str
+    qos: str
+    type_hash: str
+    count: int = 0
+
+
+@dataclass
+class FileInfo:
+    """What the metadata says of one file: stamps in nanoseconds."""
+
+    path: str
+    start_ns: int = 2**63 - 1
+    end_ns: int = 0
+    count: int = 0
+
+    def add(self, stamp_ns: int) -> None:
+        """Count one message."""
+        self.start_ns, self.end_ns = min(self.start_ns, stamp_ns), max(self.end_ns, stamp_ns)
+        self.count += 1
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """First stamp and duration in nanoseconds; zeros for an empty file."""
+        return (self.start_ns, self.end_ns - self.start_ns) if self.count else (0, 0)
+
+
+@dataclass
+class BagInfo:
+    """What the metadata says of a bag."""
+
+    topics: list[TopicInfo] = field(default_factory=list)
+    files: list[FileInfo] = field(default_factory=list)
+    lost: dict[str, str] = field(default_factory=dict)  # topic -> what of it is not in the bag
+
+
+def dump(value: Any) -> str:
+    """Return YAML without anchors, in the order given."""
+    text: str = yaml.dump(value, Dumper=_PlainDumper, sort_keys=False, default_flow_style=False)
+    return text
+
+
+@cache
+def qos_yaml(quality: Quality) -> str:
+    """Return the offered QoS profile as the list that rosbag2 writes."""
+    profile = {
+        "history": "keep_last",
+        "depth": quality.depth,
+        "reliability": "reliable" if quality.reliable else "best_effort",
+        "durability": "transient_local" if quality.transient_local else "volatile",
+        "deadline": FOREVER,
+        "lifespan": FOREVER,
+        "liveliness": "automatic",
+        "liveliness_lease_duration": FOREVER,
+        "avoid_ros_namespace_conventions": False,
+    }
+    return dump([profile]).rstrip("\n")
+
+
+@lru_cache(maxsize=256)
+def _topic_yaml(name: str, type_name: str, qos: str, type_hash: str) -> str:
+    """Return what metadata.yaml says of a topic, up to the number of its messages."""
+    metadata = {
+        "name": name,
+        "type": type_name,
+        "serialization_format": "cdr",
+        "offered_qos_profiles": profiles(qos),
+        "type_description_hash": type_hash,
+    }
+    text = dump({"bag": {"topics": [{"topic_metadata": metadata, "message_count": 0}]}})  # as deep as it will stand
+    return text.split("\n", 2)[2].removesuffix("0\n")
+
+
+def metadata_yaml(info: BagInfo) -> str:
+    """Return the text of metadata.yaml."""
+    whole = FileInfo("")
+    for file in info.files:
+        if file.count:
+            whole.start_ns, whole.end_ns = min(whole.start_ns, file.start_ns), max(whole.end_ns, file.end_ns)
+            whole.count += file.count
+    start, duration = whole.span
+    text = dump(
+        {
+            "rosbag2_bagfile_information": {
+                "version": VERSION,
+                "storage_identifier": "mcap",
+                "duration": {"nanoseconds": duration},
+                "starting_time": {"nanoseconds_since_epoch": start},
+                "message_count": whole.count,
+                "topics_with_message_count": [],
+                "compression_format": "",
+                "compression_mode": "",
+                "relative_file_paths": [file.path for file in info.files],
+                "files": [
+                    {
+                        "path": file.path,
+                        "starting_time": {"nanoseconds_since_epoch": file.span[0]},
+                        "duration": {"nanoseconds": file.span[1]},
+                        "message_count": file.count,
+                    }
+                    for file in info.files
+                ],
+                "custom_data": {f"{LOST}{topic}": words for topic, words in info.lost.items()} or None,
+                "ros_distro": "jazzy",
+            }
+        }
+    )
+    topics = "".join(f"{_topic_yaml(one.name, one.type, one.qos, one.type_hash)}{one.count}\n" for one in info.topics)
+    return text.replace(" []\n", "\n" + topics, 1) if topics else text
+
+
+def profiles(text: str) -> list[dict[str, Any]]:
+    """Return the profiles, none if the text is damaged: who reads a bag can do without them."""
+    try:
+        found = parse_yaml(text, "offered_qos_profiles") if text else []
+    except InputError:
+        return []
+    return found if isinstance(found, list) and all(_is_whole(one) for one in found) else []
+
+
+def _is_whole(profile: Any) -> bool:
+    """Whether a profile has what every reader looks for."""
+    return (
+        isinstance(profile, dict)
+        and isinstance(profile.get("depth"), int)
+        and all(isinstance(profile.get(key), str | int) for key in NAMED)
+        and all(isinstance(profile.get(key), dict) and {"sec", "nsec"} <= set(profile[key]) for key in TIMES)
+        and isinstance(profile.get("avoid_ros_namespace_conventions"), bool)
+    )
+
+
+@lru_cache(maxsize=256)
+def quality_of(text: str) -> Quality:
+    """Return the quality that the first of the profiles offers: volatile, depth 10 where the text says none."""
+    for profile in profiles(text)[:1]:
+        reliable = str(profile["reliability"]).lower() not in ("best_effort", "2")  # a number, as rosbag2 wrote before Jazzy
+        return Quality(max(1, profile["depth"]), reliable, str(profile["durability"]).lower() in ("transient_local", "1"))
+    return Quality(depth=10, transient_local=False)

@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""YAML and JSON that others wrote, read with bounds: size, depth, no aliases, plain values only, a schema."""
+
+from collections.abc import Mapping
+from functools import cache
+import json
+from pathlib import Path
+import stat
+from typing import Any, NoReturn
+
+from scenario_gen.base.errors import guarded, InputError
+
+MOST_YAML = 512 * 1024  # bytes; the parameters of all stages take 9 kB, the metadata of a bag of 1000 topics 500 kB
+MOST_JSON = 8 * 1024 * 1024  # bytes; the figures of one case take 9 kB
+DEEPEST = 32  # nested lists and mappings
+WHOLE = 2**63  # beyond this an integer is none that a parameter or a stamp can be
+LARGEST = 1e300  # of a number in JSON: no infinity, and room to reckon with it
+PLAIN = frozenset(f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "str", "seq", "map"))
+NUMBER = {"type": "number", "minimum": -LARGEST, "maximum": LARGEST}
+COUNT = {"type": "integer", "minimum": 0, "maximum": WHOLE - 1}
+
+
+@cache
+def _loader() -> Any:
+    """Make the class that reads YAML; PyYAML is imported when the first document is read, for the segmentation does without."""
+    import yaml
+
+    class Loader(yaml.CSafeLoader):  # type: ignore[misc]
+        """Plain values only: a date is text, `<<` and `=` are keys like others; numbers of more than 64 bits are refused."""
+
+        yaml_implicit_resolvers = {  # noqa: RUF012 - as the base declares it
+            first: [(tag, pattern) for tag, pattern in known if tag in PLAIN]
+            for first, known in yaml.CSafeLoader.yaml_implicit_resolvers.items()
+        }
+
+        def construct_yaml_int(self, node: Any) -> int:
+            value: int = super().construct_yaml_int(node)
+            if not -WHOLE <= value < WHOLE:
+                raise yaml.constructor.ConstructorError(None, None, "an integer of more than 64 bits", node.start_mark)
+            return value
+
+    Loader.add_constructor("tag:yaml.org,2002:int", Loader.construct_yaml_int)
+    return Loader
+
+
+def parse_yaml(text: str, what: str) -> Any:
+    """Return the value of a YAML text: mappings, lists, texts, numbers, true, false and null.
+
+    Args:
+        text: one document.
+        what: names it in messages.
+
+    Raises:
+        InputError: the text is too long, too deep, has aliases or tags of other kinds, or is no YAML.
+    """
+    import yaml
+
+    if len(text) > MOST_YAML:
+        raise InputError(f"{what}: {len(text)} characters of YAML; at most {MOST_YAML} are read")
+    try:
+        _check_events(text, what)
+        return yaml.load(text, Loader=_loader())
+    except yaml.YAMLError as error:
+        raise InputError(f"{what}: {_yaml_said(error)}") from error
+    except (ValueError, KeyError, IndexError, AttributeError) as error:  # PyYAML's own constructors, of `!!int ""` or `!!bool x`
+        raise InputError(f"{what}: a value does not suit its tag ({type(error).__name__})") from error
+
+
+def _check_events(text: str, what: str) -> None:
+    """Look at a YAML text's structure before anything is made of it.
+
+    Raises:
+        InputError: it is too deep, or has an alias or a tag of another kind.
+    """
+    import yaml
+
+    depth = 0
+    for event in yaml.parse(text, Loader=_loader()):
+        place = f"{what}, line {event.start_mark.line + 1}, column {event.start_mark.column + 1}"
+        if isinstance(event, yaml.AliasEvent):
+            raise InputError(f"{place}: the alias *{event.anchor} is not read; write the value out")
+        tag = getattr(event, "tag", None)
+        if tag not in (None, "!") and tag not in PLAIN:
+            raise InputError(f"{place}: the tag {tag} is not read; write plain text, numbers, lists and mappings")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            raise InputError(f"{place}: lists or mappings nested more than {DEEPEST} deep are not read")
+
+
+def _yaml_said(error: Exception) -> str:
+    """Return place and problem in one line."""
+    mark = getattr(error, "problem_mark", None)
+    place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+    problem = getattr(error, "problem", None) or getattr(error, "reason", None) or " ".join(str(error).split())
+    return f"not YAML ({place}{problem})"
+
+
+def read_text(path: Path, most: int, what: str) -> str:
+    """Return the text of a regular file of at most `most` bytes.
+
+    Raises:
+        InputError: it cannot be read, is no regular file, too large, or not UTF-8.
+    """
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):  # before it is opened: a pipe would wait for its writer
+            raise InputError(f"{what}: not a regular file")
+        with path.open("rb") as file:
+            data = file.read(most + 1)
+    except (OSError, ValueError) as error:  # ValueError: a name with a null byte
+        raise InputError(f"{what}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
+    if len(data) > most:
+        raise InputError(f"{what}: {path.stat().st_size} bytes; at most {most} are read")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{what}: not UTF-8 text (byte {error.start})") from error
+
+
+def read_yaml(path: Path, what: str = "") -> Any:
+    """Return the value of a YAML file, as `parse_yaml` does.
+
+    Raises:
+        InputError: likewise, or the file cannot be read.
+    """
+    what = what or str(path)
+    return parse_yaml(read_text(path, MOST_YAML, what), what)
+
+
+def parse_json(text: str, what: str, schema: Mapping[str, Any]) -> Any:
+    """Return the value of a JSON text that keeps the schema; its numbers are finite if the schema takes `NUMBER` for them.
+
+    Raises:
+        InputError: the text is no JSON, or does not keep the schema; the message names the path inside the document.
+    """
+
+    def refuse(name: str) -> NoReturn:
+        raise InputError(f"{what}: {name} is no JSON; write null where there is no number")
+
+    try:
+        value = json.loads(text, parse_constant=refuse)
+    except RecursionError:
+        raise InputError(f"{what}: lists or objects are nested too deep") from None
+    except ValueError as error:
+        raise InputError(f"{what}: not JSON ({error})") from error
+    _check_schema(value, what, schema)
+    return value
+
+
+def read_json(path: Path, schema: Mapping[str, Any], what: str = "") -> Any:
+    """Return the value of a JSON file, as `parse_json` does.
+
+    Raises:
+        InputError: likewise, or the file cannot be read.
+    """
+    what = what or str(path)
+    return parse_json(read_text(path, MOST_JSON, what), what, schema)
+
+
+def _check_schema(value: Any, what: str, schema: Mapping[str, Any]) -> None:
+    """Hold a value against a JSON schema.
+
+    Raises:
+        InputError: it does not keep it; names the path, what was found there and what is needed.
+    """
+    import jsonschema  # a quarter of a second, that only who reads JSON need wait
+
+    with guarded(what, RecursionError, remedy="lists or objects are nested too deep"):
+        error = next(jsonschema.Draft202012Validator(schema).iter_errors(value), None)
+    if error is None:
+        return
+    place = "".join(f"[{key}]" if isinstance(key, int) else f".{shown(key, 40)}" for key in error.absolute_path).lstrip(".")
+    rule = f"{error.validator} {shown(error.validator_value, 120)}"
+    raise InputError(f"{what}: {place or 'the document'} is {shown(error.instance, 120)}; its schema asks for {rule}")
+
+
+def check_shape(value: Any, shape: tuple[int, ...], what: str) -> None:
+    """Hold lists in lists against the shape of an array.
+
+    Raises:
+        InputError: there are more or fewer items somewhere.
+    """
+    if not shape:
+        return
+    if not isinstance(value, list) or len(value) != shape[0]:
+        there = f"{len(value)} items" if isinstance(value, list) else shown(value)
+        raise InputError(f"{what} holds {there} where {shape[0]} are needed")
+    for k, item in enumerate(value) if shape[1:] else ():
+        check_shape(item, shape[1:], f"{what}[{k}]")
+
+
+def shown(value: Any, most: int = 80) -> str:
+    """Return a value as text of at most `most` characters, whatever it is."""
+    try:
+        text = value if isinstance(value, str) else repr(value)
+    except (ValueError, RecursionError):  # an integer of thousands of digits, lists in lists
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= most else f"{text[: most - 1]}…"

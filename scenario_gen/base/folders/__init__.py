@@ -1,0 +1,11 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Folders of results: whole or not at all, and in the place of nothing but an earlier result of the same kind."""
+
+from scenario_gen.base.folders.disk import naming, sync, write_text
+from scenario_gen.base.folders.marker import Kind, MARKER, sha256_of
+from scenario_gen.base.folders.replace import replaced_folder
+from scenario_gen.base.folders.scratch import scratch
+
+__all__ = ["MARKER", "Kind", "naming", "replaced_folder", "scratch", "sha256_of", "sync", "write_text"]

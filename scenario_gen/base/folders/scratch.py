@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Folders of intermediate files: gone with the command, by Ctrl-C too; what a killed one left goes with the next command.
+
+A scratch folder is a claim (`claim.py`) on a result that never takes its place, so whoever looks through a folder knows one of
+a dead process by its lock, and one of a living process stays.
+"""
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+import os
+from pathlib import Path
+import tempfile
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.folders.claim import alone, Claim, claim, GUARD, PREFIX, settle
+from scenario_gen.base.interrupts import ending, uninterrupted
+
+NAME = "scratch"
+DEPTHS = ("*/", "*/*/")  # at which a corpus and a batch write below their own folder
+
+
+@contextmanager
+def scratch(parent: Path) -> Iterator[Path]:
+    """Give an empty folder in `parent`, which only this user may enter, and remove it at the end.
+
+    Raises:
+        OSError: there is no room, or no right to write.
+    """
+    claims: list[Claim] = []
+
+    def clean_up() -> None:
+        while claims:
+            claims.pop().release()
+
+    with ending(clean_up):
+        try:
+            with uninterrupted():
+                sweep(parent)
+                claims.append(_claimed(parent / NAME))
+                own = claims[0]
+                own.folder.chmod(0o700)
+            yield own.new
+        finally:
+            with uninterrupted():
+                clean_up()
+
+
+def _claimed(place: Path) -> Claim:
+    """A claim; made again where somebody swept it in the moment between its folder and its lock."""
+    with suppress(FileNotFoundError, BlockingIOError):
+        return claim(place)
+    return claim(place)
+
+
+def sweep(folder: Path) -> None:
+    """Remove what killed processes left in a folder; what cannot be removed, or is in the hands of another, stays."""
+    with suppress(OSError, InputError):
+        with os.scandir(folder) as found:
+            left = any(entry.name.startswith(PREFIX) or entry.name == GUARD for entry in found)
+        if left:
+            with alone(folder, patience=0.0):
+                settle(folder / GUARD)
+
+
+def sweep_tree(folder: Path) -> None:
+    """`sweep` a folder and those in it, where the caller is alone already."""
+    for above in sorted({path.parent for path in folder.rglob(f"{PREFIX}*")}):
+        settle(above / GUARD)
+
+
+def sweep_beside(words: Iterable[str]) -> None:
+    """`sweep` every folder that a command's words name, with those in it, the one above, and that of temporary files."""
+    folders = {Path(tempfile.gettempdir())}
+    for word in words:
+        with suppress(OSError, ValueError):
+            path = Path(word.partition("=")[2] if word.startswith("-") else word).absolute()
+            folders |= {above for above in (path, path.parent) if above.is_dir()}
+            folders |= {left.parent for depth in DEPTHS for left in path.glob(f"{depth}{PREFIX}*")}
+    for folder in sorted(folders):
+        sweep(folder)

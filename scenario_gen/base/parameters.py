@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Parameters declared once: default, unit, range and meaning; the command line, the nodes and docs/ read them here."""
+
+from dataclasses import dataclass, Field, field, fields, is_dataclass, replace
+import math
+from pathlib import Path
+from typing import Any, TypeVar
+import warnings
+
+from scenario_gen.base.documents import parse_yaml, read_yaml, shown, WHOLE
+from scenario_gen.base.errors import InputError
+
+Config = TypeVar("Config")
+
+
+def parameter(
+    default: Any,
+    meaning: str,
+    *,
+    unit: str = "",
+    low: float | None = None,
+    high: float | None = None,
+    choices: tuple[str, ...] = (),
+    was: str = "",
+) -> Any:
+    """Declare one parameter of a frozen configuration dataclass; bounds are inclusive.
+
+    Args:
+        default: its value, which also gives its type.
+        meaning: what it is, for people.
+        unit: of its values, "" for a plain number.
+        low: least value, None for no bound.
+        high: largest value, None for no bound.
+        choices: the texts allowed, none for any.
+        was: its name in the version before this one, which is still taken, with a warning.
+    """
+    meta = {"meaning": meaning, "unit": unit, "low": low, "high": high, "choices": choices, "was": was}
+    return field(default=default, metadata=meta)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Base of every configuration: its values are checked when it is made.
+
+    Raises:
+        InputError: a value has the wrong type or is out of range.
+    """
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            if entry.metadata:
+                check_value(entry.name, entry, getattr(self, entry.name))
+
+
+def check_value(name: str, entry: "Field[Any]", value: Any) -> None:
+    """Raise InputError naming `name` if `value` does not suit the declaration `entry`."""
+    wanted: type[Any] = type(entry.default)
+    if isinstance(value, int) and not -WHOLE <= value < WHOLE:
+        raise InputError(f"parameter {name} is an integer of more than 64 bits")
+    if wanted is float and isinstance(value, int) and not isinstance(value, bool):
+        value = float(value)
+    if not isinstance(value, wanted) or (wanted is int and isinstance(value, bool)):
+        raise InputError(f"parameter {name} must be of type {wanted.__name__}, not {type(value).__name__} ({shown(value)})")
+    meta = entry.metadata
+    if meta["choices"] and value not in meta["choices"]:
+        raise InputError(f"parameter {name} is {shown(value)!r}; choose one of {', '.join(meta['choices'])}")
+    if wanted in (int, float):
+        if not math.isfinite(value):
+            raise InputError(f"parameter {name} is {value}, not a number that can be reckoned with")
+        if meta["low"] is not None and value < meta["low"]:
+            raise InputError(f"parameter {name} is {value}; it must be at least {meta['low']} {meta['unit']}".rstrip())
+        if meta["high"] is not None and value > meta["high"]:
+            raise InputError(f"parameter {name} is {value}; it must be at most {meta['high']} {meta['unit']}".rstrip())
+
+
+def flatten(config: Any, prefix: str = "") -> dict[str, tuple["Field[Any]", Any]]:
+    """Return {dotted name: (declaration, value)} of a configuration and the configurations nested in it."""
+    flat: dict[str, tuple[Field[Any], Any]] = {}
+    for entry in fields(config):
+        value = getattr(config, entry.name)
+        if is_dataclass(value):
+            flat |= flatten(value, f"{prefix}{entry.name}.")
+        elif entry.metadata:
+            flat[prefix + entry.name] = (entry, value)
+    return flat
+
+
+def former_name(name: str, entry: "Field[Any]") -> str:
+    """Return the dotted name in the version before this one of the parameter `name`; the same name if it has not changed."""
+    return name.removesuffix(entry.name) + (entry.metadata["was"] or entry.name)
+
+
+def current_name(config: Any, name: str) -> str:
+    """Return the dotted name of the parameter that is called `name`, or was so one version ago, which is warned of."""
+    for known, (entry, _) in flatten(config).items():
+        if name != known and name == former_name(known, entry):
+            warnings.warn(f"parameter {name} is called {known} now; the old name goes with the next version", FutureWarning, 3)
+            return known
+    return name
+
+
+def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
+    """Return a copy of `config` with the dotted names in `values` set.
+
+    Raises:
+        InputError: a name is unknown, or a value has the wrong type or is out of range.
+    """
+    changes: dict[str, Any] = {}
+    nested: dict[str, dict[str, Any]] = {}
+    known = {entry.name: entry for entry in fields(config)}  # type: ignore[arg-type]
+    for name, value in values.items():
+        head, _, rest = current_name(config, name).partition(".")
+        if head not in known or bool(rest) != is_dataclass(getattr(config, head)):
+            raise InputError(f"unknown parameter {prefix}{shown(name)}; `scenario-gen parameters` lists them")
+        if rest:
+            nested.setdefault(head, {})[rest] = value
+        else:
+            check_value(prefix + head, known[head], value)
+            changes[head] = float(value) if isinstance(known[head].default, float) else value
+    for head, inner in nested.items():
+        changes[head] = updated(getattr(config, head), inner, f"{prefix}{head}.")
+    return replace(config, **changes)  # type: ignore[type-var]
+
+
+def assigned(config: Config, assignment: str) -> Config:
+    """Return a copy of `config` with one `name=value` set; the value is YAML, but text for a parameter that is text.
+
+    Raises:
+        InputError: there is no `=`, the name is unknown, or the value is no YAML or does not suit; the message names it.
+    """
+    name, equals, text = assignment.partition("=")
+    if not equals:
+        raise InputError(f"--set {shown(assignment)}: write it as name=value")
+    known, name = flatten(config), current_name(config, name)
+    if name not in known:
+        raise InputError(f"unknown parameter {shown(name)}; `scenario-gen parameters` lists them")
+    is_text = isinstance(known[name][0].default, str)  # stays text: vehicle "007" is no number
+    return updated(config, {name: text if is_text else parse_yaml(text, f"--set {name}={shown(text)}")})
+
+
+def loaded(config: Config, path: Path) -> Config:
+    """Return a copy of `config` with what a parameter file sets.
+
+    Raises:
+        InputError: the file cannot be read, a name is unknown or a value does not suit; the message names file and parameter.
+    """
+    values = read_parameter_file(path)
+    try:
+        return updated(config, values)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def read_parameter_file(path: Path) -> dict[str, Any]:
+    """Return {dotted name: value} of a ROS 2 parameter file (`/**: ros__parameters: ...`).
+
+    Raises:
+        InputError: the file cannot be read or is not of that form.
+    """
+    document = read_yaml(path)
+    body = next(iter(document.values())) if isinstance(document, dict) and len(document) == 1 else None
+    nested = body.get("ros__parameters") if isinstance(body, dict) else None
+    if not isinstance(nested, dict):
+        raise InputError(f"{path}: not a parameter file of the form '/**: ros__parameters: ...'")
+    return dict(_dotted(nested))
+
+
+def _dotted(nested: dict[Any, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    """Flatten nested mappings to (dotted name, value) pairs."""
+    pairs: list[tuple[str, Any]] = []
+    for name, value in nested.items():
+        pairs += _dotted(value, f"{prefix}{name}.") if isinstance(value, dict) else [(f"{prefix}{name}", value)]
+    return pairs

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The terminal: what files, vehicles and encounters are called is shown letter by letter, whatever the letters are."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from scenario_gen.base.errors import printable
+
+
+class Terminal(Console):
+    """A console that takes no text for markup and lets no control character out of one; styles come with Text objects only."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(markup=False, emoji=False, highlight=False, **options)
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Every plain text goes this way, in a table's cell, too."""
+        return super().render_str(printable(text), **options)
+
+
+@contextmanager
+def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
+    """Show progress bars on standard error, silent where nobody watches; give what is told name, done and total of each."""
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    tasks: dict[str, TaskID] = {}
+    with Progress(*columns, console=Terminal(stderr=True), transient=True) as bars:
+
+        def advance(name: str, done: int, total: int) -> None:
+            if name not in tasks:
+                tasks[name] = bars.add_task(printable(name), total=total)
+            bars.update(tasks[name], completed=done, total=total)
+
+        yield advance
+
+
+@contextmanager
+def status_line() -> Iterator[Callable[[str], None]]:
+    """Show one changing line while others work, silent where nobody watches; give what is told its text."""
+    with Terminal().status("starting") as status:
+        yield lambda text: status.update(Text(printable(text)))

@@ -1,0 +1,139 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""From logs to one folder of results: every encounter on every road."""
+
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+
+from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.folders import replaced_folder
+from scenario_gen.logs import read_log
+from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
+from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types.request import Request
+
+Advance = Callable[[str, int, int], None]
+"""Told how far a case is: its name, scenarios so far, scenarios wanted."""
+OPTIONS = {
+    "starts:='": "--start '", "goals:='": "--goal '", "sampling.max_stretch:=": "--set sampling.max_stretch=",
+    "fitting.allow=": "--allow ",
+}  # fmt: skip
+"""Parameters of nodes, as the nearest possible request names them, and the command line's options for them."""
+
+
+def generate_folder(
+    out: Path,
+    jobs: Sequence[tuple[Sequence[Path], Sequence[str]]],
+    config: PipelineConfig,
+    *,
+    count: int,
+    seed: int,
+    title: str = "",
+    encounters: Sequence[str] = (),
+    request: Request = Request(),
+    also_read: Iterable[Path] = (),
+    record: Callable[[Path, Sequence[GenerationResult]], None] | None = None,
+    progress: Callable[[], AbstractContextManager[Advance]] = lambda: nullcontext(lambda *_: None),
+) -> tuple[list[GenerationResult], list[str]]:
+    """Generate scenarios of all encounters of some logs; write bag, report and figures to `out`.
+
+    Args:
+        out: the folder; an earlier result there is replaced.
+        jobs: files that are read as one log, and the roads for its encounters.
+        config: the parameters of every stage.
+        count: scenarios per encounter and road.
+        seed: of all randomness.
+        title: heading of the report; the logs' names by default.
+        encounters: names of those to take; all by default.
+        request: a vehicle to be left out, and start and end states.
+        also_read: what else is read, so that `out` may not hold it: maps, a parameter file.
+        record: writes the bag (its path and the cases are given) instead of this process.
+        progress: a context that gives what is told how far each case is.
+
+    Returns:
+        The cases, and a sentence for each encounter and road that was refused or came out short.
+
+    Raises:
+        InputError: a log cannot be read, an encounter is unknown, or `out` may not be replaced.
+        RefusedError: nothing could be generated.
+    """
+    logs = [path for group, _ in jobs for path in group]
+    roads = [road for _, names in jobs for road in names]
+    with replaced_folder(out, GENERATED, [*logs, *map(Path, roads), *also_read]) as folder:
+        found = [read_log(group, config.log) for group, _ in jobs]
+        pairs = [
+            (encounter, road)
+            for log, (_, names) in zip(found, jobs, strict=True)
+            for encounter in chosen(log.encounters, encounters)
+            for road in names
+        ]
+        with progress() as advance:
+            cases, refusals = generate_all(pairs, config, count=count, seed=seed, request=request, advance=advance)
+        if not cases:
+            raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
+        if record is not None:
+            record(folder / BAG, cases)
+        write_results(
+            folder,
+            cases,
+            seed=seed,
+            title=title or ", ".join(path.stem for path in logs),
+            quality=[*(line for log in found for line in log.quality.lines()), *refusals],
+            provenance=provenance_of(logs, seed, count, roads, config, request),
+        )
+    return cases, refusals
+
+
+def generate_all(
+    pairs: Sequence[tuple[Encounter, str]],
+    config: PipelineConfig,
+    *,
+    count: int,
+    seed: int,
+    request: Request = Request(),
+    advance: Advance = lambda *_: None,
+) -> tuple[list[GenerationResult], list[str]]:
+    """Generate scenarios of each encounter on its road; return the cases, and a sentence for each refused or incomplete one."""
+    cases: list[GenerationResult] = []
+    refusals: list[str] = []
+    for encounter, road in pairs:
+        name = f"{encounter.name} on {Path(road).stem}"
+        advance(name, 0, count)
+
+        def told(done: int, total: int, _candidates: int, name: str = name) -> None:
+            advance(name, done, total)
+
+        try:
+            case = generate(encounter, road, config, count=count, seed=seed, request=request, progress=told)
+        except RefusedError as error:
+            refusals.append(f"{encounter.name} on {road}: {as_options(str(error))}")
+            continue
+        cases.append(case)
+        got, refused = len(case.generated.scenarios), case.generated.refused
+        if got < count:
+            causes = ", ".join(f"{number} × {cause}" for cause, number in refused.most_common()) or "no candidate was drawn"
+            refusals.append(f"{encounter.name} on {road}: only {got} of {count} scenarios: {causes}")
+    return cases, refusals
+
+
+def chosen(encounters: Sequence[Encounter], names: Sequence[str]) -> list[Encounter]:
+    """Return the encounters of those names, or all.
+
+    Raises:
+        InputError: a name is unknown; the message lists the known ones.
+    """
+    known = {encounter.name: encounter for encounter in encounters}
+    for unknown in (name for name in names if name not in known):
+        raise InputError(f"no encounter named {unknown!r} in the log; there are: {', '.join(known)}")
+    return [known[name] for name in names] or list(encounters)
+
+
+def as_options(message: str) -> str:
+    """Write the nearest possible request, which the nodes take as parameters, as options of the command line."""
+    for parameter, option in OPTIONS.items():
+        message = message.replace(parameter, option)
+    return message

@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The demo: the paper's three cases, in this process and, if asked, by the ROS nodes over DDS, which must agree byte for byte."""
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+from scenario_gen.bags.recordings.read import read_recording, SCENARIOS
+from scenario_gen.bags.recordings.write import scenario_bytes
+from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.cli.batch import Advance, generate_folder
+from scenario_gen.logs.synthetic import bundled
+from scenario_gen.output.results import namespaces
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.types.generation import GenerationResult
+
+ROADS = {"a": "t_intersection", "b": "t_intersection", "c": "straight"}
+"""The cases of the bundled log, and the road of each."""
+TITLE = "Demo: new encounters from the bundled synthetic log"
+
+
+def run_demo(
+    out: Path,
+    *,
+    count: int,
+    seed: int,
+    ros: bool,
+    progress: Callable[[], AbstractContextManager[Advance]],
+    status: Callable[[], AbstractContextManager[Callable[[str], None]]],
+) -> tuple[list[GenerationResult], list[str]]:
+    """Generate scenarios of the bundled log to a folder, as `generate_folder` does.
+
+    Args:
+        out: the folder.
+        count: scenarios per case.
+        seed: of all randomness.
+        ros: let the nodes record the bag, over DDS; their scenarios must be those made in this process.
+        progress: as of `generate_folder`.
+        status: a context that gives what is told what the nodes are about.
+
+    Raises:
+        InputError: ROS 2 is not installed, or `out` may not be replaced.
+        ScenarioGenError: the nodes' scenarios are others, which is a fault of ours.
+    """
+    config = PipelineConfig()
+    jobs = [((bundled(case),), (road,)) for case, road in ROADS.items()]
+    record = recorder(config, count, seed, status) if ros else None
+    return generate_folder(out, jobs, config, count=count, seed=seed, title=TITLE, record=record, progress=progress)
+
+
+def recorder(
+    config: PipelineConfig, count: int, seed: int, status: Callable[[], AbstractContextManager[Callable[[str], None]]]
+) -> Callable[[Path, Sequence[GenerationResult]], None]:
+    """Return what has the ROS suite record a bag, one namespace per case, and compares it with the cases of this process.
+
+    Raises:
+        InputError: ROS 2 is not installed.
+    """
+    try:
+        from scenario_gen.ros.plumbing.run_suite import Job, run_suite
+    except ImportError as error:
+        raise InputError(f"ROS 2 is not in this environment ({error}); run `make install`, or leave --ros out") from error
+
+    def record(bag: Path, cases: Sequence[GenerationResult]) -> None:
+        names = namespaces(len(ROADS))
+        jobs = [Job(name, bundled(case), road) for name, (case, road) in zip(names, ROADS.items(), strict=True)]
+        with status() as say:
+            run_suite(jobs, config, count=count, seed=seed, bag=bag, progress=say)
+        compare_with_nodes(cases, bag)
+
+    return record
+
+
+def compare_with_nodes(cases: Sequence[GenerationResult], bag: Path) -> None:
+    """Check that the scenarios that the nodes recorded are those made in this process, byte for byte.
+
+    Raises:
+        ScenarioGenError: they differ, which is a fault of ours.
+    """
+    recorded = {name: found.data(SCENARIOS) for name, found in read_recording(bag, topics=(SCENARIOS,)).namespaces.items()}
+    for case, namespace in zip(cases, namespaces(len(cases)), strict=True):
+        own = [scenario_bytes(scenario, case.encounter)[0] for scenario in case.generated.scenarios]
+        if own != recorded.get(namespace, []):
+            raise ScenarioGenError(f"the nodes' scenarios of {case.encounter.name} differ from those made in this process")

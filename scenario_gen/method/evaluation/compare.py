@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Two sets of results side by side: two seeds, two parameters, two versions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+from scenario_gen.base.documents import read_json
+from scenario_gen.base.errors import InputError, reading
+from scenario_gen.types.evaluation import as_markdown, Evaluation, formatted, Interval, Metric, SCHEMA
+from scenario_gen.types.generation import WITH
+
+FILE_SCHEMA = {  # evaluation.json of a run, or one evaluation alone
+    "type": "object",
+    "if": {"required": ["cases"]},
+    "then": {"properties": {"cases": {"type": "array", "minItems": 1, "items": SCHEMA}}},
+    "else": SCHEMA,
+}
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One metric of one case in both sets.
+
+    Attributes:
+        encounter, road: the case.
+        metric: what is compared.
+        first, second: the two estimates, None where a set has none.
+        changepoints: K of both, which stands beside E.
+    """
+
+    encounter: str
+    road: str
+    metric: Metric
+    first: Interval | None
+    second: Interval | None
+    changepoints: tuple[int, int] = (0, 0)
+
+    @property
+    def clear(self) -> bool:
+        """True if both have an interval and these do not overlap; a cautious sign that the sets differ."""
+        if self.first is None or self.second is None:
+            return False
+        bounds = (self.first.low, self.first.high, self.second.low, self.second.high)
+        return all(math.isfinite(b) for b in bounds) and (bounds[1] < bounds[2] or bounds[3] < bounds[0])
+
+    @property
+    def better(self) -> str:
+        """Return "first" or "second" where they clearly differ and the metric has a better direction, else ""."""
+        if not self.clear or not self.metric.better or self.first is None or self.second is None:
+            return ""
+        lower = "first" if self.first.value < self.second.value else "second"
+        return lower if self.metric.better == "lower" else {"first": "second", "second": "first"}[lower]
+
+
+def compare(first: Sequence[Evaluation], second: Sequence[Evaluation], row: str = WITH) -> tuple[Difference, ...]:
+    """Pair the cases of two sets by encounter and road, and every metric of `row`.
+
+    Raises:
+        InputError: the sets have no case in common, or one has none of that row.
+    """
+    others = {(evaluation.encounter, evaluation.road): evaluation for evaluation in second}
+    found: list[Difference] = []
+    for one in first:
+        other = others.get((one.encounter, one.road))
+        if other is None:
+            continue
+        mine, theirs = one.row(row), other.row(row)
+        if mine is None or theirs is None:
+            raise InputError(f"{one.encounter} on {one.road} has no row {row!r} in both sets")
+        for metric in one.metrics:
+            pair = mine.values.get(metric.id), theirs.values.get(metric.id)
+            if any(pair):
+                found.append(Difference(one.encounter, one.road, metric, *pair, (one.changepoints, other.changepoints)))
+    if not found:
+        raise InputError("the two sets have no encounter on the same road in common")
+    return tuple(found)
+
+
+def comparison_table(differences: Sequence[Difference], names: tuple[str, str] = ("A", "B")) -> str:
+    """Return Markdown: one table per case; the better one is named where the intervals do not overlap."""
+    lines: list[str] = []
+    case = ("", "")
+    names = (as_markdown(names[0]), as_markdown(names[1]))
+    for entry in differences:
+        if (entry.encounter, entry.road) != case:
+            case = (entry.encounter, entry.road)
+            lines += [
+                "",
+                f"## {as_markdown(case[0])} on {as_markdown(case[1])}",
+                "",
+                "K = {} and {} changepoints.".format(*entry.changepoints),
+                "",
+                f"| metric | {names[0]} | {names[1]} | clearly better |",
+                "|---|---|---|---|",
+            ]
+        unit = f" [{entry.metric.unit}]" if entry.metric.unit else ""
+        cells = [formatted(estimate, entry.metric.unit) for estimate in (entry.first, entry.second)]
+        better = {"first": names[0], "second": names[1], "": "differs" if entry.clear else ""}[entry.better]
+        lines.append(f"| {entry.metric.label}{unit} | {cells[0]} | {cells[1]} | {better} |")
+    return "\n".join(lines).lstrip("\n") + "\n"
+
+
+def read_evaluations(path: Path) -> tuple[Evaluation, ...]:
+    """Read the figures of a run: its folder, its evaluation.json, or one evaluation as JSON.
+
+    Raises:
+        InputError: there is no such file, or it is not one; the message names the path inside the document.
+    """
+    file = path / "evaluation.json" if path.is_dir() else path
+    document = read_json(file, FILE_SCHEMA, f"{file} is no evaluation")
+    with reading(file):
+        return tuple(Evaluation.from_document(case) for case in document.get("cases", [document]))

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How close it gets, and who goes first: distances, time to collision, post-encroachment time, passing order."""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
+from scenario_gen.method.evaluation.motion import Motion
+from scenario_gen.template.interaction import find_conflicts
+
+
+@dataclass(frozen=True)
+class Criticality:
+    """What one motion came to.
+
+    Source: time to collision, Hayward 1972; post-encroachment time, Allen, Shin & Cooper 1978.
+
+    Attributes:
+        min_distance: least distance between two footprints [m]; NaN with one vehicle.
+        min_ttc: least time to collision [s], at most the horizon; likewise.
+        pet: least post-encroachment time [s] over crossing conflicts: from the first vehicle's exit of the shared area to
+            the second's entry; negative if both were inside; NaN without such a conflict.
+        order: (pair, which of them went first) of every conflict, by vehicle index.
+    """
+
+    min_distance: float
+    min_ttc: float
+    pet: float
+    order: tuple[tuple[tuple[int, int], int], ...]
+
+    def keeps_order_of(self, template: "Criticality") -> float:
+        """Return the share of the template's conflicts that exist here too and have the same first; NaN if none exists."""
+        mine = dict(self.order)
+        same = [mine[pair] == first for pair, first in template.order if pair in mine]
+        return float(np.mean(same)) if same else float("nan")
+
+    def vanished_of(self, template: "Criticality") -> int:
+        """Return how many of the template's conflicts do not exist here; the order says nothing of those."""
+        return len(dict(template.order).keys() - dict(self.order).keys())
+
+
+def criticality(motion: Motion, horizon: float) -> Criticality:
+    """Measure one motion; a time to collision above `horizon` [s] counts as the horizon."""
+    pairs = [(a, b, motion.together(a, b)) for a, b in combinations(range(len(motion.vehicles)), 2)]
+    pairs = [(a, b, both) for a, b, both in pairs if both.stop > both.start]
+    conflicts = find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading, motion.present)
+    encroachments = [c.encroachment for c in conflicts if not c.following]
+    return Criticality(
+        min_distance=min((float(footprint_distance(motion, a, b)[both].min()) for a, b, both in pairs), default=float("nan")),
+        min_ttc=min((horizon, *(float(time_to_collision(motion, a, b)[both].min()) for a, b, both in pairs)))
+        if pairs
+        else float("nan"),
+        pet=min(encroachments, default=float("nan")),
+        order=tuple(((min(c.first, c.second), max(c.first, c.second)), c.first) for c in conflicts),
+    )

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How much the samples of a set differ from each other, and how near the nearest comes to the fitted template."""
+
+import numpy as np
+
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats
+
+
+def displacements(position: Floats, there: Bools | None = None) -> Floats:
+    """Return (S, S): mean distance in metres between samples r and s, over vehicles and instants.
+
+    Args:
+        position: (S, N, T, 2) metres, at the same share of each sample's duration.
+        there: (N, T) vehicles and instants that count; None: all.
+    """
+    samples = position.shape[0]
+    table = np.zeros((samples, samples))
+    for s in range(samples - 1):
+        step = position[s + 1 :] - position[s]
+        table[s, s + 1 :] = _mean(exact.hypot(step[..., 0], step[..., 1]), there)
+    return table + table.T
+
+
+def diversity(table: Floats, weights: Floats) -> Floats:
+    """Return the mean displacement (B,) of two different samples under weights (B, S); NaN for one sample.
+
+    A sample drawn twice makes no pair with itself, or resampling would shrink the diversity.
+    """
+    total = (exact.matmul(weights, table) * weights).sum(axis=1)
+    pairs = np.square(weights.sum(axis=1)) - np.square(weights).sum(axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(total / pairs)
+
+
+def _mean(distance: Floats, there: Bools | None) -> Floats:
+    """Mean (S,) of distances (S, N, T) over the vehicles and instants that count."""
+    return np.asarray(distance.mean(axis=(1, 2)) if there is None or there.all() else distance[:, there].mean(axis=1))
+
+
+def displacement_to(position: Floats, target: Floats, there: Bools | None = None) -> Floats:
+    """Return (S,): mean distance in metres of samples (S, N, T, 2) to a target (N, T, 2), over vehicles and instants (ADE).
+
+    Those that count, if `there` (N, T) says so.
+
+    Source: the average displacement error (Pellegrini et al. 2009).
+    """
+    step = position - target
+    return _mean(exact.hypot(step[..., 0], step[..., 1]), there)
+
+
+def weighted_min(values: Floats, weights: Floats) -> Floats:
+    """Return the least value (B,) among the samples (S,) that weights (B, S) contain.
+
+    Source: the best of several samples, as minADE takes it (Gupta et al. 2018).
+    """
+    return np.asarray(np.where(weights > 0.0, values, np.inf).min(axis=1))

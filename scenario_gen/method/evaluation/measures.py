@@ -1,0 +1,147 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How critical a scenario is, pair by pair: the figures that a target can be set on, and that the coverage page counts.
+
+They are taken on the published samples (0.1 s). Of a pair a, b:
+
+- `pet`: post-encroachment time [s] (Allen, Shin & Cooper 1978): from the first one's exit of the area that both footprints sweep
+  to the second one's entry; negative if both were inside at once. Of crossing and merging pairs only, see
+  `scenario_gen.template.interaction`.
+- `arrival_gap` [s]: from the first one's entry into that area to the second one's. Of a named pair [a,b] it has a sign:
+  negative if b is first. Of crossing and merging pairs only.
+- `ttc` [s]: least time to collision while both keep their velocities (Hayward 1972), of the footprints; infinite if they are
+  never on a collision course.
+- `gap` [m]: least distance of the two footprints.
+- `closing_speed` [m/s]: rate at which the distance of the two centres shrinks when the first one enters the shared area; of a
+  pair that neither crosses nor merges the greatest rate while both are there.
+
+Over all pairs the most critical value counts: the least, of `closing_speed` the greatest.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+import math
+
+import numpy as np
+
+from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
+from scenario_gen.method.evaluation.motion import at_period, Motion
+from scenario_gen.method.sampling.directed import Measures
+from scenario_gen.numerics import exact
+from scenario_gen.template.interaction import Conflict, pair_conflict
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.scenario import Scenario
+from scenario_gen.types.target import Pair
+
+PERIOD = 0.1  # s
+
+
+@dataclass(frozen=True)
+class PairFigures:
+    """All figures of one pair (a < b); NaN where there is none. `first`: who enters the shared area first, None without one."""
+
+    pair: Pair
+    first: int | None
+    pet: float
+    arrival_gap: float
+    ttc: float
+    gap: float
+    closing_speed: float
+
+
+def measure(scenario: Scenario | Encounter, name: str, pair: Pair | None = None) -> float:
+    """Return one figure of a pair, or the most critical of all pairs; NaN where no pair has it.
+
+    Args:
+        scenario: with all its vehicles, an ego's witness too.
+        name: of the figure, see above.
+        pair: indices of two vehicles; the sign of `arrival_gap` follows their order.
+    """
+    motion = at_period(scenario, PERIOD)
+    pairs = [pair] if pair else list(combinations(range(len(motion.vehicles)), 2))
+    values = [value for a, b in pairs if not math.isnan(value := _figure(motion, name, a, b))]
+    if pair is None and name == "arrival_gap":
+        values = [abs(value) for value in values]
+    return (max if name == "closing_speed" else min)(values, default=math.nan)
+
+
+def figures_of(scenario: Scenario | Encounter) -> tuple[PairFigures, ...]:
+    """Return all figures of every pair of vehicles that are there together; `arrival_gap` without sign."""
+    motion = at_period(scenario, PERIOD)
+    found = []
+    for a, b in combinations(range(len(motion.vehicles)), 2):
+        both = motion.together(a, b)
+        if both.stop - both.start < 2:
+            continue
+        conflict = _crossing(motion, a, b)
+        pet, arrival, first = math.nan, math.nan, None
+        if conflict is not None:
+            first = conflict.first
+            pet, arrival = conflict.encroachment, conflict.arrival_gap
+        ttc, gap = _figure(motion, "ttc", a, b), _figure(motion, "gap", a, b)
+        found.append(PairFigures((a, b), first, pet, arrival, ttc, gap, _closing_speed(motion, a, b, conflict)))
+    return tuple(found)
+
+
+def most_critical(figures: Sequence[PairFigures]) -> PairFigures | None:
+    """Return the figures of the pair with the least PET, or, where no pair crosses, with the least gap; None without pairs."""
+    crossing = [one for one in figures if not math.isnan(one.pet)]
+    return min(crossing, key=lambda one: one.pet) if crossing else min(figures, key=lambda one: one.gap, default=None)
+
+
+def features(scenario: Scenario | Encounter) -> tuple[float, ...]:
+    """Return where a scenario lies in the space that a choice covers, in bins of width 1, of its most critical pair.
+
+    Of a pair that crosses or merges: PET in 0.5 s, arrival gap in 0.5 s, closing speed in 1 m/s; of another one: a large number,
+    gap in 1 m, closing speed in 1 m/s.
+    """
+    most = most_critical(figures_of(scenario))
+    if most is None:
+        return (math.inf, 0.0, 0.0)
+    if math.isnan(most.pet):
+        return (math.inf, most.gap, most.closing_speed)
+    return (most.pet / 0.5, most.arrival_gap / 0.5, most.closing_speed)
+
+
+MEASURES = Measures(measure, features)
+"""What sampling towards a target, and a choice, measure with."""
+
+
+def _crossing(motion: Motion, a: int, b: int) -> Conflict | None:
+    """The conflict of two vehicles whose paths cross or merge; None of others, and of followers."""
+    low, high = min(a, b), max(a, b)
+    conflict = pair_conflict(motion.vehicles, motion.time, motion.position, motion.heading, low, high, motion.present)
+    return None if conflict is None or conflict.following else conflict
+
+
+def _figure(motion: Motion, name: str, a: int, b: int) -> float:
+    both = motion.together(a, b)
+    if both.stop - both.start < 2:
+        return math.nan
+    if name == "ttc":
+        return float(time_to_collision(motion, a, b)[both].min())
+    if name == "gap":
+        return float(footprint_distance(motion, a, b)[both].min())
+    conflict = _crossing(motion, a, b)
+    if name == "closing_speed":
+        return _closing_speed(motion, a, b, conflict)
+    if conflict is None:
+        return math.nan
+    if name == "pet":
+        return conflict.encroachment
+    return conflict.arrival_gap if conflict.first == a else -conflict.arrival_gap
+
+
+def _closing_speed(motion: Motion, a: int, b: int, conflict: Conflict | None) -> float:
+    """The rate [m/s] at which the distance of two centres shrinks, at the conflict's first entry, or else the greatest."""
+    both = motion.together(a, b)
+    if conflict is not None:  # at the sample nearest to it at which both are there
+        at = min(max(round(conflict.entry_first / motion.dt), both.start), both.stop - 1)
+        both = slice(at, at + 1)
+    way = motion.position[b, both] - motion.position[a, both]
+    direction = np.stack([exact.cos(motion.heading[[a, b], both]), exact.sin(motion.heading[[a, b], both])], axis=-1)
+    velocity = motion.speed[[a, b], both, None] * direction
+    distance = np.maximum(exact.hypot(way[:, 0], way[:, 1]), 1e-9)
+    return float((-((velocity[1] - velocity[0]) * way).sum(axis=-1) / distance).max())

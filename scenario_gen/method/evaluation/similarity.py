@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How like the template a set of scenarios is: the paper's figure 5 as numbers (method §7).
+
+For a pair of vehicles let M_s be the feature matrix of sample s and T the template's. E is the Frobenius norm of the mean
+of M_s - T over the norm of T. With D_s = M_s - T flattened and weights w summing to 1, its square is w'Gw / |T|² with the
+Gram matrix G = D D'; so a bootstrap of E needs the matrices once and then only G.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from scenario_gen.method.evaluation.dtw import blocks, Distance, feature_extents, feature_rows
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class PairSimilarity:
+    """Sums over the feature matrices of one pair of vehicles, enough for E and the correlation under any weights.
+
+    Attributes:
+        gram: (S, S) inner products of D_r and D_s.
+        cross: (S,) inner products of D_s and T.
+        total: (S,) sums of the entries of D_s.
+        template: number of entries, their sum, and their sum of squares in T.
+    """
+
+    gram: Floats
+    cross: Floats
+    total: Floats
+    template: tuple[int, float, float]
+
+    def error(self, weights: Floats) -> Floats:
+        """Return E (B,) under weights (B, S); NaN if T is zero (both vehicles stand throughout)."""
+        shares = weights / weights.sum(axis=1, keepdims=True)
+        square = (exact.matmul(shares, self.gram) * shares).sum(axis=1)
+        norm = self.template[2]
+        return np.sqrt(np.maximum(square, 0.0) / norm) if norm > 0.0 else np.full(len(weights), np.nan)
+
+    def correlation(self, weights: Floats) -> Floats:
+        """Return Pearson's r (B,) of the mean matrix and T; NaN if one of them is constant."""
+        shares = weights / weights.sum(axis=1, keepdims=True)
+        count, first, second = self.template
+        variance = second - first * first / count
+        total = exact.matmul(shares, self.total)
+        covariance = exact.matmul(shares, self.cross) - total * first / count
+        spread = (exact.matmul(shares, self.gram) * shares).sum(axis=1) - np.square(total) / count
+        generated = variance + 2.0 * covariance + spread
+        with np.errstate(invalid="ignore", divide="ignore"):
+            result = (variance + covariance) / np.sqrt(variance * generated)
+        return np.where((variance > 1e-12 * count) & (generated > 1e-12 * count), result, np.nan)
+
+
+def pair_similarity(
+    template: tuple[Floats, Floats], generated: tuple[Floats, Floats], distance: Distance, least: float = 0.0
+) -> PairSimilarity:
+    """Compare the feature matrices of one pair of vehicles.
+
+    Args:
+        template: series of the two vehicles, (D, T) each.
+        generated: series of the two vehicles in S samples, (S, D, T) each.
+        distance: of the feature; the paper takes Euclidean for position, Manhattan for speed.
+        least: a template whose distances spread by less counts as constant: scaled to [0, 1] it would show its noise.
+    """
+    a, b = (np.ascontiguousarray(series) for series in generated)
+    left, right = (np.ascontiguousarray(series)[None] for series in template)
+    extents, own = feature_extents(a, b, distance), feature_extents(left, right, distance)
+    samples, _, steps = a.shape
+    gram, cross, total = np.zeros((samples, samples)), np.zeros(samples), np.zeros(samples)
+    first = second = 0.0
+    if own[0, 1] - own[0, 0] < least:
+        return PairSimilarity(gram, cross, total, (steps * steps, first, second))
+    for rows in blocks(steps, samples * steps):
+        target = feature_rows(left, right, own, rows, distance)[0]
+        difference = feature_rows(a, b, extents, rows, distance)
+        difference -= target
+        gram += exact.gram(difference)
+        cross += exact.matmul(difference, target)
+        total += difference.sum(axis=1)
+        first += float(target.sum())
+        second += float(np.square(target).sum())
+    return PairSimilarity(gram, cross, total, (steps * steps, first, second))
+
+
+def pair_similarities(template: Floats, generated: Floats, distance: Distance, least: float = 0.0) -> list[PairSimilarity]:
+    """Compare all pairs of vehicles: template (N, T, D) against generated (S, N, T, D), as `pair_similarity` does."""
+    target, series = np.moveaxis(template, -1, -2), np.moveaxis(generated, -1, -2)
+    return [
+        pair_similarity((target[a], target[b]), (series[:, a], series[:, b]), distance, least)
+        for a, b in combinations(range(template.shape[0]), 2)
+    ]
+
+
+def mean_error(pairs: list[PairSimilarity], weights: Floats) -> Floats:
+    """Return E (B,) averaged over the pairs of vehicles for which it is defined; NaN if for none."""
+    return _mean_over_pairs([pair.error(weights) for pair in pairs])
+
+
+def mean_correlation(pairs: list[PairSimilarity], weights: Floats) -> Floats:
+    """Return the correlation (B,) averaged over the pairs for which it is defined; NaN if for none."""
+    return _mean_over_pairs([pair.correlation(weights) for pair in pairs])
+
+
+def _mean_over_pairs(values: list[Floats]) -> Floats:
+    if not values:
+        return np.full(1, np.nan)
+    table = np.stack(values)
+    known = np.isfinite(table)
+    count = known.sum(axis=0)
+    return np.where(count > 0, np.where(known, table, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)

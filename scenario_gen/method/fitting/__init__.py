@@ -1,0 +1,11 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Changepoints -> the target road (paper III-A, eqs 7-9 put right)."""
+
+from scenario_gen.method.fitting.config import FittingConfig
+from scenario_gen.method.fitting.fit import fit_template
+from scenario_gen.method.fitting.kept import LostConflictError
+from scenario_gen.types.fit import Fit, FittedVehicle
+
+__all__ = ["Fit", "FittedVehicle", "FittingConfig", "LostConflictError", "fit_template"]

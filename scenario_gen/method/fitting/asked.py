@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What is wrong with asked start and end states by themselves: speed, room on the road, room beside each other."""
+
+from itertools import combinations
+
+import numpy as np
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.numerics.arrays import Floats
+from scenario_gen.roads.clearance import footprint_fits
+from scenario_gen.template.separation import footprint_gap
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.fit import Fit
+from scenario_gen.types.road import Road
+
+STAND = 0.05  # m/s, a speed below this is met by standing
+NAMES = {"starts": "start", "goals": "goal"}
+
+
+def refuse_impossible(encounter: Encounter, road: Road, starts: Floats, goals: Floats, max_speed: float) -> None:
+    """Refuse states, (N, 4) each with NaN where none is asked, that no motion can have.
+
+    Raises:
+        RefusedError: one is faster than `max_speed` [m/s], or off the road; with figures.
+    """
+    for name, rows in (("starts", starts), ("goals", goals)):
+        for vehicle, state in zip(encounter.vehicles, rows, strict=True):
+            if np.isnan(state[0]):
+                continue
+            what = f"the {NAMES[name]} asked of vehicle {vehicle.id} (x {state[0]:.2f}, y {state[1]:.2f})"
+            if state[3] > max_speed:
+                raise RefusedError(f"{what} has {state[3]:g} m/s; sampling.max_speed is {max_speed:g} m/s")
+            if not footprint_fits(road, state[None, :3], vehicle.length, vehicle.width)[0]:
+                raise RefusedError(
+                    f"{what} is off the road: a footprint of {vehicle.length:g} m by {vehicle.width:g} m has no room there"
+                )
+
+
+def refuse_misfits(fit: Fit, starts: Floats, goals: Floats) -> None:
+    """Refuse asked states, (N, 4) each with NaN where none is asked, that do not go with others or with the template's motion.
+
+    Raises:
+        RefusedError: two footprints overlap at the start or the end, or a vehicle that stands there is asked to drive.
+    """
+    for name, rows, states, first in (("starts", starts, fit.asked.start, True), ("goals", goals, fit.asked.end, False)):
+        asked = ~np.isnan(rows[:, 0])
+        for (i, a), (j, b) in combinations(enumerate(fit.vehicles), 2):
+            gap = float(footprint_gap(a, states[[i], :3], b, states[[j], :3])[0][0])
+            if gap <= 0.0 and (asked[i] or asked[j]):
+                raise RefusedError(f"at the {NAMES[name]} that is asked vehicles {a.id} and {b.id} overlap by {-gap:.2f} m")
+        for i in np.flatnonzero(asked).tolist():
+            stands = fit.fitted[i].stands
+            if rows[i, 3] > STAND and stands[0 if first else -1]:
+                when = "throughout" if stands.all() else "there"
+                raise RefusedError(
+                    f"vehicle {fit.vehicles[i].id} stands {when} in the template, so the speed at its {NAMES[name]} must be 0, "
+                    f"not {rows[i, 3]:g} m/s"
+                )

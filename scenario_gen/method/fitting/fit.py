@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""One door to the fitting: which way of placing a template is tried on which road."""
+
+from collections.abc import Callable
+from functools import lru_cache
+import math
+
+import numpy as np
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.fitting.asked import refuse_impossible, refuse_misfits
+from scenario_gen.method.fitting.config import FittingConfig
+from scenario_gen.method.fitting.finish import finish
+from scenario_gen.method.fitting.given import place_given, place_in_own_frame
+from scenario_gen.method.fitting.junction import has_lanes, place_at_junction
+from scenario_gen.method.fitting.kept import refuse_lost_conflicts
+from scenario_gen.method.fitting.lanes import place_along_lanes
+from scenario_gen.method.fitting.placement import Placement
+from scenario_gen.method.fitting.search import place_by_search
+from scenario_gen.method.fitting.vector import place_on_lanes
+from scenario_gen.numerics.arrays import Floats
+from scenario_gen.roads.arms import arms_of
+from scenario_gen.template.tracks import clean_tracks, Track
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.fit import Fit
+from scenario_gen.types.request import Request
+from scenario_gen.types.road import Road
+from scenario_gen.types.segmentation import Segmentation
+
+_AT_HOME = 0.98  # share of footprints with room at which any road is taken for the template's own
+_NEAR_HOME = 0.5  # the same for a map without lanes to go by: recorded cars leave recorded maps here and there
+
+
+def fit_template(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    config: FittingConfig = FittingConfig(),
+    *,
+    starts: Floats | None = None,
+    goals: Floats | None = None,
+    request: Request = Request(),
+    max_speed: float = math.inf,
+) -> Fit:
+    """Place a template on a road (paper III-A, eqs 7-9 put right).
+
+    Args:
+        encounter: the template.
+        segmentation: its changepoints; they decide which anchors are reported, never where start and end are.
+        road: the target.
+        config: which way, and how far things may be scaled and moved.
+        starts: (N, 3) or (N, 4) given start poses x [m], y [m], yaw [rad], and speeds [m/s] of all vehicles; with `goals`.
+        goals: likewise the end.
+        request: the start and end states that are asked for, of some vehicles; the others are the road's own placement.
+        max_speed: [m/s] that no asked state may exceed.
+
+    Raises:
+        LostConflictError: the best place on the road loses a conflict of the template, and `config.allow` does not name that.
+        RefusedError: it does not fit, or a state that is asked for cannot be had; the message says why, with figures.
+        InputError: `starts` and `goals` disagree with the encounter, or a vehicle that is named does not exist.
+    """
+    if request.moves:
+        return _fit_asked(encounter, segmentation, road, config, request, max_speed)
+    if starts is not None or goals is not None:
+        placement, given = place_given(encounter, road, config, starts, goals)
+        return finish(encounter, segmentation, road, placement, config, given)
+    placement = _place(encounter, road.cleared, config)
+    fit = finish(encounter, segmentation, road, placement, config)
+    if not config.allow and not placement.at_home:
+        refuse_lost_conflicts(fit.lost, road.name)
+    return fit
+
+
+def _fit_asked(
+    encounter: Encounter, segmentation: Segmentation, road: Road, config: FittingConfig, request: Request, max_speed: float
+) -> Fit:
+    starts, goals = (request.rows(end, encounter) for end in ("starts", "goals"))
+    refuse_impossible(encounter, road, starts, goals, max_speed)
+    base = _place(encounter, road.cleared, config) if np.isnan(starts).any() or np.isnan(goals).any() else None
+    placement, given = place_given(encounter, road, config, starts, goals, base)
+    fit = finish(encounter, segmentation, road, placement, config, given)
+    refuse_misfits(fit, starts, goals)
+    if not config.allow:
+        refuse_lost_conflicts(fit.lost, road.name)
+    return fit
+
+
+@lru_cache(maxsize=1)  # changepoints have no part in it: the references have the same
+def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement:
+    if config.placement == "identity":
+        return place_in_own_frame(encounter, road, config)[0]
+    tracks = clean_tracks(encounter)
+    ways: dict[str, Callable[[tuple[Track, ...], Road, FittingConfig], Placement]] = {
+        "lanes": place_along_lanes,
+        "junction": place_at_junction,
+        "search": place_by_search,
+    }
+    if road.lanes is not None and config.placement != "search":
+        return place_on_lanes(tracks, road, config)
+    if config.placement != "auto":
+        return ways[config.placement](tracks, road, config)
+    own, share = None, 0.0
+    reasons: list[str] = []
+    order: tuple[str, ...]
+    try:
+        own, share = place_in_own_frame(encounter, road, config)
+    except RefusedError as error:
+        reasons.append(f"in its own frame, {error}")
+    if own is not None and share >= _AT_HOME:
+        return own
+    if has_lanes(road) or len(arms_of(road)) > 1:
+        order, reasons = ("lanes", "junction"), []
+    elif own is not None and share >= _NEAR_HOME:
+        return own
+    else:
+        order = ("search",)
+    for name in order:
+        try:
+            return ways[name](tracks, road, config)
+        except RefusedError as error:
+            reasons.append(str(error))
+    if order != ("search",):  # what stands against it on one road, or at a junction where the road has one
+        reasons = reasons[-1:] if len(arms_of(road)) > 2 else reasons[:1]
+    raise RefusedError(f"the template does not fit road {road.name}: " + "; ".join(reasons))

@@ -1,0 +1,371 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The nearest request that is possible: what an impossible one is answered with, each suggestion tried out before it is made."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from scenario_gen.base.errors import RefusedError, ScenarioGenError
+from scenario_gen.method.checked import sample_checked
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.fitting import fit_template, LostConflictError
+from scenario_gen.method.routing import plan_routes
+from scenario_gen.method.sampling import Cancelled, OnValid, Progress
+from scenario_gen.method.sampling.directed import TargetError
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats, wrap_angle
+from scenario_gen.numerics.curve import Curve
+from scenario_gen.roads import build_road, BUILT_IN
+from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room
+from scenario_gen.roads.ways import draw_route
+from scenario_gen.template.interaction import Wait
+from scenario_gen.template.separation import footprint_gap
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types.names import vehicle_index
+from scenario_gen.types.request import ENDS, Request, State
+from scenario_gen.types.road import Road
+from scenario_gen.types.segmentation import Segmentation
+
+BISECTIONS = 7
+_NAMED = 2  # roads that keep an encounter
+ENOUGH = 10  # valid scenarios by which a request counts as possible, if not fewer are wanted
+_FAR_ENDS = (1.0, 0.75, 0.5, 0.25)  # shares of a way at which a bisection may begin
+_STRETCHES = (0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+FAR = 30.0  # m, how far a pose with room is looked for
+_OFFSETS = (0.25 * np.arange(1, 121)).tolist()  # m, by which an overlapping footprint is moved along its heading
+_MARGINS = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2)  # m, beyond the nearest pose with room, until a pose in whole centimetres has it
+
+
+def elements(request: Request) -> list[tuple[str, str]]:
+    """Return (end, vehicle) of every state that is asked for."""
+    return [(end, name) for end in ENDS for name in request.states(end)]
+
+
+def with_state(request: Request, end: str, name: str, state: State) -> Request:
+    """Return the request with another state of one vehicle at one end."""
+    return request.with_states(end, request.states(end) | {name: state})
+
+
+def moved(state: State, pose: Floats) -> State:
+    """Return the state at another pose (3,) [m, m, rad], in whole centimetres and tenths of a milliradian; its speed stays."""
+    return (*np.round(pose[:2], 2).tolist(), round(float(pose[2]), 4), *state[3:])
+
+
+def _with_room(road: Road, vehicle: Vehicle, pose: Floats, asked: Floats) -> State:
+    """The pose in whole centimetres, as little beyond the nearest one as its footprint then needs."""
+    away = (pose - asked)[:2] / exact.hypot(*(pose - asked)[:2])
+    for margin in _MARGINS:
+        tried = np.array([*np.round(pose[:2] + margin * away, 2), asked[2]])
+        if footprint_fits(road, tried[None], vehicle.length, vehicle.width)[0]:
+            return tuple(tried.tolist())
+    return tuple(pose.tolist())
+
+
+Path = Callable[[float], Request]
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A request that is possible, the stretch of the clock it needs (None: the one in effect), and the change in words."""
+
+    request: Request
+    said: str
+    max_stretch: float | None = None
+
+
+class ImpossibleError(RefusedError):
+    """What was asked cannot be had; `suggestions` can."""
+
+    def __init__(self, reason: str, suggestions: tuple[Suggestion, ...]) -> None:
+        offers = "; or ".join(one.said for one in suggestions)
+        super().__init__(f"{reason}. " + (f"Nearest possible: {offers}" if offers else "No nearby request was found possible"))
+        self.suggestions = suggestions
+
+
+@contextmanager
+def nearest_if_impossible(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    config: PipelineConfig,
+    request: Request,
+    *,
+    count: int,
+    seed: int,
+    cancelled: Cancelled = lambda: False,
+) -> Iterator[None]:
+    """Answer a refusal in the body with the nearest requests that are possible; none if it was cancelled.
+
+    Raises:
+        LostConflictError: a conflict of the template would be lost; it names roads that keep it.
+        ImpossibleError: the asked states cannot be met; it says why, and what nearby can be.
+        RefusedError: as the body, where no states were asked for.
+    """
+    try:
+        yield
+    except TargetError:  # the states are not what is impossible
+        raise
+    except RefusedError as error:
+        if not request.moves:
+            if not isinstance(error, LostConflictError):
+                raise
+            kept = " or ".join(f"road {name}" for name in roads_that_keep(encounter, segmentation, config))
+            raise LostConflictError(f"{error}. Nearest possible: {kept}") from error
+        search = _Search(encounter, segmentation, road, config, request, seed, min(count, ENOUGH), cancelled)
+        found = tuple(search.run())
+        raise ImpossibleError(str(error), () if search.cancelled() else found) from error
+
+
+def roads_that_keep(encounter: Encounter, segmentation: Segmentation, config: PipelineConfig) -> list[str]:
+    """Names of the built-in roads that the template fits with all its conflicts, two at most; else `corridor`, its own road."""
+    found: list[str] = []
+    for name in BUILT_IN:
+        with suppress(RefusedError):
+            fit_template(encounter, segmentation, build_road(name, encounter, config.road), replace(config.fitting, allow=""))
+            found.append(name)
+        if len(found) == _NAMED:
+            break
+    return found or ["corridor"]
+
+
+def plan(
+    encounter: Encounter, segmentation: Segmentation, road: Road, config: PipelineConfig, request: Request, seed: int
+) -> GenerationResult:
+    """Fit and plan: a template on its road, with no scenarios yet.
+
+    Raises:
+        InputError, RefusedError: as the stages.
+    """
+    fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
+    return GenerationResult(encounter, segmentation, road, fit, plan_routes(road, fit, config.planning, seed), seed=seed)
+
+
+def attempt(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    config: PipelineConfig,
+    request: Request,
+    *,
+    count: int,
+    seed: int,
+    waits: tuple[Wait, ...] | None = None,
+    progress: Progress = lambda *_: None,
+    cancelled: Cancelled = lambda: False,
+    found: OnValid = lambda *_: None,
+) -> GenerationResult:
+    """Fit, plan and sample with given changepoints, without evaluation; `waits` that are kept are the template's unless given.
+
+    Raises:
+        InputError, RefusedError: as the stages.
+    """
+    return sample_checked(
+        plan(encounter, segmentation, road, config, request, seed), config.sampling, config.limits, request,
+        count=count, waits=waits, progress=progress, cancelled=cancelled, found=found,
+    )  # fmt: skip
+
+
+class _Search:
+    """Everything that the suggestions for one request need."""
+
+    def __init__(
+        self,
+        encounter: Encounter,
+        segmentation: Segmentation,
+        road: Road,
+        config: PipelineConfig,
+        asked: Request,
+        seed: int,
+        wanted: int,
+        cancelled: Cancelled,
+    ) -> None:
+        self.encounter, self.segmentation, self.road, self.config = encounter, segmentation, road, config
+        self.asked, self.seed, self.wanted, self.cancelled = asked, seed, wanted, cancelled
+        self._plans: dict[tuple[str, str], GenerationResult | None] = {}
+
+    @cached_property
+    def base(self) -> dict[str, Floats]:
+        """Start and end states of the fitting without any asked, (N, 4) by end; nothing where that is not possible either."""
+        try:
+            unasked = fit_template(self.encounter, self.segmentation, self.road, self.config.fitting)
+            plan_routes(self.road, unasked, self.config.planning, self.seed)
+        except ScenarioGenError:
+            return {}
+        return {"starts": unasked.asked.start, "goals": unasked.asked.end}
+
+    def possible(self, request: Request, stretch: float | None = None) -> bool:
+        """Whether scenarios of the request can be had within its budget."""
+        if self.cancelled():
+            return False
+        config = self.config
+        if stretch is not None:
+            config = replace(config, sampling=replace(config.sampling, max_stretch=stretch))
+        planned = self._planned(request)
+        if planned is None:
+            return False
+        try:
+            made = sample_checked(planned, config.sampling, config.limits, request, count=self.wanted)
+        except ScenarioGenError:
+            return False
+        return len(made.generated.scenarios) == self.wanted
+
+    def _planned(self, request: Request) -> GenerationResult | None:
+        """The template with these states on its road; None if they have no place or no way. Its clock has no part in that."""
+        key = request.starts, request.goals
+        if key not in self._plans:
+            try:
+                given = self.encounter, self.segmentation, self.road, self.config
+                self._plans[key] = plan(*given, request, self.seed)
+            except ScenarioGenError:
+                self._plans[key] = None
+        return self._plans[key]
+
+    def run(self) -> Iterator[Suggestion]:
+        """Yield suggestions: the plain repair alone if it suffices, else every single change that does, else all at once."""
+        start = self._repaired()
+        if start != self.asked and self.possible(start):
+            yield Suggestion(start, self._difference(start))
+            return
+        found = False
+        for end, name in elements(start):
+            for path in self._paths(start, end, name):
+                near = self._bisected(path)
+                if near is not None:
+                    found = True
+                    yield Suggestion(near, self._difference(near))
+                    break
+        stretched = self._stretched(start)
+        if stretched is not None:
+            yield stretched
+        elif not found and self.base:
+            near = self._bisected(lambda share: self._all_towards_base(start, share))
+            if near is not None:
+                yield Suggestion(near, self._difference(near))
+
+    def _repaired(self) -> Request:
+        """The request with each state moved as little as it takes to have room, and its speed within the limit."""
+        request = self.asked
+        for end, name in elements(request):
+            vehicle = self.encounter.vehicles[vehicle_index(self.encounter, name, end)]
+            state = request.states(end)[name]
+            pose = np.array(state[:3])
+            answer = nearest_pose_with_room(self.road, pose, vehicle.length, vehicle.width, FAR)
+            if answer is not None and answer[1] > 0.0:
+                state = _with_room(self.road, vehicle, answer[0], pose) + state[3:]
+            if len(state) == 4:
+                state = (*state[:3], min(state[3], self.config.sampling.max_speed))
+            request = with_state(request, end, name, state)
+        for end, name in elements(request):
+            request = self._apart(request, end, name)
+        return request
+
+    def _apart(self, request: Request, end: str, name: str) -> Request:
+        """Move a footprint that overlaps another one along its heading until it no longer does; as it was, if nowhere is room."""
+        vehicles = self.encounter.vehicles
+        n = vehicle_index(self.encounter, name, end)
+        rows = request.rows(end, self.encounter)[:, :3]
+        if self.base:
+            rows = np.where(np.isnan(rows), self.base[end][:, :3], rows)
+        others = [m for m in range(len(rows)) if m != n and not np.isnan(rows[m, 0])]
+
+        def gap(pose: Floats) -> float:
+            gaps = [footprint_gap(vehicles[n], pose[None], vehicles[m], rows[[m]])[0][0] for m in others]
+            return float(min(gaps, default=np.inf))
+
+        state = request.states(end)[name]
+        if gap(np.array(state[:3])) > 0.0:
+            return request
+        ahead = np.array([exact.cos(state[2]), exact.sin(state[2]), 0.0])
+        for offset in (sign * step for step in _OFFSETS for sign in (1.0, -1.0)):
+            tried = moved(state, np.array(state[:3]) + offset * ahead)
+            pose = np.array(tried[:3])
+            fits = footprint_fits(self.road, pose[None], vehicles[n].length, vehicles[n].width)[0]
+            if fits and gap(pose) >= self.config.fitting.clearance:
+                return with_state(request, end, name, tried)
+        return request
+
+    # --- ways to change a request: each a function of the share of the way, 0 (as it is) to 1 ---------------------
+
+    def _paths(self, request: Request, end: str, name: str) -> Iterator[Path]:
+        """The speed towards the template's, the pose along the drawn route, the pose towards where the fitting has it."""
+        n = vehicle_index(self.encounter, name, end)
+        state = request.states(end)[name]
+        base = self.base[end][n] if self.base else None
+        if len(state) == 4:
+            target = 0.0 if base is None else float(base[3])
+            yield lambda share: with_state(request, end, name, (*state[:3], round(state[3] + share * (target - state[3]), 2)))
+        route = self._route(request, n, name)
+        if route is not None:
+            yield lambda share: with_state(
+                request, end, name, moved(state, route.at((1.0 - share if end == "goals" else share) * route.length))
+            )
+        if base is not None:
+            turn = float(wrap_angle(base[2:3] - state[2])[0])
+            step = np.array([base[0] - state[0], base[1] - state[1], turn])
+            yield lambda share: with_state(request, end, name, moved(state, np.array(state[:3]) + share * step))
+
+    def _all_towards_base(self, request: Request, share: float) -> Request:
+        """Every asked state on its way to where the fitting has it: poses, then speeds."""
+        for end, name in elements(request):
+            *_, pose = self._paths(request, end, name)
+            request = pose(share)
+            if len(request.states(end)[name]) == 4:
+                speed, *_ = self._paths(request, end, name)
+                request = speed(share)
+        return request
+
+    def _route(self, request: Request, n: int, name: str) -> Curve | None:
+        """The route of line, arc and line from the vehicle's start to its goal, where there is one."""
+        ends = []
+        for end in ENDS:
+            asked = request.states(end).get(name)
+            if asked is None and not self.base:
+                return None
+            ends.append(self.base[end][n, :3] if asked is None else np.array(asked[:3]))
+        vehicle, road = self.encounter.vehicles[n], self.road
+        return draw_route(ends[0], ends[1], lambda poses: bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all()))
+
+    def _bisected(self, path: Path) -> Request | None:
+        """The least change along `path` that is possible, to 1/128 of it; None if even most of it is not enough."""
+        far = next((share for share in _FAR_ENDS if self.possible(path(share))), None)
+        if far is None:
+            return None
+        near, best = 0.0, far
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (near + best)
+            near, best = (near, middle) if self.possible(path(middle)) else (middle, best)
+        return path(best)
+
+    def _stretched(self, request: Request) -> Suggestion | None:
+        """The same states on a longer clock."""
+        for stretch in _STRETCHES:
+            if stretch > self.config.sampling.max_stretch and self.possible(request, stretch):
+                before = self.encounter.duration
+                said = f"sampling.max_stretch:={stretch:g} (up to {before * (1.0 + stretch):.1f} s instead of {before:.1f} s)"
+                other = "" if request == self.asked else f" with {self._difference(request)}"
+                return Suggestion(request, said + other, stretch)
+        return None
+
+    def _difference(self, request: Request) -> str:
+        """What differs from what was asked, as parameters to be set, and by how much."""
+        said = []
+        for end in ENDS:
+            before, after = self.asked.states(end), request.states(end)
+            changes = []
+            for name in (name for name in after if after[name] != before[name]):
+                a, b = before[name], after[name]
+                if (distance := float(exact.hypot(b[0] - a[0], b[1] - a[1]))) > 0.0:
+                    changes.append(f"vehicle {name} {distance:.2f} m away")
+                elif a[2] != b[2]:
+                    changes.append(f"vehicle {name} turned by {b[2] - a[2]:+.2f} rad")
+                if a[3:] != b[3:]:
+                    changes.append(f"vehicle {name} {b[3] - a[3]:+.2f} m/s")
+            if changes:
+                said.append(f"{end}:='{getattr(request, end)}' ({', '.join(changes)})")
+        return " and ".join(said)

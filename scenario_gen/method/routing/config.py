@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Settings of the planning stage."""
+
+from dataclasses import dataclass, field
+
+from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.method.routing.search.ompl.planners import OmplConfig
+from scenario_gen.method.routing.search.pose_planner import PoseSearchConfig
+from scenario_gen.method.routing.search.rrt_star_connect import RrtStarConnectConfig
+
+
+@dataclass(frozen=True)
+class PlanningConfig(Parameters):
+    """How routes are planned."""
+
+    planner: str = parameter(
+        "rrt_star_connect",
+        "geometric planner",
+        choices=("rrt_star_connect", "ompl_rrt_connect", "ompl_rrt_star", "ompl_informed_rrt_star", "ompl_bit_star"),
+    )
+    iterations: int = parameter(1000, "iterations of the planner between two anchors", low=1, high=10_000_000)
+    margin: float = parameter(0.3, "room to keep beside the footprint where the road has it", unit="m", low=0.0, high=5.0)
+    drivable: bool = parameter(True, "smooth routes that can be driven; false: the planner's bare polylines")
+    # A car's turning circle of 10.5 to 11 m between kerbs is one of 4.4 m radius for its centre; the checker allows 0.25.
+    max_curvature: float = parameter(0.225, "largest curvature of a route", unit="1/m", low=0.01, high=2.0)
+    spacing: float = parameter(0.5, "largest distance between two points of a route", unit="m", low=0.05, high=0.5)
+    keep_side: float = parameter(
+        0.05,
+        "price of a metre driven a metre beside a leg's direct line, threefold towards oncoming traffic; 0: no side is dearer",
+        unit="1/m",
+        low=0.0,
+        high=10.0,
+    )
+    traffic_side: str = parameter("right", "the side of the road to keep to", choices=("right", "left"))
+
+    rrt_star_connect: RrtStarConnectConfig = field(default_factory=RrtStarConnectConfig)
+    pose: PoseSearchConfig = field(default_factory=PoseSearchConfig)
+    ompl: OmplConfig = field(default_factory=OmplConfig)

@@ -1,0 +1,203 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a request aims at, and the proposal that gets there, found stage by stage."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.method.sampling.directed import Aim, CHUNK, FAIR, GOOD, Measures, PATIENCE, PLAIN, Seen, STAGE, STAGES
+from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
+from scenario_gen.numerics.arrays import Floats
+from scenario_gen.template.interaction import closest_crossing, Conflict, find_conflicts, pair_conflict
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.names import token
+from scenario_gen.types.reaction import Reaction
+from scenario_gen.types.request import Request
+from scenario_gen.types.scenario import Cause, Scenario, Verdict
+from scenario_gen.types.target import Target
+
+Check = Callable[[Sequence[Scenario]], list[Verdict]]
+Cancelled = Callable[[], bool]
+
+ANY = 1 << 30  # conflicts: with one clock for all a road alone says which there are
+MOST_BEYOND = 3.0  # s
+STARTS_INSIDE = 0.5  # s; who is in the shared area so soon has no way on which the other one could come first
+Judged = tuple[int, Scenario | None, Cause | None]  # an index, the candidate if it has a speed profile, why it is refused
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Says why a candidate is refused.
+
+    Attributes:
+        check: the validity checker.
+        absent: conflicts of the template that the undisturbed drive leaves out; where clocks are free none may lose more.
+        enough: share of valid candidates from which on a level of standard deviations is good enough.
+        lost: reactions of the template, by their vehicles, that the undisturbed drive does not keep on this road, with what is
+            said of each; no candidate is refused for them.
+    """
+
+    check: Check
+    absent: int
+    enough: float
+    lost: Mapping[tuple[int, ...], str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, sampler: Sampler, check: Check, enough: float) -> "Judge":
+        """Look what the drive without deviations loses."""
+        undisturbed = sampler.undisturbed()
+        if undisturbed is None:
+            return cls(check, ANY, enough)
+        (verdict,) = check([undisturbed])
+        lost = {one.vehicles: one.message for one in verdict.violations if one.cause == Cause.REACTION}
+        return cls(check, verdict.not_applicable if sampler.free else ANY, enough, lost)
+
+    def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
+        """Return the first cause for which each scenario is refused, None for a valid one."""
+        return [self._cause(verdict) for verdict in self.check(scenarios)]
+
+    def _cause(self, verdict: Verdict) -> Cause | None:
+        for violation in verdict.violations:
+            if violation.cause != Cause.REACTION or violation.vehicles not in self.lost:
+                return violation.cause
+        return Cause.CONFLICT_LOST if verdict.not_applicable > self.absent else None
+
+
+def aim_of(encounter: Encounter, request: Request, measures: Measures | None) -> Aim | None:
+    """What is aimed at: the targets, and for a swapped order the arrival gap of the other sign; None if nothing is.
+
+    Raises:
+        InputError: a target names a vehicle that does not exist, or nothing can be measured.
+    """
+    targets, beyond, note = request.targets, 0.0, ""
+    if request.order == "swap":
+        closest = closest_crossing(_conflicts(encounter))
+        if closest is not None:
+            names = tuple(encounter.vehicles[n].id for n in (closest.first, closest.second))
+            targets = (Target("arrival_gap", -np.inf, 0.0, names), *targets)
+            beyond = min(closest.exit_first - closest.entry_first, MOST_BEYOND)  # it must have left by then
+            if closest.entry_first <= STARTS_INSIDE:
+                note = f"; in the template vehicle {names[0]} is in the shared area {closest.entry_first:.1f} s after the start"
+    if not targets:
+        return None
+    if measures is None:
+        raise InputError("a target or another order is asked for, but nothing is given that measures scenarios (`measures`)")
+    return Aim.of(targets, encounter, measures.figure, beyond, note)
+
+
+def _conflicts(encounter: Encounter) -> tuple[Conflict, ...]:
+    return find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
+
+
+def label_of(encounter: Encounter, request: Request, aim: Aim | None, reactions: Sequence[Reaction] = ()) -> Label:
+    """Return what says a scenario's facts: figures of targets, reactions that it keeps, orders if they are not kept."""
+    names = [token(vehicle.id) for vehicle in encounter.vehicles] if reactions else []
+    held = {"reactions": "; ".join(edge.name(names) for edge in reactions)} if reactions else {}
+    conflicts = () if request.order == "keep" else _conflicts(encounter)
+
+    def label(whole: Scenario) -> dict[str, str]:
+        facts = dict(held)
+        if aim is not None:
+            facts |= {f"target.{t.label}": f"{v:.6g}" for t, v in zip(aim.targets, aim.values(whole), strict=True)}
+        if request.order == "keep":
+            return facts
+        said = [_order(encounter, own, whole) for own in conflicts]
+        return facts | {"order": request.order, "passing_order": "; ".join(said) or "nobody meets anybody"}
+
+    return label
+
+
+def _order(encounter: Encounter, own: Conflict, whole: Scenario) -> str:
+    """Say who goes first in a scenario at one of the template's conflicts."""
+    a, b = sorted((own.first, own.second))
+    found = pair_conflict(whole.vehicles, whole.time, whole.position, whole.heading, a, b, whole.present)
+    one, two = (encounter.vehicles[n].id for n in (own.first, own.second))
+    if found is None:
+        return f"{one} and {two} do not meet (in the template {one} goes first)"
+    return f"{one} before {two}, as in the template" if found.first == own.first else f"{two} before {one}, swapped"
+
+
+@dataclass(frozen=True, eq=False)
+class Adapted:
+    """A sampler with its proposal, None where natural candidates do, and what was seen on the way."""
+
+    sampler: Sampler
+    seen: Seen
+    stages: int
+    candidates: int
+    pilot: Sequence[Judged] = ()
+
+
+def adapted(sampler: Sampler, judge: Judge, aim: Aim, cancelled: Cancelled) -> Adapted:
+    """Find a proposal, stage by stage; the same request gives the same.
+
+    The levels are judged by pilots as without a target, and the first that is good enough, or the best, is the natural one.
+    """
+    pilots: list[Seen] = []
+    share: list[float] = []
+    judged: list[list[Judged]] = []
+    for level in range(len(LEVELS)):
+        pilots.append(Seen())
+        judged.append([])
+        share.append(_stage(sampler, level, 0, judge, aim, pilots[-1], np.ones(len(aim.targets)), judged[-1]))
+        if share[-1] >= judge.enough or cancelled():
+            break
+    best = int(np.argmax(share))
+    seen = pilots[best]
+    unit = seen.scale()
+    candidates, hits = len(pilots) * STAGE, seen.hits()
+    staged = replace(sampler, base=best)
+    if hits >= PLAIN * STAGE:
+        return Adapted(staged, seen, 0, candidates, judged[best])
+    seen.rescale(aim, unit)
+    most, since = hits, 0
+    for stage in range(STAGES):
+        proposal = seen.proposal()
+        if proposal is None or cancelled():
+            break
+        _stage(replace(staged, proposal=proposal), STAGED, stage, judge, aim, seen, unit)
+        candidates += STAGE
+        now = seen.hits() - hits
+        hits, since = seen.hits(), 0 if now > most else since + 1
+        most = max(most, now)
+        if most >= GOOD * STAGE or (most >= FAIR * STAGE and since >= 1) or (most and since >= PATIENCE):
+            break
+    return Adapted(replace(staged, proposal=seen.proposal() if seen.hits() else None), seen, len(seen.z) - 1, candidates)
+
+
+def _stage(
+    sampler: Sampler, level: int, stage: int, judge: Judge, aim: Aim, seen: Seen, unit: Floats, judged: list[Judged] | None = None
+) -> float:
+    """Draw a stage's candidates, measure them, check those nearest to the range; return the share of the checked that is valid.
+
+    Of a pilot all are checked.
+    """
+    blocks = range(stage * (STAGE // BLOCK), (stage + 1) * (STAGE // BLOCK))
+    z = np.concatenate([sampler.numbers(level, number) for number in blocks])
+    drawn: list[Scenario | None] = []
+    numbers: list[int] = []
+    causes: dict[int, Cause | None] = {}
+    for number in blocks:
+        batch, index = sampler.block(level, number)
+        numbers += index
+        drawn += batch.scenarios(sampler.seed, index, sampler.frame_id)
+    seen.add(aim, z, sampler.proposal, drawn, unit)
+    checked = good = 0
+    nearest = [k for k in np.argsort(seen.distance[-1], kind="stable").tolist() if drawn[k] is not None]
+    for start in range(0, len(nearest), CHUNK):
+        rows = nearest[start : start + CHUNK]
+        found = judge([scenario for k in rows if (scenario := drawn[k]) is not None])
+        causes |= dict(zip(rows, found, strict=True))
+        for k, cause in zip(rows, found, strict=True):
+            checked, good = checked + 1, good + (cause is None)
+            seen.judge(aim, k, cause)
+        in_range = bool(seen.distance[-1][rows[-1]] == 0.0)
+        if level >= DIRECTED and good >= CHUNK // 2 and not in_range:
+            break
+    if judged is not None:
+        judged += [(number, drawn[k], causes.get(k)) for k, number in enumerate(numbers)]
+    return good / STAGE if level < DIRECTED else good / max(checked, 1)

@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Parameters of sampling."""
+
+from dataclasses import dataclass
+
+from scenario_gen.base.parameters import parameter, Parameters
+
+
+@dataclass(frozen=True)
+class SamplingConfig(Parameters):
+    """What varies from scenario to scenario, by how much, and within which limits of motion.
+
+    Source: σ_f and l of eq 14, σ_ω of eq 13; the others are ours.
+    """
+
+    variety: str = parameter(
+        "wide",
+        "what is free: `narrow` keeps one clock, sizes, start and end states; `wide` frees them, each by its parameter",
+        choices=("narrow", "wide"),
+    )
+    arrival_sigma: float = parameter(
+        1.5, "wide: standard deviation of each vehicle's own shift in time against the others", unit="s", low=0.0, high=10.0
+    )
+    pace_sigma: float = parameter(0.06, "wide: standard deviation of each vehicle's own pace, as a share", low=0.0, high=0.2)
+    wait_sigma: float = parameter(1.0, "wide: standard deviation of the length of each wait", unit="s", low=0.0, high=10.0)
+    end_speed_sigma: float = parameter(0.4, "wide: standard deviation of start and end speeds", unit="m/s", low=0.0, high=5.0)
+    place_sigma: float = parameter(0.2, "wide: standard deviation of the place in the lane", unit="m", low=0.0, high=2.0)
+    sizes: str = parameter(
+        "catalogue", "wide: sizes of cars, from the catalogue of eight or as recorded", choices=("catalogue", "recorded")
+    )
+    reactions: str = parameter(
+        "keep",
+        "wide: `keep` lets followers and yielders of the template answer to those they react to, `none` lets nobody",
+        choices=("keep", "none"),
+    )
+    freedom: float = parameter(2.5, "wide: standard deviations at which all that is free is cut", low=0.5, high=4.0)
+    lateral_sigma: float = parameter(
+        0.3, "σ_f: standard deviation across the route, between anchors", unit="m", low=0.0, high=10.0
+    )
+    lateral_length: float = parameter(40.0, "l: distance along the route over which it varies", unit="m", low=1.0, high=1000.0)
+    observation_sigma: float = parameter(
+        1.0, "σ_ω: standard deviation across the route at an interior anchor", unit="m", low=1e-3, high=10.0
+    )
+    steering: float = parameter(1.0, "how much a driver corrects to the side, over what the template's does", low=0.0, high=10.0)
+    longitudinal_sigma: float = parameter(
+        1.2, "σ_s: standard deviation along the route, at the same template time", unit="m", low=0.0, high=10.0
+    )
+    longitudinal_time: float = parameter(
+        4.0, "time over which displacements along the route vary", unit="s", low=0.1, high=1000.0
+    )
+    time_sigma: float = parameter(
+        1.0, "σ_t: standard deviation of the changepoint clock that all vehicles share", unit="s", low=0.0, high=10.0
+    )
+    duration_tolerance: float = parameter(0.1, "share by which a sample may be longer or shorter", low=0.0, high=0.5)
+    fixed_duration: bool = parameter(False, "keep the template's duration")
+    max_speed: float = parameter(40.0, "highest speed", unit="m/s", low=0.1)
+    max_acceleration: float = parameter(4.5, "strongest speeding up", unit="m/s²", low=0.1)
+    max_deceleration: float = parameter(8.0, "strongest braking", unit="m/s²", low=0.1)
+    max_lateral_acceleration: float = parameter(5.0, "largest speed² times curvature", unit="m/s²", low=0.1)
+    max_jerk: float = parameter(
+        0.0, "largest jerk along the route; 0: 1.2 times the template's, 1.5 m/s³ at least", unit="m/s³", low=0.0, high=100.0
+    )
+    bend_acceleration: float = parameter(
+        0.0,
+        "lateral acceleration above which the pace is lowered ahead of bends; 0: 1.2 times the template's, 2 m/s² at least",
+        unit="m/s²",
+        low=0.0,
+        high=10.0,
+    )
+    max_stretch: float = parameter(
+        0.2, "share by which the clock may be longer than the template's, where bends or lengths ask for it", low=0.0, high=1.0
+    )
+    attempts: int = parameter(20, "candidates drawn per scenario asked for, at most", low=1, high=10_000)

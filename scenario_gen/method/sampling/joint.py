@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""One joint model: what a vehicle does differently comes back in those that react to it.
+
+Every candidate is made of standard normal numbers z, and all that is free moves the events of its vehicle linearly in them: how
+late it is at a time of the template, and how far ahead of its place. A reaction is a set of such equations that hold up to a
+residual: the follower is as late as its leader was a lag ago, and as far ahead; the yielder leaves as late as the other clears.
+Given the numbers of those whom a vehicle reacts to, its own are Gaussian again: z = m(z of them) + L eps. So the whole is one
+mixing of independent numbers eps, in the order of the graph. Who reacts to nobody is as free as before.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen.method.sampling.candidates import Scale, VehicleModel
+from scenario_gen.method.sampling.time_warp import Clock
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats
+from scenario_gen.types.reaction import FOLLOW, Reaction, ReactionGraph
+
+_STEP, _MOST = 0.8, 60  # s between the equations of a follower; number of them
+_BLUR = 3.0  # s to either side, over which a leader's motion is averaged in the part that its follower does not answer at once
+_SLOWLY, _QUICKLY = 8.0, 1.2  # s, over which a follower's own residual varies
+_QUICK = 0.08  # m, of that quick part
+_ROUGH = 0.05  # of a residual, that varies from equation to equation
+_SLOWEST, _STANDS = 1.0, 0.5  # m/s, at least, by which metres are made seconds
+_EVENT = 0.05  # s, of an event beside its residual
+
+Rows = dict[int, Floats]
+"""By vehicle: (m, d) what each of its standard normal numbers adds to m equations."""
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """How the numbers of one vehicle are mixed: own += (all `into`) `out`.
+
+    Attributes:
+        own: where its numbers are among all.
+        into: (size, k), out: (k, d).
+        out: see there.
+    """
+
+    own: slice
+    into: Floats
+    out: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Mixing:
+    """The mixing of the numbers of all vehicles: one step each, of those who react, in the order of the graph."""
+
+    steps: tuple[Step, ...]
+
+    @classmethod
+    def of(
+        cls, models: Sequence[VehicleModel], first: Sequence[int], nominal: Clock, graph: ReactionGraph, scale: Scale
+    ) -> "Mixing":
+        """Prepare.
+
+        Args:
+            models: of all vehicles.
+            first: (N + 1,) where the numbers of each begin among all, and where the last one's end.
+            nominal: the clock without deviation.
+            graph: who reacts to whom.
+            scale: factors on the standard deviations of a candidate.
+        """
+        steps = []
+        for n in graph.order:
+            edges = [edge for edge in graph.edges if edge.who == n]
+            equations = [one for edge in edges for one in _equations(edge, models, nominal, scale) if one[0][n].any()]
+            if equations:
+                steps.append(_step(n, equations, first))
+        return cls(tuple(steps))
+
+    def mixed(self, eps: Floats) -> Floats:
+        """Numbers (S, size) of candidates from independent ones (S, size)."""
+        z = eps.copy()
+        for step in self.steps:
+            z[:, step.own] += exact.matmul(exact.matmul(z, step.into), step.out)
+        return z
+
+
+def _step(n: int, equations: Sequence[tuple[Rows, Floats]], first: Sequence[int]) -> Step:
+    """The numbers of vehicle n given equations (rows, covariance of residuals): rows times numbers, plus residual, are 0."""
+    own, others, k = [], [], 0
+    for rows, covariance in equations:
+        root = np.ascontiguousarray(exact.cholesky(covariance).T)
+        whole = np.zeros((len(covariance), first[-1]))
+        for m, row in rows.items():
+            whole[:, first[m] : first[m + 1]] += row
+        white = exact.solve_triangular(root, whole, transposed=True)
+        own.append(white[:, first[n] : first[n + 1]].copy())
+        white[:, first[n] : first[n + 1]] = 0.0
+        others.append(white)
+        k += len(white)
+    q, r, _ = exact.qr(np.vstack(own).T)
+    upper = np.ascontiguousarray(exact.cholesky(np.eye(len(r)) + exact.matmul(r, r.T)).T)
+    inverse = exact.solve_triangular(upper, np.eye(len(r)))  # of the root of the covariance that is left
+    pull = exact.matmul(exact.matmul(inverse, inverse.T), r)
+    into = -exact.matmul(np.vstack(others).T, pull.T)
+    into[first[n] : first[n + 1]] = exact.matmul(q, (inverse - np.eye(len(r))).T)
+    return Step(slice(first[n], first[n + 1]), into, np.ascontiguousarray(q.T))
+
+
+def _equations(edge: Reaction, models: Sequence[VehicleModel], nominal: Clock, scale: Scale) -> list[tuple[Rows, Floats]]:
+    """The equations of a reaction, with the covariance of their residuals."""
+    who, whom = models[edge.who], models[edge.whom]
+    if edge.kind == FOLLOW:
+        count = min(max(int((edge.until - edge.since) / _STEP), 1) + 1, _MOST)
+        at = np.linspace(edge.since, edge.until, count)
+        before = at - edge.lag
+        spread = edge.residual / np.maximum(_speeds(who, at), _STANDS)  # s: while it stands, lateness is not seen
+        slow, quick = _alike(at, _SLOWLY), _alike(at, _QUICKLY)
+        rough = np.square(_ROUGH) * np.eye(count)
+        late = {edge.who: lateness(who, at, nominal, scale), edge.whom: -lateness(whom, before, nominal, scale)}
+        ahead = {edge.who: advance(who, at, scale), edge.whom: -_answered(edge, whom, before, scale)}
+        return [
+            (late, spread[:, None] * spread * (slow + rough)),
+            (ahead, np.square(edge.residual) * (slow + rough) + np.square(_QUICK) * quick),
+        ]
+    leaves, clears = np.array([edge.until]), np.array([edge.clears])
+    speed = np.maximum(_speeds(whom, clears), _SLOWEST)
+    other = lateness(whom, clears, nominal, scale) - advance(whom, clears, scale) / speed
+    return [
+        (
+            {edge.who: lateness(who, leaves, nominal, scale), edge.whom: -other},
+            np.array([[np.square(edge.residual) + np.square(_EVENT)]]),
+        )
+    ]
+
+
+def _answered(edge: Reaction, leader: VehicleModel, at: Floats, scale: Scale) -> Floats:
+    """(q, d) metres that a follower answers: of the leader's motion the share `gain` at once, the rest over some seconds."""
+    about = np.mean([advance(leader, at + off, scale) for off in np.linspace(-_BLUR, _BLUR, 7)], axis=0)
+    return np.asarray(edge.gain * advance(leader, at, scale) + (1.0 - edge.gain) * about)
+
+
+def _alike(at: Floats, length: float) -> Floats:
+    """(q, q) correlation of what varies over so many seconds, at times (q,) [s]."""
+    return exact.exp(-0.5 * np.square((at[:, None] - at) / length))
+
+
+def _speeds(model: VehicleModel, at: Floats) -> Floats:
+    """The speeds (q,) [m/s] of a vehicle without deviations at template times (q,) [s]."""
+    spline = model.speed.spline
+    return exact.matmul(spline.design(np.clip(at, spline.breaks[0], spline.breaks[-1])), model.speed.mean)
+
+
+def lateness(model: VehicleModel, at: Floats, nominal: Clock, scale: Scale) -> Floats:
+    """(q, d) seconds by which each standard normal number makes a vehicle late at template times (q,) [s]."""
+    rows = np.zeros((len(at), model.size))
+    if model.freedom is None:
+        return rows
+    clock = model.freedom.clock
+    begin = model.lateral_root.shape[1] + model.speed.size
+    basis = np.vstack([clock.shift, clock.pace, clock.waits])
+    for k, values in enumerate(basis):
+        rows[:, begin + k] = scale.own * clock.sigma[k] * np.interp(at, nominal.grid, values)
+    return rows
+
+
+def advance(model: VehicleModel, at: Floats, scale: Scale) -> Floats:
+    """(q, d) metres by which each standard normal number sets a vehicle forward at template times (q,) [s], its clock apart."""
+    rows = np.zeros((len(at), model.size))
+    spline = model.speed.spline
+    driven = spline.driven(np.clip(at, spline.breaks[0], spline.breaks[-1]))
+    begin = model.lateral_root.shape[1]
+    rows[:, begin : begin + model.speed.size] = scale.longitudinal * exact.matmul(driven, model.speed.factor)
+    if model.freedom is not None:
+        end = begin + model.speed.size + model.freedom.clock.size + 1
+        rows[:, end : end + 2] = scale.longitudinal * exact.matmul(driven, model.speed.faster) * model.freedom.end_speed
+    return rows

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The model of candidates: the clock that all share, the vehicles, and how their numbers hang together."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from scenario_gen.method.sampling.candidates import Batch, Scale, VehicleModel
+from scenario_gen.method.sampling.joint import Mixing
+from scenario_gen.method.sampling.time_warp import TimeWarp
+from scenario_gen.numerics.arrays import Floats
+from scenario_gen.types.reaction import ReactionGraph
+
+
+class CandidateModel:
+    """Draws candidates of one encounter on its routes.
+
+    Source: paper III-C.
+    """
+
+    def __init__(self, vehicles: tuple[VehicleModel, ...], warp: TimeWarp, reactions: ReactionGraph | None = None) -> None:
+        self.vehicles, self.warp, self.reactions = vehicles, warp, reactions
+        self._parts = np.cumsum([warp.size] + [v.size for v in vehicles]).tolist()
+        self._mixings: dict[Scale, Mixing] = {}
+
+    @property
+    def size(self) -> int:
+        """Standard normal numbers needed per candidate."""
+        return int(self._parts[-1])
+
+    def draw(self, eps: Floats, scale: Scale) -> Batch:
+        """Candidates from independent numbers eps (S, size), their standard deviations multiplied by `scale`."""
+        z = eps if self.reactions is None else self._mixing(scale).mixed(eps)
+        clock = self.warp.sample(z[:, : self.warp.size], scale.time)
+        drawn = [
+            v.draw(z[:, a:b], scale, clock, self.warp.nominal)
+            for v, (a, b) in zip(self.vehicles, pairwise(self._parts), strict=True)
+        ]
+        return Batch.of(self.vehicles, drawn)
+
+    def _mixing(self, scale: Scale) -> Mixing:
+        """The mixing at a scale, made once."""
+        if scale not in self._mixings and self.reactions is not None:
+            self._mixings[scale] = Mixing.of(self.vehicles, self._parts, self.warp.nominal, self.reactions, scale)
+        return self._mixings[scale]

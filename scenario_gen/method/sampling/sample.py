@@ -1,0 +1,351 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The loop: draw candidates, have them checked, keep the valid ones, account for the others."""
+
+from array import array
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+import itertools
+from typing import Any
+
+import numpy as np
+
+from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.method.sampling.adapt import adapted, aim_of, Cancelled, Check, Judge, label_of
+from scenario_gen.method.sampling.candidates import Batch
+from scenario_gen.method.sampling.config import SamplingConfig
+from scenario_gen.method.sampling.directed import Aim, estimated, Measures, reachable, STAGE, TargetError
+from scenario_gen.method.sampling.diverse import POOL_SHARE, spread_out
+from scenario_gen.method.sampling.lazy import LazyScenarios
+from scenario_gen.method.sampling.prepare import prepare
+from scenario_gen.method.sampling.sampler import (
+    BLOCK,
+    DIRECTED,
+    ENOUGH,
+    index_of,
+    LEVEL_SIZE,
+    LEVEL_SLOTS,
+    LEVELS,
+    place_of,
+    Sampler,
+)
+from scenario_gen.template.interaction import Wait
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.reaction import NOT_KEPT
+from scenario_gen.types.request import Request
+from scenario_gen.types.road import Road
+from scenario_gen.types.route import Route
+from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario, ScenarioSet
+from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.types.target import Reached
+
+__all__ = [
+    "BLOCK", "KEPT", "LEVELS", "LEVEL_SIZE", "LEVEL_SLOTS", "PILOT", "Cancelled", "OnValid", "Progress", "Sampler", "index_of",
+    "place_of", "regenerate", "sample_scenarios",
+]  # fmt: skip
+
+Progress = Callable[[int, int, int], None]  # of scenarios so far, scenarios wanted, candidates so far
+OnValid = Callable[[Scenario, BoundaryStates, EgoSlot | None], None]  # a valid one, the states asked, what the ego is asked
+
+KEPT = 1000  # scenarios up to which a set stays in memory
+LEAST_COUNT = 20  # where clocks are free: scenarios for which candidates are drawn at least, so that levels can be tried
+PILOT = 2 * BLOCK  # candidates by which a level is judged
+DIRECTED_BUDGET = 10  # times the budget of a request without a target
+HOPELESS = 20 * BLOCK  # candidates of a proposal after which it is given up if none of them is valid and in the range
+
+
+def sample_scenarios(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    routes: Sequence[Route],
+    asked: BoundaryStates,
+    check: Check,
+    config: SamplingConfig = SamplingConfig(),
+    *,
+    count: int,
+    seed: int = 0,
+    waits: tuple[Wait, ...],
+    request: Request = Request(),
+    progress: Progress = lambda *_: None,
+    cancelled: Cancelled = lambda: False,
+    found: OnValid = lambda *_: None,
+    measures: Measures | None = None,
+) -> ScenarioSet:
+    """Draw candidates until `count` are valid or the budget is spent.
+
+    Source: paper III-C.
+
+    Args:
+        encounter: the template.
+        segmentation: its changepoints.
+        road: the target road, for the room it leaves.
+        routes: one per vehicle, with an anchor at start, changepoints and end.
+        asked: start and end states; their speeds are met exactly.
+        check: the validity checker of all vehicles, the ego too; its verdicts decide.
+        config: the standard deviations and limits.
+        count: valid scenarios wanted.
+        seed: of all randomness; with a scenario's index it gives that scenario again.
+        waits: when a vehicle stands, on the template's clock.
+        request: which vehicle is left out of every scenario, its own motion given as witness; whether states were asked for;
+            which range, choice and order.
+        progress: called with (valid so far, count, candidates so far).
+        cancelled: asked before each candidate; if True, the set so far is returned.
+        found: called with each valid scenario as it is drawn, in the set's order; of a chosen set, when it is chosen.
+        measures: what measures a scenario for a target or a choice, see `Measures`; `check` knows the order asked.
+
+    Returns:
+        At most `count` scenarios; fewer if the budget did not suffice, which the account (`refused`) explains. Of more than KEPT
+        only the indices are kept, so that memory hardly grows with their number.
+
+    Raises:
+        InputError: routes, segmentation and encounter disagree, or the ego is none of the vehicles.
+        RefusedError: states or a target were asked for, and not one candidate that meets them is valid.
+    """
+    ego = request.ego_of(encounter)
+    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config, request.order)
+    slot = None if ego is None else EgoSlot(encounter.vehicles[ego], asked.start[ego], asked.end[ego])
+    if prepared.model is None:
+        made = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot)
+    else:
+        aim = aim_of(encounter, request, measures)
+        sampler = Sampler(prepared.model, seed, road.frame_id, ego, label=label_of(encounter, request, aim))
+        judge = Judge.of(sampler, check, _enough(config, request))
+        graph = prepared.model.reactions
+        kept = tuple(edge for edge in (graph.edges if graph is not None else ()) if (edge.who, edge.whom) not in judge.lost)
+        sampler = replace(sampler, label=label_of(encounter, request, aim, kept))
+        loop = _Loop(sampler, judge, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
+        loop.aim, loop.measures = aim, measures
+        loop.run_request(config.attempts, diverse=request.choose == "diverse")
+        lost = [f"{NOT_KEPT}: {said}" for said in judge.lost.values()]
+        sentences = (*prepared.adaptations, *lost, *loop.adaptations)
+        made = ScenarioSet(
+            count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot, loop.reached, loop.chosen_from, kept,
+        )  # fmt: skip
+    if request.moves and not made.scenarios and not cancelled():
+        causes = ", ".join(f"{number} × {cause.value}" for cause, number in made.refused.most_common())
+        more = f"; {'; '.join(made.adaptations)}" if made.adaptations else ""
+        raise RefusedError(f"none of {made.candidates} candidate(s) with the asked states is valid ({causes}{more})")
+    return made
+
+
+def regenerate(
+    encounter: Encounter,
+    segmentation: Segmentation,
+    road: Road,
+    routes: Sequence[Route],
+    asked: BoundaryStates,
+    config: SamplingConfig = SamplingConfig(),
+    *,
+    seed: int,
+    index: int,
+    waits: tuple[Wait, ...],
+    request: Request = Request(),
+    check: Check | None = None,
+    measures: Measures | None = None,
+) -> Scenario | None:
+    """The scenario with this seed and index again, bit for bit, without the others; arguments as in `sample_scenarios`.
+
+    One of a proposal needs `check` and `measures`, by which that is found again.
+
+    Raises:
+        InputError: no candidate has this index, or nothing is said of the target.
+    """
+    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config, request.order)
+    if prepared.model is None:
+        return None
+    ego, aim = request.ego_of(encounter), aim_of(encounter, request, measures)
+    sampler = Sampler(prepared.model, seed, road.frame_id, ego, label=label_of(encounter, request, aim))
+    if place_of(index)[0] == DIRECTED:
+        if aim is None or check is None:
+            raise InputError(f"index {index} is of a proposal, but no target was asked for")
+        sampler = adapted(sampler, Judge.of(sampler, check, _enough(config, request)), aim, lambda: False).sampler
+    return sampler.scenario(index)
+
+
+def _enough(config: SamplingConfig, request: Request) -> float:
+    """Return the share of valid candidates by which a level is good enough; any, where the order alone makes most invalid."""
+    return 0.0 if request.order == "swap" else ENOUGH[config.variety]
+
+
+@dataclass
+class _Loop:
+    """The account of one request."""
+
+    sampler: Sampler
+    judge: Judge
+    count: int
+    progress: Progress
+    cancelled: Cancelled
+    found: Callable[[Scenario], None]
+    kept: list[Scenario] = field(default_factory=list)  # the first KEPT
+    index: Any = field(default_factory=lambda: array("q"))  # of all that are valid
+    refused: Counter[Cause] = field(default_factory=Counter)
+    candidates: int = 0
+    adaptations: list[str] = field(default_factory=list)
+    aim: Aim | None = None
+    measures: Measures | None = None
+    reached: Reached | None = None
+    chosen_from: int = 0
+    keep: int = field(default_factory=lambda: KEPT)
+    publish: bool = True
+
+    def run_request(self, attempts: int, *, diverse: bool) -> None:
+        """Sample what was asked: towards a target, and, if a choice is asked for, from a pool."""
+        wanted = self.count
+        if diverse:
+            self.count, self.keep, self.publish = wanted * POOL_SHARE, 0, False
+        if self.aim is None:
+            self.run(attempts * max(self.count, LEAST_COUNT if self.sampler.free else 1))
+        else:
+            self.run_directed(DIRECTED_BUDGET * attempts * self.count)
+        if diverse:
+            self.choose(wanted)
+
+    def choose(self, wanted: int) -> None:
+        """Keep those of the pool that cover best."""
+        if self.measures is None:
+            raise InputError("choose: nothing is given that measures scenarios (`measures`)")
+        pool = list(self.index)
+        features = [self.measures.features(whole) for whole in self._whole(pool)]
+        chosen = spread_out(features, wanted)
+        self.chosen_from, self.count, self.keep, self.publish = len(pool), wanted, KEPT, True
+        self.index = array("q")
+        self.adaptations.append(
+            f"chosen for diversity: {len(chosen)} of {len(pool)} valid scenarios; such a set is no sample, so it has no weights"
+        )
+        self.sampler = replace(self.sampler, weighted=False)
+        for k in sorted(chosen):
+            scenario = self.sampler.scenario(pool[k])
+            if scenario is not None and not self.cancelled():
+                self._keep(pool[k], scenario)
+
+    def _whole(self, index: Sequence[int]) -> Iterator[Scenario]:
+        """Candidates of all vehicles, by ascending indices."""
+        plain = replace(self.sampler, ego=None, label=lambda _: {}, weighted=False)
+        for _, together in itertools.groupby(index, lambda one: one // BLOCK):
+            yield from plain.redraw(list(together))
+
+    def _keep(self, number: int, scenario: Scenario) -> None:
+        self.index.append(number)
+        if len(self.kept) < self.keep:
+            self.kept.append(scenario)
+        if self.publish:
+            self.found(scenario)
+
+    def run_directed(self, budget: int) -> None:
+        """Find a proposal, then draw from it.
+
+        Raises:
+            TargetError: not one valid candidate in the range was found; the message says which range there is.
+        """
+        aim = self.aim
+        assert aim is not None
+        made = adapted(self.sampler, self.judge, aim, self.cancelled)
+        self.sampler = made.sampler
+        weights: list[float] = []
+        if made.seen.hits() and not self.cancelled():
+            level = self.sampler.base if made.sampler.proposal is None else DIRECTED
+            blocks = self._blocks(level)
+            if made.sampler.proposal is None:
+                self._take_pilot(made.pilot)
+                blocks = itertools.islice(blocks, STAGE // BLOCK, None)
+                weights = [1.0] * len(self.index)
+            while not self._done(budget) and (self.index or self.candidates < HOPELESS):
+                before = len(self.index)
+                if not self._spend(blocks, min(BLOCK, budget - self.candidates))[0]:
+                    break
+                weights += [self.sampler.weight(number) for number in self.index[before:]]
+        share, low, high = estimated(np.array(weights), self.candidates)
+        if self.candidates:
+            directed = self.sampler.proposal is not None
+            self.reached = Reached(aim.targets, made.stages, made.candidates, share, low, high, directed)
+            self.adaptations.append(self.reached.sentence())
+            if self.sampler.base:
+                self._describe(self.sampler.base, 2)
+        if len(self.index) < self.count and not self.cancelled():
+            said = f"target {'; '.join(map(str, aim.targets))}: "
+            drawn = f"{made.candidates} candidates of {1 + made.stages} stage(s) and {self.candidates} more"
+            said += f"{len(self.index)} found in {drawn}; reachable: {reachable(aim, made.seen)}"
+            if not self.index:
+                raise TargetError(said)
+            self.adaptations.append(said)
+
+    def _take_pilot(self, pilot: Sequence[tuple[int, Scenario | None, Cause | None]]) -> None:
+        """Take the candidates of a level that were drawn and checked already."""
+        for number, scenario, cause in pilot:
+            if len(self.index) == self.count or self.cancelled():
+                break
+            self.candidates += 1
+            if scenario is None or cause is not None or not self._in_range(scenario):
+                self.refused[cause or (Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE)] += 1
+            else:
+                self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
+
+    def run(self, budget: int) -> None:
+        """Judge the levels by their first candidates, then stay with the first that is good enough, or the best."""
+        blocks = [self._blocks(level) for level in range(len(LEVELS))]
+        share = []
+        for level in range(len(LEVELS)):
+            seen, good = self._spend(blocks[level], min(PILOT, budget - self.candidates))
+            share.append(good / seen if seen else 0.0)
+            if self._done(budget) or share[-1] >= self.judge.enough:
+                break
+        best = int(np.argmax(share))
+        while not self._done(budget) and self._spend(blocks[best], budget - self.candidates)[0]:
+            pass
+        self._describe(best, len(share))
+
+    def scenarios(self) -> Sequence[Scenario]:
+        """The valid candidates: themselves, or, where they are many, what draws them again."""
+        if len(self.index) <= KEPT:
+            return tuple(self.kept)
+        return LazyScenarios(self.sampler.redraw, np.array(self.index, dtype=np.int64), BLOCK)
+
+    def _done(self, budget: int) -> bool:
+        return len(self.index) >= self.count or self.candidates >= budget or self.cancelled()
+
+    def _blocks(self, level: int) -> Iterator[tuple[Batch, list[int]]]:
+        for number in itertools.count():
+            yield self.sampler.block(level, number)
+
+    def _spend(self, blocks: Iterator[tuple[Batch, list[int]]], most: int) -> tuple[int, int]:
+        """Check up to `most` candidates, whole blocks at a time; how many were seen, and how many of them were valid."""
+        seen = good = 0
+        while seen < most and len(self.index) < self.count and not self.cancelled():
+            batch, index = next(blocks)
+            drawn = batch.scenarios(self.sampler.seed, index, self.sampler.frame_id)
+            aimed = [scenario is not None and self._in_range(scenario) for scenario in drawn]
+            causes = iter(self.judge([s for s, ok in zip(drawn, aimed, strict=True) if ok and s is not None]))
+            for number, scenario, ok in zip(index, drawn, aimed, strict=True):
+                if seen == most or len(self.index) == self.count or self.cancelled():
+                    break
+                seen += 1
+                cause = next(causes) if ok else Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE
+                if scenario is not None and cause is None:
+                    good += 1
+                    self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
+                else:
+                    self.refused[cause or Cause.SPEED_PROFILE] += 1
+            self.progress(len(self.index), self.count, self.candidates + seen)
+        self.candidates += seen
+        return seen, good
+
+    def _in_range(self, scenario: Scenario) -> bool:
+        return self.aim is None or self.aim.holds(self.aim.values(scenario))
+
+    def _describe(self, best: int, tried: int) -> None:
+        """Put what was adapted into sentences."""
+        if tried > 1 and best == 0:
+            self.adaptations.append("few candidates were valid, and smaller standard deviations did not help")
+        elif tried > 1:
+            s = LEVELS[best]
+            own = f", {s.own:g} of each vehicle's own clock" if self.sampler.free else ""
+            self.adaptations.append(
+                f"few candidates were valid: standard deviations multiplied by {s.lateral:g} across the route, "
+                f"{s.longitudinal:g} along it, {s.time:g} in time{own}"
+            )
+        if self.cancelled():
+            self.adaptations.append("cancelled")

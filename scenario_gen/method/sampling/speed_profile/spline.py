@@ -1,0 +1,173 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Speed as a cubic B-spline over the template's clock: acceleration is continuous, jerk bounded by the coefficients.
+
+The coefficients of the derivatives are differences of neighbouring ones, and a spline lies in the convex hull of its
+coefficients (de Boor, A Practical Guide to Splines, 2001): coefficients that are not negative are speeds that are not.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats, frozen, frozen_ints, Ints
+
+KNOT_SPACING = 0.4  # s; what a driver does with the pedals is slower
+MOST_KNOTS = 600  # of long encounters the knots are farther apart
+DEGREE = 3
+_BEFORE = 1e-9  # s
+_GAUSS_X = np.array([-0.8611363115940526, -0.3399810435848563, 0.3399810435848563, 0.8611363115940526])
+_GAUSS_W = np.array([0.3478548451374538, 0.6521451548625461, 0.6521451548625461, 0.3478548451374538])
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedSpline:
+    """A clamped cubic B-spline basis, and which of its functions reach into a stand.
+
+    Where a stand begins or ends a knot stands twice: acceleration is continuous there, and jerk may jump, as when a foot leaves
+    the brake.
+
+    Attributes:
+        knots: (n + 4,) seconds on the template's clock, the first and the last four times.
+        still: (n,) True for the functions that do not vanish throughout the stands.
+    """
+
+    knots: Floats
+    still: Bools
+
+    @classmethod
+    def over(cls, start: float, end: float, stands: list[tuple[float, float]]) -> "SpeedSpline":
+        """The basis on [start, end] [s] for a vehicle that stands in the intervals `stands` [s], in order and apart."""
+        spacing = max(KNOT_SPACING, (end - start) / MOST_KNOTS)
+        cuts = sorted({start, end, *(t for stand in stands for t in stand if start < t < end)})
+        inner = [np.linspace(a, b, max(round((b - a) / spacing), 1) + 1)[:-1] for a, b in pairwise(cuts)]
+        knots = np.sort(np.concatenate([[start] * DEGREE, *inner, cuts[1:-1], [end] * (DEGREE + 1)]))
+        low, high = knots[: -DEGREE - 1], knots[DEGREE + 1 :]
+        still = np.zeros(len(low), dtype=np.bool_)
+        for a, b in stands:
+            still |= (low < b - 1e-9) & (high > a + 1e-9)
+        return cls(frozen(knots), still)
+
+    @property
+    def size(self) -> int:
+        """Number n of coefficients."""
+        return len(self.knots) - DEGREE - 1
+
+    @cached_property
+    def breaks(self) -> Floats:
+        """(m + 1,) distinct knots [s]."""
+        return frozen(np.unique(self.knots))
+
+    @cached_property
+    def first(self) -> Ints:
+        """(m,) the first of the four basis functions that are not zero between two breaks."""
+        return frozen_ints(np.searchsorted(self.knots, self.breaks[:-1], side="right") - 1 - DEGREE)
+
+    @cached_property
+    def stations(self) -> Floats:
+        """(b,) seconds at which a derivative of the speed can be largest: the breaks, and just before those where jerk jumps."""
+        inner = self.knots[DEGREE + 1 : -DEGREE - 1]
+        return frozen(np.sort(np.concatenate([self.breaks, inner[1:][np.diff(inner) == 0.0] - _BEFORE])))
+
+    @cached_property
+    def at_stations(self) -> tuple[Floats, Floats, Floats]:
+        """Three of (b, n): the values of all basis functions at the stations, their first derivatives, and their second."""
+        value, slope, bend = (frozen(self.design(self.stations, k)) for k in range(3))
+        return value, slope, bend
+
+    @cached_property
+    def middle(self) -> Floats:
+        """(n,) seconds at which a spline with coefficients t has the value t (Greville's abscissae)."""
+        return frozen((self.knots[1:-3] + self.knots[2:-2] + self.knots[3:-1]) / 3.0)
+
+    def design(self, at: Floats, derivative: int = 0) -> Floats:
+        """Values (q, n) of all basis functions, or of their derivatives, at times (q,) [s] inside the basis' interval."""
+        t, degree = self.knots, DEGREE - derivative
+        cell = self.first[np.clip(np.searchsorted(self.breaks, at, side="right") - 1, 0, len(self.breaks) - 2)] + DEGREE
+        basis = np.zeros((len(at), DEGREE + 2))  # functions cell - p to cell of degree p, and a zero on either side
+        basis[:, 1] = 1.0
+        for p in range(1, DEGREE + 1):
+            i = cell[:, None] + np.arange(-p, 1)
+            low, high = t[i], t[i + p + 1]
+            left, right = t[i + p] - low, high - t[i + 1]
+            if p <= degree:  # Cox and de Boor
+                left, right = _ratio(at[:, None] - low, left), _ratio(high - at[:, None], right)
+                basis[:, 1 : p + 2] = left * basis[:, : p + 1] + right * basis[:, 1 : p + 2]
+            else:  # the derivative of degree p has differences of its coefficients
+                top = np.array(float(p))
+                basis[:, 1 : p + 2] = basis[:, : p + 1] * _ratio(top, left) - basis[:, 1 : p + 2] * _ratio(top, right)
+        out = np.zeros((len(at), self.size))
+        out[np.arange(len(at))[:, None], cell[:, None] + np.arange(-DEGREE, 1)] = basis[:, 1:]
+        return out
+
+    @cached_property
+    def length(self) -> Floats:
+        """(n,) metres that each coefficient of 1 m/s drives in all."""
+        return frozen((self.knots[DEGREE + 1 :] - self.knots[: -DEGREE - 1]) / (DEGREE + 1.0))
+
+    def driven(self, until: Floats) -> Floats:
+        """(q, n) metres that each coefficient of 1 m/s drives until times (q,) [s]."""
+        cell = np.clip(np.searchsorted(self.breaks, until, side="right") - 1, 0, len(self.breaks) - 2)
+        half = 0.5 * (until - self.breaks[cell])
+        points = self.breaks[cell][:, None] + half[:, None] * (1.0 + _GAUSS_X)
+        return np.asarray(self._driven_before[cell] + self._summed(points, half[:, None] * _GAUSS_W))
+
+    @cached_property
+    def _driven_before(self) -> Floats:
+        """(m + 1, n) metres that each coefficient of 1 m/s drives until each break."""
+        whole = self._summed(*self._quadrature())
+        return frozen(np.concatenate([np.zeros((1, self.size)), np.cumsum(whole, axis=0)]))
+
+    def _summed(self, at: Floats, weight: Floats) -> Floats:
+        """(q, n) weighted sums of the basis functions over points (q, 4) [s]."""
+        return np.asarray((self.design(at.ravel()).reshape(*at.shape, self.size) * weight[..., None]).sum(axis=1))
+
+    @cached_property
+    def gram(self) -> Floats:
+        """(n, n) integrals [s] of products of two basis functions."""
+        return self._gram(0)
+
+    @cached_property
+    def bending(self) -> Floats:
+        """(n, n) integrals [1/s³] of products of second derivatives of two basis functions."""
+        return self._gram(2)
+
+    def _gram(self, derivative: int) -> Floats:
+        """(n, n) integrals of products of derivatives of two basis functions."""
+        at, weight = self._quadrature()
+        basis = self.design(at.ravel(), derivative)
+        return frozen(exact.matmul((basis * weight.ravel()[:, None]).T, basis))
+
+    def projected(self, at: Floats, values: Floats) -> Floats:
+        """(n,) integrals of each basis function times the straight lines through `values` (q,) at times `at` (q,) [s]."""
+        t = np.unique(np.concatenate([self.breaks, at[(at > self.breaks[0]) & (at < self.breaks[-1])]]))
+        half, middle = 0.5 * np.diff(t), 0.5 * (t[1:] + t[:-1])
+        points = (middle[:, None] + half[:, None] * _GAUSS_X).ravel()
+        weight = (half[:, None] * _GAUSS_W).ravel()
+        return exact.matmul(self.design(points).T, weight * np.interp(points, at, values))
+
+    @cached_property
+    def pieces(self) -> Floats:
+        """(m, 4, 4): coefficients of 1, x, x², x³, x the seconds since the break, from the four that are not zero there."""
+        out = np.empty((len(self.breaks) - 1, 4, 4))
+        inside = self.breaks[:-1]
+        factorial = (1.0, 1.0, 2.0, 6.0)
+        for power in range(4):
+            rows = self.design(inside, power) / factorial[power]
+            for i in range(len(out)):
+                out[i, power] = rows[i, self.first[i] : self.first[i] + 4]
+        return frozen(out)
+
+    def _quadrature(self) -> tuple[Floats, Floats]:
+        """Points and weights (m, 4) [s] of Gauss' rule on every interval."""
+        half, middle = 0.5 * np.diff(self.breaks), 0.5 * (self.breaks[1:] + self.breaks[:-1])
+        return middle[:, None] + half[:, None] * _GAUSS_X, half[:, None] * _GAUSS_W
+
+
+def _ratio(a: Floats, b: Floats) -> Floats:
+    """A / b, and 0 where b is: a knot that stands several times."""
+    return np.asarray(np.where(b > 0.0, a / np.where(b > 0.0, b, 1.0), 0.0))

@@ -1,0 +1,350 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Emissions of all states at once: y = A z + noise, (A, Σ) ~ MNIW(M, K, ν0, S0), in one form for Gaussian and AR.
+
+With the regressor z = 1 this is the Gaussian-NIW emission (A is the mean, K its κ0); with z = (1, past samples) it is
+the autoregressive one. A sample is v = (z, y), P + D numbers. All that a state knows is G = G0 + Σ v vᵀ with
+G0 = [[K, K Mᵀ], [M K, S0 + M K Mᵀ]]; its Cholesky factor [[Lz, 0], [Lyz, Ly]] holds the whole posterior:
+K' = Lz Lzᵀ, A' = Lyz Lz⁻¹, S' = Ly Lyᵀ. Plain loops: they compile fast, and vectorise over the last axis.
+"""
+
+import math
+
+import numpy as np
+
+from scenario_gen.method.segmentation.hdp_hmm.random import gamma_draw, normal, State
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics.kernels import kernel
+
+BLOCK = 64
+LEAST_LOG = -300.0
+LOG2_E = 1.4426950408889634
+LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
+TO_INTEGER = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer, which its lowest bits then hold
+ONE_BITS = 1023 << 52  # the bits of 1.0
+ROOT_BITS = 0x3FE6A09E667F3BCD  # the bits of √½: mantissas lie in √½ .. √2
+LN2, LOG_PI = 6.93147180559945309417e-01, 1.14472988584940017414
+MOST_PRODUCT = 1e100
+
+
+@kernel(inline=True)
+def cholesky(matrix: Floats) -> bool:
+    """Overwrite the lower triangle of `matrix` (n, n) with its Cholesky factor; False if it is not positive definite."""
+    n = matrix.shape[0]
+    for j in range(n):
+        for k in range(j):
+            c = matrix[j, k]
+            for i in range(j, n):
+                matrix[i, j] -= matrix[i, k] * c
+        if not matrix[j, j] > 0.0:
+            return False
+        pivot = math.sqrt(matrix[j, j])
+        for i in range(j, n):
+            matrix[i, j] /= pivot
+    return True
+
+
+@kernel(inline=True)
+def accumulate(v: Floats, labels: Ints, mass: Floats, outer: Floats, sums: Floats) -> None:
+    """Fill the statistics of all states from samples v (T, M), labels (T,) and masses (T,).
+
+    Args:
+        v: rows (z, y).
+        labels: 0 .. L - 1.
+        mass: what a sample's square counts for: 1, the scale of heavy-tailed noise, or 0 for a sample that was not observed.
+        outer: (L, M, M) output, Σ mass v vᵀ; lower triangles.
+        sums: (L, 2) output, observed samples and Σ mass.
+    """
+    outer[:] = 0.0
+    sums[:] = 0.0
+    for t in range(v.shape[0]):
+        if mass[t] > 0.0:
+            add_sample(v[t], mass[t], outer[labels[t]])
+            sums[labels[t], 0] += 1.0
+            sums[labels[t], 1] += mass[t]
+
+
+@kernel(inline=True)
+def add_sample(v: Floats, mass: float, outer: Floats) -> None:
+    """Add mass × v vᵀ to `outer` (M, M; lower triangle)."""
+    for i in range(len(v)):
+        c = mass * v[i]
+        for j in range(i + 1):
+            outer[i, j] += c * v[j]
+
+
+@kernel(inline=True)
+def posterior_factor(outer: Floats, total: float, g0: Floats, weight: float, blur: Floats, out: Floats) -> None:
+    """Fill `out` (M, M) with the Cholesky factor of a state's G.
+
+    Args:
+        outer: (M, M) Σ mass v vᵀ of its samples; lower triangle.
+        total: Σ mass.
+        g0: (M, M) joint prior.
+        weight: what a sample counts for (1: all of it; less where neighbouring samples repeat each other).
+        blur: (D,) variance to which a sample's channels are known at all.
+        out: see above.
+    """
+    m = g0.shape[0]
+    d = len(blur)
+    for i in range(m):
+        for j in range(i + 1):
+            out[i, j] = g0[i, j] + weight * outer[i, j]
+        if i >= m - d:
+            out[i, i] += weight * total * blur[i - (m - d)]
+    cholesky(out)
+
+
+@kernel(inline=True)
+def log_marginal(factor: Floats, n: float, p: int, nu: float) -> float:
+    """Part of log p(samples) that depends on them, from the Cholesky factor (M, M) of G; `nu` is the prior's ν0.
+
+    log p = c(factor, n) - c(prior factor, 0) with c = -nD/2 log π + log Γ_D(ν'/2) - ν'/2 log|S'| - D/2 log|K'|.
+    """
+    m = factor.shape[0]
+    d = m - p
+    value: float = log_gammas(0.5 * (nu + n), d) - 0.5 * n * d * LOG_PI
+    value -= d * log_diagonal(factor[:p, :p]) + (nu + n) * log_diagonal(factor[p:, p:])
+    return value
+
+
+@kernel(inline=True)
+def log_diagonal(matrix: Floats) -> float:
+    """Return Σ log of the diagonal of `matrix` (n, n), as the logarithm of products, which cost less."""
+    value, product = 0.0, 1.0
+    for i in range(len(matrix)):
+        product *= matrix[i, i]
+        if not 1.0 / MOST_PRODUCT < product < MOST_PRODUCT:
+            value += exact.log(product)
+            product = 1.0
+    return value + exact.log(product)
+
+
+@kernel(inline=True)
+def log_gammas(a: float, d: int) -> float:
+    """Return log Γ(a) + log Γ(a - 1/2) + ... + log Γ(a - (d - 1) / 2), every second one by Γ(x + 1) = x Γ(x) from the least."""
+    value = 0.0
+    for least in range(max(d - 2, 0), d):
+        x = a - 0.5 * least
+        base, ratio, product = exact.lgamma(x), 1.0, 1.0
+        value += base
+        for step in range(least // 2):
+            ratio *= x + step
+            product *= ratio
+            value += base
+            if product > MOST_PRODUCT:
+                base, value = base + exact.log(ratio), value + exact.log(product)
+                ratio, product = 1.0, 1.0
+        value += exact.log(product)
+    return value
+
+
+@kernel(inline=True)
+def draw_emission(state: State, factor: Floats, n: float, p: int, nu: float, coef: Floats) -> float:
+    """Draw (A, Σ) from the posterior; returns log|Σ|^(-1/2).
+
+    `coef` (D, M) becomes the map of v to its whitened residual: W y - B z with WᵀW = Σ⁻¹ (W lower) and B = W A.
+    Σ⁻¹ = Ly⁻ᵀ U Uᵀ Ly⁻¹ with U upper triangular (Bartlett), so W = Uᵀ Ly⁻¹; A = (Lyz + W⁻¹ E) Lz⁻¹, E standard normal.
+    """
+    m = factor.shape[0]
+    d = m - p
+    for i in range(d):
+        for j in range(i):
+            coef[i, p + j] = normal(state)
+        coef[i, p + i] = math.sqrt(2.0 * gamma_draw(state, 0.5 * (nu + n - (d - 1 - i))))
+        for j in range(i + 1, d):
+            coef[i, p + j] = 0.0
+        for q in range(p):
+            coef[i, q] = -normal(state)
+        solve_row(factor, p, coef, i)
+    return log_diagonal(coef[:, p:])
+
+
+@kernel(inline=True)
+def block_log_likelihood(
+    vt: Floats, start: int, stop: int, coef: Floats, shape: Floats, weight: float, dof: float, out: Floats, row: Floats
+) -> None:
+    """Fill out (L, BLOCK) with log p(y_t | z_t, state) up to a constant.
+
+    Args:
+        vt: (M, T) samples.
+        start: first sample.
+        stop: one past the last, at most BLOCK further.
+        coef: (L, D, M) emissions, see `draw_emission`.
+        shape: (L, 2) log|Σ|^(-1/2) and tr(Σ⁻¹ blur).
+        weight: what a sample counts for.
+        dof: degrees of freedom of Student-t noise; 0: Gaussian.
+        out: output.
+        row: (BLOCK,) work space.
+    """
+    states, d, m = coef.shape
+    n = stop - start
+    for k in range(states):
+        total = out[k]
+        for t in range(n):
+            total[t] = shape[k, 1]
+        for i in range(d):
+            used = m - d + i + 1
+            c = coef[k, i]
+            x = vt[0, start:stop]
+            for t in range(n):
+                row[t] = c[0] * x[t]
+            j = 1
+            while j + 3 < used:  # four at a time: a partial sum is fetched and stored a quarter as often
+                c0, c1, c2, c3 = c[j], c[j + 1], c[j + 2], c[j + 3]
+                x0, x1, x2, x3 = vt[j, start:stop], vt[j + 1, start:stop], vt[j + 2, start:stop], vt[j + 3, start:stop]
+                for t in range(n):
+                    row[t] += (c0 * x0[t] + c1 * x1[t]) + (c2 * x2[t] + c3 * x3[t])
+                j += 4
+            for rest in range(j, used):
+                c0 = c[rest]
+                x = vt[rest, start:stop]
+                for t in range(n):
+                    row[t] += c0 * x[t]
+            for t in range(n):
+                total[t] += row[t] * row[t]
+        if dof > 0.0:
+            student(total, n, weight * shape[k, 0], weight / dof, 0.5 * (dof + weight * d), row)
+        else:
+            for t in range(n):
+                total[t] = weight * (shape[k, 0] - 0.5 * total[t])
+
+
+@kernel(inline=True)
+def student(total: Floats, n: int, logdet: float, share: float, power: float, work: Floats) -> None:
+    """Overwrite the first n squares of `total` (B,) with logdet - power log(1 + share × square); work (B,).
+
+    The logarithm is 2 artanh((m - 1) / (m + 1)) of the mantissa, a series, which is vectorised; it is right to 1e-13.
+    """
+    bits = work.view(np.int64)
+    for t in range(n):
+        work[t] = 1.0 + share * total[t]
+    for t in range(n):
+        total[t] = float((bits[t] - ROOT_BITS) >> 52)
+        bits[t] -= ((bits[t] - ROOT_BITS) >> 52) << 52
+    for t in range(n):
+        f = (work[t] - 1.0) / (work[t] + 1.0)
+        s = f * f
+        p = 2.0 / 17.0
+        p = p * s + 2.0 / 15.0
+        p = p * s + 2.0 / 13.0
+        p = p * s + 2.0 / 11.0
+        p = p * s + 2.0 / 9.0
+        p = p * s + 2.0 / 7.0
+        p = p * s + 2.0 / 5.0
+        p = p * s + 2.0 / 3.0
+        p = p * s + 2.0
+        total[t] = logdet - power * (total[t] * LN2 + p * f)
+
+
+@kernel(inline=True)
+def square(coef: Floats, v: Floats) -> float:
+    """Squared whitened residual of one sample v (M,) under one state's coef (D, M)."""
+    d, m = coef.shape
+    total = 0.0
+    for i in range(d):
+        rest = 0.0
+        for j in range(m - d + i + 1):
+            rest += coef[i, j] * v[j]
+        total += rest * rest
+    return total
+
+
+@kernel(inline=True)
+def mean_emission(factor: Floats, n: float, p: int, nu: float, blur: Floats, coef: Floats, shape: Floats) -> None:
+    """Fill coef (D, M) and shape (2,), see `block_log_likelihood`, with the posterior's mean precision and regression."""
+    m = factor.shape[0]
+    d = m - p
+    root = math.sqrt(nu + n)
+    for i in range(d):
+        for j in range(d):
+            coef[i, p + j] = root if i == j else 0.0
+        for q in range(p):
+            coef[i, q] = 0.0
+        solve_row(factor, p, coef, i)
+    shape[0] = log_diagonal(coef[:, p:])
+    shape[1] = blurred(coef, blur)
+
+
+@kernel(inline=True)
+def solve_row(factor: Floats, p: int, coef: Floats, i: int) -> None:
+    """Turn row i of coef (D, M), (e, u), into (e - u Ly⁻¹ Lyz) Lz⁻¹ and u Ly⁻¹, with the factor (M, M) of a state's G."""
+    for j in range(i, -1, -1):
+        c = coef[i, p + j] / factor[p + j, p + j]
+        coef[i, p + j] = c
+        for q in range(j):
+            coef[i, p + q] -= c * factor[p + j, p + q]
+    for j in range(i + 1):
+        c = coef[i, p + j]
+        for q in range(p):
+            coef[i, q] -= c * factor[p + j, q]
+    for j in range(p - 1, -1, -1):
+        c = coef[i, j] / factor[j, j]
+        coef[i, j] = c
+        for q in range(j):
+            coef[i, q] -= c * factor[j, q]
+
+
+@kernel(inline=True)
+def blurred(coef: Floats, blur: Floats) -> float:
+    """tr(Σ⁻¹ blur) of a state's coef (D, M)."""
+    d, m = coef.shape
+    total = 0.0
+    for i in range(d):
+        for j in range(i + 1):
+            total += coef[i, m - d + j] ** 2 * blur[j]
+    return total
+
+
+@kernel(inline=True)
+def block_likelihood(logs: Floats, n: int, best: Floats, work: Floats, out: Floats) -> None:
+    """Fill out (n, L) with exp(logs - best of all states), logs (L, BLOCK); below e^-300 it is 0. Work (2, BLOCK).
+
+    The exponential is a polynomial (Cody & Waite), which is vectorised, unlike a call per number; it is right to 3e-13,
+    as exact as a log-likelihood of a thousand is.
+    """
+    states = logs.shape[0]
+    for t in range(n):
+        best[t] = logs[0, t]
+    for k in range(1, states):
+        x = logs[k]
+        for t in range(n):
+            best[t] = x[t] if x[t] > best[t] else best[t]
+    power, value = work[0], work[1]
+    bits = power.view(np.int64)
+    for k in range(states):
+        x = logs[k]
+        for t in range(n):
+            y = x[t] - best[t]
+            y = y if y > LEAST_LOG else LEAST_LOG
+            shifted = y * LOG2_E + TO_INTEGER
+            power[t] = shifted
+            turns = shifted - TO_INTEGER
+            r = (y - turns * LN2_HIGH) - turns * LN2_LOW
+            p = 1.0 / 3628800.0
+            p = p * r + 1.0 / 362880.0
+            p = p * r + 1.0 / 40320.0
+            p = p * r + 1.0 / 5040.0
+            p = p * r + 1.0 / 720.0
+            p = p * r + 1.0 / 120.0
+            p = p * r + 1.0 / 24.0
+            p = p * r + 1.0 / 6.0
+            p = p * r + 0.5
+            p = p * r + 1.0
+            value[t] = (p * r + 1.0) if y > LEAST_LOG else 0.0
+        for t in range(n):
+            bits[t] = (bits[t] << 52) + ONE_BITS
+        for t in range(n):
+            out[t, k] = value[t] * power[t]
+
+
+def joint_prior(mean: Floats, precision: Floats, scale: Floats) -> Floats:
+    """Return G0 (P + D, P + D) of an MNIW prior with mean M (D, P), K (P, P) and S0 (D, D)."""
+    return np.block(
+        [
+            [precision, exact.matmul(precision, mean.T)],
+            [exact.matmul(mean, precision), scale + exact.matmul(exact.matmul(mean, precision), mean.T)],
+        ]
+    )

@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Samples that count for less than one: outliers under heavy tails, and channels that were not observed.
+
+Student-t noise is Gaussian noise whose precision is scaled by a mass of its own in every sample, Gamma(ν/2, ν/2) (Andrews &
+Mallows 1974). Labels are drawn with the masses integrated out, then masses given labels. Channels that are missing are
+integrated out of the likelihood, then drawn given the others, so that the statistics keep one form. A sample of which
+nothing was observed has mass 0.
+"""
+
+import math
+
+import numpy as np
+
+from scenario_gen.method.segmentation.hdp_hmm.emission import cholesky, square
+from scenario_gen.method.segmentation.hdp_hmm.random import log_gamma_draw, normal, State
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Bools, Floats, Ints
+from scenario_gen.numerics.kernels import kernel
+
+
+@kernel(inline=True)
+def without_hidden(v: Floats, hidden: Bools, coef: Floats, factor: Floats, shift: Floats) -> tuple[float, float]:
+    """Squared whitened residual of a sample's observed channels, and log|Λ|^(1/2), Λ the precision of the hidden given them.
+
+    Args:
+        v: (M,) sample; what it holds in hidden channels does not matter.
+        hidden: (D,).
+        coef: (D, M) emission of the state.
+        factor: (D, D) output, Cholesky factor R of Λ in its first rows and columns, one per hidden channel.
+        shift: (D,) output, R⁻¹ C' r: the hidden channels' mean given the others is -R⁻ᵀ shift.
+    """
+    d, m = coef.shape
+    p = m - d
+    rest = np.zeros(d)
+    for i in range(d):
+        for j in range(p + i + 1):
+            if j < p or not hidden[j - p]:
+                rest[i] += coef[i, j] * v[j]
+    total = 0.0
+    for i in range(d):
+        total += rest[i] * rest[i]
+    a = 0
+    for i in range(d):
+        if hidden[i]:
+            b = 0
+            for j in range(i + 1):
+                if hidden[j]:
+                    factor[a, b] = 0.0
+                    for q in range(d):
+                        factor[a, b] += coef[q, p + i] * coef[q, p + j]
+                    b += 1
+            shift[a] = 0.0
+            for q in range(d):
+                shift[a] += coef[q, p + i] * rest[q]
+            a += 1
+    cholesky(factor[:a, :a])
+    half = 0.0
+    for i in range(a):
+        for j in range(i):
+            shift[i] -= factor[i, j] * shift[j]
+        shift[i] /= factor[i, i]
+        total -= shift[i] * shift[i]
+        half += exact.log(factor[i, i])
+    return max(total, 0.0), half
+
+
+@kernel(inline=True)
+def log_radial(square: float, n: float, weight: float, dof: float) -> float:
+    """Return log p(y) as far as it depends on the squared whitened residual.
+
+    Args:
+        square: squared whitened residual.
+        n: observed channels times `weight`.
+        weight: what a sample counts for.
+        dof: degrees of freedom of Student-t noise; 0: Gaussian.
+    """
+    if dof > 0.0:
+        return -0.5 * (dof + n) * exact.log(1.0 + weight * square / dof)
+    return -0.5 * weight * square
+
+
+@kernel(inline=True)
+def observed_log_likelihood(
+    v: Floats, hidden: Bools, coef: Floats, shape: Floats, weight: float, dof: float, out: Floats
+) -> None:
+    """Fill out (L,) with the log-likelihood of a sample's observed channels, up to a constant; see `block_log_likelihood`."""
+    states, d = coef.shape[0], coef.shape[1]
+    seen = d - hidden.sum()
+    if seen == 0:
+        for k in range(states):
+            out[k] = 0.0
+        return
+    factor, shift = np.empty((d, d)), np.empty(d)
+    for k in range(states):
+        total, half = without_hidden(v, hidden, coef[k], factor, shift)
+        total += shape[k, 1] * seen / d
+        out[k] = weight * (shape[k, 0] - half) + log_radial(total, weight * seen, weight, dof)
+
+
+@kernel(inline=True)
+def draw_masses(
+    state: State,
+    v: Floats,
+    labels: Ints,
+    coef: Floats,
+    shape: Floats,
+    weight: float,
+    dof: float,
+    gaps: Ints,
+    hidden: Bools,
+    mass: Floats,
+) -> None:
+    """Draw mass (T,) given labels and emissions; those that are 0 stay so."""
+    d = coef.shape[1]
+    factor, shift = np.empty((d, d)), np.empty(d)
+    gap = 0
+    for t in range(len(mass)):
+        while gap < len(gaps) and gaps[gap] < t:
+            gap += 1
+        k = labels[t]
+        if mass[t] > 0.0:
+            if gap < len(gaps) and gaps[gap] == t:
+                seen = d - hidden[gap].sum()
+                total = without_hidden(v[t], hidden[gap], coef[k], factor, shift)[0]
+            else:
+                seen = d
+                total = square(coef[k], v[t])
+            total += shape[k, 1] * seen / d
+            mass[t] = exact.exp(log_gamma_draw(state, 0.5 * (dof + weight * seen))) / (0.5 * (dof + weight * total))
+
+
+@kernel(inline=True)
+def draw_hidden(state: State, v: Floats, vt: Floats, labels: Ints, coef: Floats, mass: Floats, gaps: Ints, hidden: Bools) -> None:
+    """Draw the hidden channels of v (T, M) and of vt, its transpose, given the observed ones, labels and emissions."""
+    d, m = coef.shape[1], coef.shape[2]
+    p = m - d
+    factor, shift = np.empty((d, d)), np.empty(d)
+    for r in range(len(gaps)):
+        t = gaps[r]
+        if mass[t] > 0.0:
+            without_hidden(v[t], hidden[r], coef[labels[t]], factor, shift)
+            a = hidden[r].sum()
+            for i in range(a):
+                shift[i] = normal(state) / math.sqrt(mass[t]) - shift[i]
+            for i in range(a - 1, -1, -1):
+                for j in range(i + 1, a):
+                    shift[i] -= factor[j, i] * shift[j]
+                shift[i] /= factor[i, i]
+            a = 0
+            for i in range(d):
+                if hidden[r, i]:
+                    v[t, p + i] = vt[p + i, t] = shift[a]
+                    a += 1
+
+
+@kernel(inline=True)
+def log_masses(mass: Floats, power: float, dof: float) -> float:
+    """Log density of mass (T,), and what they add to the samples' log density: Σ ½ power log mass; up to a constant."""
+    value = 0.0
+    for t in range(len(mass)):
+        if mass[t] > 0.0:
+            value += (0.5 * (power + dof) - 1.0) * exact.log(mass[t]) - 0.5 * dof * mass[t]
+    return value

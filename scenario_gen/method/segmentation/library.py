@@ -1,0 +1,282 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A library of primitives shared by many encounters: what the hierarchy of the HDP is for."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenario_gen.base.documents import check_shape, COUNT, NUMBER, read_json
+from scenario_gen.base.errors import guarded, InputError
+from scenario_gen.method.segmentation.descriptions import describe_accelerations, describe_segments
+from scenario_gen.method.segmentation.features import driving_features
+from scenario_gen.method.segmentation.posterior import in_order
+from scenario_gen.method.segmentation.segmenter import cut, DEFAULT, on_trends, relabel, SegmentationConfig
+from scenario_gen.method.segmentation.series import segment_series
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats, frozen, frozen_ints, Ints
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.segmentation import Segmentation
+
+FORMAT = "scenario_gen primitive library 1"
+_ROW = {"type": "array", "minItems": 1, "items": {**NUMBER, "minimum": -1e9, "maximum": 1e9}}  # of accelerations, speeds, seconds
+_SHARES = {"type": "array", "minItems": 1, "items": {"type": "number", "minimum": 0.0, "maximum": 1.0}}
+SCHEMA: dict[str, Any] = {
+    "type": "object",
+    "properties": {
+        "format": {"const": FORMAT},
+        "vehicles": {**COUNT, "minimum": 2, "maximum": 64},
+        "means": {"type": "array", "minItems": 1, "maxItems": 1000, "items": _ROW},
+        "covariances": {"type": "array", "items": {"type": "array", "items": _ROW}},
+        "transition": {"type": "array", "items": _SHARES},
+        "initial": _SHARES,
+        "segments": {"type": "array", "items": COUNT},
+        "seconds": _ROW,
+        "weight": {"type": "number", "exclusiveMinimum": 0.0, "maximum": 1.0},
+        "windows": {
+            "type": "array",
+            "minItems": 4,
+            "maxItems": 4,
+            "items": {"type": "number", "minimum": 0.0, "maximum": 3600.0},
+        },
+        "descriptions": {"type": "array", "items": {"type": "string", "maxLength": 10_000}},
+    },
+}
+SCHEMA["required"] = list(SCHEMA["properties"])
+"""Of the JSON that `save` writes; that the shapes agree is checked beside it."""
+
+
+@dataclass(frozen=True, eq=False)
+class PrimitiveLibrary:
+    """K primitives of encounters of N vehicles.
+
+    Attributes:
+        vehicles: N; vehicle order matters, a primitive says what the first and what the second one does.
+        means: (K, 3N) features (longitudinal and lateral acceleration [m/s²], moving 0..1, vehicle by vehicle).
+        covariances: (K, 3N, 3N).
+        transition: (K, K) probability of the next sample's primitive.
+        initial: (K,) probability of being the first.
+        segments: (K,) how many segments were seen.
+        seconds: (K,) mean duration of a segment.
+        weight: what a sample counts for.
+        windows: (4,) windows [s] and noises [m/s²] of the features, see `driving_features`.
+        descriptions: K sentences.
+    """
+
+    vehicles: int
+    means: Floats
+    covariances: Floats
+    transition: Floats
+    initial: Floats
+    segments: Ints
+    seconds: Floats
+    weight: float
+    windows: Floats
+    descriptions: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("means", "covariances", "transition", "initial", "seconds", "windows"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        object.__setattr__(self, "segments", frozen_ints(self.segments))
+
+    def features(self, encounter: Encounter) -> Floats:
+        """(T, 3N) features of an encounter as this library looks at them.
+
+        Raises:
+            InputError: the encounter has another number of vehicles.
+        """
+        if len(encounter.vehicles) != self.vehicles:
+            count = len(encounter.vehicles)
+            raise InputError(f"encounter {encounter.name!r} has {count} vehicles; the primitive library is for {self.vehicles}")
+        return driving_features(encounter, *(float(w) for w in self.windows))[0]
+
+    def save(self, path: Path) -> None:
+        """Write the library as JSON."""
+        values: dict[str, Any] = {"format": FORMAT}
+        for name in self.__dataclass_fields__:
+            value = getattr(self, name)
+            values[name] = value.tolist() if isinstance(value, np.ndarray) else value
+        path.write_text(json.dumps(values, indent=1, ensure_ascii=False), encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: Path) -> "PrimitiveLibrary":
+        """Read a library that `save` wrote.
+
+        Raises:
+            InputError: the file cannot be read or is no such library.
+        """
+        what = f"{path} is not a primitive library"
+        values = read_json(path, SCHEMA, what)
+        k, width = len(values["means"]), 3 * values["vehicles"]
+        shapes = {
+            "means": (k, width),
+            "covariances": (k, width, width),
+            "transition": (k, k),
+            **dict.fromkeys(("initial", "segments", "seconds", "descriptions"), (k,)),
+        }
+        for name, shape in shapes.items():
+            check_shape(values[name], shape, f"{what}: {name}")
+        for name, one in (("transition", "row"), ("initial", "list")):
+            sums = np.sum(values[name], axis=-1)
+            if (np.abs(sums - 1.0) > 1e-6).any():
+                raise InputError(f"{what}: {name} holds probabilities; each {one} must sum to 1, not {np.ravel(sums)[0]:g}")
+        with guarded(f"{what}: covariances", remedy="each must be symmetric and positive definite"):
+            covariances = np.array(values["covariances"])
+            for covariance in covariances:
+                exact.cholesky(covariance)
+        if not np.allclose(covariances, covariances.swapaxes(1, 2)):
+            raise InputError(f"{what}: covariances must be symmetric")
+        known = {name: values[name] for name in cls.__dataclass_fields__}
+        return cls(**known | {"descriptions": tuple(values["descriptions"])})
+
+
+@dataclass(frozen=True, eq=False)
+class Assignment:
+    """An encounter in terms of a library: its segmentation, and the library's primitive (K + 1,) of each segment."""
+
+    segmentation: Segmentation
+    primitives: Ints
+
+
+def build_library(
+    encounters: Sequence[Encounter], config: SegmentationConfig = DEFAULT, seed: int = 0
+) -> tuple[PrimitiveLibrary, tuple[Assignment, ...]]:
+    """Segment many encounters together, so that they share their primitives.
+
+    Args:
+        encounters: all with the same number of vehicles and the same dt.
+        config: as for one encounter; `max_rate` holds for each.
+        seed: same seed, same answer.
+
+    Raises:
+        InputError: no encounter, or they differ in number of vehicles or dt.
+    """
+    kinds = {(len(e.vehicles), e.dt_ns) for e in encounters}
+    if len(kinds) != 1:
+        raise InputError("a primitive library needs encounters with one number of vehicles and one sampling period, at least one")
+    windows = (config.speed_window, config.turn_window, config.speed_noise, config.turn_noise)
+    parts = [driving_features(e, *windows) for e in encounters]
+    x, blur = np.vstack([features for features, _ in parts]), parts[0][1]
+    ends = tuple(int(n) for n in np.cumsum([len(features) for features, _ in parts]))
+    posterior = segment_series(x, config.sampler, seed, ends=ends, blur=blur)
+    labels = posterior.labels.copy()
+    points = []
+    for encounter, start, stop in zip(encounters, (0, *ends[:-1]), ends, strict=True):
+        own = posterior.part(start, stop)
+        found = on_trends(encounter, own, cut(own, config, encounter.dt), config)
+        labels[start:stop] = relabel(posterior.labels[start:stop], found, fresh=False)
+        points.append(np.flatnonzero(np.diff(labels[start:stop])) + 1)
+    labels = in_order(labels)
+    library = _summarise(x, labels, ends, encounters[0], windows, config.sampler.weight or 1.0, blur)
+    assignments = []
+    for encounter, start, stop, own_points in zip(encounters, (0, *ends[:-1]), ends, points, strict=True):
+        own_labels = labels[start:stop]
+        segmentation = Segmentation(
+            in_order(own_labels),
+            own_points,
+            posterior.probability[start:stop],
+            describe_segments(encounter, own_points),
+            float(posterior.r_hat.max()),
+        )
+        assignments.append(Assignment(segmentation, frozen_ints(own_labels[[0, *own_points]])))
+    return library, tuple(assignments)
+
+
+def _summarise(
+    x: Floats,
+    labels: Ints,
+    ends: tuple[int, ...],
+    example: Encounter,
+    windows: tuple[float, float, float, float],
+    weight: float,
+    blur: Floats,
+) -> PrimitiveLibrary:
+    """Take every primitive's statistics from labelled samples."""
+    k = int(labels.max()) + 1
+    pairs = np.ones((k, k)) * 0.1 / k
+    initial = np.full(k, 0.1)
+    lengths: list[list[float]] = [[] for _ in range(k)]
+    for start, stop in zip((0, *ends[:-1]), ends, strict=True):
+        own = labels[start:stop]
+        np.add.at(pairs, (own[:-1], own[1:]), 1.0)
+        initial[own[0]] += 1.0
+        edges = [0, *(np.flatnonzero(np.diff(own)) + 1), len(own)]
+        for a, b in pairwise(edges):
+            lengths[own[a]].append((b - a) * example.dt)
+    means = np.array([x[labels == j].mean(axis=0) for j in range(k)])
+    within = x - means[labels]
+    within -= within.mean(axis=0)
+    pooled = exact.matmul(within.T, within) / (len(x) - 1) + np.diag(np.square(blur))
+    covariances = np.empty((k, x.shape[1], x.shape[1]))
+    prior = 3.0 * x.shape[1]
+    for j in range(k):
+        rest = x[labels == j] - means[j]
+        covariances[j] = (prior * pooled + exact.matmul(rest.T, rest) + len(rest) * np.diag(np.square(blur))) / (
+            prior + len(rest)
+        )
+    return PrimitiveLibrary(
+        vehicles=len(example.vehicles),
+        means=means,
+        covariances=covariances,
+        transition=pairs / pairs.sum(axis=1, keepdims=True),
+        initial=initial / initial.sum(),
+        segments=np.array([len(each) for each in lengths]),
+        seconds=np.array([np.mean(each) for each in lengths]),
+        weight=weight,
+        windows=np.array(windows),
+        descriptions=tuple(describe_accelerations(mean) for mean in means),
+    )
+
+
+def assign(encounter: Encounter, library: PrimitiveLibrary, config: SegmentationConfig = DEFAULT) -> Assignment:
+    """Cut a new encounter into the primitives of a library, without fitting anything (forward-backward smoothing).
+
+    Raises:
+        InputError: the encounter has another number of vehicles than the library.
+    """
+    x = library.features(encounter)
+    smooth, changed = _smooth(library, x)
+    labels = smooth.argmax(axis=1).astype(np.int64)
+    points = np.flatnonzero(np.diff(labels)) + 1
+    gap = max(2, round(config.min_segment / encounter.dt))
+    while len(points) and np.diff([0, *points, len(x)]).min() < gap:
+        near = int(np.argmin(np.diff([0, *points, len(x)])))
+        points = np.delete(points, min(near, len(points) - 1))
+    result = relabel(labels, points, fresh=False)
+    points = np.flatnonzero(np.diff(result)) + 1
+    found = Segmentation(in_order(result), points, changed, describe_segments(encounter, points))
+    return Assignment(found, frozen_ints(result[[0, *points]]))
+
+
+def _smooth(library: PrimitiveLibrary, x: Floats) -> tuple[Floats, Floats]:
+    """(T, K) probability of each primitive and (T,) of a change, at each sample of x (T, D)."""
+    log_likelihood = np.empty((len(x), len(library.means)))
+    for k, (mean, covariance) in enumerate(zip(library.means, library.covariances, strict=True)):
+        factor = exact.cholesky(covariance)
+        rest = exact.solve_triangular(factor.T, (x - mean).T, transposed=True)
+        log_likelihood[:, k] = -0.5 * np.square(rest).sum(axis=0) - exact.log(np.diag(factor)).sum()
+    log_likelihood *= library.weight
+    likelihood = exact.exp(log_likelihood - log_likelihood.max(axis=1, keepdims=True)) + 1e-300
+    forward = np.empty_like(likelihood)
+    backward = np.ones_like(likelihood)
+    forward[0] = library.initial * likelihood[0]
+    forward[0] /= forward[0].sum()
+    for t in range(1, len(x)):
+        forward[t] = exact.matmul(forward[t - 1], library.transition) * likelihood[t]
+        forward[t] /= forward[t].sum()
+    for t in range(len(x) - 2, -1, -1):
+        backward[t] = exact.matmul(library.transition, likelihood[t + 1] * backward[t + 1])
+        backward[t] /= backward[t].sum()
+    smooth = forward * backward
+    smooth /= smooth.sum(axis=1, keepdims=True)
+    changed = np.zeros(len(x))
+    same = forward[:-1] * np.diag(library.transition) * likelihood[1:] * backward[1:]
+    every = (exact.matmul(forward[:-1], library.transition) * likelihood[1:] * backward[1:]).sum(axis=1)
+    changed[1:] = np.clip(1.0 - same.sum(axis=1) / every, 0.0, 1.0)
+    return smooth, changed

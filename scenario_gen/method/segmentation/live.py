@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Samples as they come → changepoints as they are confirmed, for whoever is there."""
+
+from collections import deque
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scenario_gen.method.segmentation.online import Changepoint, OnlineConfig, OnlineSegmenter
+from scenario_gen.method.segmentation.trends import course
+from scenario_gen.types.segmentation import LiveChangepoints
+
+if TYPE_CHECKING:  # logs bring pandas and shapely, which a segmentation does not need
+    from scenario_gen.logs.streams import Sample
+
+
+class LiveSegmenter:
+    """An `OnlineSegmenter` for vehicles that come and go: each change of who is there begins a new stretch."""
+
+    def __init__(self, dt_ns: int, config: OnlineConfig = OnlineConfig()) -> None:
+        """Start with no samples; they will be `dt_ns` nanoseconds apart."""
+        self._dt_ns = dt_ns
+        self._config = config
+        self._past: deque[Sample] = deque(maxlen=round(config.window * 1e9 / dt_ns))
+        self._online: OnlineSegmenter | None = None
+        self._start_ns = 0
+
+    def push(self, sample: "Sample") -> LiveChangepoints | None:
+        """Take the next sample and return the changepoints it confirms, if any."""
+        last = self._past[-1] if self._past else None
+        if self._online is None or last is None or not self._follows(last, sample):
+            self._past.clear()
+            self._online = OnlineSegmenter(len(sample.vehicles), self._dt_ns * 1e-9, self._config)
+            self._start_ns = sample.stamp_ns
+        self._past.append(sample)
+        found = self._online.push(sample.position, sample.speed)
+        return self._states(found) if found else None
+
+    def _follows(self, last: "Sample", sample: "Sample") -> bool:
+        return sample.stamp_ns == last.stamp_ns + self._dt_ns and sample.vehicles == last.vehicles
+
+    def _states(self, found: Sequence[Changepoint]) -> LiveChangepoints:
+        time_ns = np.array([changepoint.sample for changepoint in found], dtype=np.int64) * self._dt_ns
+        at = (self._start_ns + time_ns - self._past[0].stamp_ns) // self._dt_ns
+        position = np.stack([sample.position for sample in self._past], axis=1)
+        speed = np.stack([sample.speed for sample in self._past], axis=1)
+        heading = np.array([course(xy, v, self._dt_ns * 1e-9)[0] for xy, v in zip(position, speed, strict=True)])
+        vehicles = self._past[-1].vehicles
+        ended = [changepoint.ended for changepoint in found]
+        return LiveChangepoints(
+            self._start_ns,
+            vehicles,
+            time_ns,
+            position[:, at],
+            heading[:, at],
+            speed[:, at],
+            probability=np.array([changepoint.probability for changepoint in found]),
+            label=np.array([segment.label for segment in ended], dtype=np.int64),
+            label_probability=np.array([segment.probability[segment.labels == segment.label][0] for segment in ended]),
+        )

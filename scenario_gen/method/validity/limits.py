@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a valid scenario must keep to; every limit is a parameter."""
+
+from dataclasses import dataclass, replace
+
+from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.template.separation import least_gap
+from scenario_gen.types.encounter import Encounter
+
+_SHARE_OF_GAP, _MOST_CLEARANCE = 0.5, 0.5  # of the template's least gap; m
+
+
+@dataclass(frozen=True)
+class Limits(Parameters):
+    """Limits of the checker. Speed and heading are linear between samples, position is the cubic of `Scenario`."""
+
+    max_speed: float = parameter(45.0, "highest speed", unit="m/s", low=0.0)
+    max_acceleration: float = parameter(5.0, "strongest speeding up", unit="m/s²", low=0.0)
+    max_deceleration: float = parameter(9.0, "strongest braking", unit="m/s²", low=0.0)
+    max_lateral_acceleration: float = parameter(6.0, "largest product of speed and yaw rate", unit="m/s²", low=0.0)
+    max_curvature: float = parameter(0.25, "largest change of heading per metre driven", unit="1/m", low=0.0)
+    position_tolerance: float = parameter(0.1, "start and end positions are this near to what was asked", unit="m", low=0.0)
+    speed_tolerance: float = parameter(0.1, "start and end speeds are this near to what was asked", unit="m/s", low=0.0)
+    stand_speed: float = parameter(0.1, "a vehicle that stands in the template is slower than this", unit="m/s", low=0.0)
+    creep_speed: float = parameter(
+        0.5, "a vehicle that waits in the template, but creeps, is slower than this", unit="m/s", low=0.0
+    )
+    stand_duration: float = parameter(1.0, "shortest stand or creep that counts as a wait", unit="s", low=0.01)
+    min_clearance: float = parameter(
+        -1.0,
+        "smallest gap between two footprints, by their best separating axis; a gap of 0 (touching) is an overlap; -1: half the "
+        "template's own least gap, at most 0.5 m",
+        unit="m",
+        low=-1.0,
+    )
+    slip: float = parameter(
+        0.2, "displacement over time may differ from speed along heading by this, ahead and sideways", unit="m/s", low=0.0
+    )
+    slip_share: float = parameter(0.03, "and by this share of the speed", low=0.0)
+    acceleration_tolerance: float = parameter(
+        0.5,
+        "change of speed over time may leave the range of the two samples' accelerations by this, and accelerations taken from "
+        "the positions alone may exceed their limits by it",
+        unit="m/s²",
+        low=0.0,
+    )
+    presence_margin: float = parameter(
+        1.0,
+        "a vehicle drives on for this long before it comes and after it goes, at the speed and rate of turn that it has there; "
+        "nobody may be where it then is",
+        unit="s",
+        low=0.0,
+        high=10.0,
+    )
+    anticipation: float = parameter(
+        0.5,
+        "who waits for another one in the template leaves at most this long before that one has cleared, or earlier by this than "
+        "the template's if that anticipates",
+        unit="s",
+        low=0.0,
+    )
+    patience: float = parameter(
+        3.0, "and at most this long after the template's own lag, or after the clearing if that is later", unit="s", low=0.0
+    )
+    headway_share: float = parameter(
+        0.5, "a follower's time gaps stay within those of the template's, widened by this share", low=0.0, high=10.0
+    )
+    time_resolution: float = parameter(
+        1e-6, "what cannot be proven over an interval this short is refused", unit="s", low=1e-9, high=1.0
+    )
+
+    @property
+    def clearance(self) -> float:
+        """Gap [m] that must be exceeded; 0 where it follows a template and none is known."""
+        return max(self.min_clearance, 0.0)
+
+    def for_template(self, encounter: Encounter) -> "Limits":
+        """Return the limits of scenarios of a template, whose own least gap says how near vehicles may come to one another."""
+        if self.min_clearance >= 0.0:
+            return self
+        return replace(self, min_clearance=min(max(_SHARE_OF_GAP * least_gap(encounter), 0.0), _MOST_CLEARANCE))

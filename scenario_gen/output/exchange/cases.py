@@ -1,0 +1,201 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What of a bag is exported: every scenario with its road's lanes and its ego, case by case."""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+from scenario_gen.bags.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS, WITNESS
+from scenario_gen.bags.storage.bag import within
+from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.lanes import Lane, LaneMap, lanes_of
+from scenario_gen.output.exchange.road_lanes import lane_map_of
+from scenario_gen.types.ego import split_off
+from scenario_gen.types.names import tokens
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import Scenario
+
+TOPICS = ("tracks", "map", "road/lanes", "fit/info", "ego/track", SCENARIOS, INFO)
+
+
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """One scenario to be exported.
+
+    Attributes:
+        index: as in `scenarios/info`; without an entry its place in the bag.
+        seed: of its request.
+        sha256: of its message in the bag.
+        others: the vehicles around the ego; all of them where there is none.
+        ego: the ego's track, a scenario of one vehicle that begins at the same instant.
+        driven: whether the ego's track is a part of the scenario, so that it and the others are proven valid together.
+    """
+
+    index: int
+    seed: int
+    sha256: str
+    others: Scenario
+    ego: Scenario | None
+    driven: bool
+
+    @property
+    def duration(self) -> float:
+        """Seconds until the last vehicle, or the ego, is at its end."""
+        return max(float(s.time[-1]) for s in (self.others, self.ego) if s is not None)
+
+    def refuse_late_ego(self) -> None:
+        """Refuse an ego that arrives late: a controller under test is there from the first instant on.
+
+        Raises:
+            RefusedError: it arrives late.
+        """
+        if self.ego is not None and self.ego.present[0, 0] > 0:
+            begin = float(self.ego.time[self.ego.present[0, 0]])
+            raise RefusedError(
+                f"scenario {self.index}: the ego, vehicle {self.ego.vehicles[0].id}, arrives {begin:.1f} s late, and a planner "
+                "under test begins at 0; choose a vehicle with --ego that is there from the start"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """The scenarios of one template on one road.
+
+    Attributes:
+        number: from 1, among all cases of the bag.
+        namespace: in the bag; "" is the root.
+        road_name: for people.
+        start_ns: the template's stamp.
+        scenarios: those asked for.
+        lane_map: of the road; the same whichever scenarios are asked for.
+    """
+
+    number: int
+    namespace: str
+    road_name: str
+    start_ns: int
+    scenarios: tuple[Exported, ...]
+    lane_map: LaneMap
+
+    @cached_property
+    def lanes(self) -> tuple[Lane, ...]:
+        """All lanes; of a vector map its own."""
+        return self.lane_map.network or lanes_of(self.lane_map)
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Scenarios of one namespace, template and road."""
+
+    stamp: int
+    entry: ScenarioEntry | None
+    scenarios: list[Exported]
+
+
+def read_cases(
+    bag: Path,
+    export: ExportConfig = ExportConfig(),
+    config: BagConfig = BagConfig(),
+    *,
+    namespace: str | None = None,
+    indices: Collection[int] = (),
+) -> tuple[Case, ...]:
+    """Return what is to be exported of a bag, ours or not.
+
+    Args:
+        bag: its folder.
+        export: ego and lanes.
+        config: what is read of the bag at most.
+        namespace: only this one.
+        indices: only scenarios of these, as in `scenarios/info`; all if none is given.
+
+    Raises:
+        InputError: the bag cannot be read, holds no scenario that is asked for, or an ego is none of the vehicles.
+    """
+    found = read_recording(bag, config, TOPICS).namespaces
+    spaces = [one for one in found.values() if SCENARIOS in one.messages]
+    if not spaces:
+        raise InputError(f"{bag}: no topic `{SCENARIOS}` in any namespace; there is nothing to export")
+    if namespace is not None:
+        wanted = namespace if not namespace or namespace.startswith("/") else f"/{namespace}"
+        spaces = [one for one in spaces if one.name == wanted]
+        if not spaces:
+            raise InputError(f"{bag}: no scenarios in namespace {namespace!r}; there are: {', '.join(n or '/' for n in found)}")
+    with within(bag):
+        groups = [(space, group) for space in spaces for group in _groups(space, export)]
+        cases = [_case(k + 1, space, group, export, indices) for k, (space, group) in enumerate(groups)]
+    cases = [case for case in cases if case.scenarios]
+    if not cases:
+        known = sorted({one.index for _, group in groups for one in group.scenarios})
+        raise InputError(f"{bag}: no scenario of index {sorted(indices)}; there are {known[0]} to {known[-1]}")
+    return tuple(cases)
+
+
+def _groups(space: Namespace, export: ExportConfig) -> Iterator[_Group]:
+    """Yield the scenarios of a namespace by template and road."""
+    space.check_infos()
+    groups: dict[tuple[object, ...], _Group] = {}
+    for k, sha256 in enumerate(space.hashes):
+        entry = space.entry(k)
+        stamp, scenario = space.scenario(k)
+        key = (stamp, entry and entry.template_hash, entry and entry.map_hash)
+        group = groups.setdefault(key, _Group(stamp, entry, []))
+        others, ego, driven = _with_ego(space, entry, scenario, export.ego)
+        group.scenarios.append(Exported(scenario.index, scenario.seed, sha256, others, ego, driven))
+    yield from groups.values()
+
+
+def _with_ego(
+    space: Namespace, entry: ScenarioEntry | None, scenario: Scenario, asked: str
+) -> tuple[Scenario, Scenario | None, bool]:
+    """Return the vehicles around the ego, its track, and whether that is a part of the scenario.
+
+    Raises:
+        InputError: the ego asked for is none of the vehicles, or alone; another was left out; its track is not in the bag.
+    """
+    slot = entry.ego if entry else ""
+    ids = list(tokens(vehicle.id for vehicle in scenario.vehicles))
+    where = f"{space.where(SCENARIOS)}, scenario {scenario.index}"
+    if slot:
+        if asked not in ("", slot):
+            raise InputError(f"{where} was made for ego {slot!r}; leave --ego out, or name that one")
+        track = scenario.witness or space.ego_track
+        if track is None or tokens(vehicle.id for vehicle in track.vehicles) != (slot,):
+            raise InputError(f"{where} was made for ego {slot!r}, whose track is not on {space.where(WITNESS)}")
+        return replace(scenario, witness=None), track, scenario.witness is not None
+    if not asked:
+        return scenario, None, False
+    if asked not in ids:
+        raise InputError(f"{where} has no vehicle {asked!r} to be the ego; there are: {', '.join(ids)}")
+    if len(ids) == 1:
+        raise InputError(f"{where} has no vehicle but {asked!r}: there would be nobody around the ego")
+    others, ego = split_off(scenario, ids.index(asked))
+    return others, ego, True
+
+
+def _case(number: int, space: Namespace, group: _Group, export: ExportConfig, indices: Collection[int]) -> Case:
+    """Return a case with its lanes.
+
+    Raises:
+        InputError: its tracks or its map are damaged.
+    """
+    road: Road | None = space.road_of(group.entry, group.stamp)
+    if road is None and space.data("map"):
+        road = space.road
+    tracks = space.tracks_of(group.entry, group.stamp)
+    values = next((s.values for s in reversed(space.summaries) if group.entry and s.request == group.entry.request), {})
+    everybody: Sequence[Scenario] = [s for one in group.scenarios for s in (one.others, one.ego) if s is not None]
+    name = group.entry.road if group.entry else ""
+    return Case(
+        number=number,
+        namespace=space.name,
+        road_name=name or "road",
+        start_ns=group.stamp,
+        scenarios=tuple(one for one in group.scenarios if not indices or one.index in indices),
+        lane_map=lane_map_of(road, name, tracks, values, everybody, export.run_out),
+    )

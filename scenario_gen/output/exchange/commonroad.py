@@ -1,0 +1,227 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""CommonRoad 2020a: one XML file per scenario, with lanelets, obstacles and a planning problem.
+
+Obstacles and the planning problem are posed at the centre of their shape, as the format defines it. Times are whole steps of
+`timeStepSize`. The date is that of the template's stamp, so that the same bag gives the same bytes. Without an ego there is a
+placeholder problem, for the format's schema demands one; a comment in the file says so.
+"""
+
+from collections.abc import Sequence
+from datetime import datetime, UTC
+import re
+
+import numpy as np
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats
+from scenario_gen.output.exchange.cases import Case, Exported
+from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.lanes import Lane, stations
+from scenario_gen.output.exchange.motion import at_even_steps, even_step
+from scenario_gen.output.exchange.xml import add, comment, Element, serialized
+from scenario_gen.types.body import is_truck
+from scenario_gen.types.scenario import Scenario
+
+OBSTACLES, PROBLEM, INTERSECTION = 100_000, 200_000, 300_000  # ids from here on; lanelets count from 1
+GOAL_TURN = 0.3  # rad by which an ego may be turned at its goal
+AUTHOR = "scenario_gen"
+
+
+def benchmark_id(case: Case, one: Exported) -> str:
+    """Return the scenario's name in CommonRoad's manner, which is its file's name too."""
+    words = re.findall(r"[0-9A-Za-z]+", case.road_name)
+    name = "".join(word[:1].upper() + word[1:] for word in words) or "Road"
+    return f"ZAM_{name}-{case.number}_{one.index + 1}_T-1"
+
+
+def write_commonroad(case: Case, one: Exported, export: ExportConfig = ExportConfig()) -> tuple[bytes, tuple[str, ...]]:
+    """Return a scenario as the bytes of a CommonRoad file, and sentences on what was changed for it.
+
+    Raises:
+        RefusedError: a vehicle arrives late, for which the schema has no form, or the ego does.
+    """
+    one.refuse_late_ego()
+    scenario, notes = _even(one.others, export)
+    late = [v.id for v, (first, _) in zip(scenario.vehicles, scenario.present.tolist(), strict=True) if first > 0]
+    if late and export.late == "refused":
+        raise RefusedError(
+            f"scenario {one.index}: vehicle {', '.join(late)} arrives late, and CommonRoad's schema has obstacles "
+            "from the first step on only; `--set late=written` writes the step at which it arrives, which commonroad-io "
+            "reads; or export it to openscenario or autoware"
+        )
+    if late:
+        notes += (f"vehicle {', '.join(late)} arrives late: its initial time step is not 0, which the schema does not allow",)
+    step = even_step(scenario) or export.step
+    root = Element(
+        "commonRoad",
+        {
+            "commonRoadVersion": "2020a",
+            "benchmarkID": benchmark_id(case, one),
+            "date": datetime.fromtimestamp(case.start_ns // 10**9, UTC).date().isoformat(),
+            "author": AUTHOR,
+            "affiliation": AUTHOR,
+            "source": f"scenario {one.index} of {case.namespace or '/'}, sha256 {one.sha256}",
+            "timeStepSize": f"{step:.9f}".rstrip("0"),
+        },
+    )
+    comment(root, f"lanelets: {case.lane_map.network_origin or case.lane_map.origin}")
+    location = add(root, "location")
+    add(location, "geoNameId", "-999")  # the format's value for unknown, as 999 below
+    add(location, "gpsLatitude", "999")
+    add(location, "gpsLongitude", "999")
+    tags = add(root, "scenarioTags")
+    add(tags, "simulated")
+    if any(lane.turn for lane in case.lanes):
+        add(tags, "intersection")
+    for lane in case.lanes:
+        _lanelet(root, lane)
+    _intersection(root, case.lanes)
+    for n, vehicle in enumerate(scenario.vehicles):
+        comment(root, f"vehicle {vehicle.id}")
+        _obstacle(root, scenario, n)
+    if one.ego is None:
+        comment(root, "a placeholder: nobody is left out of this scenario, and the format demands a planning problem")
+        _placeholder(root, case.lanes, len(scenario.time))
+    else:
+        comment(root, f"vehicle {one.ego.vehicles[0].id}")
+        _problem(root, one.ego, step, export)
+    return serialized(root), notes
+
+
+def _even(scenario: Scenario, export: ExportConfig) -> tuple[Scenario, tuple[str, ...]]:
+    if even_step(scenario) is not None:
+        return scenario, ()
+    made = at_even_steps(scenario, export.step)
+    lost = float(scenario.time[-1] - made.time[-1])
+    return made, (f"its uneven instants were resampled at {export.step:g} s; its last {lost:.3f} s are left out",)
+
+
+def _points(parent: Element, tag: str, points: Floats) -> None:
+    bound = add(parent, tag)
+    for x, y in points.tolist():
+        point = add(bound, "point")
+        add(point, "x", x)
+        add(point, "y", y)
+
+
+def _lanelet(root: Element, lane: Lane) -> None:
+    lanelet = add(root, "lanelet", id=lane.id)
+    _points(lanelet, "leftBound", lane.left)
+    _points(lanelet, "rightBound", lane.right)
+    for other in lane.predecessors:
+        add(lanelet, "predecessor", ref=other)
+    for other in lane.successors:
+        add(lanelet, "successor", ref=other)
+    for tag, beside in (("adjacentLeft", lane.left_of), ("adjacentRight", lane.right_of)):
+        if beside is not None:
+            add(lanelet, tag, ref=beside[0], drivingDir="same" if beside[1] else "opposite")
+    add(lanelet, "laneletType", "unknown" if lane.derived else "urban")
+    if lane.turn:
+        add(lanelet, "laneletType", "intersection")
+    add(lanelet, "userOneWay", "vehicle")
+
+
+def _intersection(root: Element, lanes: Sequence[Lane]) -> None:
+    """Say of every strip that leads into the junction where one can go from it."""
+    by_id = {lane.id: lane for lane in lanes}
+    incoming = [lane for lane in lanes if not lane.turn and any(by_id[other].turn for other in lane.successors)]
+    if not incoming:
+        return
+    intersection = add(root, "intersection", id=INTERSECTION)
+    for k, strip in enumerate(dict.fromkeys(lane.strip for lane in incoming)):
+        element = add(intersection, "incoming", id=INTERSECTION + 1 + k)
+        own = [lane for lane in incoming if lane.strip == strip]
+        for lane in own:
+            add(element, "incomingLanelet", ref=lane.id)
+        for turn in ("right", "straight", "left"):
+            for lane in own:
+                for other in lane.successors:
+                    if by_id[other].turn == turn:
+                        add(element, f"successors{turn.title()}", ref=other)
+
+
+def _exact(parent: Element, tag: str, value: float) -> None:
+    add(add(parent, tag), "exact", value)
+
+
+def _interval(parent: Element, tag: str, low: float, high: float) -> None:
+    element = add(parent, tag)
+    add(element, "intervalStart", low)
+    add(element, "intervalEnd", high)
+
+
+def _state(parent: Element, tag: str, scenario: Scenario, n: int, k: int) -> Element:
+    """Append position, orientation, time, velocity and acceleration of vehicle `n` at instant `k`."""
+    state = add(parent, tag)
+    point = add(add(state, "position"), "point")
+    add(point, "x", float(scenario.position[n, k, 0]))
+    add(point, "y", float(scenario.position[n, k, 1]))
+    _exact(state, "orientation", float(scenario.heading[n, k]))
+    add(add(state, "time"), "exact", k)
+    _exact(state, "velocity", float(scenario.speed[n, k]))
+    _exact(state, "acceleration", float(scenario.acceleration[n, k]))
+    return state
+
+
+def _obstacle(root: Element, scenario: Scenario, n: int) -> None:
+    vehicle = scenario.vehicles[n]
+    obstacle = add(root, "dynamicObstacle", id=OBSTACLES + n + 1)
+    add(obstacle, "type", "truck" if is_truck(vehicle) else "car")
+    rectangle = add(add(obstacle, "shape"), "rectangle")
+    add(rectangle, "length", vehicle.length)
+    add(rectangle, "width", vehicle.width)
+    first, last = scenario.present[n].tolist()
+    _state(obstacle, "initialState", scenario, n, first)
+    trajectory = add(obstacle, "trajectory")
+    for k in range(first + 1, last + 1):
+        _state(trajectory, "state", scenario, n, k)
+
+
+def _problem(root: Element, ego: Scenario, step: float, export: ExportConfig) -> None:
+    """Append the ego's problem: from its start to a region about its end, within a wide window of time."""
+    problem = add(root, "planningProblem", id=PROBLEM + 1)
+    start = _state(problem, "initialState", ego, 0, 0)
+    rate = (ego.heading[0, 1] - ego.heading[0, 0]) / (ego.time[1] - ego.time[0])
+    _exact(start, "yawRate", float(rate))
+    _exact(start, "slipAngle", 0.0)
+    end = int(ego.present[0, 1])
+    (x, y), yaw = ego.position[0, end].tolist(), float(ego.heading[0, end])
+    last = int(np.ceil(export.goal_late * ego.time[end] / step))
+    _goal(problem, (x, y, yaw), (export.goal_length, export.goal_width), last)
+
+
+def _goal(problem: Element, pose: tuple[float, float, float], size: tuple[float, float], last: int) -> None:
+    goal = add(problem, "goalState")
+    time = add(goal, "time")
+    add(time, "intervalStart", 1)
+    add(time, "intervalEnd", last)
+    x, y, yaw = pose
+    yaw = float((yaw + np.pi) % (2.0 * np.pi) - np.pi)
+    rectangle = add(add(goal, "position"), "rectangle")
+    add(rectangle, "length", size[0])
+    add(rectangle, "width", size[1])
+    add(rectangle, "orientation", yaw)
+    center = add(rectangle, "center")
+    add(center, "x", x)
+    add(center, "y", y)
+    _interval(goal, "orientation", yaw - GOAL_TURN, yaw + GOAL_TURN)
+
+
+def _placeholder(root: Element, lanes: Sequence[Lane], steps: int) -> None:
+    """Append a problem that is solved by standing still, near the beginning of the first lane, on its run-out."""
+    middle = lanes[0].middle
+    at = min(int(np.searchsorted(stations(middle), 5.0)), len(middle) - 2)
+    yaw = float(exact.arctan2(*(middle[at + 1] - middle[at])[::-1]))
+    x, y = middle[at].tolist()
+    problem = add(root, "planningProblem", id=PROBLEM)
+    state = add(problem, "initialState")
+    point = add(add(state, "position"), "point")
+    add(point, "x", x)
+    add(point, "y", y)
+    for tag, value in (("velocity", 0.0), ("orientation", yaw), ("yawRate", 0.0), ("slipAngle", 0.0)):
+        _exact(state, tag, value)
+    add(add(state, "time"), "exact", 0)
+    _goal(problem, (x, y, yaw), (1.0, 1.0), max(steps - 1, 1))

@@ -1,0 +1,222 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""`scenario-gen import`: trajectories of CommonRoad and OpenSCENARIO files as a table that is read as a log.
+
+Columns: vehicle, t_s from the file's time zero, x_m and y_m of the footprint's centre, speed_mps, heading_rad from +x
+counter-clockwise, length_m, width_m. CommonRoad (2018b, 2020a) says all of it; a speed it does not say is derived. OpenSCENARIO
+poses the rear axle, and its vertices have no speeds: the centre follows from the bounding box; the speeds are those of our own
+files' property; in others' files they are derived from positions and times, but for the first, which the initial action says.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from scenario_gen.base.errors import InputError, of_system, reading
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.output.exchange.openscenario import SPEEDS
+from scenario_gen.output.exchange.xml import number, Place, read_xml
+
+HEADER = "vehicle,t_s,x_m,y_m,speed_mps,heading_rad,length_m,width_m"
+MOST_ROWS = 2_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A vehicle's trajectory.
+
+    Attributes:
+        vehicle: id.
+        length, width: metres.
+        rows: (K, 5) time [s], x [m], y [m] of the footprint's centre, speed [m/s], heading [rad].
+    """
+
+    vehicle: str
+    length: float
+    width: float
+    rows: Floats
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What was read: the tracks, and sentences on what was left out."""
+
+    tracks: tuple[Track, ...]
+    notes: tuple[str, ...]
+
+
+def read_scenario_file(path: Path) -> Imported:
+    """Return the trajectories in a CommonRoad or OpenSCENARIO file.
+
+    Raises:
+        InputError: it cannot be read, is neither, or holds no trajectory with times; file and place are named.
+    """
+    with reading(path):
+        root = read_xml(path)
+        place = Place(path, root, root.tag)
+        if root.tag == "commonRoad":
+            made = _commonroad(place)
+        elif root.tag == "OpenSCENARIO":
+            made = _openscenario(place)
+        else:
+            raise InputError(f"{path}: its root is {root.tag[:40]!r}; commonRoad and OpenSCENARIO are read")
+    if not made.tracks:
+        raise InputError(f"{path}: no vehicle with a trajectory in it" + "".join(f"; {note}" for note in made.notes))
+    return made
+
+
+def import_file(path: Path, out: Path) -> Imported:
+    """Write the trajectories of a file to a new table `out`.
+
+    Raises:
+        InputError: as of `read_scenario_file`; `out` is there already, or cannot be written.
+    """
+    made = read_scenario_file(path)
+    lines = [HEADER]
+    for track in made.tracks:
+        size = f"{number(track.length)},{number(track.width)}"
+        lines += [f"{track.vehicle},{','.join(map(number, row))},{size}" for row in track.rows.tolist()]
+    try:
+        with out.open("x", encoding="utf-8", newline="") as file:
+            file.write("\n".join(lines) + "\n")
+    except FileExistsError:
+        raise InputError(f"{out} exists already; name another file with --out, or remove it") from None
+    except OSError as error:
+        raise of_system(error, out) from error
+    return made
+
+
+def _commonroad(root: Place) -> Imported:
+    """Return what a CommonRoad file has on vehicles in motion."""
+    step = root.attribute("timeStepSize")
+    if step <= 0.0:
+        raise root.error(f"timeStepSize is {step:g}; it must be positive")
+    tracks, notes = [], []
+    left_out: dict[str, int] = {}
+    for obstacle in root.all("dynamicObstacle"):
+        kind = (obstacle.child("type").element.text or "").strip()
+        if kind in ("pedestrian", "bicycle"):
+            left_out[kind] = left_out.get(kind, 0) + 1
+            continue
+        if obstacle.element.find("trajectory") is None:
+            left_out["obstacle without a trajectory"] = left_out.get("obstacle without a trajectory", 0) + 1
+            continue
+        rectangle = obstacle.child("shape/rectangle")
+        states = [obstacle.child("initialState"), *obstacle.all("trajectory/state")]
+        rows = np.array([_state(state, step) for state in states])
+        length, width = rectangle.value("length"), rectangle.value("width")
+        tracks.append(_track(obstacle, obstacle.text("id"), (length, width), rows, None))
+    notes += [f"{count} × {kind} left out" for kind, count in left_out.items()]
+    if static := len(root.element.findall("staticObstacle")):
+        notes.append(f"{static} × static obstacle left out")
+    return Imported(tuple(tracks), tuple(notes))
+
+
+def _state(state: Place, step: float) -> tuple[float, ...]:
+    """Return time [s], x, y [m], speed [m/s], NaN if it is not said, and heading [rad] of a state."""
+    point = state.child("position/point")
+    said = state.element.find("velocity") is not None
+    speed = state.value("velocity/exact") if said else float("nan")
+    heading = state.value("orientation/exact")
+    return state.value("time/exact") * step, point.value("x"), point.value("y"), speed, heading
+
+
+def _openscenario(root: Place) -> Imported:
+    """Return what an OpenSCENARIO file has on vehicles that follow timed polylines."""
+    boxes: dict[str, Place] = {}
+    own: dict[str, Floats | None] = {}
+    notes = []
+    for entity in root.all("Entities/ScenarioObject", "name"):
+        found = entity.element.find("Vehicle/BoundingBox")
+        if found is None:
+            notes.append(f"{entity.text('name')} left out: it is no vehicle with a bounding box in this file")
+        else:
+            boxes[entity.text("name")] = entity.child("Vehicle/BoundingBox")
+            own[entity.text("name")] = _own_speeds(entity)
+    speeds = {
+        private.text("entityRef"): target.attribute("value")
+        for private in root.all("Storyboard/Init/Actions/Private", "entityRef")
+        for target in private.all("PrivateAction/LongitudinalAction/SpeedAction/SpeedActionTarget/AbsoluteTargetSpeed")
+    }
+    tracks = []
+    for group in root.all("Storyboard/Story/Act/ManeuverGroup", "name"):
+        for follow in group.all("Maneuver/Event/Action/PrivateAction/RoutingAction/FollowTrajectoryAction"):
+            for actor in group.all("Actors/EntityRef", "entityRef"):
+                name = actor.text("entityRef")
+                if name in boxes:
+                    tracks.append(_followed(follow, name, boxes[name], speeds.get(name), own[name]))
+    still = sorted(set(boxes) - {track.vehicle for track in tracks})
+    notes += [f"{name} left out: it follows no trajectory" for name in still]
+    return Imported(tuple(tracks), tuple(notes))
+
+
+def _own_speeds(entity: Place) -> Floats | None:
+    """Return the speeds (K,) [m/s] that a file of ours has as a property of the vehicle; None if it has none, or damaged ones."""
+    for own in entity.all("Vehicle/Properties/Property", "name"):
+        if own.element.get("name") == SPEEDS:
+            try:
+                found = np.array(own.text("value").split(), dtype=np.float64)
+            except ValueError:
+                return None
+            return found if np.isfinite(found).all() else None
+    return None
+
+
+def _followed(follow: Place, name: str, box: Place, speed: float | None, speeds: Floats | None) -> Track:
+    """Return the track of a vehicle that follows a trajectory in absolute time."""
+    timing = follow.child("TimeReference/Timing")
+    if timing.text("domainAbsoluteRelative") != "absolute":
+        raise timing.error("its times are relative to a trigger; only absolute ones are read")
+    scale, offset = timing.attribute("scale"), timing.attribute("offset")
+    rows = []
+    for vertex in follow.child("TrajectoryRef/Trajectory/Shape/Polyline").all("Vertex", "time"):
+        world = vertex.child("Position/WorldPosition")
+        time = vertex.attribute("time") * scale + offset
+        rows.append((time, world.attribute("x"), world.attribute("y"), float("nan"), world.attribute("h", 0.0)))
+    if len(rows) < 2:
+        raise follow.error(f"its polyline has {len(rows)} vertices; at least 2 are needed")
+    made = np.array(rows)
+    made[:, 4] = np.unwrap(made[:, 4])
+    center, size = box.child("Center"), box.child("Dimensions")
+    x, y = center.attribute("x"), center.attribute("y")
+    cos, sin = exact.cos(made[:, 4]), exact.sin(made[:, 4])
+    made[:, 1] += x * cos - y * sin
+    made[:, 2] += x * sin + y * cos
+    if speeds is not None and len(speeds) == len(made):
+        made[:, 3] = speeds
+    return _track(follow, name, (size.attribute("length"), size.attribute("width")), made, speed)
+
+
+def _track(place: Place, vehicle: str, size: tuple[float, float], rows: Floats, speed: float | None) -> Track:
+    """Return a track whose times ascend; speeds that are not said are derived.
+
+    Raises:
+        InputError: a time is not later than the one before, a size is not positive, or there are too many rows.
+    """
+    if len(rows) > MOST_ROWS:
+        raise place.error(f"{len(rows)} states; at most {MOST_ROWS} are read")
+    if min(size) <= 0.0:
+        raise place.error(f"a footprint of {size[0]:g} m × {size[1]:g} m; both must be positive")
+    if len(rows) < 2 or (np.diff(rows[:, 0]) <= 0.0).any():
+        raise place.error("times must ascend, and be two at least")
+    if np.isnan(rows[:, 3]).any():
+        rows[:, 3] = _speeds(rows, speed)
+    if not np.isfinite(rows).all():
+        raise place.error("its times, places or speeds are beyond all numbers")
+    if any(not c.isprintable() or c in ',"' for c in vehicle) or not vehicle:
+        raise place.error(f"the id {vehicle[:40]!r} cannot stand in a table; rename it")
+    return Track(vehicle, *size, rows)
+
+
+def _speeds(rows: Floats, first: float | None) -> Floats:
+    """Return (K,) speeds [m/s] along the headings by central differences; `first` is that of the first row, if it is known."""
+    order: Literal[1, 2] = 2 if len(rows) > 2 else 1
+    velocity = np.gradient(rows[:, 1:3], rows[:, 0], axis=0, edge_order=order)
+    along = velocity[:, 0] * exact.cos(rows[:, 4]) + velocity[:, 1] * exact.sin(rows[:, 4])
+    if first is not None:
+        along[0] = first
+    return frozen(np.maximum(along, 0.0))

@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""OpenSCENARIO XML 1.2: one file per scenario, every vehicle on a timed polyline, beside the OpenDRIVE file of its road.
+
+A vehicle's reference point is the middle of its rear axle on the ground, x ahead, as the standard defines it; its bounding box
+says where the footprint lies about it. Trajectories are in absolute time from the start of the simulation: their start condition
+(simulation time at least 0) has no edge: a rising one would wait for a change that never comes, or comes a step late.
+A vehicle that arrives late is added to the simulation then, and one that leaves is deleted. The ego, if there is one, is placed,
+has its speed, and is left to the controller under test; its goal is a routing action.
+"""
+
+from datetime import datetime, UTC
+
+from scenario_gen.output.exchange.cases import Case, Exported
+from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.xml import add, Element, number, serialized
+from scenario_gen.types.body import height, is_truck, rear_axle, shifted, WHEELBASE
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.names import token
+from scenario_gen.types.scenario import Scenario
+
+EGO = "Ego"
+SPEEDS = "speed_mps"  # name of the property that holds a vehicle's speed at each vertex, for `scenario-gen import`
+WHEEL = 0.65  # metres of diameter
+LIMITS = {"maxSpeed": 70.0, "maxAcceleration": 10.0, "maxDeceleration": 10.0}  # beyond what any published scenario does
+STEERING = 0.7  # rad
+
+
+def write_openscenario(case: Case, one: Exported, road_file: str, export: ExportConfig = ExportConfig()) -> bytes:
+    """Return a scenario as the bytes of an OpenSCENARIO file; `road_file` names its OpenDRIVE file, beside it.
+
+    Raises:
+        RefusedError: the ego arrives late.
+    """
+    one.refuse_late_ego()
+    root = Element("OpenSCENARIO")
+    add(
+        root,
+        "FileHeader",
+        revMajor="1",
+        revMinor="2",
+        date=datetime.fromtimestamp(case.start_ns // 10**9, UTC).strftime("%Y-%m-%dT%H:%M:%S"),
+        description=f"{case.road_name}, scenario {one.index} of {case.namespace or '/'}, sha256 {one.sha256}",
+        author="scenario_gen",
+    )
+    add(root, "ParameterDeclarations")
+    add(root, "CatalogLocations")
+    add(add(root, "RoadNetwork"), "LogicFile", filepath=road_file)
+    entities = add(root, "Entities")
+    for n, vehicle in enumerate(one.others.vehicles):
+        _entity(entities, entity_name(vehicle), vehicle, _speeds(one.others, n))
+    if one.ego is not None:
+        _entity(entities, EGO, one.ego.vehicles[0], "")
+    storyboard = add(root, "Storyboard")
+    actions = add(add(storyboard, "Init"), "Actions")
+    for n in range(len(one.others.vehicles)):
+        if one.others.present[n, 0] == 0:
+            _placed(actions, entity_name(one.others.vehicles[n]), one.others, n)
+    if one.ego is not None:
+        _ego(actions, one.ego)
+    act = _story(storyboard)
+    for n in range(len(one.others.vehicles)):
+        _follow(act, one.others, n, export.following)
+    _start(act)
+    _at(add(storyboard, "StopTrigger"), "end", one.duration, "greaterThan")
+    return serialized(root)
+
+
+def entity_name(vehicle: Vehicle) -> str:
+    """Return how a vehicle is called in the file."""
+    return f"vehicle_{token(vehicle.id)}"
+
+
+def _speeds(scenario: Scenario, n: int) -> str:
+    """Return the speeds at a vehicle's vertices, which the format has no place for, as the text of a property."""
+    first, last = scenario.present[n].tolist()
+    return " ".join(map(number, scenario.speed[n, first : last + 1].tolist()))
+
+
+def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None:
+    kind = "truck" if is_truck(vehicle) else "car"
+    element = add(add(entities, "ScenarioObject", name=name), "Vehicle", name=kind, vehicleCategory=kind)
+    add(element, "ParameterDeclarations")
+    box = add(element, "BoundingBox")
+    add(box, "Center", x=rear_axle(vehicle), y=0.0, z=height(vehicle) / 2.0)
+    add(box, "Dimensions", length=vehicle.length, width=vehicle.width, height=height(vehicle))
+    add(element, "Performance", **LIMITS)
+    axles = add(element, "Axles")
+    track = 0.85 * vehicle.width
+    for tag, x, steering in (("FrontAxle", WHEELBASE * vehicle.length, STEERING), ("RearAxle", 0.0, 0.0)):
+        add(axles, tag, maxSteering=steering, wheelDiameter=WHEEL, trackWidth=track, positionX=x, positionZ=WHEEL / 2.0)
+    properties = add(element, "Properties")
+    if speeds:
+        add(properties, "Property", name=SPEEDS, value=speeds)
+
+
+def _pose(parent: Element, scenario: Scenario, n: int, k: int) -> None:
+    """Append where the reference point of vehicle `n` is at instant `k`."""
+    axle = shifted(scenario.position[n, k], scenario.heading[n, k], -rear_axle(scenario.vehicles[n]))
+    add(
+        add(parent, "Position"),
+        "WorldPosition",
+        x=float(axle[0]),
+        y=float(axle[1]),
+        z=0.0,
+        h=float(scenario.heading[n, k]),
+        p=0.0,
+        r=0.0,
+    )
+
+
+def _placed(actions: Element, name: str, scenario: Scenario, n: int) -> Element:
+    """Append a vehicle's place and speed at its first instant; return its initial actions."""
+    first = int(scenario.present[n, 0])
+    private = add(actions, "Private", entityRef=name)
+    _pose(add(add(private, "PrivateAction"), "TeleportAction"), scenario, n, first)
+    _speed(add(private, "PrivateAction"), float(scenario.speed[n, first]))
+    return private
+
+
+def _speed(action: Element, speed: float) -> None:
+    change = add(add(action, "LongitudinalAction"), "SpeedAction")
+    add(change, "SpeedActionDynamics", dynamicsShape="step", value=0.0, dynamicsDimension="time")
+    add(add(change, "SpeedActionTarget"), "AbsoluteTargetSpeed", value=speed)
+
+
+def _ego(actions: Element, ego: Scenario) -> None:
+    private = _placed(actions, EGO, ego, 0)
+    goal = add(add(add(private, "PrivateAction"), "RoutingAction"), "AcquirePositionAction")
+    _pose(goal, ego, 0, int(ego.present[0, 1]))
+
+
+def _story(storyboard: Element) -> Element:
+    return add(add(storyboard, "Story", name="story"), "Act", name="act")
+
+
+def _start(act: Element) -> None:
+    _at(add(act, "StartTrigger"), "start", 0.0, "greaterOrEqual")
+
+
+def _at(trigger: Element, name: str, seconds: float, rule: str) -> None:
+    """Append a condition on the simulation's time; it holds by its value, no edge is waited for."""
+    group = add(trigger, "ConditionGroup")
+    condition = add(group, "Condition", name=name, delay=0.0, conditionEdge="none")
+    add(add(condition, "ByValueCondition"), "SimulationTimeCondition", value=seconds, rule=rule)
+
+
+def _follow(act: Element, scenario: Scenario, n: int, mode: str) -> None:
+    """Append a vehicle's maneuver: it arrives, if it arrives late, follows its trajectory, and leaves, if it leaves early."""
+    vehicle = scenario.vehicles[n]
+    name = entity_name(vehicle)
+    first, last = scenario.present[n].tolist()
+    group = add(act, "ManeuverGroup", name=f"{name}_group", maximumExecutionCount=1)
+    add(add(group, "Actors", selectTriggeringEntities="false"), "EntityRef", entityRef=name)
+    maneuver = add(group, "Maneuver", name=f"{name}_maneuver")
+    begin, end = float(scenario.time[first]), float(scenario.time[last])
+    if first > 0:
+        event = add(maneuver, "Event", name=f"{name}_arrives", priority="parallel")
+        action = add(add(event, "Action", name=f"{name}_added"), "GlobalAction")
+        _pose(add(add(action, "EntityAction", entityRef=name), "AddEntityAction"), scenario, n, first)
+        _at(add(event, "StartTrigger"), f"{name}_arrival", begin, "greaterOrEqual")
+    event = add(maneuver, "Event", name=f"{name}_drives", priority="parallel" if first > 0 else "override")
+    routing = add(add(add(event, "Action", name=f"{name}_follows"), "PrivateAction"), "RoutingAction")
+    follow = add(routing, "FollowTrajectoryAction")
+    trajectory = add(add(follow, "TrajectoryRef"), "Trajectory", name=f"{name}_trajectory", closed="false")
+    add(trajectory, "ParameterDeclarations")
+    polyline = add(add(trajectory, "Shape"), "Polyline")
+    for k in range(first, last + 1):
+        _pose(add(polyline, "Vertex", time=float(scenario.time[k])), scenario, n, k)
+    reference = add(follow, "TimeReference")
+    add(reference, "Timing", domainAbsoluteRelative="absolute", scale=1.0, offset=0.0)
+    add(follow, "TrajectoryFollowingMode", followingMode=mode)
+    _at(add(event, "StartTrigger"), f"{name}_start", begin, "greaterOrEqual")
+    if last < len(scenario.time) - 1:
+        event = add(maneuver, "Event", name=f"{name}_leaves", priority="parallel")
+        action = add(add(event, "Action", name=f"{name}_deleted"), "GlobalAction")
+        add(add(action, "EntityAction", entityRef=name), "DeleteEntityAction")
+        _at(add(event, "StartTrigger"), f"{name}_departure", end, "greaterOrEqual")

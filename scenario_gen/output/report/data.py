@@ -1,0 +1,206 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the report draws, made small: trajectories as 16-bit integers, matrices as bytes, the road as runs of cells."""
+
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from scenario_gen.method.evaluation.dtw import mean_feature
+from scenario_gen.method.evaluation.motion import at_common, at_count
+from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.fit import Fit
+from scenario_gen.types.generation import GenerationResult, UNIFORM, WITHOUT
+from scenario_gen.types.road import Road
+from scenario_gen.types.route import Route
+from scenario_gen.types.scenario import Scenario
+from scenario_gen.types.segmentation import Segmentation
+
+FRAME_PERIOD = 0.2
+"""Seconds between the frames that are stored; the page interpolates between them."""
+MAX_FRAMES, MAX_CELLS, MATRIX_SIZE, MAX_PAIRS, MAX_ROUTE_POINTS = 240, 900, 72, 10, 200
+MOTION_PERIOD, MAX_MOTION_FRAMES, MAX_MOTION_SAMPLES = 0.1, 400, 12
+"""Speed and accelerations over time are stored more finely than the animation, of fewer samples."""
+
+
+def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
+    """Return all that one case draws, ready for JSON; at most `samples` scenarios of each arm."""
+    sets = {"with": case.generated, "without": case.references.get(WITHOUT), "uniform": case.references.get(UNIFORM)}
+    arms = {name: tuple(made.scenarios[:samples]) for name, made in sets.items() if made is not None}
+    covered = case.coverage
+    if covered is not None:  # the scenarios that stand out are always drawn
+        shown = {one.index for one in arms["with"]}
+        extra = {index for index in covered.picks.values() if index not in shown}
+        arms["with"] += tuple(one for one in case.generated.scenarios[samples:] if one.index in extra) if extra else ()
+    ids = [vehicle.id for vehicle in case.encounter.vehicles]
+    if case.oracle is not None:
+        arms["oracle"] = (case.oracle,)
+    longest = max([case.encounter.duration, *(float(s.time[-1]) for group in arms.values() for s in group)])
+    frames = min(MAX_FRAMES, int(np.ceil(longest / FRAME_PERIOD)) + 1)
+    return {
+        "row": case.row,
+        "vehicles": [{"id": v.id, "length": _short(v.length), "width": _short(v.width)} for v in case.encounter.vehicles],
+        "left_out": [n for n, known in enumerate(ids) if known not in case.evaluation.vehicles],
+        "road": road_data(case.road) if case.road else None,
+        "template": _template(case.encounter, case.segmentation, frames),
+        "fit": _fit(case.fit, case.routes) if case.fit else [],
+        "arms": {name: _trajectories(group, frames, ids) for name, group in arms.items() if group},
+        "motion": _motion(case.encounter, case.generated.scenarios[:MAX_MOTION_SAMPLES]),
+        "coverage": None if covered is None else covered.document(),
+        "features": _features(case.encounter, arms, case.evaluation.vehicles),
+    }
+
+
+def pack(values: Floats) -> dict[str, Any]:
+    """Pack an array (..., K), any unit, as 16-bit integers, each of its K columns with its own offset and step."""
+    flat = values.reshape(-1, values.shape[-1])
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    step = np.maximum((high - low) / 65535.0, 1e-9)
+    whole = np.round((flat - low) / step).astype("<u2")
+    return {
+        "shape": list(values.shape),
+        "low": [_short(value, 9) for value in low],
+        "step": [float(f"{value:.9g}") for value in step],
+        "data": b64encode(whole.tobytes()).decode("ascii"),
+    }
+
+
+def runs(mask: Bools) -> list[int]:
+    """Return the lengths of the runs of equal cells of a grid (H, W) in row order, the first of them False (possibly 0)."""
+    flat = mask.ravel()
+    edges = np.flatnonzero(np.diff(flat)) + 1
+    lengths = np.diff(np.concatenate([[0], edges, [flat.size]]))
+    return [int(length) for length in ([0, *lengths] if flat[0] else lengths)]
+
+
+def _short(value: float, digits: int = 3) -> float:
+    return round(float(value), digits)
+
+
+def road_data(road: Road) -> dict[str, Any]:
+    """Return the grid with cells merged until its longer side has at most MAX_CELLS; a merged cell is drivable by majority."""
+    factor = max(1, -(-max(road.drivable.shape) // MAX_CELLS))
+    height, width = (-(-side // factor) for side in road.drivable.shape)
+    padded = np.zeros((height * factor, width * factor))
+    padded[: road.drivable.shape[0], : road.drivable.shape[1]] = road.drivable
+    coarse = padded.reshape(height, factor, width, factor).mean(axis=(1, 3)) >= 0.5
+    return {
+        "name": road.name,
+        "cell": float(road.resolution * factor),
+        "origin": [_short(v) for v in road.origin],
+        "size": [width, height],
+        "runs": runs(coarse),
+    }
+
+
+def states(source: Encounter | Scenario, frames: int) -> Floats:
+    """Return (N, frames, 4) x, y [m], yaw [rad], speed [m/s] at instants spread evenly from start to end."""
+    motion = at_count(source, frames)
+    return np.concatenate([motion.position, motion.heading[..., None], motion.speed[..., None]], axis=-1)
+
+
+def _trajectories(scenarios: Sequence[Scenario], frames: int, ids: Sequence[str]) -> dict[str, Any]:
+    return {
+        "states": pack(np.stack([_whole(scenario, frames, ids) for scenario in scenarios])),
+        "there": [_there(scenario, ids) for scenario in scenarios],
+        "durations": [_short(scenario.time[-1]) for scenario in scenarios],
+        "index": [scenario.index for scenario in scenarios],
+    }
+
+
+def _there(source: Encounter | Scenario, ids: Sequence[str]) -> list[list[float]]:
+    """Return from which to which share of the duration each vehicle is there; one that is left out, throughout."""
+    own = [vehicle.id for vehicle in source.vehicles]
+    shares = source.time[source.present] / source.time[-1]
+    return [[_short(v, 5) for v in shares[own.index(known)]] if known in own else [0.0, 1.0] for known in ids]
+
+
+def _whole(scenario: Scenario, frames: int, ids: Sequence[str]) -> Floats:
+    """Return the states of all vehicles; in place of one that was left out stands the ego's witness.
+
+    Without a witness it is drawn where the first vehicle is, underneath it.
+    """
+    own = {vehicle.id: state for vehicle, state in zip(scenario.vehicles, states(scenario, frames), strict=True)}
+    track = next(iter(own.values())) if scenario.witness is None else states(scenario.witness, frames)[0]
+    return np.stack([own.get(known, track) for known in ids])
+
+
+def _motion(encounter: Encounter, scenarios: Sequence[Scenario]) -> list[dict[str, Any]]:
+    """Return for each vehicle speed, acceleration and lateral acceleration of the template and of the scenarios that have it."""
+    found = []
+    for n, vehicle in enumerate(encounter.vehicles):
+        rows = [(s, k) for s in scenarios for k, own in enumerate(s.vehicles) if own.id == vehicle.id]
+        samples = [_over_time(scenario, k) for scenario, k in rows]
+        index = [scenario.index for scenario, _ in rows]
+        found.append({"template": _over_time(encounter, n), "samples": samples, "index": index})
+    return found
+
+
+def _over_time(source: Encounter | Scenario, n: int) -> dict[str, Any]:
+    """Speed [m/s], acceleration and lateral acceleration (speed times yaw rate) [m/s²] of one vehicle while it is there."""
+    first, last = source.time[source.present[n]].tolist()
+    frames = min(MAX_MOTION_FRAMES, max(3, round((last - first) / MOTION_PERIOD) + 1))
+    time = np.linspace(first, last, frames)
+    speed, heading = (np.interp(time, source.time, values[n]) for values in (source.speed, source.heading))
+    rates = np.gradient(np.stack([speed, heading]), time, axis=1)
+    return {"from": _short(first), "to": _short(last), "values": pack(np.column_stack([speed, rates[0], speed * rates[1]]))}
+
+
+def _template(encounter: Encounter, segmentation: Segmentation, frames: int) -> dict[str, Any]:
+    bounds = [0, *segmentation.changepoints.tolist(), len(encounter.time) - 1]
+    step = max(1, -(-len(encounter.time) // 600))
+    probability = segmentation.changepoint_probability
+    padded = np.append(probability, np.zeros(-len(probability) % step)).reshape(-1, step)
+    return {
+        "states": pack(states(encounter, frames)[None]),
+        "durations": [_short(encounter.duration)],
+        "bounds": [_short(encounter.time[i]) for i in bounds],
+        "labels": [int(segmentation.labels[i]) for i in bounds[:-1]],
+        "descriptions": list(segmentation.descriptions),
+        "probability": [_short(value) for value in padded.max(axis=1)],
+        "probability_step": _short(step * encounter.dt, 6),
+    }
+
+
+def _fit(fit: Fit, routes: Sequence[Route]) -> list[dict[str, Any]]:
+    vehicles = []
+    for fitted, route in zip(fit.fitted, routes, strict=True):
+        keep = np.linspace(0, len(route.points) - 1, min(len(route.points), MAX_ROUTE_POINTS)).round().astype(np.int64)
+        vehicles.append(
+            {
+                "route": [[_short(x, 2), _short(y, 2)] for x, y, _ in route.points[keep]],
+                "anchors": [[_short(x, 2), _short(y, 2), _short(yaw)] for x, y, yaw in fitted.anchors],
+                "moved": [_short(value, 2) for value in fitted.moved],
+            }
+        )
+    return vehicles
+
+
+def _features(encounter: Encounter, arms: Mapping[str, Sequence[Scenario]], shared: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the paper's figure 5 for each pair of the `shared` vehicles: matrices of MATRIX_SIZE² bytes, 255 = 1."""
+    groups: dict[str, Sequence[Encounter | Scenario]] = {"template": [encounter], **arms}
+    pairs = []
+    rows = [n for n, vehicle in enumerate(encounter.vehicles) if vehicle.id in shared]
+    for pair in list(combinations(rows, 2))[:MAX_PAIRS]:
+        names = encounter.vehicles[pair[0]].id, encounter.vehicles[pair[1]].id
+        entry: dict[str, Any] = {"pair": list(pair), "position": {}, "speed": {}}
+        for name, group in groups.items():
+            common = [at_common(source, names, MATRIX_SIZE) for source in group]
+            motions = [motion for motion in common if motion is not None]
+            if not motions:
+                continue
+            place = [np.ascontiguousarray(np.stack([m.position[k].T for m in motions])) for k in (0, 1)]
+            pace = [np.stack([m.speed[k][None] for m in motions]) for k in (0, 1)]
+            entry["position"][name] = _bytes(mean_feature(place[0], place[1], "euclidean"))
+            entry["speed"][name] = _bytes(mean_feature(pace[0], pace[1], "manhattan"))
+        pairs.append(entry)
+    return pairs
+
+
+def _bytes(matrix: Floats) -> str:
+    return b64encode(np.round(255.0 * matrix).astype(np.uint8).tobytes()).decode("ascii")

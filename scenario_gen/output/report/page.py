@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The report: one HTML page that holds everything, opens offline and is a pleasure to look at."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from scenario_gen.base.folders import write_text
+from scenario_gen.output.report.data import case_data
+from scenario_gen.output.report.html import render_page
+from scenario_gen.types.evaluation import formatted, Interval
+from scenario_gen.types.generation import ERRORS, GenerationResult, NARROW, ORACLE, UNIFORM, WITHOUT
+from scenario_gen.types.reaction import NOT_KEPT
+from scenario_gen.types.route import Route, routes_in_words
+from scenario_gen.types.scenario import ScenarioSet
+
+SIGNIFICANT = 0.03
+"""Below this, E without changepoints leaves nothing to gain and the case is not counted."""
+MAX_SAMPLES = 50
+"""Scenarios of each arm that a page draws; the figures count all."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReportInput:
+    """A page.
+
+    Attributes:
+        cases: at least one.
+        title: heading and window title.
+        quality: the log's data quality, in lines.
+        provenance: log, its hash, seed, versions, parameters, by name.
+    """
+
+    cases: Sequence[GenerationResult]
+    title: str = "Generated encounters"
+    quality: Sequence[str] = ()
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+
+def write_report(path: Path, report: ReportInput) -> None:
+    """Write the page to `path`; the same input gives the same bytes."""
+    write_text(path, render(report))
+
+
+def render(report: ReportInput) -> str:
+    """Return the page as text."""
+    views = [_view(index, case) for index, case in enumerate(report.cases)]
+    return render_page(
+        "report.html.j2",
+        ("scene.js", "charts.js", "page.js"),
+        [case_data(case, MAX_SAMPLES) for case in report.cases],
+        report=report,
+        views=views,
+        verdict=_verdict(views),
+        significant=SIGNIFICANT,
+        facts=[fact for fact in report.provenance.items() if not _is_parameter(fact[0])],
+        parameters=[fact for fact in report.provenance.items() if _is_parameter(fact[0])],
+    )
+
+
+def _is_parameter(name: str) -> bool:
+    """Parameters have dotted names ("sampling.sigma_f"); they are many, and folded away."""
+    return "." in name and " " not in name
+
+
+def _view(index: int, case: GenerationResult) -> dict[str, Any]:
+    """Return what the page's tables say about one case."""
+    arms = [(case.row, case.generated), *((name, case.references.get(name)) for name in (WITHOUT, UNIFORM))]
+    evaluation = case.evaluation
+    duration = case.encounter.duration
+    bounds = [*(float(case.encounter.time[i]) for i in (0, *case.segmentation.changepoints)), duration]
+    routes: Sequence[Route | None] = case.routes or [None] * len(case.encounter.vehicles)
+    vehicles = zip(case.encounter.vehicles, case.fit.fitted, routes, strict=True) if case.fit else ()
+    return {
+        "index": index,
+        "case": case,
+        "title": case.title,
+        "without": case.references.get(WITHOUT),
+        "refused": [case.refusals.get(name, "") for name in (WITHOUT, UNIFORM)],
+        "arms": [(name, made, _causes(made)) for name, made in arms if made is not None],
+        "rows": [*evaluation.rows[1:], evaluation.rows[0]],
+        "metrics": evaluation.metrics,
+        "ego": case.generated.ego.vehicle.id if case.generated.ego else "",
+        "k": len(case.segmentation.changepoints),
+        "remark": case.segmentation.remark(duration),
+        "rate": len(case.segmentation.changepoints) / duration,
+        "errors": {key: _errors(case, key) for key in ERRORS},
+        "best": {key: case.best(key) for key in ERRORS},
+        "reactions": case.reacting,
+        "not_kept": [said for said in case.generated.adaptations if said.startswith(NOT_KEPT)],
+        "outdone": case.similarity()["said"],
+        "segments": [
+            {"from": bounds[k], "to": bounds[k + 1], "label": int(case.segmentation.labels[start]), "text": text}
+            for k, (start, text) in enumerate(
+                zip((0, *case.segmentation.changepoints), case.segmentation.descriptions, strict=True)
+            )
+        ],
+        "vehicles": [
+            {
+                "id": v.id,
+                "manoeuvre": f.manoeuvre,
+                "scale": f.scale,
+                "moved": float(f.moved.max()),
+                "turned": f.figures(),
+                "dwells": int(sum(f.stands)),
+                "route": r.figures() if r else {},
+            }
+            for v, f, r in vehicles
+        ],
+        "remarks": [said for v, r in zip(case.encounter.vehicles, case.routes, strict=False) for said in r.remarks(v.id)],
+        "lost": [loss.said for loss in case.fit.lost] if case.fit else [],
+        "planned": routes_in_words(case.routes),
+    }
+
+
+def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
+    """E of the delivered set, and what stands below it: each with its words and whether it is the best of what is compared."""
+    best = case.best(metric)
+    words = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "preset narrow", ORACLE: "replayed"}
+    found = {row: formatted(Interval(case.evaluation.value(row, metric)), "") for row in words if case.evaluation.row(row)}
+    return {
+        "own": formatted(Interval(case.evaluation.value(case.row, metric)), ""),
+        "kind": "" if not best else "good" if best == case.row else "bad",
+        "beside": [(f"{value} {words[row]}", row == best) for row, value in found.items() if value != "–"],
+    }
+
+
+def _causes(made: ScenarioSet) -> list[tuple[str, int]]:
+    """Return the causes of refusal, the most frequent first."""
+    return sorted(
+        ((cause.value.replace("_", " "), count) for cause, count in made.refused.items() if count), key=lambda c: (-c[1], c[0])
+    )
+
+
+def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the page's first sentences in figures: how many were accepted, and where E is below what it is compared with."""
+    better: dict[str, dict[str, tuple[int, int]]] = {}
+    for row, words in ((WITHOUT, "without changepoints"), (UNIFORM, "with as many evenly spaced ones")):
+        cases = [view["case"] for view in views if row in view["case"].compared]
+        for key, what in ERRORS.items():
+            pairs = [(case.evaluation.value(case.row, key), case.evaluation.value(row, key)) for case in cases]
+            known = [one < other for one, other in pairs if other >= SIGNIFICANT]
+            if known:
+                better.setdefault(words, {})[what] = (sum(known), len(known))
+    sets = [view["case"].generated for view in views]
+    return {
+        "published": sum(view["case"].published for view in views),
+        "requested": sum(made.requested for made in sets),
+        "candidates": sum(made.candidates for made in sets),
+        "better": better,
+    }

@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The end of a run on one screen of the terminal."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+import math
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from scenario_gen.base.errors import printable
+from scenario_gen.types.evaluation import formatted, Interval
+from scenario_gen.types.generation import ERRORS, GenerationResult, NARROW, ORACLE, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.reaction import NOT_KEPT
+from scenario_gen.types.route import routes_in_words
+from scenario_gen.types.scenario import Cause
+
+SHORT = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "narrow", ORACLE: "replayed"}
+
+
+def summary(cases: Sequence[GenerationResult]) -> RenderableType:
+    """Return two lines per case and what was refused, for rich to print; names are long, so no table."""
+    lines = [line for case in cases for line in _case(case)]
+    refused: Counter[Cause] = sum((case.generated.refused for case in cases), Counter())
+    causes = ", ".join(
+        f"{count} {cause.value.replace('_', ' ')}" for cause, count in sorted(refused.items(), key=lambda c: (-c[1], c[0]))
+    )
+    return Group(
+        *lines,
+        Text(f"refused candidates: {causes}" if causes else "no candidate was refused"),
+        Text(
+            "K: changepoints. E: distance of the delivered set to the template, lower is nearer; after | of sets drawn likewise, "
+            "without changepoints and with K evenly spaced; in brackets, not compared: preset narrow, the template replayed.",
+            style="dim",
+        ),
+    )
+
+
+def _case(case: GenerationResult) -> list[Text]:
+    """The name of a case, its figures, and what is to be said of its segmentation."""
+    made, found = case.generated, case.evaluation.row(WITH)
+    order = formatted(found.values.get("order_kept"), "%", bounds=False) if found else "–"
+    title = Text(printable(case.title), style="bold")
+    title.append(f"  {len(case.encounter.vehicles)} vehicles, {case.encounter.duration:.1f} s", style="dim")
+    complete = len(made.scenarios) >= made.requested
+    measured = f" (of {found.samples:,}, evenly spaced)" if found and found.samples < len(made.scenarios) else ""
+    figures = Text.assemble(
+        "  ",
+        (f"{len(made.scenarios)}/{made.requested} valid", "green" if complete else "red"),
+        f" of {made.candidates}  K {len(case.segmentation.changepoints)}"
+        f"  order {order if order == '–' else order + ' %'}{measured}",
+    )
+    kept = [] if found is None else _not_kept(found.values)
+    remark = case.segmentation.remark(case.encounter.duration)
+    lost = [f"lost on this road: {loss.said}" for loss in case.fit.lost] if case.fit else []
+    vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
+    routes = [said for vehicle, route in vehicles for said in route.remarks(vehicle.id)]
+    planned = routes_in_words(case.routes)
+    if planned:
+        figures.append(f"  routes: {planned}")
+    similar = [_errors(case, metric) for metric in ERRORS if found and metric in found.values]
+    kept += case.similarity()["said"]
+    kept += [said for said in made.adaptations if said.startswith(NOT_KEPT)]
+    reactions = case.reacting["sentences"]
+    return [
+        title,
+        figures,
+        *(Text(f"  {printable(line)}") for line in reactions),
+        *similar,
+        *(Text(f"  {printable(line)}", style="yellow") for line in (*lost, *kept, *routes, *([remark] if remark else []))),
+    ]
+
+
+def _not_kept(values: Mapping[str, Interval]) -> list[str]:
+    """Say what of the template the samples have not: turns, conflicts."""
+    turns, vanished, conflicts = (
+        values.get(key, Interval(math.nan)).value for key in ("turn_kept", "vanished_conflicts", "conflicts")
+    )
+    said = [f"{100.0 * (1.0 - turns):.3g} % of the vehicles turn otherwise than in the template"] if turns < 1.0 else []
+    if vanished > 0.0:
+        said.append(f"{vanished:.3g} of the template's {vanished + conflicts:.0f} conflict(s) vanish, mean over samples")
+    return said
+
+
+def _errors(case: GenerationResult, metric: str) -> Text:
+    """E of the delivered set, of those it is compared with and of those beside it; the best of the compared is green."""
+    compared, best, value = case.compared, case.best(metric), case.evaluation.value
+    text = Text(f"  E {ERRORS[metric]} ")
+    text.append(_figure(value(case.row, metric)), style="bold green" if best == case.row else "bold")
+    for k, row in enumerate(compared[1:]):
+        text.append(" | " if k == 0 else ", ").append(f"{SHORT[row]} ")
+        text.append(_figure(value(row, metric)), style="green" if best == row else "")
+    beside = [row for row in SHORT if row not in compared and case.evaluation.row(row) is not None]
+    if beside:
+        text.append(f" ({', '.join(f'{SHORT[row]} {_figure(value(row, metric))}' for row in beside)})", style="dim")
+    return text
+
+
+def _figure(value: float) -> str:
+    return f"{value:.3f}" if math.isfinite(value) else "–"

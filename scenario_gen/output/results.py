@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a request leaves behind: a bag, a report and the figures."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+import json
+from pathlib import Path
+from typing import Any
+
+from scenario_gen.bags.recordings.provenance import parameter_texts, versions
+from scenario_gen.bags.recordings.read import INFO, read_recording
+from scenario_gen.bags.recordings.write import add_results
+from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.bags.storage.writer import BagWriter
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.folders import Kind, sha256_of, write_text
+from scenario_gen.base.parameters import flatten
+from scenario_gen.method.evaluation import read_evaluations
+from scenario_gen.output.report.page import ReportInput, write_report
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.types.evaluation import as_markdown
+from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types.request import Request
+
+BAG, REPORT, FIGURES, TABLE = "bag", "report.html", "evaluation.json", "evaluation.md"
+
+
+def write_results(
+    folder: Path,
+    cases: Sequence[GenerationResult],
+    *,
+    seed: int,
+    title: str,
+    quality: Sequence[str],
+    provenance: Mapping[str, str],
+) -> None:
+    """Write bag, report and figures of all cases to `folder`.
+
+    Args:
+        folder: that `replaced_folder` gives; if it has a bag already, which was recorded, that one stays.
+        cases: one per encounter and road; with several, each has its own namespace in the bag.
+        seed: of the request.
+        title: heading of the report.
+        quality: the log's data-quality summary, in lines.
+        provenance: what is needed to do it again.
+
+    Raises:
+        OSError: the disk is full, or fails.
+    """
+    if not (folder / BAG).exists():
+        names = namespaces(len(cases))
+        with BagWriter(folder / BAG) as bag:
+            add_results(bag, {name: replace(case, provenance=provenance) for name, case in zip(names, cases, strict=True)})
+    write_report(folder / REPORT, ReportInput(cases, title, quality, provenance))
+    figures = {"provenance": dict(provenance), "cases": [_figures(case) for case in cases]}
+    write_text(folder / FIGURES, json.dumps(figures, indent=2) + "\n")
+
+
+def _figures(case: GenerationResult) -> dict[str, Any]:
+    """Return a case's E beside what it is compared with, who reacts to whom, its evaluation, and what the stages did."""
+    vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
+    said = {"similarity": case.similarity(), "reactions": case.reacting}
+    figures: dict[str, Any] = {**said, **json.loads(case.evaluation.to_json()), "adaptations": list(case.generated.adaptations)}
+    fit = {} if case.fit is None else case.fit.figures()
+    coverage = {} if case.coverage is None else case.coverage.document()
+    reached = {} if case.generated.reached is None else case.generated.reached.figures()
+    weights = {str(one.index): one.facts["weight"] for one in case.generated.scenarios if "weight" in one.facts}
+    figures |= {"coverage": coverage, "target": {**reached, "weights": weights} if reached else {}}
+    return figures | {"fit": fit, "routes": {vehicle.id: route.figures() for vehicle, route in vehicles}}
+
+
+def write_evaluation(folder: Path, cases: Sequence[GenerationResult], bag: Path, config: BagConfig) -> None:
+    """Write report, figures and table of what a bag was found to hold to `folder`, which `replaced_folder` gives.
+
+    Raises:
+        OSError: the disk is full, or fails.
+    """
+    write_text(folder / TABLE, as_table(cases) + "\n")
+    write_text(folder / FIGURES, json.dumps({"cases": [_figures(case) for case in cases]}, indent=2) + "\n")
+    facts = {f"bag {bag.name}": f"sha256 {sha256_of(bag)}"} | read_recording(bag, config, (INFO,)).provenance
+    write_report(folder / REPORT, ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts))
+
+
+def as_table(cases: Sequence[GenerationResult]) -> str:
+    """Return the figures of all cases as Markdown."""
+    return "\n\n".join(f"{case.evaluation.to_markdown()}\n{_reactions(case)}" for case in cases)
+
+
+def _reactions(case: GenerationResult) -> str:
+    said = case.reacting["sentences"]
+    return "\n".join(["Who reacts to whom in the template:", "", *(f"- {as_markdown(line)}" for line in said)]) if said else ""
+
+
+def _is_generated(folder: Path) -> bool:
+    """Say whether a folder without a marker is what `write_results` left there: these names, and its figures."""
+    if {path.name for path in folder.iterdir()} != {BAG, REPORT, FIGURES} or not (folder / BAG).is_dir():
+        return False
+    names = {path.name for path in (folder / BAG).iterdir()}
+    files = {f"{BAG}_{k}.mcap" for k in range(len(names) - 1)}
+    return names == {"metadata.yaml", *files} and _has_figures(folder, {"provenance", "cases"})
+
+
+def _is_evaluated(folder: Path) -> bool:
+    """Say the same of `write_evaluation`."""
+    return {path.name for path in folder.iterdir()} == {TABLE, REPORT, FIGURES} and _has_figures(folder, {"cases"})
+
+
+def _has_figures(folder: Path, keys: set[str]) -> bool:
+    try:
+        document = json.loads((folder / FIGURES).read_text(encoding="utf-8"))
+        read_evaluations(folder)
+    except (OSError, ValueError, InputError):
+        return False
+    return set(document) == keys and {"scenario_gen", "seed"} <= set(document.get("provenance", ("scenario_gen", "seed")))
+
+
+GENERATED = Kind("generated", _is_generated)
+EVALUATED = Kind("evaluated", _is_evaluated)
+
+
+def namespaces(count: int) -> list[str]:
+    """Return one ROS namespace per case; a single case needs none."""
+    return [""] if count == 1 else [f"/case_{k + 1}" for k in range(count)]
+
+
+def provenance_of(
+    logs: Sequence[Path],
+    seed: int,
+    count: int,
+    roads: Sequence[str],
+    config: PipelineConfig,
+    request: Request = Request(),
+) -> dict[str, str]:
+    """Return everything needed to do it again: log hashes, seed, versions, the request and all parameters."""
+    facts = {f"log {path.name}": f"sha256 {sha256_of(path)}" for path in logs}
+    facts |= {"roads": ", ".join(roads), "seed": str(seed), "count": str(count)}
+    facts |= {name: value for name, (_, value) in flatten(request).items() if value}
+    return facts | versions() | parameter_texts(config)

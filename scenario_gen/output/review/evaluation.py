@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The evaluation of any bag that keeps the conventions of the suite, ours or not."""
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from scenario_gen.bags.recordings.read import Namespace, NO_ENTRY, read_recording, SCENARIOS
+from scenario_gen.bags.storage.bag import within
+from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.base.errors import InputError
+from scenario_gen.method.evaluation import coverage_of, evaluate_scenarios, EvaluationConfig
+from scenario_gen.method.validity import Checker, Limits
+from scenario_gen.output.review.validation import kept_reactions, Reference
+from scenario_gen.template.interaction import find_conflicts, find_waits, orders_asked
+from scenario_gen.template.reactions import reactions_of
+from scenario_gen.types.ego import together
+from scenario_gen.types.evaluation import CheckCounts
+from scenario_gen.types.generation import GenerationResult, WITHOUT
+from scenario_gen.types.presence import at_ends
+from scenario_gen.types.scenario import EgoSlot, Scenario, ScenarioSet, Verdict
+
+
+def bag_results(
+    path: Path, config: EvaluationConfig | None = None, limits: Limits | None = None, seed: int = 0, bag: BagConfig = BagConfig()
+) -> tuple[GenerationResult, ...]:
+    """Evaluate every namespace of a bag that holds both `tracks` and `scenarios`, ready for the report.
+
+    The scenarios are checked anew, on the bag's map if it has one; start and end states are not asked. What the bag does not say
+    is left out: without `changepoints` K counts as 0; fit and routes are shown if both are there, with what the fitting decided.
+
+    Raises:
+        InputError: the bag is missing or damaged, or no namespace has both topics.
+    """
+    namespaces = read_recording(path, bag).namespaces.values()
+    whole = [one for one in namespaces if {"tracks", SCENARIOS} <= one.messages.keys()]
+    if not whole:
+        raise InputError(f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare")
+    with within(path):
+        return tuple(_result(one, config or EvaluationConfig(), limits, seed) for one in whole)
+
+
+def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | None, seed: int) -> GenerationResult:
+    encounter, segmentation, road = namespace.encounter, namespace.segmentation, namespace.road
+    fit, routes = namespace.fit
+    graph = reactions_of(encounter)
+    scenarios = tuple(namespace.scenario(k)[1] for k in range(len(namespace.hashes)))
+    counts = CheckCounts.of_verdicts(_verdicts(namespace, scenarios, limits))
+    evaluation = evaluate_scenarios(
+        encounter,
+        {SCENARIOS: scenarios},
+        changepoints=len(segmentation.changepoints),
+        checks={SCENARIOS: counts},
+        road=road.name if road else "",
+        config=config,
+        seed=seed,
+    )
+    notes = list(namespace.missing)
+    lost = sum(entry is None for entry in namespace.unknown.values())
+    if lost:
+        notes.append(f"{lost} of {len(scenarios)} scenarios are unaccounted: {NO_ENTRY}")
+    rows = [replace(row, notes=(*row.notes, *notes)) if row.name == SCENARIOS else row for row in evaluation.rows]
+    evaluation = replace(evaluation, rows=tuple(rows))
+    ego, track = None, namespace.ego_track
+    if track is not None and track.vehicles[0].id not in evaluation.vehicles:  # else of another request than these scenarios
+        scenarios = tuple(one if one.witness else replace(one, witness=track) for one in scenarios)  # to be drawn
+    witness = next((one.witness for one in scenarios if one.witness is not None), None)
+    if witness is not None:
+        first, last = (np.array([*witness.position[0, k], witness.heading[0, k], witness.speed[0, k]]) for k in (0, -1))
+        ego = EgoSlot(witness.vehicles[0], first, last)
+    names = [vehicle.id for vehicle in encounter.vehicles]
+    held = [kept_reactions(encounter, names, namespace.entry(k)) for k in range(len(scenarios))]
+    generated = ScenarioSet(
+        len(scenarios), scenarios, counts.candidates, Counter(counts.refused), _left_out(namespace), ego,
+        reactions=tuple(edge for edge in graph.edges if all(edge in kept for kept in held)), graph=graph,
+    )  # fmt: skip
+    return GenerationResult(
+        encounter,
+        segmentation,
+        road,
+        fit=fit,
+        routes=routes,
+        generated=generated,
+        evaluation=evaluation,
+        refusals={WITHOUT: "the bag holds one set of scenarios"},
+        row=SCENARIOS,
+        valid=counts.candidates - sum(counts.refused.values()),
+        coverage=coverage_of(encounter, scenarios),
+    )
+
+
+def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Limits | None) -> list[Verdict]:
+    """Check every scenario; an ego may have been left out of one, and its map be another than the newest."""
+    encounter = namespace.encounter
+    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
+    waits = find_waits(encounter) if namespace.segmentation.changepoints.size else ()
+    names = tuple(vehicle.id for vehicle in encounter.vehicles)
+    checkers: dict[tuple[object, ...], Checker] = {}
+    verdicts: list[Verdict] = []
+    for k, one in enumerate(scenarios):
+        entry = namespace.entry(k)
+        map_hash = entry.map_hash if entry else None
+        scenario = together(one)
+        order = entry.order if entry else "keep"
+        reactions = kept_reactions(encounter, names, entry)
+        key = (map_hash or "", order, *reactions, *(vehicle.id for vehicle in scenario.vehicles))
+        if key not in checkers:
+            road = namespace.road
+            if namespace.roads_differ:
+                road = namespace.road_of(entry, encounter.start_ns) if map_hash else None
+            first, ends = orders_asked(conflicts, order), at_ends(encounter.present, len(encounter.time))
+            reference = Reference(road, names, tuple(conflicts), waits, first, reactions, ends=ends)
+            checkers[key] = reference.checker(scenario, limits, None)
+        verdicts += checkers[key].check([scenario])
+    return verdicts
+
+
+def _left_out(namespace: Namespace) -> tuple[str, ...]:
+    """Say what the bag has not, and what follows from it; and what its requests say they came to."""
+    said = ["all scenarios of the bag are shown and measured, valid or not; start and end states were not asked"]
+    if "map" not in namespace.messages:
+        said.append("the bag has no map: whether vehicles leave the road was not checked")
+    if "changepoints" not in namespace.messages:
+        said.append("the bag has no changepoints: the template counts as one primitive, and its waits were not asked")
+    return (*said, *(summary.sentence() for summary in namespace.summaries))

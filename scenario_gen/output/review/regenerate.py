@@ -1,0 +1,230 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""One published scenario again, bit for bit, from what its bag says: template, road, parameters, seed and index."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from scenario_gen.bags.recordings.provenance import read_parameters, versions
+from scenario_gen.bags.recordings.read import INFO, Namespace, read_recording, RequestSummary, ScenarioEntry
+from scenario_gen.bags.recordings.template import decode_template, missing_topics
+from scenario_gen.bags.recordings.write import add_message, same_tracks, scenario_bytes
+from scenario_gen.bags.storage.bag import bag_topics, BagMessage, within
+from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.bags.storage.writer import atomic_bag
+from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.folders import Kind, sha256_of
+from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.method.evaluation.measures import MEASURES
+from scenario_gen.method.fitting import fit_template, FittingConfig
+from scenario_gen.method.routing import plan_routes, PlanningConfig
+from scenario_gen.method.sampling import freed_states, kept_reactions, regenerate, SamplingConfig
+from scenario_gen.method.segmentation import segment, SegmentationConfig
+from scenario_gen.method.validity import Checker, Limits
+from scenario_gen.template.interaction import waits_to_keep
+from scenario_gen.template.side import mirrored
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types.request import Request
+from scenario_gen.types.scenario import Scenario
+from scenario_gen.types.segmentation import Segmentation
+
+TEMPLATE = ("tracks", "changepoints", "map", "fit")
+
+
+@dataclass(frozen=True, eq=False)
+class Regenerated:
+    """A scenario made again.
+
+    Attributes:
+        scenario: the same as in the bag, its witness too; data: its CDR bytes, whose SHA-256 is that in `scenarios/info`.
+        messages: those of the bag that belong to it (template, road, routes, its own, its entry), for a bag of its own.
+        sha256: of `data`.
+    """
+
+    scenario: Scenario
+    data: bytes
+    messages: tuple[BagMessage, ...]
+    sha256: str
+
+
+def regenerate_scenario(
+    bag: Path,
+    index: int,
+    *,
+    namespace: str | None = None,
+    request: str | None = None,
+    log: Path | None = None,
+    config: BagConfig = BagConfig(),
+) -> Regenerated:
+    """Make scenario `index` of a bag again and compare it with the recorded SHA-256.
+
+    Everything is taken from the bag; where `log` is given, tracks and changepoints are made from that file instead, so that
+    the whole chain is repeated.
+
+    Args:
+        bag: its folder.
+        index: as in `scenarios/info`.
+        namespace: where several hold such an index.
+        request: id, likewise.
+        log: the raw log.
+        config: what is read of the bag at most.
+
+    Raises:
+        InputError: the bag, the index, or something that is needed is not there or ambiguous; the log is another one.
+        ScenarioGenError: it comes out differently (another version); the message names what differs.
+    """
+    with within(bag):
+        found = _find(bag, index, namespace, request, config)
+        return _regenerate(found, f"{bag}: request {found.entry.request}", log)
+
+
+def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
+    """Make the scenario that was found; `what` names bag and request in messages."""
+    values, seed, index = found.summary.values, found.entry.seed, found.entry.index
+    asked = Request(**{entry.name: values.get(entry.name, str(entry.default)) for entry in fields(Request)})
+    template = found.template(what)
+    encounter, segmentation, routes, (road, fit) = template.encounter, template.segmentation, template.routes, template.placed()
+    if log is not None:
+        encounter, segmentation = _from_log(log, encounter, found.summary, seed, what)
+    sampling = read_parameters(SamplingConfig(), values, "sampling.", what)
+    if asked.moves or log is not None:  # what the bag has on `fit` need not be this request's
+        fitting = read_parameters(FittingConfig(), values, "fitting.", what)
+        planning = read_parameters(PlanningConfig(), values, "planning.", what)
+        fit = fit_template(encounter, segmentation, road, fitting, request=asked, max_speed=sampling.max_speed)
+        routes = plan_routes(road, fit, planning, seed)
+    waits = waits_to_keep(encounter, segmentation)
+    states = freed_states(fit.asked, encounter, sampling, asked)
+    check = None
+    if asked.target or asked.order == "swap":  # a proposal is found again with them
+        limits = read_parameters(Limits(), values, "limits.", what)
+        graph = kept_reactions(encounter, sampling, asked.order)
+        edges = graph.edges if graph is not None else ()
+        check = Checker.of_template(encounter, road, states, waits, limits, asked.order, edges).check
+    scenario = regenerate(
+        encounter, segmentation, road, routes, states, sampling, seed=seed, index=index, waits=waits, request=asked,
+        check=check, measures=MEASURES,
+    )  # fmt: skip
+    data, sha256 = (b"", "") if scenario is None else scenario_bytes(scenario, encounter)
+    witness = None if scenario is None else scenario.witness
+    own = "" if witness is None else scenario_bytes(witness, encounter)[1]
+    if scenario is None or sha256 != found.entry.sha256 or own != found.entry.witness:
+        now = versions()
+        other = [f"{name} {values[name]} there, {now[name]} here" for name in now if values.get(name, now[name]) != now[name]]
+        why = ", ".join(other) or "the versions agree, so the bag was changed"
+        raise ScenarioGenError(f"{what}: scenario {index} comes out differently: {why}")
+    return Regenerated(scenario, data, found.messages, sha256)
+
+
+def write_regenerated(made: Regenerated, folder: Path, inputs: Sequence[Path] = ()) -> Path:
+    """Write the scenario, its entry and its template to a bag of its own; return `folder`.
+
+    Args:
+        made: the scenario.
+        folder: of the bag; one that this function wrote there earlier is replaced.
+        inputs: the bag, and the log, it was made from.
+
+    Raises:
+        InputError: the folder is there and is something else, holds an input, or cannot be written.
+    """
+    with atomic_bag(folder, REGENERATED, inputs) as bag:
+        for message in made.messages:
+            add_message(bag, message.topic, message.data, message.stamp_ns)
+    return folder
+
+
+def _is_regenerated(folder: Path) -> bool:
+    """Say whether a bag without a marker was written by `write_regenerated`.
+
+    Nothing is there but one file; every topic is one of the template's with one message, but for `scenarios/info`, whose entry
+    and summary were logged at the same instant: those of a recording never are.
+    """
+    if {path.name for path in folder.iterdir()} != {"metadata.yaml", f"{folder.name}_0.mcap"}:
+        return False
+    try:
+        (namespace,) = read_recording(folder).namespaces.values()
+        (one, _), (closing, (summary,)) = namespace.infos
+    except (InputError, ValueError):
+        return False
+    topics = {topic: len(messages) for topic, messages in namespace.messages.items() if topic != INFO}
+    known = not topics.keys() & {"posterior", "fit/info", "diagnostics"} and len(bag_topics(folder)) == len(topics) + 1
+    whole = {"scenarios", *TEMPLATE} <= set(topics) and set(topics.values()) == {1}
+    return known and whole and isinstance(summary, RequestSummary) and summary.published == 1 and one.stamp_ns == closing.stamp_ns
+
+
+REGENERATED = Kind("regenerated bag", _is_regenerated)
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A scenario's entry in a bag, the summary of its request, and the messages that belong to it, its own among them."""
+
+    namespace: Namespace
+    entry: ScenarioEntry
+    summary: RequestSummary
+    messages: tuple[BagMessage, ...]
+
+    def template(self, what: str) -> GenerationResult:
+        """Return the template.
+
+        Raises:
+            InputError: a message that is needed is damaged, or not in the bag.
+        """
+        newest = {message.topic.removeprefix(self.namespace.where("")): message.data for message in self.messages}
+        missing = missing_topics(newest)
+        if missing:
+            raise InputError(f"{what} cannot be made again: the bag has no {', '.join(missing)} with the scenario's stamp")
+        return decode_template(newest)
+
+
+def _find(bag: Path, index: int, namespace: str | None, request: str | None, config: BagConfig) -> _Found:
+    """Find the one scenario of that index.
+
+    Raises:
+        InputError: there is none, several, or its request was not closed.
+    """
+    namespaces = read_recording(bag, config).namespaces.values()
+    entries = []
+    for one in namespaces:
+        one.check_infos()
+        entries += [(one, info, message) for message, infos in one.infos for info in infos if isinstance(info, ScenarioEntry)]
+    if not entries:
+        raise InputError(f"{bag}: no scenario has an entry on `{INFO}`; only what this suite published can be made again")
+    own = [found for found in entries if namespace in (None, found[0].name) and request in (None, found[1].request)]
+    same = [found for found in own if found[1].index == index]
+    if not same:
+        known = sorted({entry.index for _, entry, _ in own})
+        some = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")
+        raise InputError(f"{bag}: no scenario of index {index}; there are: {some or 'none in that namespace and request'}")
+    if len(same) > 1:
+        places = "; ".join(f"--namespace '{where.name}' --request {entry.request}" for where, entry, _ in same)
+        raise InputError(f"{bag}: {len(same)} scenarios have index {index}; choose one: {places}")
+    ((where, entry, info),) = same
+    summary = next((one for one in reversed(where.summaries) if one.request == entry.request), None)
+    if summary is None:
+        raise InputError(f"{bag}: request {entry.request} was not closed on {where.where(INFO)}: its parameters are missing")
+    return _Found(where, entry, summary, where.messages_of(info, entry, summary))
+
+
+def _from_log(log: Path, recorded: Encounter, summary: RequestSummary, seed: int, what: str) -> tuple[Encounter, Segmentation]:
+    """The template and its changepoints from the raw log.
+
+    Raises:
+        InputError: it is not the log that the bag was made from, or the bag does not say which that was.
+    """
+    known = {name: text.removeprefix("sha256 ") for name, text in summary.values.items() if name.startswith("log ")}
+    if not known:
+        raise InputError(f"{what}: the bag does not say which log it was made from (nodes do not know it); leave --log out")
+    own = sha256_of(log) if log.exists() else ""
+    if own not in known.values():
+        there = ", ".join(f"{name.removeprefix('log ')} (sha256 {text})" for name, text in known.items())
+        is_missing = "is not there" if not own else f"has sha256 {own}: it is another file, or was changed"
+        raise InputError(f"{log} {is_missing}; the bag was made from {there}")
+    config = read_parameters(LogConfig(), summary.values, "log.", what)
+    images = (each for e in read_log(log, config).encounters if e.start_ns == recorded.start_ns for each in (e, mirrored(e)))
+    same = [e for e in images if same_tracks(e, recorded)]
+    if not same:
+        raise InputError(f"{log}: no encounter in it is the one on the bag's tracks, though the file is the same")
+    return same[0], segment(same[0], read_parameters(SegmentationConfig(), summary.values, "segmentation.", what), seed)

@@ -1,0 +1,209 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Is every scenario of a bag valid? For any bag of the conventions, ours or not.
+
+A scenario is checked against what bears its stamp in its own namespace: the states asked of it and how far they may be left
+(its own in `scenarios/info`), the conflicts and waits of its template (`tracks`; waits if there are `changepoints`), in the
+order that was asked, and the road: the `map` that its entry on `scenarios/info` names by hash, else the newest one of the
+stamp, or of all. What is not there is not checked, and said. Vehicles are matched by id, so one may be left out for an ego;
+with its witness, all are checked together. Where there are entries, a scenario is not to stand in the place of another that was
+published; one without any entry is counted, and checked as far as that goes.
+"""
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from scenario_gen.bags.recordings.read import INFO, Namespace, read_recording, ScenarioEntry, SCENARIOS, WITNESS
+from scenario_gen.bags.storage.bag import within
+from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.base.errors import InputError
+from scenario_gen.method.validity import Checker, Limits
+from scenario_gen.numerics.arrays import Bools
+from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, orders_asked, Wait
+from scenario_gen.template.reactions import reactions_of
+from scenario_gen.types.ego import together
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.names import tokens
+from scenario_gen.types.presence import at_ends
+from scenario_gen.types.reaction import Reaction
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario
+
+UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
+NO_WITNESS = f"the ego: its witness is not on {WITNESS}"
+ALTERED = "altered_message"  # not the bytes that scenarios/info has an entry for
+
+
+@dataclass
+class Found:
+    """How many scenarios have violations of one cause, and the first of them."""
+
+    count: int
+    scenario: int
+    message: str
+
+
+@dataclass
+class Validation:
+    """What was found in one namespace: `found` by cause; `left_out` says what could not be checked, and of how many scenarios.
+
+    `unaccounted` scenarios have no entry on `scenarios/info`, though others have; they are valid if nothing else is wrong.
+    `missing` says which requests are not there whole, `proven` how many scenarios keep each reaction that their entries name.
+    """
+
+    namespace: str
+    scenarios: int = 0
+    invalid: int = 0
+    unaccounted: int = 0
+    found: dict[str, Found] = field(default_factory=dict)
+    left_out: dict[str, int] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()
+    proven: Counter[str] = field(default_factory=Counter)
+
+    def add(self, index: int, violations: Sequence[tuple[str, str]], left_out: Collection[str]) -> None:
+        """Count one scenario with its violations (cause, sentence)."""
+        self.scenarios += 1
+        self.invalid += bool(violations)
+        for cause in dict.fromkeys(cause for cause, _ in violations):
+            first = next(message for other, message in violations if other == cause)
+            self.found.setdefault(cause, Found(0, index, first)).count += 1
+        for sentence in left_out:
+            self.left_out[sentence] = self.left_out.get(sentence, 0) + 1
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """What the scenarios of one stamp are held against.
+
+    `first` says who must go first at each conflict, by index in `template`, None for anyone; nothing: as in the template.
+    `reactions` are those of the template that the entry says are kept. `ends` (N, 2) says who of `template` is there at its first
+    and last instant.
+    """
+
+    road: Road | None
+    template: tuple[str, ...] | None
+    conflicts: tuple[Conflict, ...]
+    waits: tuple[Wait, ...] | None
+    first: tuple[int | None, ...] = ()
+    reactions: tuple[Reaction, ...] = ()
+    ends: Bools | None = None
+
+    def checker(self, scenario: Scenario, limits: Limits | None, asked: BoundaryStates | None) -> Checker:
+        """Return the checker of scenarios with this one's vehicles, of which `asked` was asked."""
+        ids = tokens(vehicle.id for vehicle in scenario.vehicles)
+        if self.template is None or not set(ids) <= set(self.template):
+            return Checker(self.road, asked, None, None, limits)
+        at = {self.template.index(name): k for k, name in enumerate(ids)}
+        known = [k for k, c in enumerate(self.conflicts) if {c.first, c.second} <= set(at)]
+        conflicts = [replace(c, first=at[c.first], second=at[c.second]) for c in (self.conflicts[k] for k in known)]
+        asked_first = self.first or tuple(c.first for c in self.conflicts)
+        first = [None if one is None else at[one] for one in (asked_first[k] for k in known)]
+        waits = None if self.waits is None else [replace(w, vehicle=at[w.vehicle]) for w in self.waits if w.vehicle in at]
+        edges = [replace(e, who=at[e.who], whom=at[e.whom]) for e in self.reactions if {e.who, e.whom} <= set(at)]
+        ends = None if self.ends is None else self.ends[list(at)]
+        return Checker(self.road, asked, conflicts, waits, limits, first, edges, ends)
+
+
+def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = BagConfig()) -> tuple[Validation, ...]:
+    """Check every scenario of every namespace that holds any; `config` says how much is read at most.
+
+    Raises:
+        InputError: the bag is missing or damaged, holds no scenarios, or one of its tracks, maps, … cannot be read.
+    """
+    namespaces = read_recording(
+        path, config, ("tracks", "changepoints", "map", "road/lanes", "fit", "fit/info", SCENARIOS, INFO)
+    ).namespaces.values()
+    found = [namespace for namespace in namespaces if SCENARIOS in namespace.messages]
+    if not found:
+        raise InputError(f"{path}: no topic `scenarios` in any namespace; there is nothing to check")
+    with within(path):
+        return tuple(_validate(namespace, limits) for namespace in found)
+
+
+def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
+    namespace.check_infos()
+    result = Validation(namespace.name, missing=namespace.missing)
+    said = () if namespace.entries else (f"sha256: there is no entry on {INFO}",)
+    references: dict[tuple[object, ...], Reference] = {}
+    checkers: dict[tuple[object, ...], Checker] = {}
+    for k, sha256 in enumerate(namespace.hashes):
+        wrong, entry = [], namespace.unknown.get(k)
+        if entry is not None:
+            wrong = [(ALTERED, _altered(k, sha256, entry))]
+        elif k in namespace.unknown:
+            result.unaccounted += 1
+        entry = namespace.entry(k) or entry
+        silent = said
+        if entry is not None and namespace.without_witness(entry):
+            if namespace.strange_witnesses:
+                wrong.append((ALTERED, f"the ego's witness is not what was published for index {entry.index}"))
+            silent = (*said, NO_WITNESS)
+        try:
+            stamp, scenario = namespace.scenario(k)
+        except InputError as error:
+            result.add(k, [*wrong, (UNUSABLE, str(error))], ())
+            continue
+        states = None
+        if entry is not None:
+            states = entry.asked(namespace.where(INFO), witness=scenario.witness is not None)
+        scenario = together(scenario)
+        is_lost = k in namespace.unknown and entry is None
+        kept = "" if entry is None else entry.facts.get("reactions", "")
+        place = (stamp, is_lost, entry and entry.template_hash, entry and entry.map_hash, entry and entry.order, kept)
+        if place not in references:
+            references[place] = _reference(namespace, stamp, entry, is_lost)
+        of_these = b"" if states is None else states.start.tobytes() + states.end.tobytes()
+        key = (place, tuple(vehicle.id for vehicle in scenario.vehicles), of_these)
+        try:
+            if key not in checkers:
+                checkers[key] = references[place].checker(scenario, limits, states)
+            (verdict,) = checkers[key].check([scenario])
+        except InputError as error:
+            result.add(k, [*wrong, (UNUSABLE, str(error))], ())
+            continue
+        wrong += [(violation.cause.value, violation.message) for violation in verdict.violations]
+        result.add(k, wrong, (*silent, *checkers[key].not_applicable))
+        broken = {violation.vehicles for violation in verdict.violations if violation.cause == Cause.REACTION}
+        ids = tokens(vehicle.id for vehicle in scenario.vehicles)
+        for edge in checkers[key].reactions:
+            result.proven[edge.words(ids)] += (edge.who, edge.whom) not in broken
+    return result
+
+
+def kept_reactions(encounter: Encounter, names: Sequence[str], entry: ScenarioEntry | None) -> tuple[Reaction, ...]:
+    """Return the reactions of a template, whose vehicles have these names, that an entry says its scenario keeps."""
+    kept = entry.facts.get("reactions", "").split("; ") if entry else []
+    return tuple(edge for edge in reactions_of(encounter).edges if edge.name(names) in kept) if any(kept) else ()
+
+
+def _altered(k: int, sha256: str, entry: ScenarioEntry) -> str:
+    """Return the sentence for a message that stands where another one was published."""
+    published = f"index {entry.index} of request {entry.request} was published as {entry.sha256[:12]}…"
+    return f"message {k} has SHA-256 {sha256[:12]}…, which {INFO} does not know; {published}"
+
+
+def _reference(namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is_lost: bool) -> Reference:
+    """Return what a scenario of the stamp and entry is held against; if its entry is lost, only what is beyond doubt.
+
+    Raises:
+        InputError: a message of it is damaged.
+    """
+    road = namespace.road_of(entry, stamp)
+    if is_lost and namespace.roads_differ:
+        road = None
+    encounter = namespace.tracks_of(entry, stamp)
+    if encounter is None:
+        return Reference(road, None, (), None)
+    segmentation = namespace.segmentation_of(encounter)
+    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
+    waits = None  # without changepoints there is no dwell to hold: waits are not asked for
+    if segmentation is not None:
+        waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()
+    names = tokens(vehicle.id for vehicle in encounter.vehicles)
+    reactions = kept_reactions(encounter, names, entry)
+    first = orders_asked(conflicts, entry.order if entry else "keep")
+    ends = at_ends(encounter.present, len(encounter.time))
+    return Reference(road, names, tuple(conflicts), waits, first, reactions, ends)

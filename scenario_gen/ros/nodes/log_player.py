@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""log_player: a log in, one of its encounters out as latched `tracks`; `~/play` reads it again.
+
+With `stream`, the encounter comes as every vehicle's own `vehicle_<id>/fix` and `vehicle_<id>/speed`, and `/clock`, instead.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+import time
+
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
+
+from msg_conventions.cdr import CdrWriter
+from msg_conventions.diagnostics import Level
+from msg_conventions.streams import encode_fix, encode_speed
+from msg_conventions.topics import vehicle_topic
+from msg_conventions.tracks import encode_tracks
+from scenario_gen.base.cancelling import stop_if_cancelled
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs.geodesy import latitude_longitude
+from scenario_gen.ros.plumbing.base import StageNode
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.names import tokens
+
+HEAD_START = 1.0  # seconds in which listeners find the streams, which are not latched
+
+
+@dataclass(frozen=True)
+class Config(Parameters):
+    """The log player's parameters."""
+
+    log_path: str = parameter("", "log to read: a file, a bag or a folder of files")
+    encounter: int = parameter(0, "which encounter of the log, from 0", low=0)
+    stream: bool = parameter(False, "play the encounter as fixes and speeds of each vehicle, and not as tracks")
+    rate: float = parameter(1.0, "how many times as fast as it was recorded the stream is", low=0.01, high=1000.0)
+    wait_matching_subscriptions: int = parameter(0, "do not begin to stream before each stream has so many listeners", low=0)
+    log: LogConfig = field(default_factory=LogConfig)
+
+
+class LogPlayer(StageNode):
+    """Reads a log and publishes the encounter that is asked for."""
+
+    OUTPUTS = ("tracks",)
+
+    def __init__(self, namespace: str | None = None) -> None:
+        super().__init__("log_player", Config(), namespace)
+        self.serve(Trigger, "~/play", self._play_again)
+
+    def started(self) -> None:
+        """Read the log, if one is named."""
+        if self.config.log_path:
+            self.work("play", self._play)
+
+    def _play(self, cancelled: Callable[[], bool]) -> None:
+        config = self.config
+        result = read_log(Path(config.log_path), config.log)
+        if config.encounter >= len(result.encounters):
+            raise InputError(
+                f"parameter encounter is {config.encounter}; {config.log_path} holds {len(result.encounters)}, counted from 0"
+            )
+        encounter = result.encounters[config.encounter]
+        stop_if_cancelled()
+        if not config.stream:
+            self.outputs.send("tracks", encode_tracks(encounter))
+        n, samples = encounter.speed.shape
+        message = f"{encounter.name}: {n} vehicles, {samples} samples over {encounter.duration:.1f} s"
+        notes = {f"note.{k}": note for k, note in enumerate(result.quality.notes)}
+        if encounter.origin is not None:
+            notes["origin"] = "{!r},{!r}".format(*encounter.origin)
+        self.status(Level.OK, message, "encounter", encounter.start_ns, **notes)
+        if config.stream:
+            self._stream(encounter, config, cancelled)
+
+    def _stream(self, encounter: Encounter, config: Config, cancelled: Callable[[], bool]) -> None:
+        """Publish sample after sample, at the rate, until the end or until cancelled; the clock runs ahead of none."""
+        names, places = tokens(vehicle.id for vehicle in encounter.vehicles), latitude_longitude(encounter)
+        clock = self.create_publisher(Clock, "/clock", 10)
+        topics = [vehicle_topic(name, kind) for name in names for kind in ("fix", "speed")]
+        for topic in topics:
+            self.outputs.advertise(topic)
+        while min(map(self.count_subscribers, topics)) < config.wait_matching_subscriptions and not cancelled():
+            time.sleep(0.05)
+        started = time.monotonic() + HEAD_START
+        for k in range(encounter.speed.shape[1]):
+            while (ahead := started + k * encounter.dt / config.rate - time.monotonic()) > 0.0 and not cancelled():
+                time.sleep(min(ahead, 0.1))
+            if cancelled() or not self.context.ok():
+                break
+            stamp = encounter.start_ns + k * encounter.dt_ns
+            self.outputs.publish(clock, CdrWriter().stamp(stamp).finish())
+            for i, name in enumerate(names):
+                frame, (latitude, longitude) = f"vehicle_{name}", places[i, k].tolist()
+                self.outputs.send(vehicle_topic(name, "fix"), encode_fix(latitude, longitude, stamp, frame))
+                self.outputs.send(vehicle_topic(name, "speed"), encode_speed(float(encounter.speed[i, k]), stamp, frame))
+        else:
+            self.status(Level.OK, f"{encounter.name}: streamed", "stream", encounter.start_ns)
+        self.destroy_publisher(clock)
+
+    def _play_again(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = self.active and bool(self.config.log_path)
+        response.message = "started" if response.success else "parameter log_path is empty, or the node is not active"
+        self.started()
+        return response

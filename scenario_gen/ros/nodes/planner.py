@@ -1,0 +1,177 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""planner: `map`, `tracks` and `changepoints` of one template in; `fit`, a `vehicle_<id>/route` each, and `fit/info` out.
+
+`~/get_plan` (nav_msgs/GetPlan) plans on the newest map for anyone; a plan that cannot be is empty, and `~/explain` says why.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+import math
+from typing import Any
+
+from nav_msgs.msg import Path
+from nav_msgs.srv import GetPlan
+import numpy as np
+from rclpy.serialization import deserialize_message
+from rclpy.time import Time
+from std_srvs.srv import Trigger
+
+from msg_conventions.changepoints import decode_changepoints
+from msg_conventions.diagnostics import Level, written
+from msg_conventions.fits import anchor_stamps, encode_fit, fit_statuses
+from msg_conventions.hashes import encode_hashes, template_hashes
+from msg_conventions.lanes import TOPIC as LANES
+from msg_conventions.paths import encode_path, encode_route
+from msg_conventions.roads import decode_map
+from msg_conventions.topics import vehicle_topic
+from msg_conventions.tracks import decode_tracks
+from scenario_gen.base.cancelling import stop_if_cancelled
+from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
+from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.method.fitting import fit_template, FittingConfig
+from scenario_gen.method.routing import plan_routes, PlanningConfig
+from scenario_gen.method.routing.plan import make_planner
+from scenario_gen.method.routing.search.planner import plan_with_retry, Query
+from scenario_gen.numerics import exact
+from scenario_gen.numerics.arrays import Floats
+from scenario_gen.ros.plumbing.base import REQUESTS, StageNode
+from scenario_gen.ros.plumbing.inputs import Inputs
+from scenario_gen.types.names import tokens
+from scenario_gen.types.road import Road
+
+EXPLAINED = 20  # newest plans whose lack is explained
+ROAD = ("map", "road/entries", "road/exits")
+
+
+@dataclass(frozen=True)
+class Config(Parameters):
+    """The planner's parameters."""
+
+    fitting: FittingConfig = field(default_factory=FittingConfig)
+    planning: PlanningConfig = field(default_factory=PlanningConfig)
+    seed: int = parameter(0, "seed of the planner", low=0)
+    radius: float = parameter(1.0, "radius of the disc that ~/get_plan plans for", unit="m", low=0.0, high=20.0)
+    pair_map: bool = parameter(True, "take only a map with the template's stamp; false: any map server's newest one")
+
+
+class Planner(StageNode):
+    """Fits each template to the road and plans every vehicle's route between its changepoints."""
+
+    INPUTS = (*ROAD, LANES, "road/info", "tracks", "changepoints")
+    STAGES = ("template", "roads", "method.fitting", "method.routing")
+    OUTPUTS = ("fit", "fit/info")
+
+    def __init__(self, namespace: str | None = None) -> None:
+        super().__init__("planner", Config(), namespace)
+        self.create_service(GetPlan, "~/get_plan", self._get_plan, qos_profile=REQUESTS)
+        self.serve(Trigger, "~/explain", self._explain)
+        self._reasons: deque[tuple[int, str]] = deque(maxlen=EXPLAINED)  # stamp of a request, and why there is no path
+        paired = self.config.pair_map
+        self._asked = 0
+        self.inputs = Inputs(("tracks", "changepoints", *(ROAD if paired else ())), () if paired else ("map",), (LANES,))
+
+    def stopped(self) -> None:
+        """Forget the inputs: being latched, they come again."""
+        self.inputs.clear()
+
+    def received(self, topic: str, data: bytes) -> None:
+        """Plan when road, tracks and changepoints are those of one template."""
+        if topic in ("road/info", LANES) and not self.config.pair_map:
+            return  # a map server of the user's own does not say what belongs to its map
+        self.inputs.put(topic, data)
+        messages = self.inputs.complete()  # if not all is there, the work on what was there is cancelled all the same
+        self.work("plan", lambda _: self._plan(messages) if messages else None)
+
+    def _plan(self, messages: dict[str, bytes]) -> None:
+        config = self.config
+        encounter = decode_tracks(messages["tracks"])
+        segmentation = decode_changepoints(messages["changepoints"], encounter)
+        _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"), messages.get(LANES))
+        fit = fit_template(encounter, segmentation, road, config.fitting)
+        routes = plan_routes(road, fit, config.planning, config.seed)
+        stop_if_cancelled()
+        anchors = anchor_stamps(encounter, segmentation.changepoints)
+        made = {
+            vehicle_topic(name, "route"): encode_route(route, anchors, road.frame_id)
+            for name, route in zip(tokens(vehicle.id for vehicle in encounter.vehicles), routes, strict=True)
+        }
+        made["fit"] = encode_fit(encounter, fit, road.frame_id)
+        made["fit/info"] = encode_hashes("fit", messages | made, encounter.start_ns)
+        for topic, data in made.items():
+            self.outputs.send(topic, data)
+        self.get_logger().info(f"planned {len(routes)} routes through {len(anchors)} anchors")
+        statuses = fit_statuses(fit, self.get_fully_qualified_name(), template_hashes(messages), routes)
+        self.diagnostics.report(*statuses, stamp_ns=encounter.start_ns)
+
+    async def _get_plan(self, request: GetPlan.Request, response: GetPlan.Response) -> GetPlan.Response:
+        """Plan for a caller, off the executor's thread."""
+        grid = self.inputs.get("map")
+        stamp = Time.from_msg(request.start.header.stamp).nanoseconds
+        self._asked += 1
+        name = f"get_plan {self._asked}"
+
+        def job(cancelled: Callable[[], bool]) -> tuple[bytes, str]:
+            try:
+                if grid is None or cancelled():
+                    raise RefusedError("there is no map yet" if grid is None else "cancelled")
+                _, road = decode_map(grid)
+                query = query_of(request, road.frame_id, self.config.radius)
+                poses = plan_poses(road, query, self.config.planning, self.config.seed)
+                return encode_path(poses, np.full(len(poses), stamp), road.frame_id, stamp), ""
+            except ScenarioGenError as error:
+                kind = type(error).__name__
+                self.status(Level.ERROR, str(error), "get_plan", error=kind, job=name, request_stamp=written(stamp))
+                return b"", str(error)
+
+        response.plan.header.stamp = request.start.header.stamp
+        plan, reason = b"", "the node is not active; activate it first"
+        if self.active:
+            plan, reason = await self.result_of(name, job, lambda error: (b"", f"{type(error).__name__}: {error}"))
+        self._reasons.appendleft((stamp, reason))
+        if plan:
+            response.plan = deserialize_message(plan, Path)
+        return response
+
+    def _explain(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Say whether the newest plan is a path, and a line for each, newest first: its request's stamp and the reason.
+
+        nav_msgs/GetPlan has no place for it.
+        """
+        lines = [f"{written(stamp)}: {reason or 'a path was found'}" for stamp, reason in self._reasons]
+        response.success = bool(lines) and not self._reasons[0][1]
+        response.message = "\n".join(lines) or "no plan has been asked for"
+        return response
+
+
+def query_of(request: Any, frame_id: str, radius: float) -> Query:
+    """Return the query of a nav_msgs/srv/GetPlan request.
+
+    Raises:
+        InputError: a pose is not finite, in another frame than the map, or the tolerance is negative.
+    """
+    if not (math.isfinite(request.tolerance) and request.tolerance >= 0.0):
+        raise InputError(f"tolerance is {request.tolerance}; it must be at least 0 m")
+    ends = []
+    for name, stamped in (("start", request.start), ("goal", request.goal)):
+        position = stamped.pose.position
+        if stamped.header.frame_id not in ("", frame_id):
+            raise InputError(f"{name} is in frame {stamped.header.frame_id!r}; the map is in {frame_id!r}")
+        if not (math.isfinite(position.x) and math.isfinite(position.y)):
+            raise InputError(f"{name} is not finite ({position.x}, {position.y})")
+        ends.append(np.array([position.x, position.y]))
+    return Query(ends[0], ends[1], radius)
+
+
+def plan_poses(road: Road, query: Query, config: PlanningConfig, seed: int) -> Floats:
+    """Return (M, 3) x, y, yaw along the path found; the heading is that of the piece ahead.
+
+    Raises:
+        RefusedError: the start or goal is blocked, there is no way, or the budget is spent.
+    """
+    path = plan_with_retry(make_planner(config), road, query, config.iterations, seed).path
+    ahead = np.diff(path, axis=0) if len(path) > 1 else np.zeros((1, 2))
+    heading = exact.arctan2(ahead[:, 1], ahead[:, 0])
+    return np.column_stack([path, np.append(heading, heading[-1])[: len(path)]])

@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""road_server: `map`, `road/entries`, `road/exits`; `~/get_map`, and `~/load_map` for another road.
+
+Built-in roads are sized to the template, so the node listens to `tracks` and publishes the road for each encounter it hears, with
+its stamp. Without tracks it publishes the road in its plain size, stamp 0 (`corridor` waits for tracks).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlparse
+
+from ament_index_python.packages import get_package_share_directory, PackageNotFoundError
+from nav_msgs.msg import OccupancyGrid
+from nav_msgs.srv import GetMap, LoadMap
+from rclpy.serialization import deserialize_message
+
+from msg_conventions.cdr import stamp_of
+from msg_conventions.diagnostics import Level
+from msg_conventions.hashes import encode_hashes, template_hashes
+from msg_conventions.lanes import encode_lanes
+from msg_conventions.lanes import TOPIC as LANES
+from msg_conventions.roads import encode_map, encode_poses
+from msg_conventions.tracks import decode_tracks
+from scenario_gen.base.cancelling import stop_if_cancelled
+from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.roads import build_road, RoadConfig
+from scenario_gen.ros.plumbing.base import REQUESTS, StageNode
+
+
+@dataclass(frozen=True)
+class Config(Parameters):
+    """The road server's parameters."""
+
+    road_name: str = parameter(
+        "t_intersection", "straight, curve, t_intersection, four_way, merge, roundabout, corridor, or a map_server YAML file"
+    )
+    wait_for_tracks: bool = parameter(False, "publish nothing until tracks say what the road is sized to")
+    road: RoadConfig = field(default_factory=RoadConfig)
+
+
+def road_of_url(url: str) -> str:
+    """Return the built-in name or file path that a LoadMap request means.
+
+    Raises:
+        InputError: another scheme than file:// and package://, or a package that is not installed.
+    """
+    parts = urlparse(url)
+    if parts.scheme == "file":
+        return unquote(parts.path)
+    if parts.scheme == "package":
+        try:
+            return str(Path(get_package_share_directory(parts.netloc)) / unquote(parts.path).lstrip("/"))
+        except (PackageNotFoundError, ValueError):
+            raise InputError(f"{url}: package {parts.netloc!r} is not installed or not sourced") from None
+    if parts.scheme:
+        raise InputError(f"{url}: give file://, package://, a path, or the name of a built-in road")
+    return url
+
+
+class RoadServer(StageNode):
+    """Serves one road at a time."""
+
+    INPUTS = ("tracks",)
+    STAGES = ("roads",)
+    OUTPUTS = ("map", "road/entries", "road/exits", LANES, "road/info")
+
+    def __init__(self, namespace: str | None = None) -> None:
+        super().__init__("road_server", Config(), namespace)
+        self._tracks: bytes | None = None
+        self._name = self.config.road_name
+        self._grid: bytes | None = None
+        self._with_lanes = False  # whether the road before had lanes, which are to be taken back then
+        self.serve(GetMap, "~/get_map", self._get_map)
+        self._asked = 0
+        self.create_service(LoadMap, "~/load_map", self._load_map, qos_profile=REQUESTS)
+
+    def started(self) -> None:
+        """Publish the plain road until tracks come."""
+        if not self.config.wait_for_tracks and self.config.road_name != "corridor":
+            self.work("road", lambda _: self._publish(self._name))
+
+    def received(self, topic: str, data: bytes) -> None:
+        """Size the road to the newest encounter."""
+        self._tracks = data
+        self.work("road", lambda _: self._publish(self._name))
+
+    def _publish(self, name: str) -> None:
+        """Build a road, sized to the tracks if there are any, and publish it."""
+        tracks = self._tracks
+        road = build_road(name, decode_tracks(tracks) if tracks else None, self.config.road)
+        stamp_ns = stamp_of(tracks, "tracks") if tracks else 0
+        messages = {
+            "road/entries": encode_poses(road.entries, road.frame_id, stamp_ns),
+            "road/exits": encode_poses(road.exits, road.frame_id, stamp_ns),
+            "map": encode_map(road, stamp_ns),
+        }
+        if road.lanes is not None:
+            messages = {LANES: encode_lanes(road.lanes, road.frame_id, stamp_ns), **messages}  # before the map that they are of
+        stop_if_cancelled()
+        if self._with_lanes and road.lanes is None:
+            self.outputs.send(LANES, encode_lanes(None, road.frame_id, stamp_ns))
+        self._with_lanes = road.lanes is not None
+        for topic, data in messages.items():
+            self.outputs.send(topic, data)
+        template = {"tracks": tracks} if tracks else {}
+        self.outputs.send("road/info", encode_hashes("road", messages | template, stamp_ns))
+        self._grid = messages["map"]
+        height, width = road.drivable.shape
+        message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, {len(road.entries)} entries"
+        self.status(Level.OK, message, "road", stamp_ns, **template_hashes(messages | template))
+
+    def _get_map(self, _request: Any, response: Any) -> Any:
+        if self._grid is not None:
+            response.map = deserialize_message(self._grid, OccupancyGrid)
+        return response
+
+    async def _load_map(self, request: LoadMap.Request, response: LoadMap.Response) -> LoadMap.Response:
+        """Load another road, off the executor's thread; it stays until the next request or restart."""
+        codes = LoadMap.Response
+        self._asked += 1
+
+        def job(cancelled: Callable[[], bool]) -> int:
+            if cancelled():
+                return int(codes.RESULT_UNDEFINED_FAILURE)
+            try:
+                name = road_of_url(request.map_url)
+                self._publish(name)
+                self._name = name
+                return int(codes.RESULT_SUCCESS)
+            except ScenarioGenError as reason:
+                message = f"load_map {request.map_url!r}: {reason}"
+                self.status(Level.ERROR, message, "load_map", error=type(reason).__name__)  # which is over when the job is done
+                missing = not Path(request.map_url.removeprefix("file://")).exists()
+                return int(codes.RESULT_MAP_DOES_NOT_EXIST if missing else codes.RESULT_INVALID_MAP_METADATA)
+
+        response.result = codes.RESULT_UNDEFINED_FAILURE
+        if self.active:
+            response.result = await self.result_of(f"load_map {self._asked}", job, lambda _: int(codes.RESULT_UNDEFINED_FAILURE))
+            if response.result == codes.RESULT_SUCCESS:
+                self._get_map(request, response)
+        return response

@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""segmenter: `tracks`, or the vehicles' streams, in; `changepoints` and `posterior` out; `~/segment` does it again.
+
+While `vehicle_<id>/fix` and `vehicle_<id>/speed` come in, changepoints are published on `changepoints/live` as they are
+confirmed. At the end of the streams, or on `~/segment`, what was buffered is read as a log is, and published as `tracks`: for
+this node as for all others.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from std_srvs.srv import Trigger
+
+from msg_conventions.changepoints import (
+    encode_changepoints,
+    encode_live_changepoints,
+    encode_posterior,
+    segmentation_status,
+)
+from msg_conventions.diagnostics import Level
+from msg_conventions.tracks import decode_tracks, encode_tracks
+from scenario_gen.base.cancelling import stop_if_cancelled
+from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.logs import encounters_of, LogConfig, Sample
+from scenario_gen.logs.raw import RawLog
+from scenario_gen.method.segmentation import LiveSegmenter, OnlineConfig, segment, SegmentationConfig
+from scenario_gen.ros.plumbing.base import StageNode
+from scenario_gen.ros.plumbing.live import LiveConfig, LiveStreams
+
+
+@dataclass(frozen=True)
+class Config(Parameters):
+    """The segmenter's parameters; `live`, `log` and `online` are for streams and take effect at the next activation."""
+
+    segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
+    seed: int = parameter(0, "seed of the sampler", low=0)
+    live: LiveConfig = field(default_factory=LiveConfig)
+    log: LogConfig = field(default_factory=LogConfig)
+    online: OnlineConfig = field(default_factory=OnlineConfig)
+
+
+class Segmenter(StageNode):
+    """Finds the driving primitives of every encounter it hears."""
+
+    INPUTS = ("tracks",)
+    STAGES = ("method.segmentation",)
+    OUTPUTS = ("changepoints", "posterior", "changepoints/live")
+
+    def __init__(self, namespace: str | None = None) -> None:
+        super().__init__("segmenter", Config(), namespace)
+        self._tracks: bytes | None = None
+        self._live: LiveStreams | None = None
+        self._encounters = 0
+        self.serve(Trigger, "~/segment", self._segment_again)
+
+    def started(self) -> None:
+        """Look for streams."""
+        config = self.config
+        if config.live.listen:
+            self._online = LiveSegmenter(round(config.log.period * 1e9), config.online)
+            self._live = LiveStreams(self, config.live, config.log, self._sampled, self._ended)
+
+    def stopped(self) -> None:
+        """Look for streams no more."""
+        if self._live is not None:
+            self._live.close()
+            self._live = None
+
+    def received(self, topic: str, data: bytes) -> None:
+        """Segment the newest encounter, or go on with the one that comes in."""
+        if topic == "tracks":
+            self._tracks = data
+            self.work("segment", lambda _: self._segment(data))
+        elif self._live is not None:
+            self._live.received(topic, data)
+
+    def _segment(self, data: bytes) -> None:
+        encounter = decode_tracks(data)
+        segmentation = segment(encounter, self.config.segmentation, self.config.seed)
+        stop_if_cancelled()
+        self.outputs.send("changepoints", encode_changepoints(encounter, segmentation))
+        self.outputs.send("posterior", encode_posterior(encounter, segmentation))
+        status = segmentation_status(segmentation, self.get_fully_qualified_name(), encounter.duration)
+        self.get_logger().info(status.message)
+        self.diagnostics.report(status, stamp_ns=encounter.start_ns)
+
+    def _sampled(self, sample: Sample) -> None:
+        if (found := self._online.push(sample)) is not None:
+            self.outputs.send("changepoints/live", encode_live_changepoints(found))
+
+    def _ended(self, log: RawLog, config: LogConfig) -> None:
+        """Read what the streams amount to, off the executor's thread."""
+        self._encounters += 1
+
+        def job(_: Callable[[], bool]) -> None:
+            result = encounters_of(log, config)
+            encounter = max(result.encounters, key=lambda e: e.speed.size)
+            notes = {f"note.{k}": note for k, note in enumerate(result.quality.lines())}
+            n, samples = encounter.speed.shape
+            message = f"streams of {n} vehicles, {samples} samples; the largest of {len(result.encounters)} encounter(s)"
+            self.status(Level.OK, message, "encounter", encounter.start_ns, **notes)
+            self.outputs.send("tracks", encode_tracks(encounter))
+
+        self.work(f"encounter {self._encounters}", job)
+
+    def _segment_again(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self._live is not None and self._live.end():
+            response.success, response.message = True, "started with what the streams have brought so far"
+        elif self.active and self._tracks is not None:
+            self.received("tracks", self._tracks)
+            response.success, response.message = True, "started"
+        else:
+            response.message = "no tracks yet, or the node is not active"
+        return response

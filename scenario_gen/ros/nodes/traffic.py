@@ -1,0 +1,333 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""traffic: drives the vehicles of a scenario around a planner's ego, in real time or in lock-step, and judges the planner.
+
+Scenarios come from a bag, or, without one, live from `scenarios`, `scenarios/info`, `ego/witness` and `map`. The ego takes the
+place of one vehicle and is steered by `ego/cmd_vel`, `ego/cmd_vel_stamped`, `ego/trajectory`, `ego/path` or `ego/odom`; what
+came last counts. The drive begins with the first of them. `~/next`, `~/reset`, `~/pause`, `~/resume`, and `~/step` in
+lock-step: one step for each call, which waits for a command that came after the step before, so that a client that answers each
+step with one command gets the same drive again.
+Topics, frames and units: msg_conventions/driving.py. What is wrong with the ego stands on /diagnostics and in the verdict.
+"""
+
+from collections.abc import Callable
+import json
+from pathlib import Path
+from time import monotonic
+
+import numpy as np
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from msg_conventions.autoware import EGO, OBJECTS
+from msg_conventions.diagnostics import Level
+from msg_conventions.ego import encode_state
+from msg_conventions.hashes import hash_of
+from msg_conventions.paths import encode_path
+from msg_conventions.roads import decode_map
+from msg_conventions.topics import vehicle_topic
+from scenario_gen.bags.recordings.arriving import ArrivingScenarios, TOPICS
+from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.closed_loop.ego import Command, Pose
+from scenario_gen.closed_loop.results import write_verdicts
+from scenario_gen.closed_loop.simulation import ClosedLoop, State
+from scenario_gen.closed_loop.trials import Outcome, read_trials, Trial, trial_of
+from scenario_gen.closed_loop.verdict import judge
+from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
+from scenario_gen.ros.plumbing.ego_commands import FIRST_STAMP, Heard, INPUTS, stamp_of, understood, unusable
+from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
+from scenario_gen.ros.plumbing.topics import create_publisher, create_subscription, publish
+from scenario_gen.ros.plumbing.traffic_config import Config
+from scenario_gen.ros.plumbing.traffic_messages import encode_verdict, surroundings
+from scenario_gen.types.names import tokens
+from scenario_gen.types.road import Road
+
+OUTPUTS = ("/clock", "/tf", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
+LOOK_AROUND = 10  # steps between two looks at who commands the ego
+LOOK = 0.05  # seconds of real time between two looks at whether a wait is at its end
+
+
+class Traffic(Node):  # type: ignore[misc]
+    """Drives one scenario after the other."""
+
+    def __init__(self, namespace: str | None = None, config: Config = Config()) -> None:
+        self._together = ReentrantCallbackGroup()  # a call of ~/step waits for a command, which another callback takes
+        super().__init__("traffic", namespace=namespace)
+        self.parameters = ConfigParameters(self, config)
+        self.diagnostics = NodeDiagnostics(self, self._report)
+        self._trials: list[Trial] = []
+        self._at = self.config.index
+        self._loop: ClosedLoop | None = None
+        self._states: list[State] = []
+        self._heard: Heard | None = None
+        self._waiting: Future | None = None
+        self._until = 0.0  # when that ends, on the steady clock [s]
+        self.create_timer(LOOK, self._end_waiting, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._paused = False
+        self._sources: list[str] = []
+        self._outcomes: list[Outcome] = []
+        self._roads: dict[str, Road] = {}  # by the hash of their map
+        self._arriving = ArrivingScenarios()
+        self._verdict = ""
+        self._out = {topic: create_publisher(self, topic) for topic in OUTPUTS}
+        self._autoware: tuple[str, ...] = ()
+        for topic in INPUTS:
+            create_subscription(self, topic, lambda data, topic=topic: self._hear(topic, data))
+        for name, action in (("next", self._next), ("reset", self._reset), ("pause", self._pause), ("resume", self._resume)):
+            self.create_service(Trigger, f"~/{name}", lambda _, response, action=action: self._answer(action, response))
+        self.create_service(Trigger, "~/step", self._serve_step)
+
+    @property
+    def default_callback_group(self) -> ReentrantCallbackGroup:
+        """Reentrant; see above."""
+        return self._together
+
+    @property
+    def config(self) -> Config:
+        """The parameters in effect."""
+        return self.parameters.config  # type: ignore[no-any-return]
+
+    def autostart(self) -> None:
+        """Read the bag, or listen for scenarios, and begin.
+
+        Raises:
+            InputError: the bag cannot be read, or has no such vehicle or scenario; autoware_perception_msgs is not there.
+        """
+        config = self.config
+        if config.autoware:
+            self._autoware = (OBJECTS, EGO)
+            self._out |= {topic: create_publisher(self, topic) for topic in self._autoware}
+        if config.bag:
+            self._trials = read_trials(Path(config.bag), config.ego)
+            if config.index >= len(self._trials):
+                raise InputError(f"parameter index is {config.index}; {config.bag} has {len(self._trials)} scenarios, from 0")
+            self._load(config.index)
+        else:
+            create_subscription(self, "map", self._take_map)
+            for topic in TOPICS:
+                create_subscription(self, topic, lambda data, topic=topic: self._take(topic, data))
+        if not config.lock_step:
+            period = config.drive.step / config.rate
+            self.create_timer(period, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    # --- scenarios --------------------------------------------------------------------------------------------
+
+    def _take_map(self, data: bytes) -> None:
+        try:
+            self._roads[hash_of("map", data)] = decode_map(data)[1]
+        except InputError as error:
+            self._say(Level.ERROR, str(error), "map")
+
+    def _take(self, topic: str, data: bytes) -> None:
+        """Take a message of a live scenario; what is whole waits for its turn, on the road that its entry names."""
+        try:
+            for entry, _, scenario in self._arriving.take(topic, data):
+                road = self._roads.get(entry.map_hash or "")
+                name = f"{entry.request} {entry.index}"
+                self._trials.append(trial_of(name, scenario, entry, road, self.config.ego, f"scenario {name}"))
+            if self._idle and len(self._trials) > self._at:
+                self._load(self._at)
+        except ScenarioGenError as error:
+            self._say(Level.ERROR, str(error), topic)
+
+    @property
+    def _idle(self) -> bool:
+        """Whether nothing is driven."""
+        return self._loop is None
+
+    def _load(self, number: int) -> None:
+        """Begin a scenario.
+
+        Raises:
+            InputError: it has no such vehicle.
+        """
+        trial = self._trials[number]
+        self._loop = ClosedLoop(trial.scenario, trial.ego, trial.road, self.config.drive)
+        self._at, self._states, self._heard, self._verdict = number, [self._loop.start()], None, ""
+        scenario, ego = self._loop.scenario, self._loop.ego
+        self._names = tokens(vehicle.id for vehicle in scenario.vehicles)
+        self._children = tuple(f"vehicle_{name}" for name in self._names)
+        for name in self._names:
+            topic = vehicle_topic(name, "odom")
+            if topic not in self._out:
+                self._out[topic] = create_publisher(self, topic)
+        task = self._loop.task()
+        stamps = np.full(len(task.route), FIRST_STAMP, dtype=np.int64)
+        self._publish("ego/goal", encode_state(task.goal, self._children[ego], scenario.frame_id, FIRST_STAMP))
+        self._publish("ego/route", encode_path(task.route, stamps, scenario.frame_id, FIRST_STAMP))
+        self._tell()
+        self._report()
+
+    # --- the ego ----------------------------------------------------------------------------------------------
+
+    def _hear(self, topic: str, data: bytes) -> None:
+        """Take a command; whatever is wrong with it, the node lives on."""
+        if self._loop is None:
+            return
+        try:
+            heard = understood(topic, data, self._loop, self._children[self._loop.ego], self._states[-1].step)
+        except ScenarioGenError as error:
+            heard = unusable(topic, self._states[-1].step, str(error))
+        if heard.fault:
+            self._say(Level.WARN, heard.fault, "ego")
+        self._heard = heard
+        if self._waiting is not None and not self._waiting.done():
+            self._waiting.set_result(None)
+
+    def _command(self, state: State) -> tuple[Command | Pose | None, str]:
+        """Return what is asked of the ego now, and what is wrong with it."""
+        heard = self._heard
+        if heard is None:
+            return None, ""
+        if fault := heard.fault_at(state, self.config.drive.step, self.config.silence):
+            return None, fault
+        if state.step % LOOK_AROUND == 0:
+            self._sources = self._commanding()
+        note = f"several egos: {', '.join(self._sources)}; what came last counts" if len(self._sources) > 1 else ""
+        return heard.ask(state), note
+
+    def _commanding(self) -> list[str]:
+        """Return the nodes that publish commands."""
+        found = [info for topic in INPUTS for info in self.get_publishers_info_by_topic(topic)]
+        return sorted({f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in found})
+
+    # --- steps ------------------------------------------------------------------------------------------------
+
+    def _tick(self) -> None:
+        if self._loop is not None and not (self._paused or self._waits_for_ego or self._verdict):
+            self._advance(self._loop)
+
+    @property
+    def _waits_for_ego(self) -> bool:
+        """Whether the drive begins with the ego's first command, and none has come."""
+        return self._heard is None and (self.config.wait_for_ego or self.config.lock_step)
+
+    def _advance(self, loop: ClosedLoop) -> None:
+        asked, note = self._command(self._states[-1])
+        self._states.append(loop.step(self._states[-1], asked, note))
+        if fault := self._states[-1].fault:
+            self._say(Level.WARN, fault, "ego")
+        self._tell()
+        if loop.over(self._states[-1]):
+            self._conclude(loop)
+
+    def _conclude(self, loop: ClosedLoop) -> None:
+        """Publish the verdict, and go on with the next scenario."""
+        drive = loop.record(self._states)
+        verdict, trial = judge(loop, drive), self._trials[self._at]
+        self._verdict = verdict.sentence()
+        self._outcomes.append(Outcome(trial.name, verdict, drive))
+        self._publish("verdicts", encode_verdict(self.get_name(), self._outcomes[-1], stamp_of(self._states[-1])))
+        self.get_logger().info(f"scenario {trial.name}: {self._verdict}")
+        if self.config.results:
+            Path(self.config.results).mkdir(parents=True, exist_ok=True)
+            write_verdicts(Path(self.config.results), self._outcomes, f"{self.get_name()} over ROS 2", self.config.drive)
+        if self.config.follow_on and not self.config.lock_step and self._at + 1 < len(self._trials):
+            self._load(self._at + 1)
+
+    async def _serve_step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Go one step, with a command that came after the one before; without one within the patience, without one."""
+        loop = self._loop
+        if loop is None or self._verdict or not self.config.lock_step:
+            response.message = self._why_no_step()
+            return response
+        await self._step_once(loop)
+        response.success = True
+        response.message = json.dumps({"time": self._states[-1].time, "over": bool(self._verdict), "verdict": self._verdict})
+        return response
+
+    async def _step_once(self, loop: ClosedLoop) -> None:
+        """Go one step of a drive when a command that answers its last one is there, or patience is at its end."""
+        state = self._states[-1]
+        await self._answered(state, self.config.patience)
+        if self._loop is loop and self._states[-1] is state:
+            self._advance(loop)
+
+    async def _answered(self, state: State, patience: float) -> None:
+        """Return when a command has come since this state was told, or after `patience` [s] of real time."""
+        if self._heard is not None and self._heard.step >= state.step:
+            return
+        await self._next_command(monotonic() + patience)
+
+    async def _next_command(self, until: float) -> None:
+        """Return when a command comes, or at `until` [s] on the steady clock."""
+        self._until, self._waiting = until, Future(executor=self.executor)
+        await self._waiting
+
+    def _end_waiting(self) -> None:
+        """End a wait for a command that has come to the end of its patience."""
+        if self._waiting is not None and not self._waiting.done() and monotonic() > self._until:
+            self._waiting.set_result(None)
+
+    def _why_no_step(self) -> str:
+        if not self.config.lock_step:
+            return "the parameter lock_step is false: the clock makes the steps"
+        if self._loop is None:
+            return "there is no scenario yet"
+        return f"scenario {self._trials[self._at].name} is over: {self._verdict}; call ~/next or ~/reset"
+
+    # --- services ---------------------------------------------------------------------------------------------
+
+    def _answer(self, action: Callable[[], str], response: Trigger.Response) -> Trigger.Response:
+        try:
+            response.message = action()
+            response.success = True
+        except ScenarioGenError as error:
+            response.message = str(error)
+        return response
+
+    def _next(self) -> str:
+        if self._at + 1 >= len(self._trials):
+            raise InputError(f"there is no scenario after number {self._at}; there are {len(self._trials)}")
+        self._load(self._at + 1)
+        return f"scenario {self._trials[self._at].name}"
+
+    def _reset(self) -> str:
+        if self._loop is None:
+            raise InputError("there is no scenario yet")
+        self._load(self._at)
+        return f"scenario {self._trials[self._at].name}, from its start"
+
+    def _pause(self) -> str:
+        self._paused = True
+        return "paused"
+
+    def _resume(self) -> str:
+        self._paused = False
+        return "driving"
+
+    # --- what is published ------------------------------------------------------------------------------------
+
+    def _publish(self, topic: str, data: bytes) -> None:
+        publish(self, self._out[topic], data)
+
+    def _tell(self) -> None:
+        """Publish where everyone is now; the ego's odometry last, so that who answers it has heard of all else."""
+        if self._loop is not None:
+            for topic, data in surroundings(self._loop, self._states[-2:], self._names, self._autoware, self._is_heard):
+                self._publish(topic, data)
+
+    def _is_heard(self, topic: str) -> bool:
+        """Whether somebody listens: what is dear to make and not latched is made for nobody else."""
+        return int(self._out[topic].get_subscription_count()) > 0
+
+    def _say(self, level: Level, message: str, subject: str) -> None:
+        self.diagnostics.status(level, message, subject, {}, log=False)
+
+    def _report(self) -> None:
+        """Say each second what is driven; a fault of the ego that is over clears."""
+        if self._loop is None:
+            waiting = f": {self._arriving.unmatched} messages wait for scenarios/info" if self._arriving.unmatched else ""
+            self._say(Level.WARN, f"there is no scenario yet{waiting}", "driving")
+            return
+        state, trial = self._states[-1], self._trials[self._at]
+        doing = self._verdict or ("paused" if self._paused else "waiting for the ego" if self._waits_for_ego else "driving")
+        self._say(Level.OK, f"scenario {trial.name}, {state.time:.1f} s: {doing}", "driving")
+        if self._waits_for_ego and not self._verdict:
+            self._tell()  # who came late has not heard where everyone is
+        if not state.fault and not (self._heard and self._heard.fault):
+            self.diagnostics.resolve("ego")

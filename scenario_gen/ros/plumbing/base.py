@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What all nodes with a stage have in common: lifecycle, parameters, raw topics, a worker, diagnostics, a clean end."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.qos import QoSProfile
+from rclpy.task import Future
+
+from msg_conventions.diagnostics import Level
+from msg_conventions.topics import LATCHED, topic_entry
+from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
+from scenario_gen.ros.plumbing.inputs import refuse_damaged
+from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
+from scenario_gen.ros.plumbing.topics import create_subscription, Outputs
+from scenario_gen.ros.plumbing.worker import Job, Worker
+from scenario_gen.types.qos import Quality
+
+REQUESTS = QoSProfile(depth=1000)  # ROS's own 10 would drop the oldest of many requests that come at once
+Result = TypeVar("Result")
+
+
+class StageNode(LifecycleNode):  # type: ignore[misc]
+    """A lifecycle node around a stage.
+
+    A subclass names its inputs in `INPUTS` and takes them in `received`; it does its work in jobs given to `work`. Inputs
+    are subscribed while the node is active; being latched, they come again after a deactivation or a restart.
+    """
+
+    INPUTS: tuple[str, ...] = ()
+    OUTPUTS: tuple[str, ...] = ()  # advertised while configuring, so that listeners are there before the first message
+    STAGES: tuple[str, ...] = ()  # packages of scenario_gen whose kernels are compiled before it is configured
+
+    def __init__(self, name: str, config: Any, namespace: str | None = None) -> None:
+        self._together = ReentrantCallbackGroup()
+        super().__init__(name, namespace=namespace)
+        self.outputs = Outputs(self)
+        self.diagnostics = NodeDiagnostics(self, self.update_diagnostics, enabled=False)
+        self.diagnostics.state("unconfigured")
+        self._listening: dict[str, Any] = {}
+        self._latched: dict[str, tuple[bytes, Any]] = {}
+        self._worker: Worker | None = None
+        self.parameters = ConfigParameters(self, config)
+        self.declare_parameter("autostart", True)
+
+    @property
+    def default_callback_group(self) -> ReentrantCallbackGroup:
+        """Reentrant: in rclpy's own, a service that awaits its answer keeps all other callbacks of the node from running."""
+        return self._together
+
+    @property
+    def config(self) -> Any:
+        """The configuration in effect."""
+        return self.parameters.config
+
+    @property
+    def active(self) -> bool:
+        """True between activation and deactivation."""
+        return self._worker is not None
+
+    def autostart(self) -> None:
+        """Configure and activate, unless the parameter `autostart` is false."""
+        if self.get_parameter("autostart").value and self.trigger_configure() is TransitionCallbackReturn.SUCCESS:
+            self.trigger_activate()
+
+    # --- for subclasses ---------------------------------------------------------------------------------------
+
+    def received(self, topic: str, data: bytes) -> None:
+        """Take an input in; called on the executor's thread, so anything long goes to `work`."""
+
+    def started(self) -> None:
+        """Begin what needs no input; called at activation."""
+
+    def stopped(self) -> None:
+        """End what was begun and forget what was received; called at deactivation, when no work runs any more."""
+
+    def listen(self, topic: str, quality: Quality | None = None) -> None:
+        """Subscribe to a topic of the suite, raw; `received` gets its messages. `quality`: another one than the suite's."""
+        if topic not in self._listening:
+            take = self._receive_latched if topic_entry(topic)[1] == LATCHED else self._receive
+            self._listening[topic] = create_subscription(self, topic, lambda data: take(topic, data), quality)
+
+    def ignore(self, topic: str) -> None:
+        """End a subscription."""
+        if topic in self._listening:
+            self.destroy_subscription(self._listening.pop(topic))
+            self._latched.pop(topic, None)
+            self.diagnostics.resolve(topic)
+
+    def serve(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
+        """Offer a service; whatever goes wrong in it, the caller gets an answer and the node lives on."""
+
+        def guarded(request: Any, response: Any) -> Any:
+            try:
+                return callback(request, response)
+            except Exception as error:
+                self.diagnostics.failed(name, error)
+                self.diagnostics.resolve(name)
+                return response
+
+        self.create_service(kind, name, guarded, qos_profile=REQUESTS)
+
+    def work(self, name: str, job: Job) -> None:
+        """Run a job off the executor's thread; a waiting one of the same name is replaced, a running one cancelled."""
+        if self._worker is not None:
+            self._worker.submit(name, lambda cancelled: None if cancelled() else job(cancelled))
+
+    async def result_of(
+        self, name: str, job: Callable[[Callable[[], bool]], Result], failed: Callable[[Exception], Result]
+    ) -> Result:
+        """Run a job off the executor's thread for a service, also if it is cancelled before its turn; return its result.
+
+        Args:
+            name: of the job.
+            job: called with a function that says whether it has been cancelled.
+            failed: returns the result of a job that raises; the error is reported on /diagnostics all the same.
+        """
+        answer, executor = Future(), self.executor
+
+        def run(cancelled: Callable[[], bool]) -> None:
+            try:
+                answer.set_result(job(cancelled))
+            except Exception as error:
+                answer.set_result(failed(error))
+                raise
+            finally:
+                executor.wake()
+
+        if self._worker is not None:
+            self._worker.submit(name, run)
+        result: Result = await answer
+        return result
+
+    def cancel(self, only: str | None = None) -> list[str]:
+        """Cancel all jobs, or those of one name; return their names."""
+        return self._worker.cancel(only) if self._worker is not None else []
+
+    def status(self, level: Level, message: str, subject: str = "status", stamp_ns: int = 0, **values: str) -> None:
+        """Report one status on /diagnostics and log it; an abandoned job ends here, before it is logged."""
+        self.diagnostics.status(level, message, subject, values, stamp_ns)
+
+    def update_diagnostics(self) -> None:
+        """Bring up to date, each second, what /diagnostics reports of the work that goes on."""
+        if self._worker is not None:
+            self.diagnostics.state("active", **self._worker.account())
+
+    # --- lifecycle --------------------------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Advertise the outputs; `run_nodes` has made the kernels ready."""
+        for topic in self.OUTPUTS:
+            self.outputs.advertise(topic)
+        self.diagnostics.state("inactive")
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Subscribe to the inputs."""
+        self._worker = Worker(self.diagnostics.failed, self.get_name(), self.diagnostics.resolve)
+        self.outputs.activate()
+        self.diagnostics.enable(True)
+        self.diagnostics.state("active")
+        for topic in self.INPUTS:
+            self.listen(topic)
+        self.started()
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Cancel the work and forget the inputs; what was published stays for late joiners."""
+        self._stop()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Withdraw what was published."""
+        self.outputs.destroy()
+        self.diagnostics.state("unconfigured")
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """End the work."""
+        self._stop()
+        return super().on_shutdown(state)
+
+    def _stop(self) -> None:
+        self.outputs.deactivate()
+        self.diagnostics.enable(False)
+        for topic in list(self._listening):
+            self.ignore(topic)
+        if self._worker is not None:
+            self._worker.close()
+            self._worker = None
+            self.stopped()
+            self.diagnostics.state("inactive")
+
+    def destroy_node(self) -> None:
+        """End the work, then the node."""
+        self._stop()
+        super().destroy_node()
+
+    def _receive_latched(self, topic: str, data: bytes) -> None:
+        """Take an input in, unless it is the last one word for word and the parameters are, too: then its node was restarted."""
+        if self._latched.get(topic) != (data, self.config):
+            self._latched[topic] = (data, self.config)
+            self._receive(topic, data)
+
+    def _receive(self, topic: str, data: bytes) -> None:
+        """Take an input in; whatever is wrong with it, the node lives on."""
+        try:
+            refuse_damaged(topic, data)
+            self.received(topic, data)
+            self.diagnostics.resolve(topic)
+        except Exception as error:
+            self.diagnostics.failed(topic, error)

@@ -1,0 +1,210 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a node reports of itself on /diagnostics: its statuses by name, all of them every second, and at once when one changes.
+
+That is how diagnostic_updater does it, so that diagnostic_aggregator takes no status for stale, and who comes late has all of
+them within a second. Nothing is latched: an error of an hour ago would reach a late aggregator as news.
+
+A finding that is over goes back to OK, but not before it could be seen: aggregators look once a second.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+import threading
+from time import monotonic
+import traceback
+
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from msg_conventions.diagnostics import encode_diagnostics, Level, of_template, Status
+from scenario_gen.base.errors import printable, ScenarioGenError
+from scenario_gen.ros.plumbing.topics import create_publisher, publish
+from scenario_gen.ros.plumbing.worker import stop_if_abandoned
+
+PERIOD = 1.0  # seconds of real time between two regular messages; what waits is published after half of it at most
+HOLD = 3.0  # seconds for which a finding is shown at least
+AT_ONCE = 20  # messages a second beside the regular ones; what changes more often waits
+ALSO = 50  # findings of one name that a message holds beside the newest
+MOST = 100  # statuses of a node
+LONGEST = 2_000  # characters of a message
+LARGEST = 65_536  # characters of the values of one status
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """A status, when it was reported, how often a finding was reported in a row, and whether it is over."""
+
+    status: Status
+    since: float
+    times: int = 1
+    over: bool = False
+
+    @property
+    def bad(self) -> bool:
+        return self.status.level is not Level.OK
+
+
+class NodeDiagnostics:
+    """The statuses of one node."""
+
+    def __init__(self, node: Node, update: Callable[[], None] = lambda: None, *, enabled: bool = True) -> None:
+        """Report from now on; `update` is called each second, to bring what goes on up to date, `enabled` see `enable`."""
+        self._node, self._update, self._enabled = node, update, enabled
+        self._entries: dict[str, _Entry] = {}
+        self._lock = threading.RLock()
+        self._state: Status | None = None  # of nodes that have any
+        self._news: dict[str, list[str]] = {}  # findings since the last message, by name
+        self._waiting = False  # something is to be published before the next regular message
+        self._left, self._refilled = AT_ONCE, monotonic()
+        self._regular = self._updating = False  # this tick's message is a regular one; it is being made
+        self._publisher = create_publisher(node, "/diagnostics")
+        node.create_timer(0.5 * PERIOD, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def enable(self, enabled: bool) -> None:
+        """Take in what the node's work reports, or forget what it reported and take in no more, but the node's state."""
+        with self._lock:
+            self._enabled = enabled
+            self._entries.clear()
+            self._news.clear()
+
+    def state(self, message: str, **values: str) -> None:
+        """Report in which state the node is; values that only tell how far something is wait for the next second."""
+        with self._lock:
+            old, self._state = self._state, self._status("state", Level.OK, message, values)
+            if old is None or old.message != message:
+                self._publish_soon()
+
+    def report(self, *statuses: Status, stamp_ns: int = 0) -> None:
+        """Keep statuses, and forget those of an earlier report about the same: names that begin with the same word.
+
+        Raises:
+            CancelledError: on the thread of a job that was abandoned.
+        """
+        with self._lock:
+            stop_if_abandoned()
+            names, families = {status.name for status in statuses}, {family(status.name) for status in statuses}
+            for name in [name for name in self._entries if family(name) in families and name not in names]:
+                self._entries.pop(name)
+            changed = [self._keep(of_template(status, stamp_ns) if stamp_ns else status) for status in statuses]
+            if any(changed):
+                self._publish_soon()
+
+    def status(
+        self, level: Level, message: str, subject: str, values: Mapping[str, str], stamp_ns: int = 0, *, log: bool = True
+    ) -> None:
+        """Keep one status and log it; an abandoned job ends here, before it is logged.
+
+        Raises:
+            CancelledError: on the thread of a job that was abandoned.
+        """
+        with self._lock:
+            stop_if_abandoned()
+            status = self._status(subject, level, message, values)
+            if self._keep(of_template(status, stamp_ns) if stamp_ns else status):
+                self._publish_soon()
+        if not log:
+            return
+        if level is Level.OK:  # a call of its own for each severity: rclpy refuses to change it between calls from one line
+            self._node.get_logger().info(message)
+        elif level is Level.WARN:
+            self._node.get_logger().warning(message)
+        else:
+            self._node.get_logger().error(message)
+
+    def failed(self, name: str, error: BaseException) -> None:
+        """Report that something went wrong; of a numbered job, `get_plan 7`, the subject is `get_plan`. The node lives on."""
+        if not self._node.context.ok():
+            return
+        kind, (subject, _, job) = type(error).__name__, name.partition(" ")
+        message = str(error)
+        if not isinstance(error, ScenarioGenError):
+            self._node.get_logger().error("".join(traceback.format_exception(error)))
+            message = f"{kind}: {error}"
+        self.status(Level.ERROR, message, subject, {"error": kind} | ({"job": job} if job else {}))
+
+    def resolve(self, name: str) -> None:
+        """Mark what was wrong with something as over: good input has come, or a job of that name has been done."""
+        subject = f"{self._node.get_fully_qualified_name()}: {name.partition(' ')[0]}"
+        with self._lock:
+            if (entry := self._entries.get(subject)) is not None and entry.bad:
+                self._entries[subject] = replace(entry, over=True)
+
+    def _status(self, subject: str, level: Level, message: str, values: Mapping[str, str]) -> Status:
+        return Status(f"{self._node.get_fully_qualified_name()}: {subject}", level, message, values)
+
+    def _keep(self, status: Status) -> bool:
+        """Take a status in; return whether it is news."""
+        if not self._enabled:
+            return False
+        status, old = bounded(status), self._entries.get(status.name)
+        news, times = True, 1
+        if status.level is Level.OK:
+            news = old is None or old.status != status
+        else:
+            if old is not None and old.bad:
+                times = old.times + 1
+                status = replace(status, values={**status.values, "times": str(times)})
+            found = self._news.setdefault(status.name, [])
+            found.append(status.message)
+            del found[: -ALSO - 1]
+        self._entries[status.name] = _Entry(status, monotonic(), times)
+        while len(self._entries) > MOST:  # at first what is well
+            first = next(iter(self._entries))
+            self._entries.pop(next((name for name, entry in self._entries.items() if not entry.bad), first))
+        return news
+
+    def _publish_soon(self) -> None:
+        """Publish now, or with the next tick if that were too often."""
+        if monotonic() - self._refilled >= PERIOD:
+            self._left, self._refilled = AT_ONCE, monotonic()
+        self._waiting = True
+        if self._left > 0 and not self._updating:
+            self._left -= 1
+            self._publish()
+
+    def _tick(self) -> None:
+        """Every second bring all up to date, end what is over and was shown long enough, and publish; between, what waits."""
+        self._regular = not self._regular
+        if self._regular:
+            self._updating = True
+            self._update()
+        with self._lock:
+            now, self._updating = monotonic(), False
+            for name, entry in self._entries.items():
+                if entry.over and now - entry.since >= HOLD:
+                    values = {key: value for key, value in entry.status.values.items() if key != "error"}
+                    self._entries[name] = _Entry(Status(name, Level.OK, f"over: {entry.status.message}", values), now)
+            if self._regular or self._waiting:
+                self._publish()
+
+    def _publish(self) -> None:
+        """Publish all; findings of one name that no message has held yet stand beside the newest."""
+        statuses = [self._state] if self._state else []
+        for name, entry in self._entries.items():
+            also = {f"also.{k}": message for k, message in enumerate(self._news.get(name, [])[: -1 if entry.bad else None])}
+            statuses.append(bounded(replace(entry.status, values={**entry.status.values, **also})) if also else entry.status)
+        self._news.clear()
+        self._waiting = False
+        publish(self._node, self._publisher, encode_diagnostics(statuses, self._node.get_clock().now().nanoseconds))
+
+
+def family(name: str) -> str:
+    """Return node and first word of a status's name: `/planner: fit` of `/planner: fit of 7`."""
+    node, _, subject = name.partition(": ")
+    return f"{node}: {subject.partition(' ')[0]}"
+
+
+def bounded(status: Status) -> Status:
+    """Return a status of bounded size, all of which prints; values that are too many are counted."""
+    left, values = LARGEST, dict[str, str]()
+    for key, value in status.values.items():
+        left -= len(key) + len(value)
+        if left < 0:
+            break
+        values[key] = value
+    if missing := len(status.values) - len(values):
+        values["left_out"] = f"{missing} values, which would make the message too long"
+    message = status.message if len(status.message) <= LONGEST else f"{status.message[:LONGEST]} …"
+    return Status(status.name[:LONGEST], status.level, printable(message), values)

@@ -1,0 +1,280 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Topics: message classes by name, qualities of service, and a node's publishers with their pace.
+
+A publisher remembers as many messages as its depth says; what it forgets before a subscriber has it is lost, in silence. A reader
+that keeps all acknowledges a message only where it has room for it (Fast DDS: 5000 of a topic), so whoever waits for
+acknowledgements goes no faster than its subscribers.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from functools import partial
+import importlib
+import threading
+from time import monotonic, sleep
+from typing import Any
+
+from rclpy.duration import Duration
+from rclpy.exceptions import InvalidHandle
+from rclpy.executors import Executor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from msg_conventions.topics import topic_entry
+from scenario_gen.base.errors import InputError
+from scenario_gen.ros.plumbing.worker import stop_if_abandoned
+from scenario_gen.types.qos import Quality
+
+DEPTH = 1000  # messages that a subscription holds at least
+TICK = 0.002  # seconds between two looks for acknowledgements
+SLOWLY = 0.001  # seconds for each message while a subscriber is not waited for: for the sake of the others
+
+
+def message_class(kind: str) -> Any:
+    """Return the class of e.g. `nav_msgs/msg/Path`.
+
+    Raises:
+        InputError: the package is not installed or has no such type.
+    """
+    package, _, name = kind.partition("/msg/")
+    try:
+        return getattr(importlib.import_module(f"{package}.msg"), name)
+    except (ImportError, AttributeError, ValueError):
+        if kind == "tf2_msgs/msg/TFMessage":
+            from scenario_gen.ros.plumbing.raw_tf import raw_tf_message
+
+            return raw_tf_message()
+        raise InputError(f"message type {kind} is not installed; source the workspace that has {package or 'it'}") from None
+
+
+def qos(quality: Quality) -> QoSProfile:
+    """Return the profile of a topic."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_ALL if quality.keep_all else HistoryPolicy.KEEP_LAST,
+        depth=quality.depth,
+        reliability=ReliabilityPolicy.RELIABLE if quality.reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if quality.transient_local else DurabilityPolicy.VOLATILE,
+    )
+
+
+def adapted_quality(topic: str, offers: Sequence[QoSProfile]) -> tuple[Quality, Quality]:
+    """Return the quality to subscribe with, which suits every publisher, and the one to offer at replay.
+
+    Of the suite's own topics all is kept (DDS holds 5000 messages), so that publishers that pace themselves wait for the
+    recorder; other messages may be of any size, and the newest are kept.
+
+    Discovery does not always tell a publisher's depth; then it is that of the topic's kind.
+    """
+    reliable = all(offer.reliability == ReliabilityPolicy.RELIABLE for offer in offers)
+    transient_local = all(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
+    offered = max(offer.depth for offer in offers)
+    depth = offered or (DEPTH if topic.endswith(("/scenarios", "/scenarios/info")) else 1)
+    of_suite = True
+    try:
+        topic_entry(topic)
+    except KeyError:
+        of_suite = False
+    subscribed = Quality(max(DEPTH, offered), reliable, transient_local, keep_all=reliable and of_suite)
+    return subscribed, Quality(depth, reliable, transient_local)
+
+
+def create_publisher(node: Node, topic: str, name: str = "") -> Any:
+    """Return a publisher of a topic of the suite, as `name` if that is another."""
+    kind, quality = topic_entry(topic)
+    return node.create_publisher(message_class(kind), name or topic, qos(quality))
+
+
+def create_subscription(node: Node, topic: str, callback: Callable[..., None], quality: Quality | None = None) -> Any:
+    """Subscribe, raw, to a topic of the suite, with its own quality of service or another."""
+    kind, own = topic_entry(topic)
+    return node.create_subscription(message_class(kind), topic, callback, qos(quality or own), raw=True)
+
+
+def publish(node: Node, publisher: Any, data: bytes) -> None:
+    """Publish CDR bytes from any thread; it is no error if a signal has ended the node or its context meanwhile."""
+    try:
+        if node.context.ok():
+            publisher.publish(data)
+    except rclpy_implementation.InvalidHandle:
+        return  # the publisher was destroyed meanwhile
+    except rclpy_implementation.RCLError:
+        if node.context.ok():
+            raise
+
+
+class Outputs:
+    """The publishers of one node, which publish while it is active.
+
+    A message is published whole or not at all: once `deactivate` has returned nothing more is, whatever still runs.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._publishers: dict[str, Any] = {}
+        self._lock = threading.RLock()
+        self._active = False
+        self._paces: dict[str, Pace] = {}
+
+    def activate(self) -> None:
+        """Publish from now on."""
+        self._active = True
+
+    def deactivate(self) -> None:
+        """Publish no more."""
+        with self._lock:
+            self._active = False
+
+    def advertise(self, topic: str) -> None:
+        """Offer a topic of the suite.
+
+        Raises:
+            CancelledError: on the thread of a job that was abandoned.
+        """
+        with self._lock:
+            stop_if_abandoned()
+            if topic not in self._publishers:
+                self._publishers[topic] = create_publisher(self._node, topic)
+
+    def send(self, topic: str, data: bytes) -> None:
+        """Publish the CDR bytes of a topic of the suite, if the node is active.
+
+        Raises:
+            CancelledError: on the thread of a job that was abandoned.
+        """
+        with self._lock:
+            stop_if_abandoned()
+            if self._active:
+                self.advertise(topic)
+                publish(self._node, self._publishers[topic], data)
+
+    def publish(self, publisher: Any, data: bytes) -> None:
+        """Publish the CDR bytes of any other publisher of the node, if it is active.
+
+        Raises:
+            CancelledError: on the thread of a job that was abandoned.
+        """
+        with self._lock:
+            stop_if_abandoned()
+            if self._active:
+                publish(self._node, publisher, data)
+
+    @contextmanager
+    def paced(self, topics: Iterable[str], patience: float, report: Callable[[str, int], None]) -> Iterator[None]:
+        """Let `send_paced` pace these topics inside; `report` is called with the topic and what its `Pace` reports."""
+        for topic in topics:
+            self.advertise(topic)
+            depth = topic_entry(topic)[1].depth
+            self._paces[topic] = Pace(self._publishers[topic], depth, patience, partial(report, topic))
+        try:
+            yield
+        finally:
+            for topic in topics:
+                self._paces.pop(topic).end()
+
+    def send_paced(self, topic: str, data: bytes, stop: Callable[[], bool]) -> None:
+        """Publish as `send` does; on a topic that is paced, once its subscribers have room, or `stop` says so.
+
+        Topics that are paced together take turns: on the last of them nodes of the same process are let take, too.
+        Not to be called on the executor's thread.
+
+        Raises:
+            CancelledError: on the thread of a job that was abandoned.
+        """
+        if topic in self._paces:
+            self._paces[topic].wait(lambda: stop() or not self._active)
+            if topic == next(reversed(self._paces)):
+                let_others_take(self._node.executor, lambda: stop() or not self._active)
+        self.send(topic, data)
+
+    def destroy(self) -> None:
+        """Destroy all publishers, and with them what late joiners would have got."""
+        with self._lock:
+            for topic in list(self._publishers):
+                self._node.destroy_publisher(self._publishers.pop(topic))
+
+
+class Pace:
+    """Counts what one publisher's subscribers may not have acknowledged yet."""
+
+    def __init__(self, publisher: Any, depth: int, patience: float, report: Callable[[int], None]) -> None:
+        """Begin.
+
+        Args:
+            publisher: of rclpy.
+            depth: messages that it remembers.
+            patience: seconds without acknowledgement after which its subscribers are not waited for; 0: always wait.
+            report: called when that happens with 0, and when all is acknowledged again, or at `end`, with the number of
+                messages that were published meanwhile.
+        """
+        self._publisher, self._patience, self._report = publisher, patience, report
+        self._most = max(1, depth * 9 // 10)
+        self._open = 0  # messages since everything was acknowledged, or was waited for in vain
+        self._left = patience  # seconds that the next wait may take
+        self._alone = False  # a subscriber is not waited for
+        self._unacknowledged = 0
+
+    def wait(self, stop: Callable[[], bool]) -> None:
+        """Wait until one message more overwrites none that is on its way, or `stop` says so."""
+        if 8 * self._open >= self._most and self._acknowledged():
+            self._done()
+        deadline = monotonic() + self._left
+        while self._open >= self._most and not stop():
+            if self._acknowledged():
+                self._done()
+            elif self._patience and monotonic() >= deadline:
+                self._go_on()
+            else:
+                sleep(TICK)
+        if self._alone:
+            self._unacknowledged += 1
+            sleep(SLOWLY)
+        self._open += 1
+
+    def end(self) -> None:
+        """Say what is still unacknowledged of what was not waited for."""
+        if self._alone:
+            self._done()
+
+    def _go_on(self) -> None:
+        """Wait no more for now, and half as long the next time: twice `patience` in all."""
+        self._open, self._left = 0, 0.5 * self._left
+        if not self._alone:
+            self._alone = True
+            self._report(0)
+
+    def _done(self) -> None:
+        unacknowledged, alone = self._unacknowledged, self._alone
+        self._open, self._unacknowledged, self._alone, self._left = 0, 0, False, self._patience
+        if alone:
+            self._report(unacknowledged)
+
+    def _acknowledged(self) -> bool:
+        with suppress(InvalidHandle):  # it was destroyed meanwhile
+            return bool(self._publisher.wait_for_all_acked(Duration()))
+        return True
+
+
+def let_others_take(executor: Executor | None, stop: Callable[[], bool]) -> None:
+    """Wait until the executor has gone round once, where it serves other nodes, too: each subscription takes a message then.
+
+    In one process the worker would else outrun the executor's thread without end. Never called on that thread.
+    """
+    if executor is None or len(executor.get_nodes()) < 2:
+        return
+    turned = threading.Event()
+    executor.create_task(turned.set)
+    while not turned.wait(TICK) and not stop():
+        pass
+
+
+def unacknowledged(node: Node, topic: str, count: int) -> str:
+    """Say in a sentence what `Pace` reported: that a topic's subscribers are not waited for any more, or what they may lack."""
+    name = node.resolve_topic_name(topic)
+    said = f"a subscriber of {name} acknowledges nothing; it is not waited for any more"
+    if count:
+        said = f"{count} messages of {name} were published without acknowledgement, a subscriber may lack them"
+    who = ", ".join(sorted({one.node_name for one in node.get_subscriptions_info_by_topic(name)})) or "none any more"
+    return f"{said} (subscribers: {who}); see which one hangs, or raise patience; who joins anew gets the last 1000"

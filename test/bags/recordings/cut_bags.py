@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A bag of several small chunks to cut and damage, and what the mcap library says of its chunks."""
+
+from io import BytesIO
+from pathlib import Path
+
+from mcap.records import Chunk, Message
+from mcap.stream_reader import breakup_chunk, StreamReader
+
+from scenario_gen.bags.storage.config import Allowance, BagConfig
+from scenario_gen.bags.storage.salvage import salvage
+from scenario_gen.bags.storage.writer import BagWriter
+
+
+def small_bag(folder: Path, *, compress: bool) -> Path:
+    """Write a bag of two topics in seven chunks; return its file."""
+    with BagWriter(folder, compress=compress, chunk_bytes=400) as bag:
+        bag.add_topic("/a", "std_msgs/msg/String")
+        bag.add_topic("/b", "std_msgs/msg/Header")
+        for k in range(60):
+            bag.write("/a" if k % 3 else "/b", b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00" + bytes([k]), 1000 + k)
+    return folder / f"{folder.name}_0.mcap"
+
+
+def chunk_ends(whole: bytes) -> list[tuple[int, int]]:
+    """Return where each chunk ends, and how many messages the file has up to there; by the mcap library."""
+    reader = StreamReader(BytesIO(whole), emit_chunks=True)
+    found, count = [], 0
+    for record in reader.records:
+        if isinstance(record, Chunk):
+            count += sum(isinstance(inner, Message) for inner in breakup_chunk(record))
+            found.append((reader._stream.count, count))
+    return found
+
+
+def salvaged(data: bytes, path: Path) -> list[tuple[int, bytes]]:
+    """Return stamp and bytes of the messages that are whole in a file of these bytes and whose topic is known."""
+    path.write_bytes(data)
+    config = BagConfig()
+    with path.open("rb") as file:
+        whole = salvage(file, len(data), Allowance(config, str(path), len(data))).whole
+        whole.allowance = Allowance(config, str(path), len(data))
+        known = {channel.id for channel in whole.channels.values() if channel.schema_id in whole.schemas}
+        return [(stamp, message) for stamp, _, message in whole.in_order(known, strict=False)]

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Live scenarios are whole in whatever order their messages come, and only then."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+from message_examples import scenario
+import numpy as np
+import pytest
+
+from msg_conventions.scenario_info import encode_info, scenario_entry
+from msg_conventions.scenarios import encode_scenario, messages_of
+from scenario_gen.bags.recordings.arriving import ArrivingScenarios, INFO, SCENARIOS, WITNESS
+from scenario_gen.base.errors import InputError
+from scenario_gen.types.ego import together, with_witness
+from scenario_gen.types.scenario import BoundaryStates, EgoSlot, Scenario
+
+
+def set_of(count):
+    """Scenarios of four vehicles that come and go, without one; and their messages, by topic."""
+    made, messages = [], []
+    for index in range(count):
+        all_of_it = scenario(7 + index, n=4)
+        last = len(all_of_it.time) - 1
+        present = np.array([[0, last], [2, last], [2, last - 3], [1, last]])
+        arrays = (all_of_it.time, all_of_it.position, all_of_it.heading, all_of_it.speed, all_of_it.acceleration)
+        one = with_witness(Scenario(all_of_it.vehicles, *arrays, 3, index, all_of_it.frame_id, present), 3)
+        data = encode_scenario(one, 17)
+        slot = EgoSlot(one.witness.vehicles[0], np.zeros(4), np.ones(4))
+        asked = BoundaryStates(np.zeros((4, 4)), np.ones((4, 4)))
+        entry = scenario_entry(one, data, "r", "/n", template=all_of_it.vehicles, asked=asked, ego=slot)
+        messages += [(SCENARIOS, part) for part in messages_of(data)]
+        messages += [(WITNESS, encode_scenario(one.witness, 17)), (INFO, encode_info(entry, 17))]
+        made.append(one)
+    return made, messages
+
+
+MADE, MESSAGES = set_of(2)
+
+
+@given(st.permutations(range(len(MESSAGES))))
+def test_whatever_comes_first(order):
+    arriving = ArrivingScenarios()
+    found = [one for k in order for one in arriving.take(*MESSAGES[k])]
+    assert sorted(entry.index for entry, _, _ in found) == [0, 1] and arriving.unmatched == 0
+    for entry, stamp, got in found:
+        assert stamp == 17 and entry.ego == got.witness.vehicles[0].id
+        wanted = together(MADE[entry.index])
+        assert encode_scenario(together(got), 17) == encode_scenario(wanted, 17)
+    assert [one for k in order for one in arriving.take(*MESSAGES[k])] == [], "what comes twice counts once"
+
+
+def test_what_is_not_whole_waits():
+    arriving = ArrivingScenarios()
+    assert all(arriving.take(*message) == [] for message in MESSAGES if message[0] != WITNESS)
+    assert arriving.unmatched > 0
+    with pytest.raises(InputError):
+        arriving.take(INFO, b"damaged")

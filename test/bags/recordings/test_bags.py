@@ -1,0 +1,284 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Bags: what is written opens everywhere, the same bytes each time, whole or not at all; what others wrote can be read."""
+
+from collections import Counter
+from dataclasses import replace
+import os
+from pathlib import Path
+import resource
+import subprocess
+import sys
+
+from bag_examples import hand_made_run
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import get_typestore, Stores
+import yaml
+
+from msg_conventions.changepoints import decode_posterior
+from msg_conventions.fits import anchor_stamps, decode_fit
+from msg_conventions.paths import decode_route
+from msg_conventions.roads import decode_map
+from msg_conventions.scenario_info import decode_info
+from msg_conventions.scenarios import decode_scenario, digest, messages_of
+from msg_conventions.tracks import decode_tracks
+from scenario_gen.bags.recordings.read import read_recording, read_scenario_set
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.bags.storage.reindex import reindex
+from scenario_gen.bags.storage.writer import BagWriter, Split
+from scenario_gen.base.errors import InputError
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.generation import GenerationResult
+
+
+@pytest.fixture
+def run() -> GenerationResult:
+    return hand_made_run()
+
+
+def test_every_message_decodes_in_every_reader(run, tmp_path):
+    folder = write_recording(tmp_path / "bag", {"/a": run, "": run})
+    expected = 2 * (10 + 4 + 3 * 5 + 1)
+    counts = Counter()
+    with AnyReader([folder], default_typestore=get_typestore(Stores.EMPTY)) as reader:
+        for connection, _, data in reader.messages():
+            reader.deserialize(data, connection.msgtype)
+            counts["rosbags"] += 1
+    with (folder / "bag_0.mcap").open("rb") as stream:
+        for schema, channel, _, message in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            assert message is not None
+            assert schema.encoding == "ros2msg"
+            assert channel.message_encoding == "cdr"
+            counts["mcap_ros2"] += 1
+    assert counts == {"rosbags": expected, "mcap_ros2": expected}
+    assert len(list(read_messages(folder))) == expected
+
+
+def test_the_file_says_what_rosbag2_wants(run, tmp_path):
+    folder = write_recording(tmp_path / "bag", run)
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with (folder / "bag_0.mcap").open("rb") as stream:
+        reader = make_reader(stream)
+        assert reader.get_header().profile == "ros2"
+        summary = reader.get_summary()
+        assert summary.chunk_indexes
+        assert summary.chunk_indexes[0].compression == "zstd"
+        for channel in summary.channels.values():
+            schema = summary.schemas[channel.schema_id]
+            assert channel.metadata["topic_type_hash"] == store.hash_rihs01(schema.name)
+            (profile,) = yaml.safe_load(channel.metadata["offered_qos_profiles"])
+            assert profile["durability"] == "transient_local"
+            assert profile["depth"] == (1000 if "scenarios" in channel.topic else 100 if "diag" in channel.topic else 1)
+    text = (folder / "metadata.yaml").read_text()
+    info = yaml.safe_load(text)["rosbag2_bagfile_information"]
+    assert info["version"] == 9
+    assert info["storage_identifier"] == "mcap"
+    assert info["relative_file_paths"] == ["bag_0.mcap"]
+    assert info["starting_time"]["nanoseconds_since_epoch"] == run.encounter.start_ns
+    assert info["message_count"] == sum(topic["message_count"] for topic in info["topics_with_message_count"])
+    topics = {topic["topic_metadata"]["name"]: topic["topic_metadata"] for topic in info["topics_with_message_count"]}
+    assert topics["/scenarios"]["offered_qos_profiles"][0]["reliability"] == "reliable"
+    assert "/vehicle_bus_2/route" in topics
+    assert "&" not in text
+
+
+def test_a_run_is_read_back_from_its_bag(run, tmp_path):
+    messages = list(read_messages(write_recording(tmp_path / "bag", run)))
+    by_topic = {message.topic: message.data for message in messages}
+    template = decode_tracks(by_topic["/tracks"])
+    assert template.position.tobytes() == run.encounter.position.tobytes()
+    assert template.vehicles[1] == Vehicle("bus_2", 12.0, 2.5)
+    _, road = decode_map(by_topic["/map"], by_topic["/road/entries"], by_topic["/road/exits"])
+    assert (road.drivable == run.road.drivable).all()
+    assert decode_posterior(by_topic["/posterior"]).changepoints.tolist() == [20, 45]
+    assert decode_fit(by_topic["/fit"])[2].end.tobytes() == run.fit.asked.end.tobytes()
+    anchors = anchor_stamps(template, run.segmentation.changepoints)
+    assert decode_route(by_topic["/vehicle_1/route"], anchors)[1].points.tobytes() == run.routes[0].points.tobytes()
+    sent = [message.data for message in messages if message.topic == "/scenarios"]
+    *entries, summary = [decode_info(m.data)[0] for m in messages if m.topic == "/scenarios/info"]
+    assert [entry.sha256 for entry in entries] == [digest(data) for data in sent]
+    scenarios = [decode_scenario(data)[1] for data in sent]
+    assert [s.position.tobytes() for s in scenarios] == [s.position.tobytes() for s in run.generated.scenarios]
+    found = summary.result()
+    assert (found.requested, found.candidates, found.refused) == (5, 8, run.generated.refused)
+
+
+def test_the_scenarios_of_a_request_are_read_with_their_counts(run, tmp_path):
+    other = replace(run, generated=replace(run.generated, requested=6, scenarios=run.generated.scenarios[:2]))
+    folder = write_recording(tmp_path / "bag", {"": run, "/b": other})
+    for namespace, sent in (("", run), ("/b", other)):
+        got = read_scenario_set(folder, namespace)
+        assert (got.requested, got.candidates, got.refused) == (sent.generated.requested, 8, run.generated.refused)
+        assert [(s.index, s.seed) for s in got.scenarios] == [(s.index, s.seed) for s in sent.generated.scenarios]
+        assert [s.position.tobytes() for s in got.scenarios] == [s.position.tobytes() for s in sent.generated.scenarios]
+    with pytest.raises(InputError, match="no request"):
+        read_scenario_set(folder, "/c")
+
+
+@pytest.mark.parametrize(
+    "indices", [(0, 1, 2, 3, 4), (1, 2, 1_000_001, 1_000_003, 4)], ids=["none refused", "refused and adapted"]
+)
+@pytest.mark.parametrize("begun", [3, 5, 7])
+def test_a_request_that_came_twice_counts_once(run, tmp_path, indices, begun):
+    """As a sampler publishes it that was killed in the midst of it and started again."""
+    scenarios = tuple(replace(s, index=index) for s, index in zip(run.generated.scenarios, indices, strict=True))
+    run = replace(run, generated=replace(run.generated, scenarios=scenarios))
+    whole = list(read_messages(write_recording(tmp_path / "whole", run)))
+    told = [message for message in whole if message.topic in ("/scenarios", "/scenarios/info")]
+    bag = BagWriter(tmp_path / "twice")
+    for topic in bag_topics(tmp_path / "whole"):
+        bag.add_topic(topic.name, topic.type)
+    for k, message in enumerate([*whole, *told[:begun], *told]):
+        bag.write(message.topic, message.data, whole[0].stamp_ns + k)
+    bag.close()
+    got = read_scenario_set(tmp_path / "twice")
+    assert [s.index for s in got.scenarios] == list(indices)
+    assert [s.position.tobytes() for s in got.scenarios] == [s.position.tobytes() for s in run.generated.scenarios]
+
+
+def test_same_run_same_bytes(run, tmp_path):
+    one, two = (write_recording(tmp_path / name / "bag", run) for name in "ab")
+    for name in ("bag_0.mcap", "metadata.yaml"):
+        assert (one / name).read_bytes() == (two / name).read_bytes()
+
+
+def test_nothing_half_written_and_no_folder_of_others_is_touched(run, tmp_path):
+    broken = replace(run, routes=(run.routes[0], replace(run.routes[1], anchor=np.array([0, 10, 22, 99]))))
+    with pytest.raises(IndexError):
+        write_recording(tmp_path / "bag", broken)
+    assert list(tmp_path.iterdir()) == []
+    write_recording(tmp_path / "bag", run)
+    with pytest.raises(IndexError):
+        write_recording(tmp_path / "bag", broken)
+    assert len(list(read_messages(tmp_path / "bag"))) == 30  # the earlier one is still there
+    write_recording(tmp_path / "bag", run)
+    assert [p.name for p in tmp_path.iterdir()] == ["bag"]
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").touch()
+    with pytest.raises(InputError, match=r"holds notes\.txt and is not an earlier result"):
+        write_recording(tmp_path / "mine", run)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="file"):
+        write_recording(tmp_path / "file" / "bag", run)
+
+
+def test_splitting_by_size_and_by_time(tmp_path):
+    with BagWriter(tmp_path / "bag", split=Split(seconds=1.0), compress=False) as bag:
+        bag.add_topic("/t", "std_msgs/msg/String")
+        for k in range(35):
+            bag.write("/t", b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00", k * 100_000_000)
+    assert len(bag.info.files) == 4
+    assert [m.stamp_ns for m in read_messages(tmp_path / "bag")] == [k * 100_000_000 for k in range(35)]
+    with BagWriter(tmp_path / "size", split=Split(bytes=100)) as bag:
+        bag.add_topic("/t", "std_msgs/msg/String")
+        for k in range(35):
+            bag.write("/t", b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00", k)
+    assert [file.count for file in bag.info.files] == [10, 10, 10, 5]
+    assert bag_topics(tmp_path / "size")[0].count == 35
+
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from scenario_gen.bags.storage.writer import BagWriter
+bag = BagWriter(Path(sys.argv[1]), chunk_bytes=2000)
+bag.add_topic("/t", "std_msgs/msg/String")
+for k in range(1000):
+    bag.write("/t", b"\\x00\\x01\\x00\\x00\\x02\\x00\\x00\\x00a\\x00", k)
+os.kill(os.getpid(), 9)
+"""
+
+
+def test_a_killed_recording_loses_its_last_chunk_only(tmp_path):
+    assert subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / "bag")], check=False).returncode == -9
+    with pytest.raises(InputError, match="reindex"):
+        list(read_messages(tmp_path / "bag"))
+    saved = reindex(tmp_path / "bag", tmp_path / "saved").messages
+    assert 950 <= saved < 1000  # a chunk of 2000 bytes holds about 50 such messages
+    assert [m.stamp_ns for m in read_messages(tmp_path / "saved")] == list(range(saved))
+
+
+def test_a_bag_that_could_not_be_written_on_is_left_for_reindex(tmp_path):
+    """Files may be no longer than 100 kB here, as if the disk were full then; what is whole until then is saved."""
+    bag = BagWriter(tmp_path / "bag", compress=False, chunk_bytes=5000)
+    bag.add_topic("/t", "std_msgs/msg/String")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))
+    try:
+        with pytest.raises(OSError, match=r"bag_0\.mcap"):
+            for k in range(1000):
+                bag.write("/t", bytes(1000), k)
+        bag.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert not (tmp_path / "bag" / "metadata.yaml").exists()
+    assert 80 < reindex(tmp_path / "bag", tmp_path / "saved").messages < 100
+
+
+def test_a_truncated_or_missing_bag_is_an_error_that_names_the_file(run, tmp_path):
+    folder = write_recording(tmp_path / "bag", run)
+    whole = (folder / "bag_0.mcap").read_bytes()
+    for cut in (0, 5, len(whole) // 2, len(whole) - 3):
+        (folder / "bag_0.mcap").write_bytes(whole[:cut])
+        with pytest.raises(InputError, match="bag"):
+            list(read_messages(folder))
+    with pytest.raises(InputError, match="no such bag"):
+        list(read_messages(tmp_path / "none"))
+    with pytest.raises(InputError, match=r"no \.mcap"):
+        reindex(tmp_path, tmp_path / "x")
+    assert not (tmp_path / "x").exists()
+
+
+def test_an_unknown_type_says_where_its_definition_was_sought(tmp_path):
+    with pytest.raises(InputError, match=r"no_such/msg/Thing.*AMENT_PREFIX_PATH"), BagWriter(tmp_path / "bag") as bag:
+        bag.add_topic("/t", "no_such/msg/Thing")
+
+
+def test_a_type_of_an_installed_package_is_found(tmp_path, monkeypatch):
+    share = tmp_path / "share" / "my_msgs" / "msg"
+    share.mkdir(parents=True)
+    (share / "Inner.msg").write_text("float64[3] a\nstd_msgs/Header h\n")
+    (share / "Outer.msg").write_text("Inner[] many\nInner one\nstring s\n")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", os.pathsep.join([str(tmp_path / "elsewhere"), str(tmp_path)]))
+    with BagWriter(tmp_path / "bag") as bag:
+        bag.add_topic("/t", "my_msgs/msg/Outer")
+        bag.write("/t", b"\x00\x01\x00\x00", 1)
+    assert bag_topics(tmp_path / "bag")[0].type == "my_msgs/msg/Outer"
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("name", ["wbag", "talker", "cdr_test", "test_bag_for_seek"])
+def test_bags_of_genuine_rosbag2_are_read_alike_in_both_storages(data: Path, name):
+    read = {}
+    for storage in ("mcap", "sqlite3"):
+        folder = data / "bags" / storage / name
+        messages = list(read_messages(folder))
+        info = yaml.safe_load((folder / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+        assert len(messages) == info["message_count"]
+        assert sum(topic.count for topic in bag_topics(folder)) == len(messages)
+        read[storage] = Counter((m.topic, m.type) for m in messages)
+    assert read["mcap"] == read["sqlite3"]
+
+
+def test_scenarios_of_vehicles_that_come_and_go_are_read_back_whole(run, tmp_path):
+    present = np.array([[0, 60], [20, 50]])
+    scenarios = tuple(replace(scenario, present=present) for scenario in run.generated.scenarios)
+    late = replace(run, encounter=replace(run.encounter, present=present), generated=replace(run.generated, scenarios=scenarios))
+    folder = write_recording(tmp_path / "bag", late)
+    assert sum(message.topic == "/scenarios" for message in read_messages(folder)) == 2 * len(scenarios)
+    found = read_recording(folder).namespaces[""]
+    assert not found.missing
+    assert not found.unknown
+    assert found.encounter.present.tolist() == present.tolist()
+    for before, after in zip(scenarios, found.scenario_set().scenarios, strict=True):
+        for name in ("position", "heading", "speed", "acceleration", "present"):
+            assert getattr(before, name).tobytes() == getattr(after, name).tobytes()
+    (info, (entry,)), summary = found.infos[2], found.summaries[0]
+    alone = found.messages_of(info, entry, summary)
+    assert [message.data for message in alone if message.topic == "/scenarios"] == list(messages_of(found.data("scenarios")[2]))

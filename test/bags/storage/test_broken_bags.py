@@ -1,0 +1,232 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Bags that once broke a reader, and bombs: an error that names the file, or what is whole of them; in little memory."""
+
+from dataclasses import replace
+import resource
+import shutil
+
+from bag_examples import hand_made_run
+from crash_files import crash_files, is_refused
+from mcap.writer import CompressionType, Writer
+import numpy as np
+import pytest
+
+from msg_conventions import trajectory
+from scenario_gen.bags.recordings.template import decode_template
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.bags.storage.reindex import reindex
+from scenario_gen.bags.storage.writer import BagWriter
+from scenario_gen.base.errors import InputError
+from scenario_gen.cli.commands import main
+from scenario_gen.output.review.evaluation import bag_results
+from scenario_gen.output.review.regenerate import regenerate_scenario
+from scenario_gen.output.review.validation import UNUSABLE, validate_bag
+
+MCAP = ("mcap_reader/*", "validate/*", "reindex/*", "reindex_*", "mcap_zstd*", "reindex_truncated_struct_error/*")
+
+
+@pytest.mark.parametrize("file", crash_files(*MCAP), indirect=True)
+@pytest.mark.parametrize(
+    "read", [bag_topics, lambda path: list(read_messages(path)), validate_bag], ids=["topics", "messages", "validate"]
+)
+def test_a_broken_mcap_file_is_named(file, read):
+    is_refused(lambda: read(file), str(file))
+
+
+@pytest.mark.parametrize("file", crash_files("sqlite/*"), indirect=True)
+def test_a_broken_sqlite_file_is_named(file):
+    is_refused(lambda: list(read_messages(file)), str(file))
+
+
+@pytest.mark.parametrize("file", crash_files(*MCAP), indirect=True)
+def test_reindex_saves_what_is_whole(file, tmp_path):
+    if is_refused(lambda: reindex(file, tmp_path / "saved"), str(file)):
+        assert not (tmp_path / "saved").exists()
+    else:
+        stamps = [message.stamp_ns for message in read_messages(tmp_path / "saved")]
+        assert stamps and stamps == sorted(stamps)
+
+
+@pytest.mark.parametrize("file", crash_files("meta/*"), indirect=True)
+def test_damaged_metadata_points_to_reindex(file, tmp_path):
+    bag = write_recording(tmp_path / "bag", hand_made_run())
+    for name in ("streams_b_0.mcap", "synthetic_b.mcap"):
+        shutil.copy(bag / "bag_0.mcap", bag / name)
+    shutil.copy(file, bag / "metadata.yaml")
+    if not is_refused(lambda: list(read_messages(bag)), "metadata.yaml", f"reindex {bag}"):
+        assert list(read_messages(bag))  # the damage is where nothing is read
+
+
+def test_a_bag_without_metadata_is_read_and_that_is_said(tmp_path, capsys, monkeypatch):
+    bag = write_recording(tmp_path / "bag", hand_made_run())
+    (bag / "metadata.yaml").unlink()
+    monkeypatch.setattr("sys.argv", ["scenario-gen", "validate", str(bag)])
+    with pytest.raises(SystemExit):
+        main()
+    assert "no metadata.yaml" in capsys.readouterr().out
+
+
+def bomb(path, size, chunks=1):
+    """An MCAP file of a few kilobytes per gigabyte: chunks of `size` zeros in one message each."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=1, compression=CompressionType.ZSTD)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        channel = writer.register_channel("/t", "cdr", schema)
+        for k in range(chunks):
+            writer.add_message(channel, log_time=k, data=bytes(size), publish_time=k)
+        writer.finish()
+    return path
+
+
+def test_a_chunk_has_bounds(tmp_path):
+    path = bomb(tmp_path / "a.mcap", 5_000_000)
+    small = BagConfig(most_chunk_bytes=1_000_000)
+    with pytest.raises(InputError, match=r"a\.mcap.*bag\.most_chunk_bytes is 1000000"):
+        list(read_messages(path, config=small))
+    with pytest.raises(InputError, match="most_chunk_bytes"):
+        reindex(path, tmp_path / "saved", small)
+    assert len(list(read_messages(path))) == 1
+
+
+def test_a_bag_has_bounds(tmp_path):
+    path = bomb(tmp_path / "a.mcap", 1_000_000, chunks=20)
+    small = BagConfig(most_bytes=10_000_000)
+    with pytest.raises(InputError, match=r"a\.mcap.*bag\.most_bytes"):
+        list(read_messages(path, config=small))
+    assert reindex(path, tmp_path / "saved", small).messages < 20
+    assert reindex(path, tmp_path / "all").messages == 20
+
+
+def test_the_default_bounds_keep_the_process_small(tmp_path):
+    path = bomb(tmp_path / "a.mcap", 60_000_000, chunks=15)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(InputError, match=r"bag\.most_bytes"):
+        for _ in read_messages(path):
+            pass
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 400_000  # kB
+
+
+def test_an_error_ends_with_exit_code_2(tmp_path, capsys, monkeypatch):
+    (tmp_path / "a.mcap").write_bytes(b"\x89MCAP0\r\n" + b"\xff" * 100)
+    for command in (["validate"], ["evaluate"], ["regenerate", "0"], ["reindex"]):
+        name, *more = command
+        monkeypatch.setattr("sys.argv", ["scenario-gen", name, str(tmp_path / "a.mcap"), *more])
+        with pytest.raises(SystemExit) as end:
+            main()
+        assert end.value.code == 2
+        assert "a.mcap" in capsys.readouterr().err
+
+
+def test_split_files_are_read_and_saved_by_time(tmp_path):
+    for k in range(3):
+        with BagWriter(tmp_path / f"part{k}") as bag:
+            bag.add_topic("/t", "std_msgs/msg/String")
+            for stamp in range(k, 30, 3):
+                bag.write("/t", b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00" + bytes([k]), stamp // 2)
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    for k in range(3):
+        shutil.copy(tmp_path / f"part{k}" / f"part{k}_0.mcap", folder / f"bag_{k}.mcap")
+    reindex(folder, tmp_path / "saved")
+    for path in (folder, tmp_path / "saved"):
+        stamps = [message.stamp_ns for message in read_messages(path)]
+        assert stamps == sorted(stamps) and len(stamps) == 30
+    one, two = ([message.data[-1] for message in read_messages(path)] for path in (folder, tmp_path / "saved"))
+    assert one == two  # of one stamp in the order of the files
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("name", ["wbag", "talker", "cdr_test", "test_bag_for_seek"])
+def test_recorded_bags_are_saved_whole(data, tmp_path, name):
+    folder = data / "bags" / "mcap" / name
+    made = reindex(folder, tmp_path / "saved")
+    assert made.lines() == []
+    whole, saved = ([(m.topic, m.type, m.data, m.stamp_ns) for m in read_messages(path)] for path in (folder, tmp_path / "saved"))
+    assert saved == whole
+
+
+def changed(bag, target, change):
+    """Copy a bag; `change(topic, bytes)` gives the bytes instead."""
+    with BagWriter(target) as writer:
+        for message in read_messages(bag):
+            writer.add_topic(message.topic, message.type)
+            writer.write(message.topic, change(message.topic, message.data), message.stamp_ns)
+    return target
+
+
+@pytest.mark.parametrize("topic", ["/tracks", "/map", "/changepoints", "/scenarios/info", "/scenarios"])
+@pytest.mark.parametrize("damage", ["cut", "length", "other type", "empty"])
+def test_damaged_messages_are_named_or_found(tmp_path, topic, damage):
+    bag = write_recording(tmp_path / "bag", hand_made_run())
+    other = next(m.data for m in read_messages(bag) if m.topic == ("/map" if topic != "/map" else "/tracks"))
+    change = {
+        "cut": lambda data: data[: len(data) // 2],
+        "length": lambda data: data[:12] + b"\xff" * 4 + data[16:],  # of the frame's name: 4 GiB
+        "other type": lambda _: other,
+        "empty": lambda _: b"",
+    }[damage]
+    broken = changed(bag, tmp_path / "broken", lambda name, data: change(data) if name == topic else data)
+    if topic == "/scenarios":
+        (found,) = validate_bag(broken)
+        assert found.invalid == found.scenarios == 5 and UNUSABLE in found.found
+    elif topic == "/scenarios/info" or damage != "other type":
+        assert is_refused(lambda: validate_bag(broken), topic)
+    else:
+        is_refused(lambda: validate_bag(broken), topic)
+    is_refused(lambda: bag_results(broken))
+    assert is_refused(lambda: regenerate_scenario(broken, 0))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda message: replace(message, position=message.position * 1e9), "position is"),
+        (lambda message: replace(message, speed=message.speed * 1e6), "speed is"),
+        (lambda message: replace(message, time_ns=message.time_ns * 10_000), "at most 7200 s|steps of 0.001 to 10 s"),
+        (lambda message: replace(message, vehicles=tuple(replace(v, length=1e9) for v in message.vehicles)), "0.01 to 1000 m"),
+    ],
+    ids=["position", "speed", "time", "length"],
+)
+@pytest.mark.parametrize("topic", ["/tracks", "/scenarios"])
+def test_what_no_vehicle_does_is_refused_before_it_takes_memory(tmp_path, topic, change, said):
+    bag = write_recording(tmp_path / "bag", hand_made_run())
+
+    def changed_data(name, data):
+        return trajectory.encode(change(trajectory.decode(data, name))) if name == topic else data
+
+    broken = changed(bag, tmp_path / "broken", changed_data)
+    with pytest.raises(InputError, match=said):
+        bag_results(broken)
+
+
+def test_figures_that_would_fill_the_memory_are_refused(tmp_path):
+    bag = write_recording(tmp_path / "bag", hand_made_run())
+
+    def far_apart(name, data):
+        if name != "/scenarios":
+            return data
+        message = trajectory.decode(data, name)
+        return trajectory.encode(replace(message, position=message.position * np.array([[[1e6]], [[1.0]]])))
+
+    with pytest.raises(InputError, match=r"broken: gap from .* no vehicles move so"):
+        bag_results(changed(bag, tmp_path / "broken", far_apart))
+
+
+def test_a_fit_of_other_vehicles_is_refused(tmp_path):
+    bag = write_recording(tmp_path / "bag", hand_made_run())
+
+    def of_one(name, data):
+        if name != "/fit":
+            return data
+        fit = trajectory.decode(data, name)
+        parts = {key: getattr(fit, key)[:1] for key in ("vehicles", "position", "heading", "speed", "acceleration")}
+        return trajectory.encode(replace(fit, **parts))
+
+    messages = {m.topic[1:]: m.data for m in read_messages(changed(bag, tmp_path / "broken", of_one))}
+    with pytest.raises(InputError, match="fit: 1 vehicles at 4 points"):
+        decode_template(messages)

@@ -1,0 +1,14 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The definitions that are kept, against rosbags, which they come from."""
+
+import pytest
+
+from scenario_gen.bags.storage.definitions import definition, kept, type_store
+
+
+@pytest.mark.parametrize("kind", sorted(kept()))
+def test_a_kept_definition_is_that_of_rosbags(kind):
+    text, _ = type_store().generate_msgdef(kind, ros_version=2)
+    assert definition(kind) == (text, type_store().hash_rihs01(kind))

@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Bags of all kinds as raw messages: compressed by file or message, SQLite that is no table, damage of every kind an error."""
+
+import contextlib
+from io import BytesIO
+import random
+import shutil
+import sqlite3
+
+from bag_examples import hand_made_run
+from mcap.writer import Writer
+import pytest
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as RosbagsWriter
+from rosbags.typesys import get_typestore, Stores
+
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.base.errors import InputError
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+def written(folder, plugin, mode=CompressionMode.NONE):
+    writer = RosbagsWriter(folder, version=9, storage_plugin=plugin)
+    if mode is not CompressionMode.NONE:
+        writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        connection = writer.add_connection("/t", "std_msgs/msg/String", typestore=STORE)
+        for k in range(20):
+            writer.write(connection, 1000 + k, b"\x00\x01\x00\x00" + bytes([k] * 10))
+    return folder
+
+
+@pytest.mark.parametrize("plugin", list(StoragePlugin))
+@pytest.mark.parametrize("mode", [CompressionMode.NONE, CompressionMode.FILE, CompressionMode.MESSAGE])
+def test_bags_of_rosbags_are_read(tmp_path, plugin, mode):
+    written(tmp_path / "bag", plugin, mode)
+    assert [(m.stamp_ns, m.data[-1]) for m in read_messages(tmp_path / "bag")] == [(1000 + k, k) for k in range(20)]
+    assert bag_topics(tmp_path / "bag")[0].count == 20
+    if mode is not CompressionMode.NONE:
+        with pytest.raises(InputError, match=r"bag\.most_"):
+            list(read_messages(tmp_path / "bag", config=BagConfig(most_bytes=10, most_chunk_bytes=10)))
+        for file in tmp_path.glob("bag/bag.*"):
+            file.write_bytes(file.read_bytes().replace(b"\x28\xb5\x2f\xfd", b"none"))  # what each compressed piece begins with
+        with pytest.raises(InputError, match="bag"):
+            list(read_messages(tmp_path / "bag"))
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "drop table messages",
+        "alter table messages rename column data to bytes",
+        "update messages set timestamp = 'noon'",
+        "update messages set data = 'text'",
+        "update topics set name = x'ff'",
+        "update topics set type = x'00'",
+        "alter table messages rename to old; create view messages as select * from old",
+        "alter table messages rename to old; create view messages as "
+        "with recursive r(n) as (select 1 union all select n + 1 from r) select n id, 1 topic_id, n timestamp, x'00' data from r",
+        "alter table messages drop column data; alter table messages add column data blob as (zeroblob(1000000000))",
+    ],
+)
+def test_a_changed_database_is_an_error(tmp_path, statement):
+    written(tmp_path / "bag", StoragePlugin.SQLITE3)
+    (file,) = (tmp_path / "bag").glob("*.db3")
+    with contextlib.closing(sqlite3.connect(file)) as base:
+        base.executescript("pragma writable_schema = on; drop index if exists timestamp_idx;" + statement)
+        base.commit()
+    with pytest.raises(InputError, match=r"\.db3"):
+        list(read_messages(tmp_path / "bag"))
+
+
+def test_damaged_bytes_are_an_error_or_change_nothing_else(tmp_path):
+    bag = write_recording(tmp_path / "bag", hand_made_run())
+    whole = (bag / "bag_0.mcap").read_bytes()
+    rng = random.Random(2)
+    refused = 0
+    for _ in range(300):
+        broken = bytearray(whole)
+        at = rng.randrange(len(broken))
+        broken[at : at + 4] = rng.choice((b"\xff" * 4, bytes(4), rng.randbytes(4)))
+        (tmp_path / "broken.mcap").write_bytes(broken)
+        try:
+            list(read_messages(tmp_path / "broken.mcap"))
+        except InputError as error:
+            refused += 1
+            assert "broken.mcap" in str(error) and len(str(error)) <= 500
+    assert refused > 100
+
+
+@pytest.mark.parametrize(
+    ("encoding", "profile", "said"), [("json", "ros2", "'json', not as 'cdr'"), ("cdr", "ros1", "profile is 'ros1'")]
+)
+def test_other_encodings_are_refused_by_name(tmp_path, encoding, profile, said):
+    stream = BytesIO()
+    writer = Writer(stream)
+    writer.start(profile=profile)
+    channel = writer.register_channel("/t", encoding, writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data"))
+    writer.add_message(channel, log_time=1, data=b"{}", publish_time=1)
+    writer.finish()
+    (tmp_path / "a.mcap").write_bytes(stream.getvalue())
+    with pytest.raises(InputError, match=said):
+        list(read_messages(tmp_path / "a.mcap"))
+
+
+def test_a_file_that_metadata_lists_but_is_not_there(tmp_path):
+    bag = write_recording(tmp_path / "bag", hand_made_run())
+    shutil.move(bag / "bag_0.mcap", bag / "other.mcap")
+    with pytest.raises(InputError, match=r"lists bag_0\.mcap, which is not there; .*reindex"):
+        list(read_messages(bag))

@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Errors about inputs are fit to be shown, whatever the input quoted; the boundary to decoders lets no other error out."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from scenario_gen.base.errors import guarded, InputError, LONGEST, RefusedError
+
+
+@given(st.text(), st.integers(0, 3000))
+def test_a_message_is_short_and_prints(text, times):
+    message = str(InputError(f"log.csv, line 3: {text * times}; name the column"))
+    assert len(message) <= LONGEST
+    assert all(c.isprintable() or c == "\n" for c in message)
+    assert message.startswith("log.csv, line 3: ") and message.endswith("; name the column")
+
+
+def test_a_message_that_is_fit_stays_as_it_is():
+    assert str(InputError("σ of 3 m²: too much\nsecond line")) == "σ of 3 m²: too much\nsecond line"
+
+
+def test_a_lone_surrogate_can_be_printed():
+    str(InputError("column '\ud800'")).encode("utf-8")
+
+
+@pytest.mark.parametrize(
+    "error", [KeyError("t_s"), MemoryError("Unable to allocate 596 GiB"), ValueError("two\n words"), EOFError()]
+)
+def test_what_a_library_raises_becomes_an_error_of_the_place(error):
+    with (
+        pytest.raises(InputError, match=r"^log.db3, message 3: .*; record it again$") as caught,
+        guarded("log.db3, message 3", remedy="record it again"),
+    ):
+        raise error
+    assert caught.value.__cause__ is error
+    assert "\n" not in str(caught.value)
+
+
+def test_only_the_kinds_that_are_named_are_turned():
+    with pytest.raises(KeyError), guarded("log.db3", ValueError, OSError):
+        raise KeyError("t_s")
+
+
+@pytest.mark.parametrize("error", [InputError("no"), RefusedError("no"), KeyboardInterrupt()])
+def test_errors_of_ours_and_interrupts_pass(error):
+    with pytest.raises(type(error)) as caught, guarded("log.db3"):
+        raise error
+    assert caught.value is error

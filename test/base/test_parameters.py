@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+from dataclasses import dataclass, field
+
+import pytest
+
+from scenario_gen.bags.recordings.provenance import read_parameters
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.parameters import assigned, flatten, parameter, Parameters, updated
+
+
+@dataclass(frozen=True)
+class Inner(Parameters):
+    gain: float = parameter(0.5, "how much", unit="m", low=0.0, high=1.0)
+    mode: str = parameter("a", "which", choices=("a", "b"))
+
+
+@dataclass(frozen=True)
+class Outer:
+    inner: Inner = field(default_factory=Inner)
+    count: int = parameter(3, "how many", low=1)
+    on: bool = parameter(True, "whether")
+
+
+def test_flatten_gives_dotted_names():
+    assert {name: value for name, (_, value) in flatten(Outer()).items()} == {
+        "inner.gain": 0.5,
+        "inner.mode": "a",
+        "count": 3,
+        "on": True,
+    }
+
+
+def test_updated_sets_nested_values_and_leaves_the_rest():
+    config = updated(Outer(), {"inner.gain": 1, "on": False})
+    assert config.inner.gain == 1.0 and isinstance(config.inner.gain, float)
+    assert not config.on and config.count == 3 and Outer().inner.gain == 0.5
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("inner.gain", 2.0, "inner.gain is 2.0; it must be at most 1.0 m"),
+        ("inner.gain", float("nan"), "not a number"),
+        ("inner.gain", float("inf"), "not a number"),
+        ("inner.mode", "c", "choose one of a, b"),
+        ("count", 0, "at least 1"),
+        ("count", True, "type int"),
+        ("count", 2.5, "type int"),
+        ("on", 1, "type bool"),
+        ("inner", 1, "unknown parameter inner"),
+        ("inner.loss", 1, "unknown parameter inner.loss"),
+        ("count.x", 1, "unknown parameter count.x"),
+    ],
+)
+def test_a_bad_value_is_named(name, value, said):
+    with pytest.raises(InputError, match=said):
+        updated(Outer(), {name: value})
+
+
+def test_a_bad_value_is_refused_at_construction():
+    with pytest.raises(InputError, match="gain"):
+        Inner(gain=-1.0)
+
+
+@dataclass(frozen=True)
+class Renamed:
+    length: float = parameter(1.0, "how long", unit="m", low=0.0, was="longness")
+
+
+@dataclass(frozen=True)
+class OuterRenamed:
+    inner: Renamed = field(default_factory=Renamed)
+
+
+def test_a_former_name_is_taken_with_a_warning():
+    with pytest.warns(FutureWarning, match=r"inner\.longness is called inner\.length now"):
+        assert updated(OuterRenamed(), {"inner.longness": 2.0}).inner.length == 2.0
+    with pytest.warns(FutureWarning, match=r"inner\.longness"):
+        assert assigned(OuterRenamed(), "inner.longness=3").inner.length == 3.0
+    assert read_parameters(OuterRenamed(), {"x.inner.longness": "4.0"}, "x.", "a bag").inner.length == 4.0

@@ -1,0 +1,198 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The command line as a person meets it: results that are whole, and errors that say what to do."""
+
+import json
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+from PIL import Image
+import pytest
+import yaml
+
+from scenario_gen.bags.storage.bag import read_messages
+from scenario_gen.cli.commands import main
+from scenario_gen.logs.synthetic import bundled
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run `scenario-gen` in this process, in an empty folder; return its exit code and all that it printed."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["scenario-gen", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        printed = capsys.readouterr()
+        return end.value.code or 0, printed.out + printed.err
+
+    return call
+
+
+def table(path, change=lambda rows: rows):
+    """Write a plain table of two cars that follow each other, after `change`."""
+    t = np.round(np.arange(0.0, 12.0, 0.1), 1)
+    rows = pd.concat(
+        pd.DataFrame({"t_s": t, "vehicle_id": who, "x_m": start + 8.0 * t, "y_m": 0.0, "speed_mps": 8.0})
+        for who, start in (("lead", 20.0), ("tail", 0.0))
+    ).reset_index(drop=True)
+    change(rows).to_csv(path, index=False)
+    return path
+
+
+def test_a_log_that_once_broke_a_reader_is_refused_in_a_line(run, crashes):
+    for name in ("spmd_grid_memoryerror_22GiB.csv", "table_ms_as_s_slow.csv", "table_grid_memoryerror_596GiB.parquet"):
+        code, said = run("generate", crashes / name, "--road", "straight")
+        assert code == 2 and "Traceback" not in said
+        assert name in "".join(said.split()), said
+
+
+def test_generate_leaves_bag_report_and_figures_and_is_reproducible(run, tmp_path):
+    log = table(tmp_path / "log.csv")
+    digests = []
+    for folder in ("one", "two"):
+        code, said = run("generate", log, "--road", "straight", "--count", 3, "--seed", 7, "--out", folder)
+        assert code == 0, said
+        assert "3/3 valid" in said
+        digests.append([(m.topic, m.data) for m in read_messages(tmp_path / folder / "bag")])
+    assert digests[0] == digests[1]
+    assert {topic for topic, _ in digests[0]} >= {"/map", "/tracks", "/changepoints", "/vehicle_lead/route", "/scenarios"}
+    figures = json.loads((tmp_path / "one" / "evaluation.json").read_text())
+    assert figures["provenance"]["seed"] == "7"
+    assert (tmp_path / "one" / "report.html").read_text().startswith("<!doctype html>")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["log.csv", "one", "two"]
+    code, said = run("compare", "one", "two")
+    assert code == 0 and "straight" in said
+    code, said = run("evaluate", tmp_path / "one" / "bag", "--out", "again")
+    assert code == 0 and (tmp_path / "again" / "evaluation.json").exists(), said
+
+
+def truncated_bag(folder):
+    source = next(bundled("a").glob("*.mcap"))
+    path = folder / "cut.mcap"
+    path.write_bytes(source.read_bytes()[:4000])
+    return path
+
+
+def empty_file(folder):
+    path = folder / "empty.csv"
+    path.touch()
+    return path
+
+
+def all_nan(folder):
+    return table(folder / "nan.csv", lambda rows: rows.assign(x_m=np.nan))
+
+
+def all_zero(folder):
+    return table(folder / "zero.csv", lambda rows: rows.rename(columns={"x_m": "lat_deg", "y_m": "lon_deg"}).assign(lat_deg=0.0))
+
+
+def one_vehicle(folder):
+    return table(folder / "alone.csv", lambda rows: rows[rows.vehicle_id == "lead"])
+
+
+def out_of_order(folder):
+    return table(folder / "order.csv", lambda rows: rows.iloc[[*range(10), 11, 10, *range(12, len(rows))]])
+
+
+def duplicates(folder):
+    return table(folder / "twice.csv", lambda rows: pd.concat([rows, rows.iloc[5:6]]))
+
+
+def no_column(folder):
+    return table(folder / "column.csv", lambda rows: rows.drop(columns="x_m"))
+
+
+STRICT = ("--set", "log.strict=true")
+
+
+@pytest.mark.parametrize(
+    ("make", "options", "said"),
+    [
+        (truncated_bag, (), "cut.mcap"),
+        (empty_file, (), "empty.csv"),
+        (all_nan, (), "nan.csv"),
+        (all_zero, (), "zero.csv"),
+        (one_vehicle, (), "alone.csv"),
+        (out_of_order, STRICT, "order.csv, line 13"),
+        (duplicates, STRICT, "twice.csv, line 242"),
+        (no_column, (), "column.csv"),
+    ],
+    ids=lambda value: getattr(value, "__name__", None),
+)
+def test_a_bad_log_is_named_and_nothing_is_written(run, tmp_path, make, options, said):
+    log = make(tmp_path)
+    code, printed = run("generate", log, "--road", "straight", "--out", "out", *options)
+    assert code == 2
+    assert said in printed and "error:" in printed and "Traceback" not in printed
+    assert [p.name for p in tmp_path.iterdir()] == [log.name]
+
+
+@pytest.mark.parametrize("make", [out_of_order, duplicates])
+def test_what_can_be_repaired_is_repaired_and_counted(run, tmp_path, make):
+    log = make(tmp_path)
+    code, printed = run("generate", log, "--road", "straight", "--count", 2, "--out", "out")
+    assert code == 0, printed
+    assert "×" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_an_unknown_topic_type_is_named(run, tmp_path, data):
+    code, printed = run("generate", data / "bags" / "mcap" / "talker", "--road", "straight", "--out", "out")
+    assert code == 2
+    assert "talker" in printed and "std_msgs/msg/String" in printed
+
+
+def test_a_road_with_no_way_through_is_refused(run, tmp_path):
+    """Two strips of road with a wall between: the cars' own path crosses it, and no strip is long enough for them."""
+    cells = np.full((60, 800), 254, dtype=np.uint8)
+    cells[:, ::150] = 0
+    Image.fromarray(cells).save(tmp_path / "walled.pgm")
+    facts = {"image": "walled.pgm", "resolution": 0.2, "origin": [-10.0, -6.0, 0.0], "negate": 0}
+    facts |= {"occupied_thresh": 0.65, "free_thresh": 0.196, "mode": "trinary"}
+    (tmp_path / "walled.yaml").write_text(yaml.safe_dump(facts))
+    code, printed = run("generate", table(tmp_path / "log.csv"), "--road", tmp_path / "walled.yaml", "--out", "out")
+    assert code == 2
+    assert "walled" in printed and "does not fit" in printed
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--road", "straight", "--set", "sampling.lateral_sigma=-1"), "sampling.lateral_sigma"),
+        (("--road", "straight", "--set", "sampling.nothing=1"), "unknown parameter"),
+        (("--road", "straight", "--set", "nonsense"), "name=value"),
+        (("--road", "straight", "--params", "missing.yaml"), "missing.yaml"),
+        (("--road", "missing_map.yaml"), "missing_map.yaml"),
+        (("--road", "roundabout"), "roundabout"),
+        (("--road", "straight", "--encounter", "nobody"), "nobody"),
+        (("--road", "straight", "--out", "."), "not an earlier result"),
+    ],
+)
+def test_a_bad_request_says_what_to_do(run, tmp_path, options, said):
+    code, printed = run("generate", table(tmp_path / "log.csv"), *options)
+    assert code == 2
+    assert said in printed and "Traceback" not in printed
+
+
+def test_parameters_lists_every_stage(run):
+    code, printed = run("parameters")
+    assert code == 0
+    for stage in ("log", "segmentation", "road", "fitting", "planning", "sampling", "limits", "evaluation"):
+        assert f"\n{stage}." in f"\n{printed}"
+
+
+def test_the_installed_command_ends_without_traceback(tmp_path):
+    command = shutil.which("scenario-gen") or f"{sys.prefix}/bin/scenario-gen"
+    ended = subprocess.run(
+        [command, "generate", "missing.csv", "--road", "straight"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 2
+    assert "missing.csv" in ended.stderr and "Traceback" not in ended.stderr

@@ -1,0 +1,238 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The command line and what is already there: `--out` replaces earlier results only; names stay names; signals end it cleanly."""
+
+import errno
+import os
+from pathlib import Path
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from rich.table import Table
+
+from scenario_gen.base.errors import presentable
+from scenario_gen.base.folders import MARKER
+from scenario_gen.base.folders.claim import PREFIX
+from scenario_gen.base.terminal import Terminal
+from scenario_gen.cli import commands as cli
+from scenario_gen.logs.synthetic import bundled
+
+GENERATE = ("generate", bundled("c"), "--road", "straight", "--count", 2, "--set", "evaluation.resamples=20")
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run `scenario-gen` in this process, in an empty folder; return its exit code and all that it printed."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["scenario-gen", *map(str, arguments)])
+        code = 0
+        try:
+            cli.main()
+        except SystemExit as end:
+            code = end.code or 0
+        printed = capsys.readouterr()
+        return code, printed.out + printed.err
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """One result of each kind; `page` is a stand-in for what reproduce takes long to draw."""
+    folder = tmp_path_factory.mktemp("made")
+    bag = folder / "generated" / "bag"
+    for words in (
+        (*GENERATE, "--out", folder / "generated"),
+        ("evaluate", bag, "--set", "evaluation.resamples=20", "--out", folder / "evaluated"),
+        ("regenerate", bag, 0, "--out", folder / "regenerated"),
+    ):
+        before, sys.argv = sys.argv, ["scenario-gen", *map(str, words)]
+        try:
+            cli.main()
+        except SystemExit as end:
+            assert not end.code
+        finally:
+            sys.argv = before
+    return folder
+
+
+def files(folder):
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def again(kind, bag):
+    """The command that writes another result of that kind."""
+    quick = ("--set", "evaluation.resamples=10")
+    return {
+        "generated": (*GENERATE, "--seed", 1),
+        "evaluated": ("evaluate", bag, *quick),
+        "regenerated": ("regenerate", bag, 1),
+    }[kind]
+
+
+@pytest.mark.parametrize("kind", ["generated", "evaluated", "regenerated"])
+def test_results_of_versions_without_markers_are_known_strictly(run, made, tmp_path, kind):
+    out = tmp_path / kind
+    shutil.copytree(made / kind, out)
+    (out / MARKER).unlink()
+    (out / "notes.txt").write_text("mine")
+    code, said = run(*again(kind, made / "generated" / "bag"), "--out", out)
+    assert code == 2 and "is not an earlier result" in said and (out / "notes.txt").read_text() == "mine"
+    (out / "notes.txt").unlink()
+    before = files(out)
+    code, said = run(*again(kind, made / "generated" / "bag"), "--out", out)
+    assert code == 0, said
+    after = files(out)
+    assert set(after) == {*before, Path(MARKER)} and after != before
+    assert [path.name for path in tmp_path.iterdir()] == [kind]
+
+
+def test_what_only_looks_like_an_earlier_result_is_none(run, made, tmp_path):
+    """The two that once were lost: a recording, for a scenario of its own, and notes beside a page called report.html."""
+    bag = tmp_path / "generated_bag"
+    shutil.copytree(made / "generated" / "bag", bag)
+    before = files(bag)
+    code, said = run("regenerate", made / "generated" / "bag", 0, "--out", bag)
+    assert code == 2 and "is not an earlier result" in said and files(bag) == before
+    (tmp_path / "page").mkdir()
+    (tmp_path / "page" / "report.html").write_text("a report of mine")
+    code, said = run(*GENERATE, "--out", "page")
+    assert code == 2 and "report.html" in said and (tmp_path / "page" / "report.html").read_text() == "a report of mine"
+
+
+def test_inputs_stay(run, made, tmp_path):
+    shutil.copytree(made / "generated", tmp_path / "o2")
+    shutil.copytree(bundled("c"), tmp_path / "o2" / "log")
+    bag = tmp_path / "o2" / "bag"
+    before = files(tmp_path)
+    for words in (
+        ("generate", "o2/log", "--road", "straight", "--out", "o2"),
+        ("generate", bundled("c"), "--road", "o2/map.yaml", "--params", "o2/p.yaml", "--out", "o2"),
+        ("regenerate", bag, 0, "--out", bag),
+        ("regenerate", bag, 0, "--out", "o2"),
+        ("evaluate", bag, "--out", "o2"),
+        ("evaluate", bag, "--out", bag),
+        ("reindex", bag, "--out", bag),
+        ("reproduce", "o2/log", "--out", "o2"),
+    ):
+        code, said = run(*words)
+        assert code == 2 and "error:" in said, words
+        assert files(tmp_path) == before, words
+
+
+@pytest.mark.parametrize("out", ["/", ".", "..", "link", "file", "x" * 300, "/proc/x", "file/x"])
+def test_an_out_that_cannot_be(run, tmp_path, out):
+    (tmp_path / "file").touch()
+    (tmp_path / "link").symlink_to("nowhere")
+    for words in (GENERATE, ("reproduce", bundled("c")), ("demo",), ("reindex", bundled("c"))):
+        code, said = run(*words, "--out", out)
+        assert code == 2 and len(said) <= len("error: \n") + 500 and "Traceback" not in said, said
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "link"]
+
+
+NAME = "[red]a\x1b[31m*b*\u202e[/]"
+
+
+def test_names_are_shown_letter_by_letter(run, tmp_path):
+    rows = ["t_s,vehicle_id,x_m,y_m,speed_mps"]
+    rows += [
+        f"{k / 10},{who},{start + 0.8 * k},0,8" for who, start in (("[bold]lead[/]", 20), ("ta\x1bil", 0)) for k in range(120)
+    ]
+    log = tmp_path / f"{NAME.replace('[/]', '')}.csv"
+    log.write_text("\n".join(rows) + "\n")
+    literal = r"[red]a\x1b[31m*b*\u202e"
+    out = f"[out]{NAME.replace('/', '')}"
+    code, said = run("generate", log, "--road", "straight", "--count", 2, "--out", out)
+    assert code == 0 and f"{literal} on straight" in said and rf"report: [out]{literal}[]/report.html" in said, said
+    more = (("compare", out, out), ("validate", f"{out}/bag"), ("evaluate", log), ("generate", NAME, "--road", "straight"))
+    told = [run(*words)[1] for words in more]
+    assert f"{literal} on straight" in told[0]
+    assert all("\x1b" not in text and "\u202e" not in text for text in (said, *told))
+
+
+def test_a_terminal_shows_cells_and_lines_as_they_are(capsys):
+    table = Table("cause")
+    table.add_row(NAME + ":smile:")
+    Terminal(width=80).print(table, f"{NAME}:smile:")
+    assert capsys.readouterr().out.count(r"[red]a\x1b[31m*b*\u202e[/]:smile:") == 2
+
+
+def test_an_error_is_at_most_500_characters_with_both_ends():
+    text = presentable("begins" + "x" * 2000 + "ends")
+    assert len(text) == 500 and text.startswith("begins") and text.endswith("ends") and "…" in text
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (OSError(errno.EIO, os.strerror(errno.EIO), "some/file"), "some/file: Input/output error"),
+        (PermissionError(errno.EACCES, os.strerror(errno.EACCES), "secret"), "secret: Permission denied"),
+        (MemoryError(), "not enough memory"),
+        (OSError("no number, no name"), "no number, no name"),
+    ],
+)
+def test_whatever_the_system_says_is_one_message(run, monkeypatch, error, words):
+    def broken(*_):
+        raise error
+
+    monkeypatch.setattr("scenario_gen.cli.batch.read_log", broken)
+    code, said = run(*GENERATE, "--out", "out")
+    assert code == 2 and words in said and "Traceback" not in said
+    assert list(Path().iterdir()) == []
+
+
+def started(tmp_path, *words, **options):
+    command = [sys.executable, "-m", "scenario_gen", *map(str, words)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, cwd=tmp_path, preexec_fn=hears_ctrl_c, **pipes, **options)  # noqa: PLW1509 - one thread
+
+
+def hears_ctrl_c():
+    """Take SIGINT as in a terminal: where a shell runs the tests in the background, it has them ignore it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_with_its_code_and_leaves_nothing(made, tmp_path, number):
+    shutil.copytree(made / "generated", tmp_path / "out")
+    before = files(tmp_path)
+    process = started(tmp_path, *GENERATE[:5], 10_000, "--out", "out")
+    while process.poll() is None and not any(tmp_path.glob(f"{PREFIX}*")):
+        time.sleep(0.01)
+    process.send_signal(number)
+    _, said = process.communicate()
+    assert process.returncode == 128 + number
+    assert said.strip() == f"stopped by {number.name}"
+    assert files(tmp_path) == before
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="no /proc to see what a process has loaded")
+def test_a_signal_while_the_libraries_load(tmp_path):
+    process = started(tmp_path, "parameters")
+    while process.poll() is None and "numpy" not in Path(f"/proc/{process.pid}/maps").read_text():
+        time.sleep(0.001)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate()
+    assert process.returncode == 130 and said.strip() == "stopped by SIGINT"
+
+
+def test_a_full_standard_output_is_an_error_and_a_closed_one_is_quiet(tmp_path):
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "scenario_gen", "parameters"]
+        ended = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert ended.returncode == 2 and "No space left on device" in ended.stderr and "Traceback" not in ended.stderr
+    process = started(tmp_path, "parameters")
+    process.stdout.close()  # it writes later: it has libraries to load
+    assert "Traceback" not in process.stderr.read()
+    process.wait()
+    process.stderr.close()
+    assert process.returncode == 1

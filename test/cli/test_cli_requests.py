@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""An ego slot, start and end states and one scenario again, on the command line."""
+
+import json
+import re
+import sys
+
+import pytest
+
+from msg_conventions.scenarios import decode_scenario
+from scenario_gen.bags.storage.bag import read_messages
+from scenario_gen.cli import commands as cli
+from scenario_gen.logs.synthetic import bundled
+
+LOG = bundled("b")
+QUICK = ("--road", "t_intersection", "--seed", "7", "--set", "evaluation.uniform=false", "--set", "evaluation.resamples=10")
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Run `scenario-gen` in this process, in an empty folder; return its exit code and all that it printed."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["scenario-gen", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        printed = capsys.readouterr()
+        return end.value.code or 0, printed.out + printed.err
+
+    return call
+
+
+def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(run, tmp_path):
+    asked = ("--ego", "1", "--start", "2: 53 4.57 0 9.5")
+    code, said = run("generate", LOG, *QUICK, "--count", 3, "--out", "one", *asked)
+    assert code == 0, said
+    messages = list(read_messages(tmp_path / "one" / "bag"))
+    assert {"/ego/start", "/ego/goal", "/ego/witness"} <= {message.topic for message in messages}
+    scenarios = [decode_scenario(message.data)[1] for message in messages if message.topic == "/scenarios"]
+    assert len(scenarios) == 3
+    for scenario in scenarios:
+        assert [vehicle.id for vehicle in scenario.vehicles] == ["2"]
+        assert scenario.position[0, 0] == pytest.approx([53.0, 4.57], abs=0.01)
+        assert scenario.speed[0, 0] == pytest.approx(9.5, abs=1e-6)
+    page = (tmp_path / "one" / "report.html").read_text()
+    assert "Vehicle 1 is left out for a planner under test" in page
+    assert run("validate", "one/bag")[0] == 0
+    assert run("evaluate", "one/bag", "--out", "page")[0] == 0
+    assert "Vehicle 1 is left out" in (tmp_path / "page" / "report.html").read_text()
+    code, said = run(
+        "drive", "one/bag", "--planner", "scenario_gen.closed_loop.planners:IdmFollower", "--workers", 1, "--out", "driven"
+    )
+    driven = json.loads((tmp_path / "driven" / "drives.json").read_text())
+    assert len(driven["drives"]) == 3, said
+    assert run("drive", "one/bag", "--planner", "scenario_gen.closed_loop.planners:IdmFollower", "--ego", 2)[0] == 2
+    assert run("export", "one/bag", "--to", "commonroad", "--out", "exported")[0] == 0
+    code, said = run("regenerate", "one/bag", 0, "--out", "again")
+    assert code == 0 and "the same" in said
+    again = [m.data for m in read_messages(tmp_path / "again") if m.topic == "/scenarios"]
+    assert again == [next(m.data for m in messages if m.topic == "/scenarios")]
+
+
+def test_what_cannot_be_had_is_an_error_with_what_can(run):
+    code, said = run("generate", LOG, *QUICK, "--count", 2, "--goal", "1: 19 18.07 3.1413 11")
+    assert code == 2
+    nearest = re.search(r"--goal '([^']*)'", said)[1]
+    assert "off the road" in said
+    assert run("generate", LOG, *QUICK, "--count", 2, "--goal", nearest, "--out", "taken")[0] == 0
+
+
+def test_bad_requests_say_what_is_wrong(run):
+    for arguments, reason in (
+        (("--ego", "nobody"), "there are: 1, 2"),
+        (("--start", "1 2 3"), "is not of the form"),
+        (("--goal", "5: 0 0 0"), "goals: no vehicle '5'"),
+    ):
+        code, said = run("generate", LOG, *QUICK, "--count", 2, *arguments)
+        assert code == 2 and reason in said
+    code, said = run("regenerate", "none", 0)
+    assert code == 2 and "no such bag" in said

@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""DTW and the feature matrix against hand-computed cases, a naive transcription, and the libraries."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+import numpy as np
+import pytest
+from scipy.spatial.distance import cdist
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.method.evaluation.dtw import (
+    blocks,
+    dtw,
+    dtw_distance,
+    feature_extents,
+    feature_matrix,
+    feature_rows,
+    mean_feature,
+)
+
+numbers = st.floats(-100.0, 100.0, allow_subnormal=False)
+
+
+def series(channels):
+    return st.integers(1, 12).flatmap(lambda n: arrays.arrays(np.float64, (n, channels), elements=numbers))
+
+
+def naive(a, b, metric, band):
+    cost = cdist(a, b, metric)
+    n, m = cost.shape
+    total = np.full((n + 1, m + 1), np.inf)
+    total[0, 0] = 0.0
+    for i in range(n):
+        for j in range(m):
+            if band is None or (j - i <= max(0, m - n) + band and i - j <= max(0, n - m) + band):
+                total[i + 1, j + 1] = cost[i, j] + min(total[i, j], total[i, j + 1], total[i + 1, j])
+    return total[1:, 1:]
+
+
+def test_by_hand():
+    found = dtw([0.0, 1.0, 2.0], [0.0, 2.0])
+    assert found.distance == dtw_distance([0.0, 1.0, 2.0], [0.0, 2.0]) == 1.0
+    assert found.accumulated.tolist() == [[0.0, 2.0], [1.0, 1.0], [3.0, 1.0]]
+    assert found.path.tolist() == [[0, 0], [1, 0], [2, 1]] or found.path.tolist() == [[0, 0], [1, 1], [2, 1]]
+    assert dtw_distance([[0.0, 0.0]], [[3.0, 4.0]]) == 5.0
+    assert dtw_distance([[0.0, 0.0]], [[3.0, 4.0]], "manhattan") == 7.0
+
+
+@settings(max_examples=60)
+@given(series(2), series(2), st.sampled_from(["euclidean", "manhattan"]), st.one_of(st.none(), st.integers(0, 5)))
+def test_distance_path_and_matrix_agree_with_a_naive_transcription(a, b, distance, band):
+    expected = naive(a, b, {"manhattan": "cityblock"}.get(distance, distance), band)
+    found = dtw(a, b, distance, band)
+    np.testing.assert_allclose(found.accumulated, expected, rtol=1e-12, atol=1e-9)
+    assert dtw_distance(a, b, distance, band) == pytest.approx(expected[-1, -1], rel=1e-12, abs=1e-9)
+    cost = cdist(a, b, {"manhattan": "cityblock"}.get(distance, distance))
+    assert cost[tuple(found.path.T)].sum() == pytest.approx(found.distance, rel=1e-12, abs=1e-9)
+    steps = np.diff(found.path, axis=0)
+    assert found.path[0].tolist() == [0, 0] and found.path[-1].tolist() == [len(a) - 1, len(b) - 1]
+    assert ((steps == 0) | (steps == 1)).all() and (steps.sum(axis=1) > 0).all()
+
+
+@pytest.mark.parametrize("shape", [(300, 300), (257, 400), (1000, 700)])
+@pytest.mark.parametrize("band", [None, 30])
+def test_equals_dtaidistance(shape, band):
+    peer = pytest.importorskip("dtaidistance.dtw_ndim", reason="dtaidistance is not installed")
+    rng = np.random.default_rng(1)
+    a, b = (rng.normal(size=(n, 2)).cumsum(axis=0) for n in shape)
+    expected = peer.distance_fast(a, b, inner_dist="euclidean", window=None if band is None else band + 1)
+    assert dtw_distance(a, b, band=band) == pytest.approx(expected, abs=1e-9)
+
+
+def test_feature_matrix_by_hand_and_against_scipy():
+    assert feature_matrix([0.0, 1.0], [1.0, 5.0]).tolist() == [[0.2, 1.0], [0.0, 0.8]]
+    assert not feature_matrix([3.0, 3.0], [1.0, 1.0]).any()  # all distances equal
+    rng = np.random.default_rng(2)
+    a, b = rng.normal(size=(40, 2)), rng.normal(size=(31, 2))
+    for ours, theirs in (("euclidean", "euclidean"), ("manhattan", "cityblock")):
+        cost = cdist(a, b, theirs)
+        np.testing.assert_allclose(feature_matrix(a, b, ours), (cost - cost.min()) / np.ptp(cost), atol=1e-14)
+
+
+@settings(max_examples=60)
+@given(series(1), series(1))
+def test_headings_differ_by_the_wrapped_angle(a, b):
+    away = np.abs(np.angle(np.exp(1j * (a - b.T))))
+    spread = np.ptp(away)
+    if spread > 1e-6:
+        np.testing.assert_allclose(feature_matrix(a, b, "angle"), (away - away.min()) / spread, atol=1e-11 / spread)
+    assert dtw_distance(a[:1], b[:1], "angle") == pytest.approx(away[0, 0], abs=1e-11)
+
+
+def test_batched_rows_are_the_matrices():
+    rng = np.random.default_rng(3)
+    a, b = rng.normal(size=(5, 2, 20)), rng.normal(size=(5, 2, 30))
+    single = np.stack([feature_matrix(x.T, y.T) for x, y in zip(a, b, strict=True)])
+    rows = feature_rows(a, b, feature_extents(a, b), range(3, 7))
+    np.testing.assert_array_equal(rows.reshape(5, 4, 30), single[:, 3:7])
+    np.testing.assert_allclose(mean_feature(a, b), single.mean(axis=0), atol=1e-15)
+
+
+def test_blocks_cover_every_row_once():
+    for n, width, budget in ((10, 3, 7), (1, 100, 1), (7, 1, 1000)):
+        assert [i for rows in blocks(n, width, budget) for i in rows] == list(range(n))
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "band", "word"),
+    [
+        ([], [1.0], None, "shape"),
+        ([np.nan], [1.0], None, "finite"),
+        ([[1.0, 2.0]], [1.0], None, "channels"),
+        ([1.0], [1.0], -1, "band"),
+    ],
+)
+def test_bad_series_are_named(a, b, band, word):
+    with pytest.raises(InputError, match=word):
+        dtw_distance(a, b, band=band)

@@ -1,0 +1,253 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The evaluation as a whole: rows, notes, determinism and its documents; the oracle."""
+
+from dataclasses import replace
+import json
+import math
+
+from evaluation_worlds import CARS, crossing, replayed, samples
+import numpy as np
+import pytest
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig, replay
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.evaluation import CheckCounts, Evaluation
+from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.presence import ALWAYS
+from scenario_gen.types.scenario import BoundaryStates, Cause, ScenarioSet, Verdict, Violation
+
+T = 121
+K = 2
+QUICK = EvaluationConfig(resamples=100)
+
+
+def run(**extra):
+    encounter = crossing()
+    rows = {
+        "with changepoints": samples(encounter, 50),
+        "without changepoints": samples(encounter, 12, seed=4, pace=0.0),
+        "oracle": [replayed(encounter)],
+    }
+    return evaluate_scenarios(encounter, rows, changepoints=K, config=QUICK, **extra)
+
+
+def test_rows_say_what_happened():
+    found = run(checks={"with changepoints": CheckCounts(60, {Cause.OVERLAP: 9, Cause.SPEED: 1})}, road="cross")
+    assert [row.name for row in found.rows] == ["template", "with changepoints", "without changepoints", "oracle"]
+    assert found.changepoints == 2 and found.vehicles == ("west", "south")
+    assert found.value("oracle", "e_position") < 1e-6 and found.value("oracle", "min_ade") < 1e-6
+    for key in ("e_position", "e_speed", "js_speed", "js_acceleration", "wasserstein_speed"):
+        assert found.value("with changepoints", key) < found.value("without changepoints", key)
+    assert found.value("with changepoints", "collision_rate") == pytest.approx(0.15)
+    assert found.value("with changepoints", "limit_rate") == pytest.approx(1 / 60)
+    assert found.value("with changepoints", "acceptance") == pytest.approx(50 / 60)
+    assert "from 12, not 50" in found.row("without changepoints").notes[0]
+    assert not found.row("with changepoints").notes
+    assert all(math.isnan(estimate.low) for estimate in found.row("oracle").values.values())  # one sample has no interval
+    assert math.isnan(found.value("oracle", "diversity")) and math.isnan(found.value("nobody", "e_position"))
+
+
+def test_every_estimate_lies_in_its_interval_or_has_none():
+    for row in run().rows:
+        for key, estimate in row.values.items():
+            if math.isfinite(estimate.low):
+                assert estimate.low <= estimate.value <= estimate.high, (row.name, key)
+
+
+def test_the_seed_decides_every_byte():
+    assert run(seed=3).to_json() == run(seed=3).to_json()
+    assert run(seed=3).to_json() != run(seed=4).to_json()
+
+
+def test_json_round_trip_and_markdown():
+    found = run()
+    text = found.to_json()
+    assert "NaN" not in text and json.loads(text)["changepoints"] == 2
+    assert Evaluation.from_json(text).to_json() == text
+    page = found.to_markdown()
+    assert "K = 2 changepoints" in page and "| E position |" in page and "–" in page
+    with pytest.raises(InputError, match="not an evaluation"):
+        Evaluation.from_json('{"rows": 3}')
+
+
+def turning(scenario, degrees):
+    """The scenario, its first car turned more and more to the left."""
+    more = np.radians(degrees) * np.linspace(0.0, 1.0, len(scenario.time))
+    return replace(scenario, heading=scenario.heading + np.stack([more, 0.0 * more]))
+
+
+def test_headings_and_turns():
+    encounter = crossing()
+    bend = np.radians(60.0) * np.linspace(0.0, 1.0, T)
+    bent = replace(encounter, heading=encounter.heading + np.stack([bend, 0.0 * bend]))
+    rows = {str(d): [turning(s, d) for s in samples(encounter, 3)] for d in (0, 40, 58, 60)}
+    found = evaluate_scenarios(bent, rows, changepoints=K, config=QUICK)
+    kept = [found.value(name, "turn_kept") for name in rows]
+    assert kept == [0.5, 1.0, 1.0, 1.0]  # of two cars one goes straight on instead
+    errors = [found.value(name, "e_heading") for name in rows]
+    assert errors[0] == pytest.approx(1.0) and errors[3] < 1e-6  # parallel headings are a matrix of zeros
+    straight = evaluate_scenarios(encounter, rows, changepoints=K, config=QUICK)
+    assert "e_heading" not in straight.row("0").values  # nobody turns in the template
+    assert straight.value("60", "turn_kept") == 0.5
+
+
+def test_vanished_conflicts_are_counted_for_themselves():
+    encounter = crossing()
+    away = replace(replayed(encounter, 1), position=replayed(encounter).position + np.array([[[0.0, 0.0]], [[500.0, 0.0]]]))
+    found = evaluate_scenarios(encounter, {"x": [replayed(encounter), away]}, changepoints=K, config=QUICK)
+    assert found.value("template", "conflicts") == 1.0
+    assert (found.value("x", "conflicts"), found.value("x", "vanished_conflicts")) == (0.5, 0.5)
+    assert found.value("x", "order_kept") == 1.0  # of those that are there
+    assert any("0.5 of the template's 1 conflict(s) vanish" in note for note in found.row("x").notes)
+
+
+def late(source, n, first):
+    """The encounter or scenario, vehicle n of which arrives at sample `first`."""
+    present = source.present.copy()
+    present[n, 0] = first
+    return replace(source, present=present)
+
+
+def test_who_arrives_late_is_measured_while_there():
+    whole = crossing()
+    encounter, made = late(whole, 1, 40), [late(sample, 1, 40) for sample in samples(whole, 3)]
+    found = evaluate_scenarios(encounter, {"x": made, "oracle": [late(replayed(whole), 1, 40)]}, changepoints=K, config=QUICK)
+    # for the pair the same as where both are there from then on
+    cut = replace(
+        whole, position=whole.position[:, 40:], heading=whole.heading[:, 40:], speed=whole.speed[:, 40:], present=ALWAYS
+    )
+    rows = [replayed_from(sample, 40) for sample in samples(whole, 3)]
+    after = evaluate_scenarios(cut, {"x": rows}, changepoints=K, config=QUICK)
+    for key in ("e_position", "e_speed"):
+        assert found.value("x", key) == pytest.approx(after.value("x", key), rel=0.03), key
+    for key in ("min_distance", "min_ttc"):
+        assert found.value("x", key) == pytest.approx(after.value("x", key), rel=1e-9), key
+    assert found.value("oracle", "e_position") < 1e-6 and found.value("oracle", "js_gap") < 1e-9
+    alone = late(encounter, 1, 115)
+    last = evaluate_scenarios(alone, {"x": [late(replayed(whole), 1, 115)]}, changepoints=K, config=QUICK)
+    assert any("E leaves out 1 pair(s)" in note for note in last.row("x").notes)
+    assert math.isnan(last.value("x", "e_position")) and math.isfinite(last.value("x", "js_speed"))
+
+
+def replayed_from(scenario, first):
+    """The scenario from an instant on."""
+    parts = {name: getattr(scenario, name)[:, first:] for name in ("position", "heading", "speed", "acceleration")}
+    return replace(scenario, time=scenario.time[first:] - scenario.time[first], present=ALWAYS, **parts)
+
+
+def test_missing_and_empty_rows():
+    encounter = crossing()
+    found = evaluate_scenarios(encounter, {"with changepoints": []}, changepoints=K, config=QUICK)
+    assert found.row("with changepoints").notes == ("there is no scenario in this row",)
+    assert math.isnan(found.value("with changepoints", "min_ade"))
+    assert found.to_markdown()
+
+
+def test_another_number_of_vehicles_is_refused():
+    encounter = crossing()
+    scenario = replayed(encounter)
+    trio = replace(
+        scenario,
+        vehicles=(*CARS, replace(CARS[0], id="third")),
+        position=scenario.position[[0, 1, 1]],
+        heading=scenario.heading[[0, 1, 1]],
+        speed=scenario.speed[[0, 1, 1]],
+        acceleration=scenario.acceleration[[0, 1, 1]],
+        present=scenario.present[[0, 1, 1]],
+    )
+    with pytest.raises(InputError, match="3 vehicles"):
+        evaluate_scenarios(encounter, {"x": [trio]}, changepoints=K, config=QUICK)
+
+
+def test_a_long_template_is_resampled_and_says_so():
+    encounter = crossing()
+    found = evaluate_scenarios(
+        encounter,
+        {"x": [replayed(encounter)]},
+        changepoints=K,
+        config=EvaluationConfig(max_steps=60),
+    )
+    assert "60 instants" in found.row("template").notes[0] and found.value("x", "e_position") < 1e-6
+
+
+def test_counts_from_sets_and_verdicts():
+    made = ScenarioSet(5, (), 8)
+    made.refused[Cause.OFF_ROAD] = 3
+    assert CheckCounts.of_set(made) == CheckCounts(8, {Cause.OFF_ROAD: 3})
+    bad = Verdict((Violation(Cause.OVERLAP, 1.0, (0, 1), ""), Violation(Cause.SPEED, 1.0, (0,), "")))
+    assert CheckCounts.of_verdicts([Verdict(), bad, bad]) == CheckCounts(3, {Cause.OVERLAP: 2})
+
+
+def test_the_oracle_goes_through_the_anchors():
+    encounter = crossing()
+    index = np.array([0, 40, 80, 120])
+    anchors = []
+    for n in range(2):
+        pose = np.column_stack([encounter.position[n, index], encounter.heading[n, index]])
+        turned = np.column_stack([-1.1 * pose[:, 1] + 5.0, 1.1 * pose[:, 0], pose[:, 2] + np.pi / 2])  # turned left, 10 % larger
+        anchors.append(turned)
+    ends = [np.stack([np.append(a[k], 0.0) for a in anchors]) for k in (0, -1)]
+    fitted = tuple(FittedVehicle(a, np.zeros(4), np.zeros(3, dtype=bool), 1.1, "straight") for a in anchors)
+    found = replay(encounter, Fit(CARS, fitted, index, BoundaryStates(*ends), ()))
+    expected = np.stack([-1.1 * encounter.position[..., 1] + 5.0, 1.1 * encounter.position[..., 0]], axis=-1)
+    np.testing.assert_allclose(found.position, expected, atol=1e-6)
+    np.testing.assert_allclose(found.speed, 1.1 * encounter.speed, atol=1e-9)
+    turn = found.heading - encounter.heading - np.pi / 2
+    np.testing.assert_allclose(np.cos(turn), 1.0, atol=1e-9)
+
+
+def test_the_oracle_keeps_a_dwell_and_a_short_chord():
+    time = np.arange(21) * 0.1
+    x = np.minimum(time, 1.0) * 4.0
+    position = np.stack([np.stack([x, 0 * x], -1), np.stack([0.1 * np.sin(time), 20 + 0 * x], -1)])
+    encounter = Encounter("stop", CARS, 0, 100_000_000, position, np.zeros((2, 21)), np.stack([np.gradient(x, 0.1), 0 * x]))
+    first = np.array([[0, 0, 0], [8, 0, 0], [8, 0, 0.0]])
+    second = np.array([[50, 0, np.pi / 2], [50, 0.2, np.pi / 2], [50, 0.2, np.pi / 2]])
+    fitted = (
+        FittedVehicle(first, np.zeros(3), np.array([False, True]), 2.0, "straight"),
+        FittedVehicle(second, np.zeros(3), np.array([False, True]), 1.0, "wait"),
+    )
+    states = BoundaryStates(np.zeros((2, 4)), np.zeros((2, 4)))
+    found = replay(encounter, Fit(CARS, fitted, np.array([0, 10, 20]), states, ()))
+    np.testing.assert_allclose(found.position[0, 5], [4.0, 0.0])
+    assert (found.position[0, 10:] == [8.0, 0.0]).all() and not found.speed[0, 10:].any()
+    np.testing.assert_allclose(found.position[1, [0, 10]], [[50, 0], [50, 0.2]], atol=1e-9)
+
+
+def alone(scenario, n):
+    """The scenario of vehicle n alone."""
+    fields = ("position", "heading", "speed", "acceleration", "present")
+    return replace(scenario, vehicles=(scenario.vehicles[n],), **{name: getattr(scenario, name)[[n]] for name in fields})
+
+
+def test_a_vehicle_left_out_for_an_ego_is_left_out_of_every_row():
+    encounter = crossing()
+    ones = [alone(scenario, 1) for scenario in samples(encounter, 4)]
+    found = evaluate_scenarios(encounter, {"x": ones, "oracle": [replayed(encounter)]}, changepoints=K, config=QUICK)
+    assert found.vehicles == (CARS[1].id,)
+    for figure in ("e_position", "min_distance", "min_ttc", "pet", "js_gap", "order_kept"):
+        assert np.isnan(found.value("x", figure)), figure
+    for figure in ("js_speed", "diversity", "min_ade", "coverage"):
+        assert np.isfinite(found.value("x", figure)), figure
+    assert any("one vehicle is left" in note for note in found.row("x").notes)
+
+
+def test_the_order_of_the_vehicles_does_not_matter():
+    encounter = crossing()
+    made = samples(encounter, 3)
+    swapped = [
+        replace(
+            s,
+            vehicles=s.vehicles[::-1],
+            position=s.position[::-1],
+            heading=s.heading[::-1],
+            speed=s.speed[::-1],
+            acceleration=s.acceleration[::-1],
+        )
+        for s in made
+    ]
+    one, other = (evaluate_scenarios(encounter, {"x": rows}, changepoints=K, config=QUICK).row("x") for rows in (made, swapped))
+    assert one == other

@@ -1,0 +1,225 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Each metric against a hand-computed case and, where there is one, a library."""
+
+import math
+
+from evaluation_worlds import CARS, crossing, replayed, samples
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.spatial.distance import jensenshannon
+from shapely import affinity
+from shapely.geometry import box
+
+from scenario_gen.method.evaluation import diversity, similarity
+from scenario_gen.method.evaluation.bootstrap import Bootstrap, wilson
+from scenario_gen.method.evaluation.criticality import criticality
+from scenario_gen.method.evaluation.distributions import compare, jensen_shannon, QUANTITIES, values_of
+from scenario_gen.method.evaluation.dtw import feature_matrix
+from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
+from scenario_gen.method.evaluation.motion import at_count, at_period, Motion
+from scenario_gen.types.encounter import Vehicle
+
+ONCE = np.ones((1, 1))
+
+
+def still(xy, yaw, sizes=((4.0, 2.0), (4.0, 2.0)), speed=(0.0, 0.0)):
+    vehicles = tuple(Vehicle(str(n), *size) for n, size in enumerate(sizes))
+    position, heading, pace = np.array(xy, float)[:, None], np.array(yaw, float)[:, None], np.array(speed, float)[:, None]
+    return Motion(vehicles, 0.1, position, heading, pace)
+
+
+def test_footprint_distance_by_hand():
+    assert footprint_distance(still([(0, 0), (10, 0)], (0, 0)), 0, 1) == pytest.approx(6.0)
+    assert footprint_distance(still([(0, 0), (7, 7)], (0, 0)), 0, 1) == pytest.approx(math.hypot(3.0, 5.0))
+    assert (
+        footprint_distance(still([(0, 0), (0, 0)], (0, np.pi / 2), ((10, 1), (10, 1))), 0, 1) == 0.0
+    )  # a cross, no corner inside
+
+
+@settings(max_examples=100)
+@given(st.lists(st.floats(-8, 8), min_size=2, max_size=2), st.floats(-4, 4), st.floats(-4, 4))
+def test_footprint_distance_equals_shapely(xy, yaw_a, yaw_b):
+    motion = still([(0, 0), xy], (yaw_a, yaw_b), ((5, 2), (4, 1.7)))
+    shapes = [
+        affinity.translate(affinity.rotate(box(-v.length / 2, -v.width / 2, v.length / 2, v.width / 2), yaw, (0, 0), True), *at)
+        for v, yaw, at in zip(motion.vehicles, (yaw_a, yaw_b), ((0, 0), xy), strict=True)
+    ]
+    assert footprint_distance(motion, 0, 1)[0] == pytest.approx(shapes[0].distance(shapes[1]), abs=1e-9)
+
+
+def test_time_to_collision_by_hand():
+    head_on = still([(0, 0), (24, 0)], (0, np.pi), speed=(5.0, 5.0))  # 20 m between bumpers, closing at 10 m/s
+    assert time_to_collision(head_on, 0, 1) == pytest.approx(2.0)
+    passing = still([(0, 0), (24, 2.5)], (0, np.pi), speed=(5.0, 5.0))  # half a metre beside each other
+    assert np.isinf(time_to_collision(passing, 0, 1))
+    abreast = still([(0, 0), (6, 0)], (0, 0), speed=(0.5, np.nextafter(0.5, 0)))  # differ by rounding alone
+    assert np.isinf(time_to_collision(abreast, 0, 1))
+    parting = still([(0, 0), (24, 0)], (np.pi, 0), speed=(5.0, 5.0))
+    assert np.isinf(time_to_collision(parting, 0, 1))
+    assert time_to_collision(still([(0, 0), (1, 0)], (0, 0)), 0, 1) == 0.0  # they overlap now
+
+
+@settings(max_examples=60)
+@given(*[st.tuples(st.floats(-b, b), st.floats(-b, b)) for b in (20, 3)], st.tuples(st.floats(0.5, 12), st.floats(0.5, 12)))
+def test_footprints_touch_at_the_time_to_collision(place, yaws, speeds):
+    motion = still([(0, 0), place], yaws, speed=speeds)
+    found = float(time_to_collision(motion, 0, 1)[0])
+    way = np.stack([np.cos(motion.heading), np.sin(motion.heading)], -1) * motion.speed[..., None]
+
+    def distance(t):
+        moved = Motion(motion.vehicles, 0.1, motion.position + t * way, motion.heading, motion.speed)
+        return footprint_distance(moved, 0, 1)[0]
+
+    if np.isinf(found):
+        assert all(distance(t) >= 0.0 for t in np.linspace(0, 5, 11))
+        assert not any(distance(t) == 0.0 and distance(t + 0.01) == 0.0 for t in np.linspace(0, 10, 201))
+    else:
+        assert distance(found) < 1e-6
+        assert all(distance(share * found) > 0.0 for share in (0.0, 0.3, 0.6, 0.9)) or found == 0.0
+
+
+def test_criticality_of_the_crossing():
+    found = criticality(at_period(crossing(lag=2.0), 0.1), 10.0)
+    assert found.order == (((0, 1), 0),)
+    # car 0 (10 m/s, 4 m long) has left the 2 m wide track of car 1 at 5.3 s; car 1 comes in when its front is 1 m away
+    north = crossing(lag=2.0).position[1, :, 1]
+    entry = np.interp(-3.0, north, crossing().time)
+    assert found.pet == pytest.approx(entry - 5.3, abs=0.02)
+    other = criticality(at_period(crossing(lag=-2.0), 0.1), 10.0)
+    assert other.order == (((0, 1), 1),)
+    assert other.keeps_order_of(found) == 0.0 and found.keeps_order_of(found) == 1.0
+
+
+def test_values_by_hand():
+    time = np.arange(31) * 0.1
+    speed = np.stack([2.0 + time**2, 5.0 + 0.0 * time])  # acceleration 2t, jerk 2
+    motion = Motion(
+        CARS, 0.1, np.broadcast_to([[[0.0, 0.0]], [[10.0, 0.0]]], (2, 31, 2)), np.stack([0.3 * time, 0 * time]), speed
+    )
+    values = values_of(motion)
+    np.testing.assert_allclose(values["acceleration"].reshape(2, 31)[0, 1:-1], 2.0 * time[1:-1])
+    jerk = values["jerk"].reshape(2, -1)
+    np.testing.assert_allclose(jerk[0, 1:-1], 2.0)
+    assert not jerk[1].any()
+    np.testing.assert_allclose(values["yaw_rate"].reshape(2, 31)[0], 0.3)
+    assert values["gap"][0] == pytest.approx(6.0)
+
+
+def test_jensen_shannon_by_hand_and_against_scipy():
+    assert jensen_shannon(np.array([1.0, 0.0]), np.array([0.0, 1.0])) == pytest.approx(1.0)
+    assert jensen_shannon(np.array([2.0, 2.0]), np.array([5.0, 5.0])) == 0.0
+    rng = np.random.default_rng(0)
+    p, q = rng.integers(0, 9, 20).astype(float), rng.integers(0, 9, 20).astype(float)
+    assert jensen_shannon(p, q) == pytest.approx(jensenshannon(p, q, base=2) ** 2)
+
+
+def test_comparison_of_one_quantity():
+    rng = np.random.default_rng(1)
+    template, drawn = rng.normal(0, 2, 400), [rng.normal(0.5, 2, 300) for _ in range(6)]
+    found = compare(QUANTITIES[0], template, drawn)
+    every = np.ones((1, 6))
+    assert found.template.sum() == 400 and found.samples.sum() == 1800
+    assert found.wasserstein == pytest.approx(stats.wasserstein_distance(np.concatenate(drawn), template))
+    assert found.wasserstein_near(every)[0] == pytest.approx(found.wasserstein, abs=0.01)
+    edges = np.arange(-30, 31) * QUANTITIES[0].bin_width
+    p, q = np.histogram(np.concatenate(drawn), edges)[0], np.histogram(template, edges)[0]
+    assert found.jensen_shannon(every)[0] == pytest.approx(jensenshannon(p, q, base=2) ** 2)
+    assert found.coverage(every)[0] == pytest.approx(q[p > 0].sum() / q.sum())
+    shifted = compare(QUANTITIES[0], template, [template + 3.0])
+    assert shifted.wasserstein_near(ONCE)[0] == pytest.approx(3.0, abs=0.01)
+
+
+def test_error_and_correlation_are_those_of_the_mean_matrix():
+    template = at_count(crossing(), 60)
+    motions = [at_count(scenario, 60) for scenario in samples(crossing(), 7)]
+    position = np.stack([motion.position for motion in motions])
+    pairs = similarity.pair_similarities(template.position, position, "euclidean")
+    target = feature_matrix(*template.position)
+    for weights in (np.ones(7), np.array([3.0, 0, 0, 1, 0, 2, 1])):
+        mean = np.average([feature_matrix(*motion.position) for motion in motions], axis=0, weights=weights)
+        expected = np.linalg.norm(mean - target) / np.linalg.norm(target)
+        assert similarity.mean_error(pairs, weights[None])[0] == pytest.approx(expected, rel=1e-9)
+        assert similarity.mean_correlation(pairs, weights[None])[0] == pytest.approx(
+            np.corrcoef(mean.ravel(), target.ravel())[0, 1]
+        )
+
+
+def test_a_matrix_that_is_constant_is_left_out_of_the_mean():
+    speed = np.stack([np.zeros(9), np.zeros(9), np.linspace(0, 5, 9)])[..., None]  # two stand, one drives off
+    pairs = similarity.pair_similarities(speed, np.stack([speed * 1.1 + 0.1 * np.linspace(0, 1, 9)[:, None]]), "manhattan")
+    errors = [pair.error(ONCE)[0] for pair in pairs]
+    assert math.isnan(errors[0]) and np.isfinite(errors[1:]).all()
+    assert similarity.mean_error(pairs, ONCE)[0] == pytest.approx(np.mean(errors[1:]))
+
+
+def test_diversity_by_hand():
+    position = np.zeros((3, 1, 4, 2))
+    position[1, ..., 0], position[2, ..., 1] = 3.0, 4.0  # samples at (0, 0), (3, 0), (0, 4)
+    table = diversity.displacements(position)
+    assert diversity.diversity(table, np.ones((1, 3)))[0] == pytest.approx((3.0 + 4.0 + 5.0) / 3.0)
+    assert diversity.diversity(table, np.array([[2.0, 1.0, 0.0]]))[0] == pytest.approx(3.0)
+    assert math.isnan(diversity.diversity(np.zeros((1, 1)), ONCE)[0])
+    error = diversity.displacement_to(position, position[0])
+    assert error.tolist() == [0.0, 3.0, 4.0]
+    assert diversity.weighted_min(error, np.array([[0.0, 1.0, 1.0]]))[0] == 3.0
+
+
+def test_interval_of_a_mean_agrees_with_scipy():
+    values = np.random.default_rng(5).exponential(2.0, 80)
+    ours = Bootstrap.draw(np.arange(80), 4000, 0.95, 1).mean(values)
+    theirs = stats.bootstrap((values,), np.mean, n_resamples=4000, method="percentile", random_state=1).confidence_interval
+    assert ours.value == pytest.approx(values.mean())
+    width = theirs.high - theirs.low
+    assert ours.low == pytest.approx(theirs.low, abs=0.08 * width) and ours.high == pytest.approx(theirs.high, abs=0.08 * width)
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    rng = np.random.default_rng(6)
+    held = 0
+    for trial in range(200):
+        found = Bootstrap.draw(np.arange(40), 400, 0.9, trial).mean(rng.normal(3.0, 1.0, 40))
+        held += found.low <= 3.0 <= found.high
+    assert 0.82 <= held / 200 <= 0.96
+
+
+def test_samples_that_depend_on_each_other_are_drawn_together():
+    rng = np.random.default_rng(8)
+    held = {"together": 0, "apart": 0}
+    for trial in range(200):
+        values = np.repeat(rng.normal(3.0, 1.0, 20), 2)
+        for how, unit in (("together", np.arange(40) // 2), ("apart", np.arange(40))):
+            found = Bootstrap.draw(unit, 400, 0.9, trial).mean(values)
+            held[how] += found.low <= 3.0 <= found.high
+    assert 0.82 <= held["together"] / 200 <= 0.96
+    assert held["apart"] / 200 < 0.8
+    weights = Bootstrap.draw(np.array([4, 4, 7, 9, 9]), 30, 0.9, 0).weights
+    assert (weights[:, 0] == weights[:, 1]).all() and (weights[:, 3] == weights[:, 4]).all()
+
+
+def test_one_sample_has_no_interval_and_the_seed_decides():
+    assert math.isnan(Bootstrap.draw(np.arange(1), 50, 0.95, 0).mean(np.array([2.0])).low)
+    assert math.isnan(Bootstrap.draw(np.zeros(2, dtype=int), 50, 0.95, 0).mean(np.array([2.0, 3.0])).low)  # a antithetic pair
+    one, two, other = (Bootstrap.draw(np.arange(9), 50, 0.95, seed).weights for seed in (4, 4, 5))
+    assert (one == two).all() and (one != other).any() and (one.sum(axis=1) == 9).all()
+
+
+@pytest.mark.parametrize(("count", "total"), [(0, 20), (3, 50), (50, 50)])
+def test_wilson_equals_scipy(count, total):
+    expected = stats.binomtest(count, total).proportion_ci(0.95, "wilson")
+    found = wilson(count, total, 0.95)
+    assert (found.low, found.high) == pytest.approx((expected.low, expected.high), abs=1e-12)
+    assert math.isnan(wilson(0, 0, 0.95).value)
+
+
+def test_motion_on_another_clock():
+    encounter = crossing()
+    assert at_period(encounter, 0.1).position is encounter.position
+    coarse = at_period(replayed(encounter), 0.25)
+    assert coarse.speed.shape[1] == 49 and coarse.position[0, -1, 0] == pytest.approx(70.0)
+    even = at_count(encounter, 7)
+    np.testing.assert_allclose(even.position[0, :, 0], np.linspace(-50, 70, 7), atol=1e-6)

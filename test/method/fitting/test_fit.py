@@ -1,0 +1,318 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Templates on roads: ends, lanes, who crosses whom, repair, refusals."""
+
+from lengths import SOME_ENCOUNTERS
+import numpy as np
+import pytest
+
+from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.logs import read_log
+from scenario_gen.method.fitting import fit_template, FittingConfig
+from scenario_gen.numerics.curve import Curve
+from scenario_gen.roads import build_road, RoadConfig
+from scenario_gen.roads.clearance import footprint_fits
+from scenario_gen.template.interaction import find_conflicts
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.road import Road
+from scenario_gen.types.segmentation import Segmentation
+
+pytestmark = pytest.mark.spread
+ROADS = ("straight", "t_intersection", "four_way", "corridor")
+
+
+def segmented(encounter, *changepoints):
+    t = encounter.speed.shape[1]
+    labels = np.zeros(t, dtype=np.int64)
+    for c in changepoints:
+        labels[c:] += 1
+    return Segmentation(labels, np.array(changepoints, dtype=np.int64), np.zeros(t), ("piece",) * (len(changepoints) + 1))
+
+
+def every(encounter, step=25):
+    return segmented(encounter, *range(step, encounter.speed.shape[1] - max(step // 2, 1), step))
+
+
+def driven(curve, speed, dt=0.1):
+    """(T, 3) poses and (T,) speeds of a vehicle on a curve with the given speeds."""
+    s = np.concatenate(([0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 * dt)))
+    return curve.at(s), speed
+
+
+def encounter_of(*motions):
+    poses, speed = np.stack([m[0] for m in motions]), np.stack([m[1] for m in motions])
+    vehicles = tuple(Vehicle(str(i)) for i in range(len(poses)))
+    return Encounter("made", vehicles, 0, 100_000_000, poses[..., :2], poses[..., 2], speed)
+
+
+def turn(x, y, yaw, before, angle, radius, after=60.0):
+    """Straight, an arc of `angle` [rad] (left positive), straight."""
+    n = 60
+    a = np.linspace(0.0, angle, n)
+    r = np.copysign(radius, angle)
+    local = np.column_stack((before + r * np.sin(a), r * (1.0 - np.cos(a)), a))
+    end = local[-1] + [after * np.cos(angle), after * np.sin(angle), 0.0]
+    local = np.vstack(([0.0, 0.0, 0.0], local, end))
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return Curve(
+        np.column_stack((x + local[:, 0] * cos - local[:, 1] * sin, y + local[:, 0] * sin + local[:, 1] * cos, yaw + local[:, 2]))
+    )
+
+
+def straight(x, y, yaw):
+    return Curve(np.array([[x, y, yaw], [x + 200.0 * np.cos(yaw), y + 200.0 * np.sin(yaw), yaw]]))
+
+
+def relative(pose, other):
+    d = other[:2] - pose[:2]
+    return np.array([d[0] * np.cos(pose[2]) + d[1] * np.sin(pose[2]), d[1] * np.cos(pose[2]) - d[0] * np.sin(pose[2])])
+
+
+@pytest.fixture(scope="module")
+def recorded(data):
+    assert len(SOME_ENCOUNTERS) >= 3
+    return {name: read_log(data / "trajectories" / name).encounters[0] for name in SOME_ENCOUNTERS}
+
+
+@pytest.mark.data
+def test_every_recorded_encounter_fits_two_roads_and_refusals_say_why(recorded):
+    for name, encounter in recorded.items():
+        fitted = 0
+        for road_name in ROADS:
+            road = build_road(road_name, encounter)
+            try:
+                fit = fit_template(encounter, every(encounter), road)
+            except RefusedError as error:
+                assert "vehicle" in str(error)
+                assert road_name == "straight", (name, road_name, error)
+                continue
+            fitted += 1
+            for vehicle, f in zip(fit.vehicles, fit.fitted, strict=True):
+                assert footprint_fits(road, f.anchors, vehicle.length, vehicle.width).all()
+                assert 0.8 <= f.scale <= 1.25
+                assert f.moved.max() <= 3.0
+            assert turned_otherwise(encounter, fit) <= {loss.vehicles[0] for loss in fit.lost if loss.kind == "turn"}
+        assert fitted >= 2, name
+
+
+def turned_otherwise(encounter, fit):
+    """Ids of the vehicles whose fitted path turns more than 25° differently than their recorded headings do."""
+    found = set()
+    for i, (vehicle, f) in enumerate(zip(fit.vehicles, fit.fitted, strict=True)):
+        first, last = encounter.present[i]
+        recorded = encounter.heading[i, last] - encounter.heading[i, first]
+        driven = f.path[-1, 2] - f.path[0, 2]
+        if not f.stands.all() and abs(np.degrees(recorded - driven)) > 25.0:
+            found.add(vehicle.id)
+    return found
+
+
+@pytest.mark.data
+def test_who_goes_straight_on_has_an_arm_ahead_even_where_its_record_ends_before(data):
+    files = sorted((data / "trajectories").glob("*/encounter_*.csv"))
+    for name in ("a_cross", "b_left"):  # one vehicle's record begins, or ends, in the middle of the junction
+        encounter = read_log([next(file for file in files if name in file.stem)]).encounters[0]
+        for road_name in ("t_intersection", "four_way"):
+            fit = fit_template(encounter, every(encounter), build_road(road_name, encounter))
+            assert not turned_otherwise(encounter, fit), (name, road_name)
+            assert not any(loss.kind in ("turn", "conflict") for loss in fit.lost)
+
+
+def test_oncoming_vehicles_stay_as_far_apart_where_there_are_lanes():
+    speed = np.full(80, 9.0)
+    encounter = encounter_of(driven(straight(0.0, 0.0, 0.3), speed), driven(straight(110.0, 45.0, 0.3 - np.pi), speed))
+    assert relative(np.array([0.0, 0.0, 0.3]), np.array([110.0, 45.0]))[1] == pytest.approx(10.5, abs=0.1)
+    for lanes, apart in ((0, 10.5), (1, 3.5)):  # as many as the template needs; one, which does too
+        road = build_road("straight", encounter, RoadConfig(lanes=lanes))
+        fit = fit_template(encounter, every(encounter), road)
+        one, two = (f.anchors[0] for f in fit.fitted)
+        assert abs(relative(one, two)[1]) == pytest.approx(apart, abs=0.1)
+
+
+@pytest.mark.data
+def test_ends_do_not_depend_on_changepoints(recorded):
+    for encounter in recorded.values():
+        for road_name in ("four_way", "corridor"):
+            road = build_road(road_name, encounter)
+            with_, without = (fit_template(encounter, s, road) for s in (every(encounter, 10), segmented(encounter)))
+            assert np.array_equal(with_.asked.start, without.asked.start)
+            assert np.array_equal(with_.asked.end, without.asked.end)
+            assert [f.manoeuvre for f in with_.fitted] == [f.manoeuvre for f in without.fitted]
+
+
+@pytest.mark.data
+def test_the_template_is_replayed_without_overlap_in_its_order_and_speed(recorded):
+    for name, encounter in recorded.items():
+        for road_name in ("four_way", "corridor"):
+            road = build_road(road_name, encounter)
+            fit = fit_template(encounter, every(encounter, 1), road)  # every sample an anchor: the dense placement
+            poses = np.stack([f.anchors for f in fit.fitted])
+            heading = np.unwrap(poses[..., 2], axis=1)
+            found = find_conflicts(fit.vehicles, encounter.time[fit.anchor_index], poses[..., :2], heading)
+            order = {frozenset((c.first, c.second)): c.first for c in found}
+            template = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
+            for conflict in template:
+                pair = frozenset((conflict.first, conflict.second))
+                assert order.get(pair, conflict.first) == conflict.first, (name, road_name)
+            step = np.hypot(*np.moveaxis(np.diff(poses[..., :2], axis=1), 2, 0)) / np.diff(encounter.time[fit.anchor_index])
+            recorded_speed = encounter.speed[:, fit.anchor_index]
+            middle = (recorded_speed[:, 1:] + recorded_speed[:, :-1]) / 2.0
+            assert np.median(np.abs(step - middle)) < 0.1, (name, road_name)
+
+
+def crossing_pair():
+    """Vehicle 1 comes from the right of vehicle 0 and waits for it."""
+    t = 120
+    waiting = np.concatenate((np.full(30, 6.0), np.linspace(6.0, 0.0, 30), np.zeros(30), np.linspace(0.0, 7.0, 30)))
+    return encounter_of(driven(straight(-50.0, 0.0, 0.0), np.full(t, 9.0)), driven(straight(0.0, -35.0, np.pi / 2.0), waiting))
+
+
+@pytest.mark.parametrize("road_name", ["four_way"])
+@pytest.mark.parametrize("yaw", [0.0, 1.0, -2.5])
+def test_who_comes_from_the_right_still_does_and_arrival_times_are_kept(road_name, yaw):
+    encounter = crossing_pair()
+    rotation = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    turned = Encounter(
+        "turned",
+        encounter.vehicles,
+        0,
+        100_000_000,
+        encounter.position @ rotation.T + 500.0,
+        encounter.heading + yaw,
+        encounter.speed,
+    )
+    fit = fit_template(turned, every(turned, 5), build_road(road_name, turned))
+    first, second = (f.anchors for f in fit.fitted)
+    assert [f.manoeuvre for f in fit.fitted] == ["straight", "straight"]
+    for k in (0, 5, 15):
+        i = fit.anchor_index[k]
+        template = relative([*encounter.position[0, i], encounter.heading[0, i]], encounter.position[1, i])
+        assert relative(first[k], second[k]) == pytest.approx(template, abs=0.3)
+    assert fit.fitted[1].stands[13:17].all()  # it waits from 6 s to 9 s
+    assert not fit.fitted[0].stands.any()
+    assert fit.asked.start[:, 3].tolist() == pytest.approx([9.0, 6.0])
+
+
+def test_turns_take_the_arm_on_their_side():
+    for angle, name in ((np.pi / 2.0, "left"), (-np.pi / 2.0, "right")):
+        speeds = np.full(110, 7.0)
+        encounter = encounter_of(
+            driven(turn(-40.0, -1.75, 0.0, 35.0, angle, 9.0), speeds), driven(straight(45.0, 1.75, np.pi), np.full(110, 3.0))
+        )
+        fit = fit_template(encounter, every(encounter), build_road("four_way", encounter))
+        assert [f.manoeuvre for f in fit.fitted] == [name, "straight"]
+        change = np.unwrap(fit.fitted[0].anchors[:, 2])
+        assert change[-1] - change[0] == pytest.approx(angle, abs=0.02)
+        with pytest.raises(RefusedError, match=f"vehicle 0 turns {name}"):
+            fit_template(encounter, every(encounter), build_road("straight", encounter))
+
+
+@pytest.mark.parametrize("road_name", ["curve", "t_intersection", "four_way"])
+def test_a_platoon_on_a_bend_keeps_its_bend_and_its_gaps_and_is_refused_on_a_straight_road(road_name):
+    bend = turn(0.0, 0.0, 0.0, 20.0, 1.4, 120.0, 400.0)
+    ahead = Curve(bend.at(np.arange(18.0, 400.0, 0.5)))
+    encounter = encounter_of(driven(ahead, np.full(150, 12.0)), driven(bend, np.full(150, 12.0)))
+    fit = fit_template(encounter, every(encounter), build_road(road_name, encounter))
+    lead, follow = (f.anchors for f in fit.fitted)
+    assert np.abs(np.hypot(*(lead - follow)[:, :2].T) - 18.0).max() < 0.25
+    for f in fit.fitted:
+        assert f.turned[1] == pytest.approx(f.turned[0], abs=np.radians(5.0))
+    assert not [loss for loss in fit.lost if loss.kind != "arm"]
+    with pytest.raises(RefusedError, match=r"vehicle 0 turns left by 80°.*would on road straight go straight on"):
+        fit_template(encounter, every(encounter), build_road("straight", encounter))
+
+
+def test_scale_out_of_range_is_refused_with_the_figure():
+    encounter = encounter_of(
+        driven(straight(0.0, 0.0, 0.0), np.full(150, 12.0)), driven(straight(-20.0, 0.0, 0.0), np.full(150, 12.0))
+    )
+    from scenario_gen.roads import RoadConfig
+
+    road = build_road("straight", encounter, RoadConfig(arm_length=60.0))
+    with pytest.raises(RefusedError, match=r"scale 0\.5\d; accepted is 0\.8 to 1\.25"):
+        fit_template(encounter, every(encounter), road)
+    fit = fit_template(encounter, every(encounter), road, FittingConfig(scale_low=0.4))
+    assert fit.fitted[0].scale == pytest.approx(0.55, abs=0.04)
+    assert fit.asked.start[0, 3] == pytest.approx(12.0 * fit.fitted[0].scale)
+
+
+def test_given_ends_are_met_exactly_and_the_map_keeps_orientation():
+    encounter = crossing_pair()
+    road = Road("open", np.ones((1000, 1000), dtype=bool), 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
+    chord = np.hypot(*(encounter.position[:, -1] - encounter.position[:, 0]).T)
+    starts = np.array([[30.0, 100.0, 0.3, 9.0], [100.0, 60.0, 1.8, 6.0]])
+    goals = starts.copy()
+    for i in (0, 1):
+        goals[i, :2] += 1.1 * chord[i] * np.array([np.cos(starts[i, 2]), np.sin(starts[i, 2])])
+    goals[:, 3] = (9.0, 7.0)
+    fit = fit_template(encounter, every(encounter), road, starts=starts, goals=goals)
+    assert np.abs(fit.asked.start - starts).max() < 1e-8
+    assert np.abs(fit.asked.end - goals).max() < 1e-8
+    assert [f.scale for f in fit.fitted] == pytest.approx([1.1, 1.1], abs=0.01)
+    for i in (0, 1):  # stations along the chord are the template's, times s
+        along = np.hypot(*(fit.fitted[i].anchors[:, :2] - starts[i, :2]).T)
+        own = np.hypot(*(encounter.position[i, fit.anchor_index] - encounter.position[i, 0]).T)
+        assert along == pytest.approx(1.1 * own, abs=0.15)
+    with pytest.raises(RefusedError, match=r"scale 2\.0"):
+        far = goals.copy()
+        far[:, :2] = starts[:, :2] + 2.0 / 1.1 * (goals[:, :2] - starts[:, :2])
+        fit_template(encounter, every(encounter), road, starts=starts, goals=far)
+    for bad in ({"starts": starts}, {"starts": starts[:1], "goals": goals}, {"starts": starts * np.nan, "goals": goals}):
+        with pytest.raises(InputError):
+            fit_template(encounter, every(encounter), road, **bad)
+
+
+def test_who_waits_throughout_stays_and_cannot_be_sent_away():
+    still = np.zeros(100)
+    encounter = encounter_of(
+        driven(straight(-30.0, 0.0, 0.0), np.full(100, 6.0)), driven(straight(0.0, -9.0, np.pi / 2.0), still)
+    )
+    fit = fit_template(encounter, every(encounter), build_road("four_way", encounter))
+    assert fit.fitted[1].manoeuvre == "wait"
+    assert fit.fitted[1].stands.all()
+    assert (fit.fitted[1].anchors == fit.fitted[1].anchors[0]).all()
+    moving, waiting = (f.anchors[0] for f in fit.fitted)
+    assert relative(moving, waiting) == pytest.approx([30.0, -9.0], abs=2.5)
+    road = Road("open", np.ones((600, 600), dtype=bool), 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
+    starts = np.array([[20.0, 60.0, 0.0], [60.0, 40.0, 1.5]])
+    with pytest.raises(RefusedError, match="waits throughout"):
+        fit_template(encounter, every(encounter), road, starts=starts, goals=starts + np.array([59.0, 0.0, 0.0]))
+
+
+def test_anchors_without_room_are_moved_and_said_and_far_ones_refused():
+    encounter = encounter_of(
+        driven(straight(10.0, 20.0, 0.0), np.full(100, 5.0)), driven(straight(10.0, 40.0, 0.0), np.full(100, 5.0))
+    )
+    drivable = np.zeros((300, 400), dtype=bool)
+    drivable[170:230, :] = True
+    drivable[96:150, :] = True  # the lower road begins at y = 19.2: vehicle 0 needs 19.05 or more, 0.15 m up
+    road = Road("two roads", drivable, 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
+    fit = fit_template(encounter, every(encounter), road, FittingConfig(placement="identity"))
+    assert fit.fitted[0].moved == pytest.approx(np.full(len(fit.anchor_index), 0.15), abs=0.02)
+    assert not fit.fitted[1].moved.any()
+    assert any("vehicle 0: its start had no room and was moved by 0.15 m" in note for note in fit.notes)
+    drivable[96:120] = False
+    far = Road("far", drivable, 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
+    with pytest.raises(
+        RefusedError,
+        match=r"vehicle 0 is 5\.\d m from any pose with room at sample 0 .*at most 3 m is bridged; set fitting.max_move",
+    ):
+        fit_template(encounter, every(encounter), far, FittingConfig(placement="identity"))
+
+
+def test_search_finds_a_road_of_the_templates_shape_wherever_it_is():
+    encounter = encounter_of(
+        driven(turn(0.0, 0.0, 0.0, 30.0, np.pi / 2.0, 12.0), np.full(100, 7.0)),
+        driven(straight(60.0, 3.5, np.pi), np.full(100, 2.0)),
+    )
+    home = build_road("corridor", encounter)
+    turned = Road("turned", np.rot90(home.drivable), 0.2, np.array([300.0, -80.0]), np.zeros((0, 3)), np.zeros((0, 3)))
+    fit = fit_template(encounter, every(encounter), turned)
+    one, two = (f.anchors for f in fit.fitted)
+    assert all(f.scale == 1.0 for f in fit.fitted)
+    assert relative(one[0], two[0]) == pytest.approx([60.0, 3.5], abs=0.1)
+    assert one[0, 2] == pytest.approx(-np.pi / 2.0, abs=0.1)  # rows grow with y: rot90 turns clockwise
+    narrow = Road("narrow", home.drivable[:, :60], 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
+    with pytest.raises(RefusedError, match="does not fit road narrow"):
+        fit_template(encounter, every(encounter), narrow)

@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A fit that loses the template's encounter is refused, unless it is asked for by name."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from reaction_scenes import crossing, lane_encounter
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.fitting import fit, fit_template, FittingConfig, LostConflictError
+from scenario_gen.method.fitting.kept import keeps_conflicts
+from scenario_gen.method.fitting.placement import Placement
+from scenario_gen.method.nearest import nearest_if_impossible
+from scenario_gen.method.segmentation import segment
+from scenario_gen.numerics.curve import Curve
+from scenario_gen.template.tracks import clean_tracks
+from scenario_gen.types.request import Request
+from scenario_gen.types.road import Road
+
+CROSSING = crossing(8.0)
+SEGMENTATION = segment(CROSSING)
+OPEN = Road("open", np.ones((1000, 1000), dtype=bool), 0.5, [-250.0, -250.0], [], [])
+
+
+def apart(encounter, metres):
+    """The template in its own frame, its second vehicle moved east by so much."""
+    first, second = clean_tracks(encounter)
+    moved = replace(second, curve=Curve(second.curve.points + np.array([metres, 0.0, 0.0])))
+    return Placement((first, moved), np.ones(2), ("own path", "own path"), np.zeros(2), ())
+
+
+@pytest.fixture
+def place(monkeypatch):
+    """Have the fit find a given placement, whatever the road."""
+    return lambda placement: monkeypatch.setattr(fit, "_place", lambda *_: placement)
+
+
+def test_a_lost_crossing_is_refused_and_can_be_allowed(place):
+    place(apart(CROSSING, 120.0))
+    with pytest.raises(
+        LostConflictError, match=r"vehicles 1 and 2 have crossing or merging paths .* fitting\.allow=lost_conflict"
+    ):
+        fit_template(CROSSING, SEGMENTATION, OPEN)
+    taken = fit_template(CROSSING, SEGMENTATION, OPEN, FittingConfig(allow="lost_conflict"))
+    assert [loss.kind for loss in taken.lost] == ["conflict"]
+
+
+def test_asked_states_that_lose_a_crossing_are_refused_and_can_be_allowed(place):
+    place(apart(CROSSING, 0.0))
+    ends = {name: apart(CROSSING, 120.0).tracks[1].curve.points[k] for name, k in (("starts", 0), ("goals", -1))}
+    request = Request(**{name: f"2: {x:.2f} {y:.2f} {yaw:.4f}" for name, (x, y, yaw) in ends.items()})
+    with pytest.raises(LostConflictError, match=r"fitting\.allow=lost_conflict"):
+        fit_template(CROSSING, SEGMENTATION, OPEN, request=request)
+    taken = fit_template(CROSSING, SEGMENTATION, OPEN, FittingConfig(allow="lost_conflict"), request=request)
+    assert [loss.kind for loss in taken.lost] == ["conflict"]
+
+
+def test_what_is_kept_or_at_home_is_not_refused(place):
+    place(apart(CROSSING, 1.0))
+    assert not fit_template(CROSSING, SEGMENTATION, OPEN).lost
+    place(replace(apart(CROSSING, 120.0), at_home=True))
+    assert [loss.kind for loss in fit_template(CROSSING, SEGMENTATION, OPEN).lost] == ["conflict"]
+
+
+def test_a_lost_leader_is_said_and_not_refused(place):
+    speed = np.full(150, 10.0)
+    encounter = lane_encounter(speed, speed)
+    first, second = clean_tracks(encounter)
+    beside = replace(second, curve=Curve(second.curve.points + np.array([0.0, 8.0, 0.0])))
+    place(Placement((first, beside), np.ones(2), ("own path", "own path"), np.zeros(2), ()))
+    assert "following" in [loss.kind for loss in fit_template(encounter, segment(encounter), OPEN).lost]
+
+
+def test_the_refusal_names_roads_that_keep_it():
+    config = PipelineConfig()
+    with (
+        pytest.raises(LostConflictError, match=r"lost\. Nearest possible: road (t_intersection|four_way)"),
+        nearest_if_impossible(CROSSING, SEGMENTATION, OPEN, config, Request(), count=1, seed=0),
+    ):
+        raise LostConflictError("lost")
+
+
+def test_only_what_is_known_can_be_allowed():
+    with pytest.raises(InputError, match="lost_conflict"):
+        FittingConfig(allow="everything")
+
+
+def test_keeping_is_about_paths_that_cross():
+    tracks = clean_tracks(CROSSING)
+    assert keeps_conflicts(tracks, tracks) and not keeps_conflicts(tracks, apart(CROSSING, 120.0).tracks)

@@ -1,0 +1,221 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""RRT*-Connect in the vehicle's own space: its curves, its exact sweep, its paths, and the routes round obstacles."""
+
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from shapely import affinity
+from shapely.geometry import box, LineString, MultiPoint, Point
+from shapely.ops import unary_union
+
+from benchmarks._planning_maps import road_of
+from benchmarks._planning_obstructed import obstructed
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.routing import plan, plan_routes, PlanningConfig
+from scenario_gen.method.routing.distance import distances_to_line, farthest
+from scenario_gen.method.routing.search.dubins import shortest_into
+from scenario_gen.method.routing.search.planner import BlockedError, Budget, BudgetSpentError, NoWayError
+from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect, PoseSearchConfig, Wishes
+from scenario_gen.method.routing.search.sweep import sweep_is_free
+from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.route import Route, routes_in_words
+from scenario_gen.types.scenario import BoundaryStates
+
+CAR = (4.8, 1.9)
+LIMIT = 0.225
+metre = st.floats(-50, 50).map(lambda value: round(value, 9))  # squares of less than 1e-162 are 0: shapely has such a line at inf
+point = st.tuples(metre, metre)
+pose = st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-7, 7))
+
+
+def street(obstacles="", length=60.0, width=8.0):
+    """A straight road along x from y = 1 m on, cells of 0.2 m."""
+    y = (np.arange(int((width + 2.0) / 0.2)) + 0.5) * 0.2
+    road = road_of("street", np.repeat(((y > 1.0) & (y < 1.0 + width))[:, None], int(length / 0.2), axis=1), 0.2)
+    return with_obstacles(road, read_obstacles(obstacles))
+
+
+SLALOM = "20 4 1.5708 6 1.5; 31 6 1.5708 6 1.5; 42 4 1.5708 6 1.5"  # walls that leave 2 m, of 8
+GATES = "20 3.4 1.5708 4.8 1.5; 31 6.6 1.5708 4.8 1.5; 42 3.4 1.5708 4.8 1.5"  # that leave 3.2 m
+
+
+def query(start=(4.0, 3.0, 0.0), goal=(56.0, 3.0, 0.0)):
+    return PoseQuery(np.array(start), np.array(goal), *CAR, LIMIT)
+
+
+def route_on(road, *anchors, config=PlanningConfig(), seed=0, path=None):
+    poses = np.array(anchors)
+    more = {} if path is None else {"path": np.array(path)}
+    fitted = FittedVehicle(poses, np.zeros(len(poses)), np.zeros(len(poses) - 1, dtype=bool), 1.0, "straight", **more)
+    states = BoundaryStates(*(np.append(poses[k], 5.0)[None] for k in (0, -1)))
+    (route,) = plan_routes(road, Fit((Vehicle("a", *CAR),), (fitted,), np.arange(len(poses)), states, ()), config, seed)
+    return route
+
+
+def blocked_area(road):
+    """What is not drivable, and what lies beyond the grid, as one shape."""
+    height, width = road.drivable.shape
+    cells = [box(j, i, j + 1, i + 1) for i, j in np.argwhere(~road.drivable)]
+    frame = box(-99, -99, width + 99, height + 99).difference(box(0, 0, width, height))
+    return affinity.scale(unary_union([*cells, frame]), road.resolution, road.resolution, origin=(0, 0))
+
+
+def footprint(at, size=CAR):
+    shape = affinity.rotate(box(-size[0] / 2, -size[1] / 2, size[0] / 2, size[1] / 2), at[2], origin=(0, 0), use_radians=True)
+    return affinity.translate(shape, at[0], at[1])
+
+
+@given(pose, pose, st.floats(0.3, 5.0))
+def test_a_dubins_curve_ends_where_it_should(start, end, radius):
+    out = np.empty(7)
+    shortest_into(*start, *end, radius, out)
+    np.testing.assert_allclose(out[4:6], end[:2], atol=1e-6)
+    np.testing.assert_allclose((out[6] - end[2] + np.pi) % (2 * np.pi) - np.pi, 0.0, atol=1e-6)
+    assert out[1:4].sum() >= np.hypot(end[0] - start[0], end[1] - start[1]) - 1e-9
+
+
+def test_a_dubins_curve_is_as_long_driven_backwards():
+    rng = np.random.default_rng(0)
+    there, back = np.empty(7), np.empty(7)
+    for start, end in rng.uniform((-5.0, -5.0, -4.0), (5.0, 5.0, 4.0), (200, 2, 3)):
+        shortest_into(*start, *end, 1.7, there)
+        shortest_into(*end[:2], end[2] + np.pi, *start[:2], start[2] + np.pi, 1.7, back)  # by a car that was turned round
+        np.testing.assert_allclose(back[1:4].sum(), there[1:4].sum(), atol=1e-6)
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 2**32 - 1))
+def test_what_is_swept_is_free_exactly(seed):
+    rng = np.random.default_rng(seed)
+    road = road_of("random", rng.random((14, 14)) > 0.06, 1.0)
+    curvature, size = rng.uniform(-0.3, 0.3), (rng.uniform(2.0, 5.0), rng.uniform(1.0, 2.0))
+    first = np.array([*rng.uniform(2.0, 12.0, 2), rng.uniform(-np.pi, np.pi)])
+    turn = first[2] + curvature * np.array([0.0, 0.2])
+    middle = turn.mean()
+    poses = np.array([[*first[:2], turn[0]], [first[0] + 0.2 * np.cos(middle), first[1] + 0.2 * np.sin(middle), turn[1]]])
+    swept = MultiPoint([p for at in poses for p in footprint(at, size).exterior.coords]).convex_hull
+    depth = swept.buffer(0.01).intersection(blocked_area(road)).area - swept.buffer(-0.01).intersection(blocked_area(road)).area
+    overlap = swept.intersection(blocked_area(road)).area
+    assume(overlap > 0.02 or depth == 0.0)
+    both = sweep_is_free(road, poses, *size)[:, 0]
+    assert (both.min() > 0.0) == (overlap == 0.0)
+
+
+@pytest.mark.parametrize("obstacles", ["30 3 0.4 4.5 1.8", GATES])
+def test_paths_are_arcs_and_keep_clear(obstacles):
+    road = street(obstacles)
+    plan = PoseRrtStarConnect().plan(road, query(), Budget(2000), 3)
+    first = PoseRrtStarConnect().plan(road, query(), Budget(2000, first=True), 3)
+    assert plan.iterations > 1
+    assert plan.cost <= first.cost
+    np.testing.assert_allclose(plan.poses[[0, -1]], [query().start, query().goal], atol=1e-6)
+    assert np.abs(plan.curvature).max() <= LIMIT * (1 + 1e-9)
+    turn = (np.diff(plan.poses[:, 2]) - plan.curvature[1:] * plan.step[1:] + np.pi) % (2 * np.pi) - np.pi
+    np.testing.assert_allclose(turn, 0.0, atol=1e-6)
+    half = 0.5 * plan.curvature[1:] * plan.step[1:]
+    chord = plan.step[1:] * np.sinc(half / np.pi)
+    np.testing.assert_allclose(np.hypot(*np.diff(plan.poses[:, :2], axis=0).T), chord, atol=1e-6)
+    assert plan.cost == pytest.approx(plan.step.sum())
+    shape = unary_union([footprint(at) for at in plan.poses])
+    assert shape.intersection(blocked_area(road)).area < 1e-6
+    again = PoseRrtStarConnect().plan(road, query(), Budget(2000), 3)
+    assert again.poses.tobytes() == plan.poses.tobytes()
+
+
+def test_a_free_curve_is_the_first_connection():
+    plan = PoseRrtStarConnect().plan(street(), query(), Budget(1000), 0)
+    assert plan.iterations == 1
+    assert plan.cost == pytest.approx(52.0)
+
+
+def test_searches_that_fail_say_why():
+    planner = PoseRrtStarConnect()
+    with pytest.raises(BlockedError, match=r"start .* has no room"):
+        planner.plan(street(), query(start=(4.0, 1.2, 0.0)), Budget(10), 0)
+    with pytest.raises(NoWayError, match=r"too narrow for a width of 1.90 m"):
+        planner.plan(street("30 5 0 2 7"), query(), Budget(10), 0)
+    with pytest.raises(BudgetSpentError, match="within 40 iterations"):
+        planner.plan(street(SLALOM), query(), Budget(40), 0)
+
+
+def test_more_iterations_never_make_a_path_dearer():
+    costs = [
+        PoseRrtStarConnect(PoseSearchConfig(improve=improve)).plan(street(GATES), query(), Budget(5000), 1).cost
+        for improve in (0, 100, 400)
+    ]
+    assert costs[0] >= costs[1] >= costs[2]
+
+
+def test_room_is_kept_where_the_road_has_it():
+    road = street("30 6.5 0 4.5 1.8")
+    bare = PoseRrtStarConnect().plan(road, query(goal=(56.0, 4.4, 0.0), start=(4.0, 4.4, 0.0)), Budget(500), 0)
+    wished = PoseRrtStarConnect().plan(
+        road, query(goal=(56.0, 4.4, 0.0), start=(4.0, 4.4, 0.0)), Budget(500), 0, Wishes(room=0.8, lack=3.0)
+    )
+    room = [sweep_is_free(road, plan.poses, *CAR)[:, 1].min() for plan in (bare, wished)]
+    assert room[1] >= room[0]
+
+
+def test_routes_pass_obstacles_on_their_own_side():
+    oncoming = route_on(street("30 3 0 4.5 1.8"), (4.0, 3.0, 0.0), (56.0, 3.0, 0.0))  # own lane closed: by the other one
+    assert (oncoming.joined, oncoming.searched) == (0, 1)
+    assert oncoming.points[:, 1].max() > 4.5
+    wide = street("30 6.2 0 4.5 1.8", width=11.0)  # room for a car on either side
+    for side, sign in (("right", -1.0), ("left", 1.0)):
+        route = route_on(wide, (4.0, 6.5, 0.0), (56.0, 6.5, 0.0), config=PlanningConfig(traffic_side=side))
+        offset = route.points[:, 1] - 6.5
+        assert sign * offset[np.argmax(np.abs(offset))] > 1.0
+
+
+def test_a_slalom_is_driven():
+    road = street(GATES)
+    route = route_on(road, (4.0, 3.0, 0.0), (56.0, 3.0, 0.0))
+    bend = np.diff(route.points[:, 2]) / np.diff(route.length)
+    assert np.abs(bend).max() < LIMIT * 1.02
+    assert np.abs(np.diff(bend)).max() < 0.08  # per half a metre: no jump of curvature
+    shape = unary_union([footprint(at) for at in route.points])
+    assert shape.intersection(blocked_area(road)).area < 1e-6
+
+
+def test_where_smoothing_fails_a_gentler_way_is_searched_for(monkeypatch):
+    case = obstructed(113)
+    ends = (case.query.start, case.query.goal)
+    route = route_on(case.road, *ends)
+    assert np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max() <= PlanningConfig().max_curvature
+    monkeypatch.setattr(plan, "TIGHTEST", plan.TIGHTEST[:1])
+    with pytest.raises(RefusedError, match="its curvature reaches"):
+        route_on(case.road, *ends)
+
+
+@given(st.lists(point, min_size=1, max_size=6), st.lists(point, min_size=2, max_size=6))
+def test_distances_to_a_line_are_those_of_shapely(points, line):
+    found = distances_to_line(np.array(points), np.array(line))
+    assert found == pytest.approx([LineString(line).distance(Point(each)) for each in points], abs=1e-6)
+    assert distances_to_line(np.zeros((1, 2)), np.array([(0.0, 0.0), (0.0, 5.9e-246)])) == 0.0
+
+
+def test_what_is_far_from_the_fit_is_said():
+    path = [(4.0, 3.0, 0.0), (56.0, 3.0, 0.0)]
+    straight, round_it = (route_on(street(text), *path, path=path) for text in ("", "30 3 0 4.5 1.8"))
+    assert straight.farthest < 0.05
+    assert straight.remarks("7") == []
+    assert round_it.farthest == pytest.approx(np.abs(round_it.points[:, 1] - 3.0).max(), abs=1e-6)
+    assert round_it.remarks("7") == [f"vehicle 7: its route passes {round_it.farthest:.1f} m from its fitted path"]
+    assert routes_in_words([straight, round_it]) == (
+        f"1 legs joined at once, 1 searched for, at most {round_it.farthest:.2f} m from the fitted paths"
+    )
+    assert np.isnan(farthest(straight.points, np.zeros((0, 3))))
+    assert Route(straight.points, straight.anchor, straight.length).figures()["farthest_from_fit_m"] is None
+
+
+def test_a_changepoint_that_cannot_be_passed_is_left_out_and_said():
+    hidden = (30.0, 2.05, 1.3)  # beside the kerb, heading off the lane
+    route = route_on(street("36 3 0 6 4"), (4.0, 3.0, 0.0), hidden, (56.0, 3.0, 0.0))
+    if route.left_out:
+        assert "changepoint 1" in route.remarks("7")[0] + route.remarks("7")[-1]
+    assert route.points[:, 1].max() > 5.0

@@ -1,0 +1,235 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""RRT*-Connect and string pulling: never through an obstacle, never shorter than the optimum, and close to it."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lengths import LONG
+import numpy as np
+import pytest
+
+from benchmarks._planning_maps import clutter, enters_blocked, lane, optimum, road_of, t_intersection
+from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.method.routing.search.planner import (
+    BlockedError,
+    Budget,
+    BudgetSpentError,
+    NoWayError,
+    path_length,
+    plan_with_retry,
+    Query,
+)
+from scenario_gen.method.routing.search.rrt_star_connect import _Trees, LARGE, PAPER, RrtStarConnect, RrtStarConnectConfig
+from scenario_gen.method.routing.search.tree_nodes import CHUNK, COST, EDGE, ITERATION, NODES_A, NODES_B, PARENT
+from scenario_gen.roads.clearance import clearance_in_cells, segments_free
+from scenario_gen.roads.connectivity import common_component
+
+SMALL = 24
+QUERIES = 300 if LONG else 90
+
+
+def random_query(rng, density):
+    drivable = rng.random((SMALL, SMALL)) > density
+    drivable[0, 0] = True
+    return road_of("random", drivable), rng.uniform(0.0, SMALL, (2, 2))
+
+
+@pytest.mark.parametrize("config", [RrtStarConnectConfig(step=4.0), PAPER], ids=["default", "paper"])
+@pytest.mark.parametrize("radius", [0.0, 0.7])
+def test_no_path_enters_a_blocked_cell(config, radius):
+    rng = np.random.default_rng([1, int(10 * radius)])
+    found = 0
+    for seed in range(QUERIES):
+        road, (start, goal) = random_query(rng, rng.uniform(0.01, 0.12 if radius else 0.4))
+        try:
+            plan = RrtStarConnect(config).plan(road, Query(start, goal, radius), Budget(400), seed)
+        except RefusedError:
+            continue
+        found += 1
+        np.testing.assert_array_equal(plan.path[[0, -1]], [start, goal])
+        assert not enters_blocked(road.drivable, plan.path)
+        assert segments_free(road, plan.path[:-1], plan.path[1:], radius).all()
+        assert plan.cost == pytest.approx(path_length(plan.path))
+    assert found > QUERIES / 5
+
+
+def test_the_rasteriser_sees_what_enters():
+    drivable = np.ones((4, 4), dtype=bool)
+    drivable[1, 1] = False
+    assert enters_blocked(drivable, np.array([[0.5, 0.5], [2.5, 2.5]]))
+    assert not enters_blocked(drivable, np.array([[1.0, 0.5], [1.0, 3.5]]))  # along the edge
+    assert enters_blocked(drivable, np.array([[1.0 + 1e-12, 0.5], [1.0 + 1e-12, 3.5]]))
+    assert not enters_blocked(drivable, np.array([[0.0, 2.0], [2.0, 0.0]]))  # touches a corner
+    assert enters_blocked(drivable, np.array([[3.5, 3.5], [4.5, 3.5]]))  # leaves the grid
+
+
+@settings(max_examples=80)
+@given(seed=st.integers(0, 2**32 - 1), density=st.floats(0.02, 0.35))
+def test_cost_is_near_the_optimum_and_never_below(seed, density):
+    rng = np.random.default_rng(seed)
+    road, ends = random_query(rng, density)
+    ends = np.floor(ends) + 0.5
+    planner = RrtStarConnect(RrtStarConnectConfig(step=6.0))
+    try:
+        plan = planner.plan(road, Query(*ends), Budget(1500), 3)
+    except BudgetSpentError:  # a maze: patience must find the way that the components promise
+        plan = planner.plan(road, Query(*ends), Budget(500_000, first=True), 3)
+        assert common_component(road, *ends, 0.0) is not None
+        assert plan.cost >= optimum(road, ends) - 1e-9
+        return
+    except RefusedError:
+        assert common_component(road, *ends, 0.0) is None
+        return
+    best = optimum(road, ends)  # may pass between two cells that touch at a corner: then it is shorter
+    assert plan.cost >= best - 1e-9
+    padded = ~np.pad(road.drivable, 1)
+    pinched = (padded[:-1, :-1] & padded[1:, 1:] & ~padded[:-1, 1:] & ~padded[1:, :-1]).any()
+    pinched |= (~padded[:-1, :-1] & ~padded[1:, 1:] & padded[:-1, 1:] & padded[1:, :-1]).any()
+    if not pinched:
+        assert plan.cost <= best * 1.01 + 1e-6
+
+
+@pytest.mark.parametrize(("case", "slack"), [(lane, 1e-9), (t_intersection, 1e-4), (clutter, 3e-3)])
+def test_large_maps_come_close_to_the_true_optimum(case, slack):
+    road, ends = case()
+    best = optimum(road, ends)
+    plan = RrtStarConnect().plan(road, Query(*ends), Budget(40_000), 1)
+    assert best - 1e-6 <= plan.cost <= best * (1.0 + slack)
+    assert (np.diff(plan.history[:, 2]) < 0.0).all()
+    assert plan.history[-1, 2] == pytest.approx(plan.cost)
+
+
+def test_the_paper_preset_goes_on_improving_after_the_first_meeting():
+    road, ends = t_intersection()
+    first = RrtStarConnect(PAPER).plan(road, Query(*ends), Budget(10_000, first=True), 5)
+    later = RrtStarConnect(PAPER).plan(road, Query(*ends), Budget(10_000), 5)
+    best = optimum(road, ends)
+    assert later.iterations == 10_000
+    assert best < later.cost < first.cost
+    assert later.cost < 1.005 * best
+    assert np.hypot(*np.diff(first.path, axis=0).T).max() <= 30.0 + 1e-9  # no edge longer than the near radius
+
+
+def grown(road, ends, config, iterations):
+    """Both trees after so many iterations, and the ids of all their nodes."""
+    search = _Trees(road, Query(*ends), 1, config, 2)
+    while search.counter[ITERATION] < iterations:
+        search.grow(iterations - int(search.counter[ITERATION]))
+    found = []
+    for first in search.head[search.head >= 0]:
+        k = first
+        while k >= 0:
+            found.append(k * CHUNK + np.arange(search.chunk[k, 1]))
+            k = search.chunk[k, 0]
+    return search, np.concatenate(found)
+
+
+@pytest.mark.parametrize("config", [RrtStarConnectConfig(), PAPER], ids=["default", "paper"])
+@pytest.mark.parametrize("case", [clutter, lane])
+def test_large_trees_are_whole(config, case):
+    road, ends = case()
+    search, m = grown(road, ends, config, 60_000)
+    assert len(m) == len(np.unique(m)) == search.counter[NODES_A] + search.counter[NODES_B]
+    assert len(search.drawn) > 0 or len(m) <= LARGE
+    m = m[search.link[m, PARENT] >= 0]
+    parent = search.link[m, PARENT]
+    edge = np.hypot(*(search.node[m, :2] - search.node[parent, :2]).T)
+    np.testing.assert_allclose(search.node[m, EDGE], edge, atol=1e-9)
+    np.testing.assert_allclose(search.node[m, COST], search.node[parent, COST] + edge, atol=1e-7)
+    assert segments_free(road, search.node[parent, :2], search.node[m, :2], 0.0).all()
+    path = search.path()
+    assert path_length(path) == pytest.approx(search.best)
+    np.testing.assert_array_equal(path[[0, -1]], ends)
+
+
+def test_many_nodes_on_a_small_map():
+    road, ends = road_of("small", np.ones((8, 30), dtype=bool)), np.array([[1.5, 1.5], [28.5, 6.5]])
+    search, m = grown(road, ends, PAPER, 40_000)
+    assert len(m) == search.counter[NODES_A] + search.counter[NODES_B] > LARGE
+    assert search.best == pytest.approx(np.hypot(*(ends[1] - ends[0])))
+
+
+def test_only_an_informed_search_leaves_out_what_cannot_help():
+    drivable = np.ones((200, 200), dtype=bool)
+    drivable[95:140, 100] = False  # a wall to go round
+    road, ends = road_of("open", drivable), np.array([[80.5, 100.5], [120.5, 100.5]])
+    for config, everywhere in ((PAPER, True), (RrtStarConnectConfig(greedy=False, pull=False), False)):
+        search, m = grown(road, ends, config, 4_000)
+        place = search.node[m, :2]
+        by_way_of = np.hypot(*(place - ends[0]).T) + np.hypot(*(place - ends[1]).T)
+        assert (np.mean(by_way_of > 2.0 * search.best) > 0.3) == everywhere
+
+
+def test_same_seed_same_path():
+    road, ends = clutter()
+    plans = [RrtStarConnect().plan(road, Query(*ends), Budget(3000), seed) for seed in (4, 4, 5)]
+    np.testing.assert_array_equal(plans[0].path, plans[1].path)
+    assert not np.array_equal(plans[0].path, plans[2].path)
+
+
+def test_failures_are_told_apart():
+    drivable = np.ones((60, 60), dtype=bool)
+    drivable[:, 30] = False
+    road = road_of("two halves", drivable)
+    planner = RrtStarConnect()
+    left, right, wall = np.array([5.5, 5.5]), np.array([50.5, 50.5]), np.array([30.5, 5.5])
+    with pytest.raises(BlockedError, match=r"start \(30.50, 5.50\)") as caught:
+        planner.plan(road, Query(wall, right), Budget(), 0)
+    assert caught.value.end == "start"
+    with pytest.raises(BlockedError, match="goal"):
+        planner.plan(road, Query(left, wall), Budget(), 0)
+    with pytest.raises(NoWayError, match="no way"):
+        planner.plan(road, Query(left, right), Budget(10**9), 0)  # at once: the components say so
+    drivable = drivable.copy()
+    drivable[59, 30] = True
+    with pytest.raises(BudgetSpentError, match="3 iterations"):
+        planner.plan(road_of("a gap", drivable), Query(left, right), Budget(3), 0)
+    with pytest.raises(BudgetSpentError):
+        planner.plan(road_of("a gap", drivable), Query(left, right), Budget(10**9, cancelled=lambda: True), 0)
+
+
+def test_cancelling_ends_a_search_and_keeps_what_it_has():
+    road, ends = clutter()
+    looks = iter([False] * 8 + [True])
+    plan = RrtStarConnect().plan(road, Query(*ends), Budget(None, cancelled=lambda: next(looks)), 0)
+    assert plan.cost == pytest.approx(plan.history[-1, 2])
+    assert plan.iterations < 8 * 512
+
+
+def test_a_disc_needs_its_room():
+    drivable = np.ones((40, 40), dtype=bool)
+    drivable[:, 20] = False
+    drivable[10:13, 20] = True  # three cells wide
+    road = road_of("gate", drivable)
+    query = np.array([5.5, 30.5]), np.array([35.5, 30.5])
+    wide = RrtStarConnect().plan(road, Query(*query, 1.4), Budget(2000), 0)
+    assert segments_free(road, wide.path[:-1], wide.path[1:], 1.4).all()
+    assert wide.cost > RrtStarConnect().plan(road, Query(*query, 0.0), Budget(2000), 0).cost
+    with pytest.raises(NoWayError):
+        RrtStarConnect().plan(road, Query(*query, 1.6), Budget(2000), 0)
+
+
+def test_time_ends_a_search():
+    road, ends = clutter()
+    clearance_in_cells(road)
+    plan = RrtStarConnect(RrtStarConnectConfig(pull=False)).plan(road, Query(*ends), Budget(None, seconds=0.05), 0)
+    assert plan.iterations > 100
+    assert plan.history[-1, 1] < 0.5
+
+
+def test_settings_are_checked():
+    with pytest.raises(InputError, match="step"):
+        RrtStarConnectConfig(step=0.0)
+
+
+def test_patience_finds_the_way_that_a_small_budget_does_not():
+    drivable = np.zeros((60, 60), dtype=bool)
+    drivable[:, :28] = drivable[:, 34:] = True
+    drivable[57, :] = True
+    road, query = road_of("a far gap", drivable), Query(np.array([2.5, 2.5]), np.array([57.5, 2.5]))
+    with pytest.raises(BudgetSpentError):
+        RrtStarConnect().plan(road, query, Budget(20), 0)
+    plan = plan_with_retry(RrtStarConnect(), road, query, 20, 0)
+    assert plan.iterations > 20
+    assert not enters_blocked(drivable, plan.path)

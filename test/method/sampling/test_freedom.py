@@ -1,0 +1,170 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Preset `wide`: own clocks, waits, places, end speeds, sizes, and who drives on behind its route."""
+
+from dataclasses import replace
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from sampling_scenes import scene
+
+from scenario_gen.method.sampling import freed_states, sample_scenarios, SamplingConfig
+from scenario_gen.method.sampling.candidates import Scale
+from scenario_gen.method.sampling.freedom import CATALOGUE, cut, FADES, freedom_of, onward, OwnClock, seconds_onward
+from scenario_gen.method.sampling.pace import clock_of
+from scenario_gen.method.sampling.prepare import prepare
+from scenario_gen.method.validity import Checker
+from scenario_gen.numerics.exact import random as exact_random
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.request import Request
+
+GRID = 0.1 * np.arange(201)
+NOMINAL = clock_of(GRID, np.ones(201))
+
+
+def normal(count, size, seed=0):
+    return exact_random.standard_normal(np.random.Generator(np.random.PCG64(seed)), (count, size))
+
+
+def batch(count=300, request=Request(), **parameters):
+    encounter, segmentation, road, routes, asked, waits = scene()
+    config = replace(SamplingConfig(), **parameters)
+    states = freed_states(asked, encounter, config, request)
+    model = prepare(encounter, segmentation, road, routes, states, waits, config).model
+    return model, model.draw(normal(count, model.size), Scale())
+
+
+def arrivals(b):
+    """Own time [s] of each vehicle (S, N) at the middle of its route, less the mean over vehicles."""
+    middle = np.stack([one.clock.time[:, 50] for one in b.drawn], axis=1)
+    return middle - middle.mean(axis=1, keepdims=True)
+
+
+def stand(b):
+    """How long vehicle 1 waits [s]."""
+    time = b.drawn[1].clock.time
+    return time[:, 130] - time[:, 70]
+
+
+@pytest.mark.parametrize(
+    ("name", "measure"),
+    [
+        ("arrival_sigma", lambda b: arrivals(b).std()),
+        ("pace_sigma", lambda b: (b.drawn[0].clock.rate / b.drawn[1].clock.rate)[:, 20].std()),
+        ("wait_sigma", lambda b: stand(b).std()),
+        ("end_speed_sigma", lambda b: b.at_ends[0, :, 0, 3].std()),
+        ("place_sigma", lambda b: b.drawn[0].curve[:, 0, 1].std()),
+    ],
+)
+def test_each_freedom_has_its_monotone_effect(name, measure):
+    others = dict.fromkeys(("arrival_sigma", "pace_sigma", "wait_sigma", "end_speed_sigma", "place_sigma", "time_sigma"), 0.0)
+    largest = {"pace_sigma": 0.08, "end_speed_sigma": 0.8, "place_sigma": 0.4}.get(name, 1.6)
+    found = [measure(batch(**(others | {name: share * largest}))[1]) for share in (0.0, 0.25, 0.5, 1.0)]
+    assert (np.diff(found) > 0.0).all(), found
+    assert found[0] == pytest.approx(0.0, abs=1e-9)
+
+
+@settings(max_examples=30)
+@given(
+    st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3),
+    st.booleans(),
+    st.booleans(),
+    st.floats(0.1, 3.0),
+    st.floats(0.0, 0.2),
+)
+def test_own_clocks_run_forward_within_their_bounds_and_agree_where_states_are_asked(z, start, end, shift, pace):
+    config = replace(SamplingConfig(), arrival_sigma=shift, pace_sigma=pace)
+    own = OwnClock.of(NOMINAL, [(7.0, 13.0)], (start, end), config)
+    clock = own.sample(np.array([z]), 1.0, replace(NOMINAL, time=NOMINAL.time[None], rate=NOMINAL.rate[None]), NOMINAL)
+    waits = (GRID > 6.9) & (GRID < 13.1)
+    assert clock.rate[0, ~waits].min() > 0.7
+    assert clock.rate[0, ~waits].max() < 1.4
+    assert clock.rate.min() > 0.0
+    if start:
+        assert clock.time[0, 0] == pytest.approx(0.0, abs=1e-9)
+    if end:
+        assert clock.time[0, -1] == pytest.approx(GRID[-1], abs=1e-9), "it makes up for a longer wait"
+
+
+def test_what_is_asked_holds_and_what_is_freed_keeps_its_bounds():
+    encounter, segmentation, road, routes, asked, waits = scene()
+    config = SamplingConfig()
+    x, y, yaw, speed = asked.start[0]
+    request = Request(starts=f"a: {x} {y} {yaw} {speed}")
+    states = freed_states(asked, encounter, config, request)
+    assert (states.freed[0, 0] == 0.0).all()
+    assert (states.freed[0, 1] > 0.0).all()
+    check = Checker(None, states, None, None).check
+    made = sample_scenarios(encounter, segmentation, road, routes, states, check, config, count=40, waits=waits, request=request)
+    assert len(made.scenarios) == 40
+    for scenario in made.scenarios:
+        assert np.hypot(*(scenario.position[0, 0] - asked.start[0, :2])) < 0.1
+        assert abs(scenario.speed[0, 0] - speed) < 0.1
+    ends = np.array([scenario.position[0, -1] for scenario in made.scenarios])
+    assert np.ptp(ends[:, 0]) > 1.0  # its end is free
+
+
+def test_nothing_is_freed_by_preset_narrow():
+    encounter, *_, asked, _ = scene()
+    assert freed_states(asked, encounter, SamplingConfig(variety="narrow"), Request()) is asked
+
+
+def test_a_start_off_its_bounds_is_refused():
+    encounter, segmentation, road, routes, asked, waits = scene()
+    config = SamplingConfig()
+    states = freed_states(asked, encounter, config, Request())
+    given = (encounter, segmentation, road, routes, states)
+    made = sample_scenarios(*given, Checker(None, states, None, None).check, config, count=20, waits=waits)
+    assert len(made.scenarios) == 20
+    tight = replace(states, freed=0.0 * states.freed)
+    verdicts = Checker(None, tight, None, None).check(made.scenarios)
+    assert any("from what was asked" in v.message for verdict in verdicts for v in verdict.violations)
+
+
+@pytest.mark.parametrize(("gap", "longest"), [(np.inf, 4.96), (1.0, 4.46), (0.4, 4.05), (0.0, 3.6), (-0.3, 3.6)])
+def test_who_stands_close_to_another_one_does_not_become_longer_than_half_the_gap(gap, longest):
+    car, arc, none = Vehicle("1", 4.0, 1.8), np.arange(20.0), np.zeros(2)
+    made = freedom_of(car, arc, NOMINAL, [], np.ones((2, 2)), none.astype(np.bool_), none, gap, SamplingConfig())
+    assert made.sizes[:, 0].max() == longest
+
+
+def test_sizes_are_those_of_the_catalogue():
+    model, some = batch(200)
+    sizes = {(one.length, one.width) for one in some.drawn[0].vehicles}
+    assert sizes == {tuple(size) for size in model.vehicles[0].freedom.sizes.tolist()} <= set(CATALOGUE)
+    assert len(sizes) > 4
+    assert {one.id for one in some.drawn[0].vehicles} == {"a"}
+    _, same = batch(20, sizes="recorded")
+    assert {(one.length, one.width) for one in same.drawn[0].vehicles} == {
+        (model.vehicles[0].vehicle.length, model.vehicles[0].vehicle.width)
+    }
+
+
+@settings(max_examples=50)
+@given(st.floats(2.0, 20.0), st.floats(-5.0, 4.0), st.floats(-0.15, 0.15), st.sampled_from([-1.0, 1.0]))
+def test_who_drives_on_does_so_smoothly(speed, acceleration, bend, sign):
+    state = np.array([[3.0, -2.0, 0.7, speed, acceleration]])
+    if seconds_onward(state, 100.0, sign)[0] == 0.0:
+        assert sign * acceleration < 0.0  # it would stand
+        return
+    since = np.linspace(0.0, 3.0, 601)[None]
+    found = onward(state, np.array([bend]), since, sign)[0]
+    assert found[0] == pytest.approx(state[0], abs=1e-9)
+    assert (found[:, 3] > 0.0).all()
+    step = np.hypot(*np.diff(found[:, :2], axis=0).T)
+    assert step / 0.005 == pytest.approx(0.5 * (found[1:, 3] + found[:-1, 3]), rel=2e-3)
+    assert np.diff(found[:, 3]) / 0.005 * sign == pytest.approx(0.5 * (found[1:, 4] + found[:-1, 4]), abs=0.02)
+    heading = np.arctan2(*(sign * np.diff(found[:, :2], axis=0))[:, ::-1].T)
+    assert np.abs(np.angle(np.exp(1j * (heading - found[1:, 2])))).max() < 0.02
+    assert abs(found[1, 4] - found[0, 4]) < 1e-3 * abs(acceleration) + 1e-9  # no jolt
+    assert np.abs(found[-1, 4]) < abs(acceleration) * np.exp(-2.0 / FADES) + 1e-9
+
+
+def test_cut_numbers_are_truncated_normal():
+    values = cut(normal(20_000, 1)[:, 0], 2.0)
+    assert np.abs(values).max() <= 2.0
+    assert values.std() == pytest.approx(0.8796, rel=0.02)  # of the standard normal truncated at two standard deviations
+    assert (np.diff(cut(np.linspace(-5.0, 5.0, 101), 2.0)) > 0.0).all()

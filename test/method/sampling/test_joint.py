@@ -1,0 +1,122 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""One joint model: roots are as free as before, the others answer, up to a residual, in the numbers and in what is published."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from reaction_scenes import answering, crossing, lane_encounter, wander
+
+from scenario_gen.method.evaluation.interaction import following, yielding
+from scenario_gen.method.nearest import attempt
+from scenario_gen.method.sampling import kept_reactions, regenerate, SamplingConfig
+from scenario_gen.method.sampling.candidates import Scale
+from scenario_gen.method.sampling.joint import advance, lateness, Mixing
+from scenario_gen.method.sampling.prepare import prepare
+from scenario_gen.method.segmentation import segment
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.roads import build_road
+from scenario_gen.template.interaction import waits_to_keep
+from scenario_gen.types.reaction import FOLLOW
+from scenario_gen.types.request import Request
+
+LANE = lane_encounter(LEADER := wander(np.random.default_rng(3), 200), answering(LEADER, 1.2, 0.9))
+CROSSING = crossing(8.0)
+CONFIG = PipelineConfig()
+FREE = replace(CONFIG, sampling=SamplingConfig(reactions="none"))
+
+
+@pytest.fixture(scope="module", params=["lane", "crossing"])
+def case(request):
+    encounter = {"lane": LANE, "crossing": CROSSING}[request.param]
+    road, segmentation = build_road("corridor", encounter, CONFIG.road), segment(encounter, CONFIG.segmentation, 1)
+
+    def made(config=CONFIG, count=40):
+        return attempt(encounter, segmentation, road, config, Request(), count=count, seed=1)
+
+    return encounter, made, made(), made(FREE)
+
+
+def model_of(encounter, result):
+    waits = waits_to_keep(encounter, result.segmentation)
+    given = (encounter, result.segmentation, result.road, result.routes, result.fit.asked, waits, CONFIG.sampling)
+    return prepare(*given).model
+
+
+def test_roots_keep_their_numbers_and_the_others_are_gaussian_with_the_stated_residual(case):
+    encounter, _, made, _ = case
+    model = model_of(encounter, made)
+    (edge,) = kept_reactions(encounter, CONFIG.sampling).edges
+    first = np.cumsum([model.warp.size] + [v.size for v in model.vehicles]).tolist()
+    mixing = Mixing.of(model.vehicles, first, model.warp.nominal, model.reactions, Scale())
+    eps = np.random.default_rng(0).standard_normal((20_000, model.size))
+    z = mixing.mixed(eps)
+    parts = [slice(a, b) for a, b in pairwise(first)]
+    assert np.array_equal(z[:, parts[edge.whom]], eps[:, parts[edge.whom]])
+    assert np.array_equal(z[:, : first[0]], eps[:, : first[0]])
+    assert np.allclose(z.mean(axis=0), 0.0, atol=0.06)
+    who, whom = model.vehicles[edge.who], model.vehicles[edge.whom]
+    own, other = z[:, parts[edge.who]], z[:, parts[edge.whom]]
+    if edge.kind == FOLLOW:
+        at = np.linspace(edge.since + 4.0, edge.until - 4.0, 7)
+        late = own @ lateness(who, at, model.warp.nominal, Scale()).T
+        late -= other @ lateness(whom, at - edge.lag, model.warp.nominal, Scale()).T
+        ahead = own @ advance(who, at, Scale()).T - other @ advance(whom, at - edge.lag, Scale()).T
+        assert late.std() < edge.residual / 8.0
+        assert 0.0 < ahead.std() < 1.1 * edge.residual
+    else:
+        leaves = own @ lateness(who, np.array([edge.until]), model.warp.nominal, Scale()).T
+        free = other @ lateness(whom, np.array([edge.clears]), model.warp.nominal, Scale()).T
+        free -= other @ advance(whom, np.array([edge.clears]), Scale()).T / 8.0
+        assert (leaves - free).std() == pytest.approx(0.6, abs=0.15)
+        assert free.std() > 1.2
+
+
+def test_a_mixing_is_linear_so_mirror_images_stay_mirror_images(case):
+    encounter, _, made, _ = case
+    model = model_of(encounter, made)
+    first = np.cumsum([model.warp.size] + [v.size for v in model.vehicles]).tolist()
+    mixing = Mixing.of(model.vehicles, first, model.warp.nominal, model.reactions, Scale(own=0.25))
+    eps = np.random.default_rng(0).standard_normal((4, model.size))
+    assert np.array_equal(mixing.mixed(-eps), -mixing.mixed(eps))
+    assert np.array_equal(mixing.mixed(eps)[1:2], mixing.mixed(eps[1:2]))  # alone as among others
+
+
+def test_what_is_published_answers_as_the_template_does(case):
+    encounter, _, made, free = case
+    (edge,) = made.generated.reactions
+    named = "2 follows 1" if edge.kind == FOLLOW else "2 yields to 1"
+    assert {scenario.facts["reactions"] for scenario in made.generated.scenarios} == {named}
+    assert free.generated.reactions == () and free.generated.scenarios[0].facts == {}
+    assert len(made.generated.scenarios) == 40
+    if edge.kind == FOLLOW:
+        seen, before = (following(edge, encounter, one.generated.scenarios) for one in (made, free))
+        assert seen.slope > 0.75 > before.slope
+        assert seen.gaps[0] > 0.65 and seen.gaps[1] < 1.35 < before.gaps[1]
+        assert seen.lag == pytest.approx(edge.lag, abs=0.5)
+        assert seen.own > 0.05  # copying is no reaction
+    else:
+        seen, before = (yielding(edge, one.generated.scenarios) for one in (made, free))
+        assert seen.early == 0.0
+        assert 0.3 < seen.spread < 0.9 < before.spread
+
+
+def test_a_scenario_comes_again_by_its_index(case):
+    encounter, _, made, _ = case
+    for scenario in made.generated.scenarios[3:6]:
+        again = regenerate(
+            encounter, made.segmentation, made.road, made.routes, made.fit.asked, CONFIG.sampling, seed=1, index=scenario.index,
+            waits=waits_to_keep(encounter, made.segmentation),
+        )  # fmt: skip
+        assert np.array_equal(again.position, scenario.position) and np.array_equal(again.speed, scenario.speed)
+
+
+def test_nobody_is_made_to_wait_where_another_order_is_asked_for():
+    assert kept_reactions(CROSSING, CONFIG.sampling) is not None
+    assert kept_reactions(CROSSING, CONFIG.sampling, "free") is None
+    assert kept_reactions(CROSSING, CONFIG.sampling, "swap") is None
+    assert kept_reactions(LANE, CONFIG.sampling, "free") is not None
+    assert kept_reactions(LANE, SamplingConfig(reactions="none")) is None

@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recorded encounters through the whole chain: valid sets, limits kept, the clock kept, waits kept, without changepoints too."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scenario_gen.logs import read_log
+from scenario_gen.method.fitting import fit_template
+from scenario_gen.method.routing import plan_routes
+from scenario_gen.method.sampling import regenerate, sample_scenarios, SamplingConfig
+from scenario_gen.method.segmentation import segment
+from scenario_gen.method.validity import Checker
+from scenario_gen.roads import build_road
+from scenario_gen.template.interaction import find_conflicts, find_waits, STAND_SPEED, WAIT_SPEED
+
+CASES = (
+    "ngsim_commonroad/encounter_b_left_turn_vs_opposite_Lanker-2_13_2839_21019.csv",
+    "psu_2obu/encounter_c_opposite_approach_then_stop_meet_300-340s.csv",
+)
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("ablation", [False, True])
+def test_recorded_encounter(data, case, ablation):
+    encounter = read_log(data / "trajectories" / case).encounters[0]
+    segmentation = segment(encounter)
+    if ablation:
+        labels, changes = np.zeros_like(segmentation.labels), np.zeros(0, dtype=np.int64)
+        segmentation = replace(segmentation, labels=labels, changepoints=changes, descriptions=("",))
+    waits = () if ablation else find_waits(encounter)
+    road = build_road("corridor", encounter)
+    fit = fit_template(encounter, segmentation, road)
+    routes = plan_routes(road, fit)
+    conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
+    checker, config = Checker(road, fit.asked, conflicts, waits), SamplingConfig(variety="narrow")
+    given = (encounter, segmentation, road, routes, fit.asked)
+    found = sample_scenarios(*given, checker.check, config, count=30, seed=2, waits=waits)
+    assert len(found.scenarios) == 30
+    assert found.acceptance > 0.7
+    assert found.candidates == 30 + found.refused.total()
+    for s in found.scenarios:
+        assert s.acceleration.max() <= 5.0 + 1e-6  # the checker's limit
+        assert s.acceleration.min() >= -9.0 - 1e-6
+        assert abs(s.time[-1] / encounter.duration - 1.0) <= (1.0 + config.max_stretch) * 1.1 - 1.0 + 1e-9
+        for wait in waits:
+            inside = (encounter.time >= wait.start) & (encounter.time <= wait.end)
+            stood = (encounter.speed[wait.vehicle, inside] <= STAND_SPEED).sum() * encounter.dt
+            assert (s.speed[wait.vehicle] == 0.0).sum() * 0.1 > 0.7 * stood
+            assert (s.speed[wait.vehicle] < WAIT_SPEED).sum() * 0.1 > 0.7 * (wait.end - wait.start)
+    again = regenerate(*given, config, seed=2, index=found.scenarios[-1].index, waits=waits)
+    assert again.position.tobytes() == found.scenarios[-1].position.tobytes()
+    assert again.speed.tobytes() == found.scenarios[-1].speed.tobytes()

@@ -1,0 +1,281 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whole sets on hand-made routes: a straight crossed by a quarter turn, with a wait."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sampling_scenes import CLOCK, route, scene, TIME, turn
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.method.sampling import regenerate, sample_scenarios, SamplingConfig
+from scenario_gen.method.sampling.candidates import Scale
+from scenario_gen.method.sampling.prepare import prepare
+from scenario_gen.method.sampling.sample import LEVEL_SIZE
+from scenario_gen.method.validity import Checker
+from scenario_gen.numerics.arrays import wrap_angle
+from scenario_gen.output.reproduce.speed_profile import SpeedProfile
+from scenario_gen.template.interaction import find_waits, Wait
+from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import BoundaryStates, Cause, Verdict, Violation
+
+PLAIN = SamplingConfig(variety="narrow", bend_acceleration=5.0)
+
+
+def all_valid(scenarios):
+    return [Verdict() for _ in scenarios]
+
+
+def drawn(count=50, check=all_valid, config=None, seed=5):
+    *head, waits = scene()
+    return sample_scenarios(*head, check, config or PLAIN, count=count, seed=seed, waits=waits)
+
+
+def batch(samples=200, scale=None, **changes):
+    *head, waits = scene(120.0)
+    model = prepare(*head, waits, SamplingConfig(variety="narrow", bend_acceleration=5.0, **changes)).model
+    return model, model.draw(np.random.default_rng(1).standard_normal((samples, model.size)), scale or Scale())
+
+
+@pytest.fixture(scope="module")
+def fifty():
+    return drawn()
+
+
+def test_a_full_set(fifty):
+    assert len(fifty.scenarios) == fifty.candidates == 50
+    assert not fifty.refused
+    assert len({s.position.tobytes() for s in fifty.scenarios}) == 50
+
+
+def test_grid_and_duration(fifty):
+    for s in fifty.scenarios:
+        assert np.array_equal(s.time, np.round(np.arange(len(s.time)) * 0.1, 9))
+        assert 18.0 - 1e-9 <= s.time[-1] <= 22.0 + 1e-9
+    assert len({len(s.time) for s in fifty.scenarios}) > 5
+    fixed = drawn(config=SamplingConfig(variety="narrow", fixed_duration=True, bend_acceleration=5.0))
+    assert {s.time[-1] for s in fixed.scenarios} == {20.0}
+
+
+def test_asked_states(fifty):
+    asked = scene()[4]
+    for s in fifty.scenarios:
+        for k, state in ((0, asked.start), (-1, asked.end)):
+            assert s.position[:, k] == pytest.approx(state[:, :2], abs=1e-5)
+            assert s.speed[:, k] == pytest.approx(state[:, 3], abs=1e-9)
+            assert np.abs(wrap_angle(s.heading[:, k] - state[:, 2])).max() < 0.01
+
+
+def test_waits_stand_exactly_and_still_vehicles_too(fifty):
+    for s in fifty.scenarios:
+        standing = s.speed[1] < 0.1
+        assert standing.sum() * 0.1 > 4.0
+        exactly = s.speed[1] == 0.0
+        assert np.ptp(s.position[1][exactly], axis=0).max() == 0.0
+        assert np.ptp(s.heading[1][exactly]) == 0.0
+        assert np.ptp(s.position[2], axis=0).max() == 0.0
+        assert (s.speed[2] == 0.0).all()
+
+
+def test_speed_is_the_rate_of_position_and_acceleration_that_of_speed(fifty):
+    for s in fifty.scenarios[:10]:
+        step = np.diff(s.position, axis=1)
+        along = 0.5 * (s.heading[:, 1:] + s.heading[:, :-1])
+        ahead = step[..., 0] * np.cos(along) + step[..., 1] * np.sin(along)
+        aside = -step[..., 0] * np.sin(along) + step[..., 1] * np.cos(along)
+        assert np.abs(ahead / 0.1 - 0.5 * (s.speed[:, 1:] + s.speed[:, :-1])).max() < 0.02
+        assert np.abs(aside / 0.1).max() < 0.05
+        rate = np.diff(s.speed, axis=1) / 0.1
+        low = np.minimum(s.acceleration[:, 1:], s.acceleration[:, :-1])
+        high = np.maximum(s.acceleration[:, 1:], s.acceleration[:, :-1])
+        assert ((rate > low - 0.05) & (rate < high + 0.05)).all()
+        assert np.abs(np.diff(s.acceleration, axis=1)).max() / 0.1 < 12.0  # the template's has corners of 20
+
+
+def test_headings_are_smooth(fifty):
+    for s in fifty.scenarios:
+        turn_rate = np.abs(np.diff(s.heading, axis=1)) / np.maximum(0.05 * (s.speed[:, 1:] + s.speed[:, :-1]), 1e-3)
+        assert turn_rate[:2].max() < 0.2
+
+
+def test_same_seed_same_bytes_and_any_one_again(fifty):
+    again = drawn()
+    more = drawn(count=120)
+    *head, waits = scene()
+    for a, b, c in zip(fifty.scenarios, again.scenarios, more.scenarios, strict=False):
+        assert a.position.tobytes() == b.position.tobytes() == c.position.tobytes()
+        assert a.speed.tobytes() == b.speed.tobytes() == c.speed.tobytes()
+    last = more.scenarios[-1]
+    one = regenerate(*head, PLAIN, seed=5, index=last.index, waits=waits)
+    for name in ("time", "position", "heading", "speed", "acceleration"):
+        assert getattr(one, name).tobytes() == getattr(last, name).tobytes()
+    assert drawn(count=1, seed=6).scenarios[0].position.tobytes() != fifty.scenarios[0].position.tobytes()
+
+
+def test_state_at_any_time_agrees_with_the_published_samples():
+    _, some = batch(8)
+    published = some.scenarios(0, range(8), "map")
+    for k, s in enumerate(published):
+        state = some.states(s.time)[:, k]
+        assert np.array_equal(state[..., :2], s.position)
+        assert np.array_equal(state[..., 3], s.speed)
+        between = some.states(np.linspace(0.0, s.time[-1], 5001))[:, k]
+        for n in range(2):
+            travelled = np.hypot(*np.diff(between[n, :, :2], axis=0).T).sum()
+            assert travelled == pytest.approx(some.drawn[n].arc[k, -1], abs=2e-3)
+
+
+def spread_across(b):
+    """Mean standard deviation [m] of y on the straight."""
+    return float(b.drawn[0].curve[:, :, 1].std(axis=0).mean())
+
+
+def roughness(b):
+    """Mean standard deviation of the slope of the lateral deviation on the straight."""
+    return float((b.drawn[0].curve[:, :, 3] / b.drawn[0].curve[:, :, 2]).std(axis=0).mean())
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "measure", "sign"),
+    [
+        ("lateral_sigma", (0.1, 0.2, 0.4, 0.8), spread_across, 1),
+        ("observation_sigma", (0.05, 0.2, 0.6), spread_across, 1),
+        ("lateral_length", (8.0, 15.0, 30.0, 60.0), roughness, -1),
+        ("time_sigma", (0.1, 0.3, 0.6, 1.0), lambda b: float(warped(b)[:, 2].std()), 1),
+        ("time_sigma", (0.1, 0.3, 0.6, 1.0), lambda b: float(warped(b)[:, -1].std()), 1),
+        ("longitudinal_sigma", (0.0, 0.5, 1.0, 2.0), lambda b: float(stops(b).std()), 1),
+    ],
+)
+def test_each_parameter_has_its_monotone_effect(name, values, measure, sign):
+    found = [sign * measure(batch(**{name: value})[1]) for value in values]
+    assert (np.diff(found) > 0.0).all(), found
+
+
+def warped(b):
+    """Times (S, K + 2) [s] of start, changepoints and end."""
+    return b.drawn[0].clock.time[:, np.searchsorted(b.drawn[0].clock.grid, CLOCK - 1e-9)]
+
+
+def stops(b):
+    """Where vehicle 1 stands [m]."""
+    middle = 0.5 * (warped(b)[:, 2] + warped(b)[:, 3])
+    return np.array([b.states(middle[[k]])[1, k, 0, 1] for k in range(len(middle))])
+
+
+def test_deviations_have_the_stated_standard_deviation():
+    model, some = batch(4000, lateral_sigma=0.4, observation_sigma=10.0)
+    middle = len(model.vehicles[0].path.node) // 2
+    assert some.drawn[0].curve[:, middle, 1].std() == pytest.approx(0.36, rel=0.05)  # tied down at both ends
+
+
+def test_clocks_are_monotone_and_shared_and_end_on_the_grid():
+    _, some = batch(500, time_sigma=3.0)
+    rate = some.drawn[0].clock.rate
+    assert rate.min() > 0.7
+    assert rate.max() < 1.4
+    assert np.abs(some.drawn[0].clock.time[:, -1] / 0.1 - np.round(some.drawn[0].clock.time[:, -1] / 0.1)).max() < 1e-9
+    assert np.abs(rate[:, [0, -1]] - 1.0).max() < 1e-6  # speeds are given at both ends
+
+
+def test_lateral_deviation_leaves_room_on_a_narrow_road():
+    encounter, segmentation, road, routes, asked, waits = scene()
+    lane = np.zeros(road.drivable.shape, dtype=bool)
+    lane[57:63] = True  # 1.5 m to either side of y = 0
+    narrow = Road("lane", lane, 0.5, road.origin, [], [])
+    done = prepare(encounter, segmentation, narrow, routes, asked, waits, SamplingConfig(variety="narrow"))
+    some = done.model.draw(np.random.default_rng(0).standard_normal((500, done.model.size)), Scale())
+    assert np.abs(some.drawn[0].curve[..., 1]).max() < 1.5 - 0.5 * 1.9
+    assert any("narrow" in sentence for sentence in done.adaptations)
+
+
+def test_refusals_are_counted_by_cause_and_levels_are_tried():
+    def strict(scenarios):
+        wide = [np.abs(s.position[0, :, 1]).max() > 0.12 for s in scenarios]
+        return [Verdict((Violation(Cause.OFF_ROAD, 0.0, (0,), ""),)) if w else Verdict() for w in wide]
+
+    found = drawn(check=strict)
+    assert len(found.scenarios) == 50
+    assert found.candidates == 50 + found.refused.total()
+    assert set(found.refused) == {Cause.OFF_ROAD}
+    assert any("multiplied" in sentence for sentence in found.adaptations)
+    assert max(s.index for s in found.scenarios) >= LEVEL_SIZE
+    *head, waits = scene()
+    last = found.scenarios[-1]
+    assert regenerate(*head, PLAIN, seed=5, index=last.index, waits=waits).position.tobytes() == last.position.tobytes()
+
+
+def test_short_set_is_returned_with_its_account():
+    def never(scenarios):
+        return [Verdict((Violation(Cause.OVERLAP, 0.0, (0, 1), ""),)) for _ in scenarios]
+
+    found = drawn(count=10, check=never, config=SamplingConfig(variety="narrow", attempts=5))
+    assert found.scenarios == ()
+    assert found.candidates == found.refused[Cause.OVERLAP] == 50
+
+
+def test_progress_and_cancellation():
+    *head, waits = scene()
+    seen = []
+    found = sample_scenarios(
+        *head, all_valid, count=500, waits=waits, progress=lambda *a: seen.append(a), cancelled=lambda: len(seen) > 2
+    )
+    assert 0 < len(found.scenarios) < 500
+    assert seen[-1] == (len(found.scenarios), 500, found.candidates)
+    assert "cancelled" in found.adaptations
+
+
+def test_nothing_is_given_out_after_a_cancellation():
+    *head, waits = scene()
+    given = []
+    made = sample_scenarios(
+        *head, all_valid, count=500, waits=waits, found=lambda *a: given.append(a[0]), cancelled=lambda: len(given) == 3
+    )
+    assert [s.index for s in given] == [s.index for s in made.scenarios]
+    assert len(given) == 3
+
+
+def test_a_wait_stands_where_the_vehicle_does_not_where_it_creeps():
+    *head, _ = scene()
+    speed = prepare(*head, (Wait(1, 6.8, 13.2),), SamplingConfig(variety="narrow")).model.vehicles[1].speed
+    at_rest = speed.spline.breaks[speed.spline.design(speed.spline.breaks) @ speed.mean == 0.0]
+    assert 7.0 <= at_rest[0] < 7.5
+    assert 12.5 < at_rest[-1] <= 13.0
+
+
+def test_a_creeping_wait_stays_slow_and_does_not_stand():
+    encounter, segmentation, road, routes, asked, _ = scene()
+    rolls = np.interp(TIME, [0.0, 6.0, 8.0, 12.0, 13.0, 20.0], [6.0, 6.0, 0.4, 0.4, 0.6, 6.0])
+    creeping = replace(encounter, speed=np.array([encounter.speed[0], rolls, encounter.speed[2]]))
+    total = SpeedProfile(TIME, rolls).travelled[-1]
+    own = route(*turn(35.0, 9.0, total - 35.0 - 4.5 * np.pi), rolls)
+    ends = np.array(asked.end)
+    ends[1] = [*own.points[-1], 6.0]
+    waits = tuple(wait for wait in find_waits(creeping) if wait.vehicle == 1)
+    assert [wait.creeps for wait in waits] == [True]
+    given = (creeping, segmentation, road, (routes[0], own, routes[2]), BoundaryStates(asked.start, ends))
+    made = sample_scenarios(*given, all_valid, PLAIN, count=20, seed=1, waits=waits).scenarios
+    verdicts = Checker(None, None, None, waits).check(made)
+    assert not any(violation.cause is Cause.STOP_NOT_KEPT for verdict in verdicts for violation in verdict.violations)
+    assert all((s.speed[1] > 0.0).all() for s in made)
+    stood = sample_scenarios(*given, all_valid, PLAIN, count=20, seed=1, waits=(replace(waits[0], creeps=False),)).scenarios
+    assert all((s.speed[1] == 0.0).sum() > 30 for s in stood)
+
+
+def test_stretched_clock_is_said():
+    encounter, segmentation, road, routes, asked, waits = scene()
+    slow = SamplingConfig(variety="narrow", max_speed=6.0)
+    done = prepare(encounter, segmentation, road, routes, asked, waits, slow)
+    assert done.model is not None
+    assert any("stretched" in sentence for sentence in done.adaptations)
+    slowest = SamplingConfig(variety="narrow", max_speed=3.0)
+    impossible = sample_scenarios(encounter, segmentation, road, routes, asked, all_valid, slowest, count=5, waits=waits)
+    assert impossible.refused[Cause.SPEED_PROFILE] == 1
+    assert "cannot drive" in impossible.adaptations[0]
+
+
+def test_routes_that_do_not_suit():
+    encounter, segmentation, road, routes, asked, waits = scene()
+    with pytest.raises(InputError, match="routes do not suit"):
+        sample_scenarios(encounter, segmentation, road, routes[:2], asked, all_valid, count=5, waits=waits)

@@ -1,0 +1,327 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The estimator: its parameters in X's units, what it predicts, what it warns of, and scikit-learn's own checks."""
+
+from dataclasses import fields
+import json
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from scenario_gen.method.segmentation import SamplerConfig, segment_series, SegmentationWarning, StickyHDPHMM
+
+pytestmark = pytest.mark.filterwarnings("ignore::scenario_gen.method.segmentation.SegmentationWarning")
+QUICK = {"chains": 2, "sweeps": 60, "random_state": 1}
+TRUE_MEANS = np.array([[0.0, 0.0], [400.0, -0.3]])
+TRUE_COVARIANCES = np.array([[[900.0, 1.2], [1.2, 0.0064]], [[2500.0, -1.0], [-1.0, 0.0016]]])
+
+
+def drawn(seed, rows=((0, 150), (1, 150), (0, 100), (1, 200))):
+    """Two states with other covariances, channels of far-apart units."""
+    rng = np.random.default_rng(seed)
+    labels = np.repeat([k for k, _ in rows], [n for _, n in rows])
+    x = np.array([rng.multivariate_normal(TRUE_MEANS[k], TRUE_COVARIANCES[k]) for k in labels])
+    return x, labels
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    x, labels = drawn(3)
+    return StickyHDPHMM(**QUICK).fit(x), x, labels
+
+
+def test_parameters_are_the_samplers():
+    known = {entry.name: entry.default for entry in fields(SamplerConfig)} | {"random_state": None}
+    assert StickyHDPHMM().get_params() == known
+    changed = StickyHDPHMM().set_params(states=7, random_state=2)
+    assert repr(changed) == "StickyHDPHMM(states=7, random_state=2)"
+    with pytest.raises(ValueError, match="no parameter 'depth'"):
+        changed.set_params(depth=2)
+
+
+@pytest.mark.parametrize("bad", [{"sweeps": 1}, {"emission": "poisson"}, {"random_state": -1}, {"random_state": 0.5}])
+def test_fit_refuses_bad_parameters(bad):
+    with pytest.raises(ValueError, match=next(iter(bad))):
+        StickyHDPHMM(**bad).fit(drawn(0)[0])
+
+
+def test_states_have_their_means_covariances_and_transitions_in_units(fitted):
+    model, x, labels = fitted
+    assert model.n_states_ == 2
+    assert model.n_features_in_ == 2
+    assert np.mean(model.labels_ != labels) < 0.01
+    assert np.abs(model.changepoints_ - [150, 300, 400]).max() <= 1
+    for k in range(2):
+        own = x[labels == k]
+        unit = np.sqrt(np.diag(TRUE_COVARIANCES[k]))
+        np.testing.assert_allclose((model.means_[k] - own.mean(axis=0)) / unit, 0.0, atol=0.02)
+        np.testing.assert_allclose((model.covariances_[k] - np.cov(own.T)) / np.outer(unit, unit), 0.0, atol=0.05)
+    np.testing.assert_allclose(model.transitions_.sum(axis=1), 1.0)
+    np.testing.assert_allclose(np.diag(model.transitions_), [248 / 250, 349 / 350], atol=0.01)
+    assert model.startprob_[0] > 0.5
+    assert model.startprob_.sum() == pytest.approx(1.0)
+    assert model.dof_ == np.inf
+    assert model.converged_ == (max(model.r_hat_.values()) <= 1.1)
+    assert set(model.ess_) == {"log_joint", "occupied", "gamma", "alpha_kappa", "rho"}
+
+
+def test_score_and_predict_proba_are_those_of_the_hidden_markov_model(fitted):
+    """Against every path of states, written out, with scipy's densities."""
+    model, x, _ = fitted
+    few = x[147:153]
+    density = np.array(
+        [stats.multivariate_normal(m, c).pdf(few) for m, c in zip(model.means_, model.covariances_, strict=True)]
+    ).T
+    paths = np.array(np.meshgrid(*[[0, 1]] * len(few), indexing="ij")).reshape(len(few), -1).T
+    joint = model.startprob_[paths[:, 0]] * density[0, paths[:, 0]]
+    for t in range(1, len(few)):
+        joint = joint * model.transitions_[paths[:, t - 1], paths[:, t]] * density[t, paths[:, t]]
+    assert model.score(few) * len(few) == pytest.approx(np.log(joint.sum()), rel=1e-9)
+    expected = np.array([[joint[paths[:, t] == k].sum() for k in range(2)] for t in range(len(few))]) / joint.sum()
+    assert model.posterior_.weight == pytest.approx(1.0)
+    np.testing.assert_allclose(model.predict_proba(few), expected, atol=1e-9)
+
+
+def test_predict_on_what_was_fitted_agrees_with_the_labels(fitted):
+    model, x, _ = fitted
+    assert np.mean(model.predict(x) != model.labels_) < 0.01
+    np.testing.assert_array_equal(model.predict(x), model.predict_proba(x).argmax(axis=1))
+    other, labels = drawn(8)
+    assert np.mean(model.predict(other) != labels) < 0.01
+    assert model.score(other) == pytest.approx(model.score(x), abs=0.2)
+    assert model.score(other + np.array([300.0, 1.0])) < model.score(other) - 5.0
+
+
+def test_sequences_may_be_a_list_or_lengths(fitted):
+    _, x, _ = fitted
+    a = StickyHDPHMM(**QUICK).fit([x[:250], x[250:]])
+    b = StickyHDPHMM(**QUICK).fit(x, [250, 350])
+    c = segment_series(x, SamplerConfig(chains=2, sweeps=60), 1, ends=(250, 600))
+    for labels in (b.labels_, c.labels):
+        np.testing.assert_array_equal(a.labels_, labels)
+    np.testing.assert_array_equal(a.means_, b.means_)
+    assert 250 not in a.changepoints_
+    assert a.predict([x[:20], x[300:305]]).shape == (25,)
+    apart = [a.predict_proba(part) for part in (x[:20], x[300:305])]
+    np.testing.assert_allclose(a.predict_proba([x[:20], x[300:305]]), np.vstack(apart))
+
+
+@pytest.mark.parametrize(
+    ("data", "lengths", "said"),
+    [
+        (np.zeros((10, 2)), [5, 4], "add up to 10"),
+        (np.zeros((10, 2)), [12, -2], "whole numbers"),
+        (np.zeros((10, 2)), [5.0, 5.0], "whole numbers"),
+        ([np.zeros((5, 2)), np.zeros((5, 3))], None, "differ in their channels"),
+        ([np.zeros((5, 2))], [5], "not needed"),
+        (np.full((10, 2), np.inf), None, "sample 0, channel 0"),
+        (np.zeros(10), None, "Reshape your data"),
+        (np.zeros((3, 2)), None, "n_samples = 3"),
+    ],
+)
+def test_fit_refuses_bad_data(data, lengths, said):
+    with pytest.raises(ValueError, match=said):
+        StickyHDPHMM(**QUICK).fit(data, lengths)
+
+
+def test_a_target_in_the_place_of_lengths_is_ignored_but_sequences_of_one_sample_are_not(fitted):
+    model, x, labels = fitted
+    np.testing.assert_array_equal(model.predict_proba(x, labels), model.predict_proba(x))
+    alone = model.predict_proba(x[:5], np.ones(5, np.int64))
+    np.testing.assert_allclose(alone[3], model.predict_proba(x[3:4])[0])
+
+
+def test_what_is_nan_is_integrated_out(fitted):
+    model, x, _ = fitted
+    holes = x.copy()
+    rng = np.random.default_rng(0)
+    holes[rng.random(x.shape) < 0.2] = np.nan
+    holes[200:203] = np.nan
+    found = StickyHDPHMM(**QUICK).fit(holes)
+    assert np.mean(found.labels_ != model.labels_) < 0.02
+    for k in range(2):
+        unit = np.sqrt(np.diag(TRUE_COVARIANCES[k]))
+        np.testing.assert_allclose((found.means_[k] - model.means_[k]) / unit, 0.0, atol=0.15)
+        np.testing.assert_allclose((found.covariances_[k] - model.covariances_[k]) / np.outer(unit, unit), 0.0, atol=0.2)
+    half = x[:1].copy()
+    half[0, 1] = np.nan
+    at = [stats.norm(m[0], np.sqrt(c[0, 0])).pdf(half[0, 0]) for m, c in zip(model.means_, model.covariances_, strict=True)]
+    assert model.score(half) == pytest.approx(np.log(np.dot(model.startprob_, at)))
+    assert model.score(np.full((4, 2), np.nan)) == pytest.approx(0.0)
+
+
+def test_heavy_tails_are_students_t():
+    rng = np.random.default_rng(4)
+    labels = np.repeat([0, 1, 0, 1], 150)
+    x = rng.standard_t(3.0, size=(600, 2)) + 6.0 * labels[:, None]
+    lost = x.copy()
+    lost[333, 0] = 1e6
+    with pytest.warns(SegmentationWarning, match="1 values far from .* sample 333 of channel 0"):
+        model = StickyHDPHMM(**QUICK | {"dof": 3.0}).fit(lost)
+    assert model.dof_ == 3.0
+    assert np.mean(model.labels_ != labels) < 0.02
+    for k in range(2):
+        np.testing.assert_allclose(model.means_[k], 6.0 * k, atol=0.25)
+        np.testing.assert_allclose(model.covariances_[k], np.eye(2), atol=0.35)
+    one = x[:1]
+    at = [stats.multivariate_t(m, c, 3.0).pdf(one) for m, c in zip(model.means_, model.covariances_, strict=True)]
+    assert model.score(one) == pytest.approx(np.log(np.dot(model.startprob_, at)))
+    assert np.mean(model.predict(lost) != model.labels_) < 0.01
+
+
+@pytest.mark.parametrize("lost", [0, 333, -1])
+def test_a_single_outlier_hides_nothing_wherever_it_is(fitted, lost):
+    model, x, labels = fitted
+    holed = x.copy()
+    holed[lost] = 1e9
+    with pytest.warns(SegmentationWarning, match="2 values far from those before and after"):
+        found = StickyHDPHMM(**QUICK).fit(holed)
+    assert np.mean(found.labels_ != labels) < 0.01
+    np.testing.assert_allclose(found.means_, model.means_, rtol=0.05, atol=0.5)
+    assert np.mean(found.predict(holed) != labels) < 0.01
+
+
+def test_channels_that_are_left_out_have_means_and_covariances_and_are_named(fitted):
+    _, x, _ = fitted
+    wide = np.column_stack([x, 2.0 * x[:, 0] - 100.0 * x[:, 1] + 7.0, np.full(len(x), 3.0), np.full(len(x), np.nan)])
+    left = r"left out: 2 \(follows from those before it\), 3 \(does not vary\), 4 \(not measured\)"
+    with pytest.warns(SegmentationWarning, match=left):
+        model = StickyHDPHMM(**QUICK).fit(wide)
+    for k in range(2):
+        a, b = model.means_[k, :2]
+        np.testing.assert_allclose(model.means_[k, 2], 2.0 * a - 100.0 * b + 7.0, rtol=1e-6, atol=1e-3)
+        turn = np.array([2.0, -100.0])
+        np.testing.assert_allclose(model.covariances_[k, 2, 2], turn @ model.covariances_[k, :2, :2] @ turn, rtol=1e-6)
+    np.testing.assert_allclose(model.means_[:, 3], 3.0)
+    np.testing.assert_allclose(model.covariances_[:, 3, 3], 0.0, atol=1e-20)
+    assert np.isnan(model.means_[:, 4]).all()
+    assert np.mean(model.predict(wide) != model.labels_) < 0.01
+    plain = StickyHDPHMM(**QUICK).fit(x)
+    assert model.score(wide) == pytest.approx(plain.score(x), abs=1e-3)
+
+
+def test_a_series_that_does_not_vary_is_one_state():
+    with pytest.warns(SegmentationWarning, match=r"0 \(does not vary\), 1 \(does not vary\)"):
+        model = StickyHDPHMM(**QUICK).fit(np.full((20, 2), 5.0))
+    assert model.n_states_ == 1
+    np.testing.assert_allclose(model.means_, 5.0)
+    np.testing.assert_array_equal(model.predict_proba(np.zeros((3, 2))), 1.0)
+
+
+def test_autoregressive_states_in_units():
+    rng = np.random.default_rng(2)
+    labels = np.repeat([0, 1, 0], 300)
+    regressions = np.array([[[0.9, 0.05], [0.0, 0.9]], [[-0.7, 0.0], [0.1, -0.7]]])
+    unit, offset = np.array([100.0, 0.01]), np.array([5000.0, 1.0])
+    y = np.zeros((900, 2))
+    for t in range(1, 900):
+        y[t] = regressions[labels[t]] @ y[t - 1] + rng.normal(size=2)
+    x = y * unit + offset
+    x[450:453, 0] = np.nan
+    model = StickyHDPHMM(emission="autoregressive", **QUICK).fit(x)
+    assert np.mean(model.labels_ != labels) < 0.02
+    for k in range(2):
+        np.testing.assert_allclose(model.coefficients_[k][:, 1:] * unit / unit[:, None], regressions[k], atol=0.15)
+        np.testing.assert_allclose(model.covariances_[k] / np.outer(unit, unit), np.eye(2), atol=0.3)
+    assert np.mean(model.predict(x) != model.labels_) < 0.02
+    two = x[10:14]
+    rest = [
+        [stats.multivariate_normal(b[:, 0] + b[:, 1:] @ two[t - 1], c).pdf(two[t]) for t in (1, 2, 3)]
+        for b, c in zip(model.coefficients_, model.covariances_, strict=True)
+    ]
+    ahead, total = model.startprob_, 0.0
+    for t in range(3):
+        ahead = ahead @ model.transitions_ * np.array(rest)[:, t]
+        total += np.log(ahead.sum())
+        ahead = ahead / ahead.sum()
+    assert model.score(two) * 4 == pytest.approx(total)
+    with pytest.raises(ValueError, match="needs 3 or more"):
+        model.predict(x[:2])
+
+
+def test_warns_of_chains_that_disagree_and_of_a_full_truncation():
+    x = np.random.default_rng(0).normal(size=(120, 1)).cumsum(axis=0)
+    with pytest.warns(SegmentationWarning) as told:
+        model = StickyHDPHMM(states=2, chains=4, sweeps=12, r_hat=1.001, random_state=0).fit(x)
+    messages = [str(each.message) for each in told]
+    assert not model.converged_
+    assert any("R-hat is above 1.001" in message and "raise `sweeps`" in message for message in messages)
+    assert any("all L = 2 states" in message and "raise `states`" in message for message in messages)
+
+
+def test_to_arviz_has_every_chain(fitted):
+    arviz = pytest.importorskip("arviz", reason="arviz is not installed")
+    model, x, _ = fitted
+    posterior = model.to_arviz().posterior
+    draws = len(model.posterior_.trace[0])
+    assert dict(posterior.sizes) == {"chain": 2, "draw": draws, "time": len(x)}
+    np.testing.assert_array_equal(posterior["rho"].values[1], model.posterior_.trace[1][:, 4])
+    rows = posterior["labels"].values.reshape(-1, len(x))
+    np.testing.assert_array_equal(rows[(rows >= 0).all(axis=1)], model.posterior_.samples)
+    assert float(arviz.ess(posterior["log_joint"])["log_joint"]) > 0.0
+
+
+def test_without_arviz_the_error_names_it(fitted, monkeypatch):
+    monkeypatch.setitem(sys.modules, "arviz", None)
+    with pytest.raises(ImportError, match="pip install arviz"):
+        fitted[0].to_arviz()
+
+
+def test_not_fitted_with_and_without_scikit_learn(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sklearn.exceptions", None)
+    with pytest.raises(ValueError, match="not fitted yet"):
+        StickyHDPHMM().predict(np.zeros((5, 1)))
+
+
+def test_a_fit_can_be_pickled_and_the_seed_decides(fitted):
+    model, x, _ = fitted
+    again = pickle.loads(pickle.dumps(model))
+    np.testing.assert_array_equal(again.predict_proba(x), model.predict_proba(x))
+    np.testing.assert_array_equal(StickyHDPHMM(**QUICK).fit_predict(x), model.labels_)
+
+
+def test_scikit_learns_checks():
+    """Of the checks none needs leave but one: the second argument of `fit` is `lengths`, as for other hidden Markov models."""
+    checks = pytest.importorskip("sklearn.utils.estimator_checks", reason="scikit-learn is not installed")
+    leave = {"check_fit_score_takes_y": "the second argument is `lengths`; `y` is the third, and ignored"}
+    small = StickyHDPHMM(chains=1, sweeps=20)
+    ran = checks.check_estimator(small, expected_failed_checks=leave, on_fail=None, on_skip=None)
+    failed = {each["check_name"]: each["exception"] for each in ran if each["status"] == "failed"}
+    assert not failed
+    assert [each["check_name"] for each in ran if each["status"] == "xfail"] == list(leave)
+    assert len(ran) > 30
+
+
+def test_works_in_a_pipeline_and_under_cross_validation(fitted):
+    base = pytest.importorskip("sklearn.base", reason="scikit-learn is not installed")
+    from sklearn.model_selection import cross_val_score
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    _, x, labels = fitted
+    model = StickyHDPHMM(**QUICK)
+    assert base.clone(model).get_params() == model.get_params()
+    np.testing.assert_array_equal(make_pipeline(StandardScaler(), model).fit(x, labels).predict(x), model.fit(x).labels_)
+    assert np.isfinite(cross_val_score(model, x, cv=2)).all()
+
+
+ALLOWED = {"numpy", "scipy", "numba", "llvmlite", "scenario_gen"}
+OF_NUMBA = {"cffi", "coverage", "pycparser", "yaml"}  # it takes them along where they are installed
+
+
+def test_the_segmentation_loads_numpy_scipy_and_numba_alone():
+    program = (
+        "import json, sys; before = set(sys.modules); import scenario_gen.method.segmentation as s, numpy as np;"
+        "s.StickyHDPHMM(chains=1, sweeps=10, random_state=0).fit(np.arange(40.0).reshape(20, 2) % 7);"
+        "print(json.dumps([n for n in set(sys.modules) - before if getattr(sys.modules[n], '__file__', None)]))"
+    )
+    ran = subprocess.run([sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, check=True)
+    files = {name.partition(".")[0] for name in json.loads(ran.stdout)}
+    assert {
+        name for name in files - ALLOWED - OF_NUMBA - set(sys.stdlib_module_names) if not name.startswith(("_", "cython"))
+    } == set()

@@ -1,0 +1,255 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The sampler on series with known states, and on awkward ones."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.method.segmentation import SamplerConfig, segment_series
+from scenario_gen.method.segmentation.posterior import ess, r_hat
+from scenario_gen.method.segmentation.series import usual_distances, without_outliers
+
+
+def two_states(seed: int, dimensions: int = 2) -> tuple[np.ndarray, np.ndarray]:
+    """Four dwells of 60 samples, two states 4 standard deviations apart."""
+    rng = np.random.default_rng(seed)
+    labels = np.repeat([0, 1, 0, 1], 60)
+    return rng.normal(size=(240, dimensions)) + 4.0 * labels[:, None] / np.sqrt(dimensions), labels
+
+
+@pytest.mark.parametrize("dimensions", [1, 3, 24])
+def test_finds_states_and_shares_them(dimensions):
+    x, labels = two_states(5, dimensions)
+    posterior = segment_series(x, seed=1)
+    assert np.mean(posterior.labels != labels) <= 0.02
+    assert posterior.labels.max() == 1
+    assert np.abs(posterior.changepoints - [60, 120, 180]).max() <= 2
+
+
+def test_same_seed_same_bytes_and_scale_does_not_matter():
+    x, _ = two_states(6)
+    a = segment_series(x, seed=3)
+    b = segment_series(x, seed=3)
+    assert a.samples.tobytes() == b.samples.tobytes()
+    assert a.probability.tobytes() == b.probability.tobytes()
+    assert segment_series(x, seed=4).samples.tobytes() != a.samples.tobytes()
+    np.testing.assert_array_equal(segment_series(x * 1024.0 - 512.0, seed=3).labels, a.labels)
+
+
+def test_noise_is_one_state():
+    posterior = segment_series(np.random.default_rng(0).normal(size=(300, 4)), seed=0)
+    assert posterior.labels.max() == 0
+    assert posterior.probability.max() < 0.2
+
+
+def test_autoregressive_emission_tells_dynamics_apart():
+    rng = np.random.default_rng(2)
+    labels = np.repeat([0, 1, 0], 120)
+    x = np.zeros((360, 1))
+    for t in range(1, 360):
+        x[t] = (0.95 if labels[t] == 0 else -0.8) * x[t - 1] + rng.normal() * 0.5
+    posterior = segment_series(x, SamplerConfig(emission="autoregressive"), seed=0)
+    assert np.mean(posterior.labels != labels) <= 0.05
+
+
+def test_several_sequences_share_states_and_do_not_touch():
+    x, labels = two_states(7)
+    posterior = segment_series(np.vstack([x, x[::-1]]), seed=0, ends=(240, 480))
+    assert np.mean(posterior.labels != np.concatenate([labels, labels[::-1]])) <= 0.02
+    assert 240 not in posterior.changepoints
+    assert posterior.probability[240] == 0.0
+
+
+def test_constant_channel_and_constant_series():
+    x, labels = two_states(8)
+    posterior = segment_series(np.column_stack([x, np.full(240, 7.0)]), seed=0)
+    assert np.mean(posterior.labels != labels) <= 0.02
+    assert segment_series(np.ones((50, 3))).labels.max() == 0
+
+
+@pytest.mark.parametrize("tremble", [1e-7, 1e-3, 0.1])
+def test_channel_that_varies_less_than_it_is_known_hides_nothing(tremble):
+    """A vehicle that stands throughout: blown up to unit variance, its trembling drowned every other channel's changes."""
+    x, labels = two_states(8)
+    still = tremble * np.random.default_rng(1).normal(size=(240, 2))
+    posterior = segment_series(np.column_stack([x, still]), seed=0, blur=np.array([0.2, 0.2, 0.2, 0.4]))
+    assert np.mean(posterior.labels != labels) <= 0.02
+    assert posterior.labels.max() == 1
+
+
+@pytest.mark.parametrize("bad", [np.zeros((3, 2)), np.full((10, 2), np.inf), np.zeros((0, 2))])
+def test_refuses_what_it_cannot_use(bad):
+    with pytest.raises(InputError):
+        segment_series(bad)
+
+
+@settings(max_examples=25)
+@given(st.integers(4, 40), st.integers(1, 8), st.integers(0, 1000), st.sampled_from(["gaussian", "autoregressive"]))
+def test_never_nan_and_always_consistent(samples, dimensions, seed, emission):
+    rng = np.random.default_rng(seed)
+    x = rng.standard_t(2, size=(samples, dimensions)) * 10.0 ** rng.integers(-6, 6, dimensions)
+    posterior = segment_series(x, SamplerConfig(emission=emission, sweeps=20, chains=2), seed=seed)
+    assert posterior.labels.shape == (samples,)
+    assert np.isfinite(posterior.probability).all()
+    assert ((posterior.probability >= 0.0) & (posterior.probability <= 1.0)).all()
+    assert set(np.unique(posterior.labels)) == set(range(posterior.labels.max() + 1))
+    intervals = posterior.intervals()
+    assert intervals.shape == (len(posterior.changepoints), 2)
+    assert (intervals[:, 0] <= intervals[:, 1]).all()
+    assert posterior.primitives().sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("emission", ["gaussian", "autoregressive"])
+def test_more_channels_than_samples(emission):
+    x = np.random.default_rng(3).normal(size=(10, 12))
+    posterior = segment_series(x, SamplerConfig(emission=emission), seed=0)
+    assert posterior.labels.shape == (10,)
+    assert np.isfinite(posterior.probability).all()
+
+
+def test_states_whose_means_lie_close_are_told_apart():
+    """Means of length 2.2, spread over 6 channels of unit variance."""
+    rng = np.random.default_rng(9)
+    labels = np.repeat([0, 1, 2, 0, 1, 2], 50)
+    means = rng.normal(size=(3, 6))
+    x = rng.normal(size=(300, 6)) + 2.2 * means[labels] / np.linalg.norm(means, axis=1)[labels][:, None]
+    posterior = segment_series(x, seed=2)
+    assert posterior.labels.max() == 2
+    assert np.mean(posterior.labels != labels) <= 0.05
+
+
+def test_probability_within_counts_each_sample_once():
+    x, _ = two_states(10)
+    posterior = segment_series(np.vstack([x, x]), seed=0, ends=(240, 480))
+    wide = posterior.probability_within(5)
+    for t in (0, 58, 66, 235, 244, 479):
+        low, high = max(t - 5, 0), min(t + 6, 480)
+        near = [any(low <= c < high and c != 240 for c in np.flatnonzero(np.diff(row)) + 1) for row in posterior.samples]
+        assert wide[t] == pytest.approx(np.mean(near))
+
+
+def many_states(seed: int, states: int = 6, dwell: int = 60, visits: int = 3, dimensions: int = 3):
+    """States 6 standard deviations apart, each visited several times."""
+    rng = np.random.default_rng(seed)
+    labels = np.repeat(np.concatenate([rng.permutation(states) for _ in range(visits)]), dwell)
+    means = rng.normal(size=(states, dimensions)) * 6.0
+    return means[labels] + rng.normal(size=(len(labels), dimensions)), labels
+
+
+def found_as_drawn(posterior, labels):
+    """Each state found is one that was drawn, but for 3 % of the samples."""
+    table = np.zeros((posterior.labels.max() + 1, labels.max() + 1))
+    np.add.at(table, (posterior.labels, labels), 1.0)
+    return posterior.labels.max() == labels.max() and table.max(axis=1).sum() >= 0.97 * len(labels)
+
+
+def test_chains_agree_and_say_so():
+    x, labels = many_states(1)
+    posterior = segment_series(x, seed=0)
+    assert found_as_drawn(posterior, labels)
+    assert posterior.r_hat.shape == posterior.ess.shape == (5,)
+    assert posterior.r_hat.max() <= SamplerConfig().r_hat
+    assert posterior.kept.all()
+    assert posterior.ess.min() > 10.0
+    unfinished = segment_series(x, SamplerConfig(sweeps=10, r_hat=1.0001), seed=0)
+    assert unfinished.r_hat.max() > 1.0001
+
+
+def test_r_hat_and_ess_of_known_traces():
+    rng = np.random.default_rng(0)
+    same = [rng.normal(size=(400, 5)) for _ in range(4)]
+    assert np.abs(r_hat(same) - 1.0).max() < 0.02
+    np.testing.assert_allclose(ess(same), 1600.0, rtol=0.3)
+    apart = [trace + 3.0 * k for k, trace in enumerate(same)]
+    assert r_hat(apart).min() > 2.0
+    slow = np.zeros((4, 2000, 5))
+    for t in range(1, 2000):  # an AR(1) series of coefficient 0.9 is worth a nineteenth of its length
+        slow[:, t] = 0.9 * slow[:, t - 1] + rng.normal(size=(4, 5))
+    np.testing.assert_allclose(ess(list(slow)), 8000.0 / 19.0, rtol=0.4)
+    constant = [np.ones((20, 5)), np.ones((20, 5))]
+    np.testing.assert_array_equal(r_hat(constant), 1.0)
+    assert np.isinf(r_hat([constant[0], 2.0 * constant[1]])).all()
+
+
+def test_truncation_grows_until_there_is_room():
+    x, _ = many_states(2, states=26, dwell=25, visits=2)
+    posterior = segment_series(x, seed=0)
+    assert posterior.labels.max() + 1 >= 25
+    assert posterior.states > 26
+    assert not posterior.full
+    few = segment_series(x, SamplerConfig(states=10), seed=0)
+    assert few.full
+    assert few.states == 10
+
+
+def test_channels_that_follow_from_others_change_nothing():
+    x, labels = many_states(3)
+    base = segment_series(x, seed=0)
+    for extra in (2.0 * x[:, 0] - 7.0, x[:, 0] + x[:, 1]):
+        twin = segment_series(np.column_stack([x, extra]), seed=0)
+        np.testing.assert_array_equal(twin.labels, base.labels)
+        np.testing.assert_array_equal(twin.channels, [0, 1, 2])
+    assert found_as_drawn(segment_series(np.column_stack([x[:, 0] + x[:, 1], x]), seed=0), labels)
+
+
+@pytest.mark.parametrize("share", ["cells", "rows"])
+def test_what_was_not_measured_is_left_out(share):
+    x, labels = many_states(4)
+    rng = np.random.default_rng(0)
+    lost = rng.uniform(size=x.shape if share == "cells" else (len(x), 1)) < 0.08
+    posterior = segment_series(np.where(lost, np.nan, x), seed=0)
+    assert found_as_drawn(posterior, labels)
+
+
+def test_heavy_tails_are_told_from_states():
+    x, labels = many_states(5)
+    rng = np.random.default_rng(0)
+    means = np.array([x[labels == k].mean(axis=0) for k in range(6)])
+    heavy = means[labels] + (x - means[labels]) / np.sqrt(rng.chisquare(3.0, size=(len(x), 1)) / 3.0)
+    posterior = segment_series(heavy, seed=0)
+    assert 0.0 < posterior.dof <= 6.0
+    assert found_as_drawn(posterior, labels)
+    assert segment_series(x, seed=0).dof == 0.0
+
+
+@pytest.mark.parametrize("size", [30.0, 1e6])
+def test_single_outliers_are_no_states(size):
+    x, labels = many_states(6)
+    rng = np.random.default_rng(0)
+    x[rng.uniform(size=len(x)) < 0.01] += size
+    assert found_as_drawn(segment_series(x, seed=0), labels)
+
+
+def test_outliers_are_told_by_their_own_sequence():
+    x = np.random.default_rng(2).normal(size=(100, 1)) + np.where(np.arange(100) < 50, 0.0, 100.0)[:, None]
+    x[49] = 60.0  # the last of the first sequence, on the way to the second
+    for ends, hidden in (([50, 100], [49]), ([100], [])):
+        usual = usual_distances(x, np.array(ends))
+        assert np.flatnonzero(np.isnan(without_outliers(x, usual, np.array(ends)))).tolist() == hidden
+
+
+def test_sequences_that_do_not_vary_keep_their_ends():
+    posterior = segment_series(np.ones((10, 2)), ends=(4, 10))
+    assert posterior.ends.tolist() == [4, 10] and posterior.labels.tolist() == [0] * 10
+
+
+def test_a_sequence_shorter_than_the_order_is_named():
+    x, _ = two_states(7)
+    with pytest.raises(InputError, match="sequence 1 has 3 samples; an autoregressive emission of order 2 needs 4"):
+        segment_series(x, SamplerConfig(emission="autoregressive", order=2), ends=(100, 103, 240))
+
+
+@pytest.mark.parametrize("missing", [0.15, 0.4])
+def test_what_is_missing_does_not_make_the_rest_look_correlated(missing):
+    """Gaps are filled with lines between neighbours; those once let independent samples count for two thirds."""
+    rng = np.random.default_rng(0)
+    labels = np.repeat([0, 1, 0, 1], 200)
+    x = rng.normal(size=(800, 3)) + 4.0 * labels[:, None]
+    x[rng.random(x.shape) < missing] = np.nan
+    posterior = segment_series(x, seed=1)
+    assert posterior.weight == 1.0
+    assert np.mean(posterior.labels != labels) < 0.01

@@ -1,0 +1,147 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The independent re-check of the benchmark sees what it must: as brute force does, and on scenarios that are spoilt."""
+
+from dataclasses import replace
+
+from lengths import LONG
+from motions import FREE, open_road, road_of, scenario_of, straight, wander
+import numpy as np
+from oracle import boxes_at, drivable_area
+import pytest
+import shapely
+from test_validity_presence import overlaps, random_case
+
+from benchmarks._recheck import Account, Recheck
+from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types.presence import ALWAYS
+from scenario_gen.types.scenario import BoundaryStates
+
+TIME = np.arange(101) * 0.1
+LENGTH = 100.0
+
+
+def crossing(delay=3.0):
+    """Two cars that cross: the one from the west first, the other `delay` seconds later."""
+    return scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), straight(0.0, -50.0 - 10.0 * delay, np.pi / 2, 10.0, TIME)), TIME)
+
+
+def recheck_of(scenario, road=None, changepoints=True):
+    encounter = Encounter(
+        "t", scenario.vehicles, 0, 100_000_000, scenario.position, scenario.heading, scenario.speed, present=scenario.present
+    )
+    ends = (np.column_stack([scenario.position[:, k], scenario.heading[:, k], scenario.speed[:, k]]) for k in (0, -1))
+    return Recheck(encounter, road or open_road(), BoundaryStates(*ends), changepoints)
+
+
+def found(recheck, *scenarios):
+    account = Account()
+    recheck.check(scenarios, account)
+    return account
+
+
+def test_a_sound_scenario_is_sound():
+    scenario = crossing()
+    account = found(recheck_of(scenario), scenario, scenario)
+    assert account.found == {}
+    assert (account.scenarios, account.vehicles, account.orders) == (2, 4, 2)
+
+
+@pytest.mark.parametrize(("delay", "hit"), [(0.0, True), (0.66, True), (0.68, False), (-0.66, True), (-0.68, False)])
+def test_contact_between_two_samples_is_found_to_the_millisecond(delay, hit):
+    """At right angles the sweeps are clear once the delay exceeds 0.67 s: (4.8 + 1.9) / 10."""
+    account = found(recheck_of(crossing()), crossing(delay))
+    assert ("overlap" in account.found) == hit
+
+
+def test_the_wrong_order_is_found():
+    account = found(recheck_of(crossing(3.0)), crossing(-1.5))
+    assert account.found["passing_order"] == 1
+    assert found(recheck_of(crossing(3.0)), crossing(1.5)).found["passing_order"] == 0
+
+
+def test_a_wrong_order_in_a_queue_is_found():
+    def queue(gap):
+        return scenario_of((straight(-40.0, 0.0, 0.0, 8.0, TIME), straight(-40.0 + gap, 0.0, 0.0, 8.0, TIME)), TIME)
+
+    assert found(recheck_of(queue(-15.0)), queue(-8.0)).found["passing_order"] == 0
+    assert found(recheck_of(queue(-15.0)), queue(15.0)).found["passing_order"] == 1
+
+
+def test_leaving_the_road_between_two_samples_is_found():
+    drivable = np.ones((200, 1000), dtype=bool)
+    drivable[105, 500] = False  # one cell, 1.05 to 1.2 m to the left of the way
+    road = road_of(drivable, 0.2, (-100.0, -20.0))
+    scenario = scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), straight(-50.0, 10.0, 0.0, 10.0, TIME)), TIME)
+    recheck = recheck_of(scenario, road)
+    assert found(recheck, scenario).found == {}
+    nearer = scenario.position.copy()
+    nearer[0, :, 1] += 0.051  # the side is at 1.001 m, the cell begins at 1.0 m
+    spoilt = replace(scenario, position=nearer)
+    assert found(recheck, spoilt).found["off_road"] == 1
+
+
+def test_a_wait_that_moves_and_ends_that_are_missed_are_found():
+    still = (np.tile((5.0, 20.0), (TIME.size, 1)), np.zeros(TIME.size), np.zeros(TIME.size))
+    scenario = scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), still), TIME)
+    recheck = recheck_of(scenario)
+    assert recheck.waits == [(0, 0), (1, 1)]
+    assert found(recheck, scenario).found == {}
+    creeping = scenario_of((straight(-50.0, 0.0, 0.0, 10.0, TIME), straight(5.0, 20.0, 0.0, 0.3, TIME)), TIME)
+    account = found(recheck, creeping)
+    assert account.found["stop_not_kept"] == 1
+    assert account.found["boundary_state"] >= 1
+
+
+def test_it_agrees_with_brute_force_on_random_motions():
+    """Overlap and off-road at 1 ms, by shapely alone; grazing by less than a micrometre aside."""
+    rng = np.random.default_rng(3)
+    drivable = np.ones((300, 300), dtype=bool)
+    drivable[rng.integers(0, 300, 40), rng.integers(0, 300, 40)] = False
+    road, time, agreed = road_of(drivable, 0.25, (-37.5, -37.5)), np.arange(31) * 0.1, 0
+    for _ in range(12):
+        scenario = scenario_of(
+            [wander(rng, time, 15.0) for _ in range(2)], time, (Vehicle("a", 4.0, 1.8), Vehicle("b", 4.0, 1.8))
+        )
+        instants = np.arange(3001) * 1e-3
+        boxes = boxes_at(scenario, instants)
+        meet = bool(shapely.intersects(*boxes).any())
+        off = [not bool(shapely.covers(drivable_area(road), b).all()) for b in boxes]
+        account = found(recheck_of(scenario, road), scenario)
+        assert account.found["overlap"] == meet
+        assert account.found["off_road"] == sum(off)
+        agreed += meet + sum(off)
+    assert agreed > 5, "some of them do collide or leave the road"
+
+
+@pytest.mark.parametrize(("comes", "clear"), [(42, False), (60, False), (62, True)])
+def test_nobody_stands_where_another_one_has_just_vanished(comes, clear):
+    scenario = scenario_of([straight(0.0, 0.0, 0.0, 0.0, TIME), straight(1.0, 0.0, 0.2, 0.0, TIME)], TIME)
+    scenario = replace(scenario, present=np.array([[0, 40], [comes, 100]]))
+    account = found(recheck_of(scenario), scenario)
+    assert account.found == ({} if clear else {"overlap": 1})
+
+
+def test_who_is_not_there_is_in_nobody_s_way():
+    """The second comes where the first drove long ago; before, it neither stands there nor is it first, and it does not wait."""
+    scenario = scenario_of([straight(-40.0, 0.0, 0.0, 10.0, TIME), straight(-20.0, -20.0, np.pi / 2, 4.0, TIME)], TIME)
+    late = replace(scenario, present=np.array([[0, 100], [40, 100]]))
+    recheck = recheck_of(late)
+    account = found(recheck, late)
+    assert (account.found, account.orders, recheck.orders) == ({}, 1, {(0, 1): 1})
+    standing = scenario_of([straight(-40.0, 9.0, 0.0, 0.0, TIME), straight(-20.0, -20.0, np.pi / 2, 4.0, TIME)], TIME)
+    short = recheck_of(replace(standing, present=np.array([[50, 55], [0, 100]])))
+    assert short.waits == [(0, 0), (0, 0)], "half a second is no wait"
+
+
+def test_it_agrees_with_brute_force_on_who_comes_and_goes():
+    met, seeds = 0, range(500) if LONG else (2, 3, 6, 8)  # of these four the margin decides three
+    for seed in seeds:
+        scenario, limits = random_case(seed)
+        recheck = recheck_of(replace(scenario, present=ALWAYS))
+        recheck.limits = replace(FREE, presence_margin=limits.presence_margin)
+        expected = len(overlaps(scenario, limits))
+        assert found(recheck, scenario).found["overlap"] == expected, seed
+        met += expected > 0
+    assert 0.25 * len(seeds) <= met <= 0.9 * len(seeds)

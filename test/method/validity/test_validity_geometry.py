@@ -1,0 +1,241 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Overlap and off-road: known hard cases, and agreement with an independent dense re-check on random motions."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from motions import arc, FREE, open_road, road_of, scenario_of, straight, wander
+import numpy as np
+from oracle import boxes_at, drivable_area, footprints, oracle_violations
+import pytest
+import shapely
+
+from scenario_gen.method.validity import Checker, Limits
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.scenario import Cause
+
+COARSE = np.arange(5) * 1.0
+FINE = np.arange(41) * 0.1
+
+
+def verdict(scenario, road=None, limits=FREE):
+    (answer,) = Checker(road, None, None, None, limits).check([scenario])
+    return answer
+
+
+def causes(scenario, road=None, limits=FREE):
+    """Of overlap and off-road only: some of these motions are no drives."""
+    found = [violation.cause for violation in verdict(scenario, road, limits).violations]
+    return [cause for cause in found if cause in (Cause.OVERLAP, Cause.OFF_ROAD)]
+
+
+def box_at(scenario, i, time):
+    return boxes_at(scenario, np.array([time]))[i][0]
+
+
+# ---------------------------------------------------------------- known cases
+
+
+@pytest.mark.parametrize("offset", [0.0, 3.0, -4.0])
+def test_cars_that_cross_between_two_samples_overlap(offset):
+    """At 40 m/s and one sample per second the cars are 20 m apart at every sample, and meet in between."""
+    crossing = scenario_of([straight(-60, 0, 0, 40, COARSE), straight(0, -60 + offset, np.pi / 2, 40, COARSE)], COARSE)
+    assert causes(crossing) == [Cause.OVERLAP]
+    later = scenario_of([straight(-60, 0, 0, 40, COARSE), straight(0, -68, np.pi / 2, 40, COARSE)], COARSE)
+    assert causes(later) == []
+
+
+def test_rotation_alone_can_touch():
+    """Two trucks stand 4 m apart; one turns on the spot, clear at both ends of the only interval."""
+    time, trucks = np.array([0.0, 1.0]), (Vehicle("a", 10.0, 2.0), Vehicle("b", 10.0, 2.0))
+    still = np.zeros(2)
+    standing = (np.array([[0.0, 4.0]] * 2), np.zeros(2), still)
+    turning = (np.zeros((2, 2)), np.array([-0.2, 0.2]), still)
+    assert causes(scenario_of([turning, standing], time, trucks)) == []
+    turning = (np.zeros((2, 2)), np.array([0.2, np.pi - 0.2]), still)
+    assert causes(scenario_of([turning, standing], time, trucks)) == [Cause.OVERLAP]
+
+
+def test_touching_is_overlap_and_a_millimetre_is_not():
+    cars = (Vehicle("a", 4.0, 2.0), Vehicle("b", 4.0, 2.0))
+    for gap, expected in ((0.0, [Cause.OVERLAP]), (-1e-6, [Cause.OVERLAP]), (1e-3, []), (1e-6, [])):
+        side = scenario_of([straight(0, 0, 0, 10, FINE), straight(1, 2.0 + gap, 0, 8, FINE)], FINE, cars)
+        assert causes(side) == expected
+        queue = scenario_of(
+            [straight(0, 0, 0.5, 10, FINE), straight(*((4.0 + gap) * np.array([np.cos(0.5), np.sin(0.5)])), 0.5, 10, FINE)],
+            FINE,
+            cars,
+        )
+        assert causes(queue) == expected
+
+
+def test_minimum_clearance_is_kept():
+    side = scenario_of([straight(0, 0, 0, 10, FINE), straight(30, 2.9, np.pi, 10, FINE)], FINE)
+    assert causes(side) == []
+    close = verdict(side, limits=Limits(min_clearance=1.1))
+    assert [violation.cause for violation in close.violations] == [Cause.OVERLAP]
+    assert "1.000 m" in close.violations[0].message
+    assert causes(side, limits=Limits(min_clearance=0.99)) == []
+
+
+@pytest.mark.parametrize("resolution", [0.1, 0.2])
+def test_a_post_of_one_cell_between_two_samples_is_seen(resolution):
+    drivable = np.ones((int(10 / resolution), int(200 / resolution)), dtype=bool)
+    free = road_of(drivable, resolution)
+    drive = scenario_of([straight(20, 5, 0, 30, COARSE)], COARSE)
+    assert causes(drive, free) == []
+    drivable[drivable.shape[0] // 2, int(65 / resolution)] = False
+    assert causes(drive, road_of(drivable, resolution)) == [Cause.OFF_ROAD]
+    drivable[:] = True
+    drivable[int((5 + 0.96 + resolution) / resolution), int(65 / resolution)] = False  # just beside the car
+    assert causes(drive, road_of(drivable, resolution)) == []
+
+
+def test_a_lane_as_wide_as_the_car_suffices_and_a_hair_less_does_not():
+    road = road_of(np.pad(np.ones((8, 400), dtype=bool), 2), 0.25)
+    fits = scenario_of([straight(5, 1.5, 0, 20, FINE)], FINE, (Vehicle("a", 4.0, 2.0),))
+    assert causes(fits, road) == []
+    assert causes(scenario_of([straight(5, 1.5, 0, 20, FINE)], FINE, (Vehicle("a", 4.0, 2.0 + 1e-6),)), road) == [Cause.OFF_ROAD]
+    assert causes(scenario_of([straight(5, 1.5, 1e-3, 20, FINE)], FINE, (Vehicle("a", 4.0, 2.0),)), road) == [Cause.OFF_ROAD]
+
+
+def test_outside_the_grid_is_off_road():
+    road = road_of(np.ones((100, 100), dtype=bool), 0.25)
+    for track in (straight(5, 12, 0, 6, FINE), straight(12, 3, -np.pi / 2, 1, FINE), straight(-500, 9, 0.1, 0, FINE)):
+        assert causes(scenario_of([track], FINE), road) == [Cause.OFF_ROAD]
+
+
+def test_the_cubic_between_samples_counts_not_the_chord():
+    """Both samples of a wide swerve lie on a straight corridor; the motion between them leaves it."""
+    time = np.array([0.0, 4.0])
+    road = road_of(np.pad(np.ones((16, 300), dtype=bool), 40), 0.25)
+    swerve = (np.array([[15.0, 12.0], [55.0, 12.0]]), np.array([0.3, -0.3]), np.array([11.0, 11.0]))
+    assert causes(scenario_of([swerve], time, (Vehicle("a", 1.0, 0.5),)), road) == [Cause.OFF_ROAD]
+    steady = (np.array([[15.0, 12.0], [55.0, 12.0]]), np.zeros(2), np.array([10.0, 10.0]))
+    assert causes(scenario_of([steady], time, (Vehicle("a", 1.0, 0.5),)), road) == []
+
+
+def test_many_vehicles_are_checked_in_pairs():
+    lanes = [straight(-40, 3.0 * i, 0, 8 + i, FINE) for i in range(8)]
+    assert causes(scenario_of(lanes, FINE)) == []
+    lanes[5] = straight(-20, 9.0, 0, 2, FINE)  # vehicle 3, from behind
+    (violation,) = verdict(scenario_of(lanes, FINE)).violations
+    assert violation.vehicles == (3, 5)
+    assert 1.6 <= violation.time <= 1.9
+
+
+# ---------------------------------------------------------------- random motions against the oracle
+
+
+def random_road(rng):
+    cells = np.ones((240, 240), dtype=bool)
+    for _ in range(rng.integers(0, 12)):
+        i, j, h, w = *rng.integers(0, 240, 2), *rng.integers(1, 25, 2)
+        cells[i : i + h, j : j + w] = False
+    cells[120, 120] = True
+    return road_of(cells, rng.choice([0.2, 0.5]), rng.uniform(-60, -20, 2))
+
+
+def random_case(seed):
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 5))
+    time = np.concatenate(([0.0], np.cumsum(rng.choice([0.1, 0.3, 1.0]) * rng.uniform(0.5, 1.5, 10))))
+    vehicles = tuple(Vehicle(str(i), *rng.uniform((1.5, 0.5), (12.0, 2.6))) for i in range(n))
+    return scenario_of([wander(rng, time, 25.0) for _ in range(n)], time, vehicles), random_road(rng)
+
+
+def compare(seed):
+    """Assert that checker and oracle agree about overlaps and road, up to slivers; return whether the scenario was valid."""
+    scenario, road = random_case(seed)
+    answer = verdict(scenario, road)
+    found = oracle_violations(scenario, road, None, None, None, FREE, dt=0.01)
+    geometric = [sentence for sentence in found if sentence.startswith(("overlap", "off_road"))]
+    refused = {(violation.cause, violation.vehicles) for violation in answer.violations}
+    for sentence in geometric:
+        cause, _, rest = sentence.partition(":")
+        words = rest.split(" at ")[0].split()
+        vehicles = tuple(int(word) for word in words if word.isdigit())
+        assert (Cause(cause), vehicles) in refused, sentence
+    for violation in answer.violations:  # never refused without reason: at the instant it names, it is so
+        if violation.cause is Cause.OVERLAP:
+            a, b = (box_at(scenario, i, violation.time) for i in violation.vehicles)
+            assert shapely.distance(a, b) < 0.02, violation
+        elif violation.cause is Cause.OFF_ROAD:
+            (i,) = violation.vehicles
+            assert not shapely.covers(drivable_area(road), shapely.buffer(box_at(scenario, i, violation.time), 0.02)), violation
+    return answer.valid
+
+
+@settings(max_examples=60)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_checker_and_oracle_agree_on_random_scenarios(seed):
+    compare(seed)
+
+
+def test_the_random_scenarios_are_neither_all_valid_nor_all_refused():
+    valid = sum(compare(seed) for seed in range(60))
+    assert 6 <= valid <= 54
+
+
+@settings(max_examples=200)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_standing_footprint_is_compared_with_the_cells_exactly(seed):
+    rng = np.random.default_rng(seed)
+    road = road_of(rng.random((30, 30)) > 0.02, 0.5, rng.uniform(-5, 5, 2))
+    car = Vehicle("a", *rng.uniform(0.3, 5.0, 2))
+    yaw = rng.choice([rng.uniform(-np.pi, np.pi), rng.integers(-2, 3) * np.pi / 2])
+    track = straight(*(road.origin + rng.uniform(0, 15, 2)), yaw, 0.0, np.array([0.0, 1.0]))
+    scenario = scenario_of([track], np.array([0.0, 1.0]), (car,))
+    at = scenario.position[:, 0], scenario.heading[:, 0]
+    smaller = footprints(*at, car.length - 1e-6, car.width - 1e-6)[0]
+    larger = footprints(*at, car.length + 1e-6, car.width + 1e-6)[0]
+    area = drivable_area.__wrapped__(road)
+    if causes(scenario, road):
+        assert not area.covers(larger)
+    else:
+        assert area.covers(smaller)
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_two_turning_cars_agree_with_the_oracle_near_contact(seed):
+    """Arcs that graze each other: the pair is shifted until the smallest gap the oracle sees is a centimetre."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(6) * rng.choice([0.1, 0.5, 1.0])
+    tracks = [
+        arc(*rng.uniform(-8, 8, 2), rng.uniform(-3, 3), rng.uniform(0, 12), rng.choice([-1, 1]) * rng.uniform(0.1, 0.6), time)
+        for _ in range(2)
+    ]
+    angle = rng.uniform(-np.pi, np.pi)
+    away = np.array([np.cos(angle), np.sin(angle)])
+
+    def shifted(shift):
+        return scenario_of([tracks[0], (tracks[1][0] + shift * away, *tracks[1][1:])], time)
+
+    def gap(shift):
+        return shapely.distance(*boxes_at(shifted(shift), np.linspace(0, time[-1], 500))).min()
+
+    low, high = 0.0, 200.0
+    while high - low > 1e-3:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if gap(middle) <= 0.01 else (low, middle)
+    for shift in (high, max(low - 0.03, 0.0), high + 0.2):
+        scenario = shifted(shift)
+        overlaps = [violation.time for violation in verdict(scenario).violations if violation.cause is Cause.OVERLAP]
+        if overlaps:
+            assert shapely.distance(*boxes_at(scenario, np.array(overlaps)))[0] < 1e-4
+        else:
+            assert shapely.distance(*boxes_at(scenario, np.linspace(0, time[-1], 2000))).min() > 0.0
+
+
+def test_far_from_the_origin_nothing_changes():
+    """Coordinates as in UTM: 500 km east, 4,000 km north."""
+    shift = np.array([500_000.0, 4_000_000.0])
+    near = open_road(60.0)
+    far = road_of(near.drivable, near.resolution, near.origin + shift)
+    for gap, expected in ((1.9, [Cause.OVERLAP]), (1.91, [])):
+        tracks = [straight(-15, 0, 0.3, 5, FINE), straight(-15 - gap * np.sin(0.3), gap * np.cos(0.3), 0.3, 6, FINE)]
+        assert causes(scenario_of(tracks, FINE), near) == expected
+        tracks = [(position + shift, heading, speed) for position, heading, speed in tracks]
+        assert causes(scenario_of(tracks, FINE), far) == expected

@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The certificate of interaction: who leaves too early or too late, or follows too near or too far, is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from reaction_scenes import answering, crossing, lane_encounter, wander
+
+from scenario_gen.method.validity import Checker, Limits
+from scenario_gen.template.interaction import find_conflicts
+from scenario_gen.template.reactions import reactions_of
+from scenario_gen.types.scenario import Cause, Scenario
+
+
+def as_scenario(encounter):
+    return Scenario(
+        encounter.vehicles,
+        encounter.time,
+        encounter.position,
+        encounter.heading,
+        encounter.speed,
+        np.gradient(encounter.speed, encounter.dt, axis=1),
+    )
+
+
+def refusals(scenario, template, limits=None):
+    conflicts = find_conflicts(template.vehicles, template.time, template.position, template.heading)
+    checker = Checker(None, None, conflicts, None, limits, reactions=reactions_of(template).edges)
+    (verdict,) = checker.check([scenario])
+    return [one for one in verdict.violations if one.cause == Cause.REACTION]
+
+
+TEMPLATE = crossing(8.0)
+CLEARS = reactions_of(TEMPLATE).edges[0].clears
+
+
+@pytest.mark.parametrize(
+    ("lag", "kept"), [(-1.5, False), (-1.2, False), (-0.7, True), (0.0, True), (2.0, True), (3.9, True), (5.0, False)]
+)
+def test_a_yielder_leaves_neither_before_the_other_has_cleared_nor_long_after(lag, kept):
+    """It is seen to leave 0.25 s after its speed begins to rise."""
+    own = reactions_of(TEMPLATE).edges[0].lag
+    assert -0.1 < own < 2.0
+    found = refusals(as_scenario(crossing(CLEARS + lag)), TEMPLATE)
+    assert (found == []) == kept
+    if not kept:
+        assert found[0].vehicles == (1, 0)
+        assert "vehicle 2: leaves" in found[0].message and "after vehicle 1 has cleared" in found[0].message
+
+
+def test_the_bounds_of_a_lag_are_parameters():
+    early = as_scenario(crossing(CLEARS - 1.2))
+    assert refusals(early, TEMPLATE) != []
+    assert refusals(early, TEMPLATE, Limits(anticipation=1.5)) == []
+    late = as_scenario(crossing(CLEARS + 5.0))
+    assert refusals(late, TEMPLATE, Limits(patience=6.0)) == []
+
+
+def test_a_yielder_that_no_longer_meets_the_other_does_not_yield():
+    moved = TEMPLATE.position.copy()
+    moved[0, :, 1] += 500.0
+    (found,) = refusals(as_scenario(replace(TEMPLATE, position=moved)), TEMPLATE)
+    assert "does not come behind" in found.message
+
+
+LEADER = wander(np.random.default_rng(3), 200)
+LANE = lane_encounter(LEADER, answering(LEADER, 1.2, 0.9))
+
+
+@pytest.mark.parametrize(("ahead", "kept"), [(0.0, True), (5.0, True), (12.0, False), (-8.0, True), (-25.0, False)])
+def test_a_follower_keeps_its_own_drivers_time_gaps(ahead, kept):
+    moved = LANE.position.copy()
+    moved[1, :, 0] += ahead
+    found = refusals(as_scenario(replace(LANE, position=moved)), LANE)
+    assert (found == []) == kept
+
+
+def test_templates_keep_their_own_reactions():
+    for template in (TEMPLATE, LANE):
+        assert refusals(as_scenario(template), template) == []

@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The bag for Autoware: rosbags decodes every message, hashes agree with rosidl's, poses and frames are as documented."""
+
+import json
+from pathlib import Path
+import sys
+
+import numpy as np
+import pytest
+from small_scenarios import crossing, one_vehicle
+
+from msg_conventions.autoware import AutowareEncoder, encode_predicted_objects
+from scenario_gen.bags.recordings.autoware import autoware_messages, TYPES
+from scenario_gen.bags.storage.autoware import DEFINITIONS, PACKAGE, PREDICTED, TRACKED
+from scenario_gen.bags.storage.definitions import definition, type_store
+
+OBJECTS, TRACKS = "/perception/object_recognition/objects", "/perception/object_recognition/tracking/objects"
+EGO = "/localization/kinematic_state"
+START = 1_700_000_000_000_000_000
+
+
+def decoded(others, ego=None):
+    found = {}
+    for topic, data, stamp in autoware_messages(others, ego, START):
+        message = type_store().deserialize_cdr(data, TYPES[topic])
+        again = bytes(type_store().serialize_cdr(message, TYPES[topic]))
+        assert again == data, topic  # nothing is left over, nothing is read otherwise
+        found.setdefault(topic, []).append((stamp, message))
+    return found
+
+
+def yaw_of(turn):
+    return 2.0 * np.arctan2(turn.z, turn.w)
+
+
+def test_every_message_is_what_the_scenario_says():
+    scenario, ego = crossing(), one_vehicle()
+    found = decoded(scenario, ego)
+    assert {topic: len(messages) for topic, messages in found.items()} == {
+        OBJECTS: len(scenario.time),
+        TRACKS: len(scenario.time),
+        EGO: len(ego.time),
+    }
+    for k, (stamp, message) in enumerate(found[OBJECTS]):
+        assert stamp == START + round(scenario.time[k] * 1e9)
+        assert message.header.frame_id == "map"
+        assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == stamp
+        for n, thing in enumerate(message.objects):
+            pose = thing.kinematics.initial_pose_with_covariance.pose
+            assert np.allclose([pose.position.x, pose.position.y], scenario.position[n, k], atol=1e-12)  # the shape's centre
+            assert abs(np.angle(np.exp(1j * (yaw_of(pose.orientation) - scenario.heading[n, k])))) < 1e-9
+            assert thing.kinematics.initial_twist_with_covariance.twist.linear.x == scenario.speed[n, k]
+            assert thing.shape.dimensions.x == scenario.vehicles[n].length
+            (path,) = thing.kinematics.predicted_paths
+            assert path.time_step.nanosec == 500_000_000
+            ahead = [scenario.position[n, i] for i in range(k, min(k + 101, len(scenario.time)), 5)]
+            assert np.allclose([[p.position.x, p.position.y] for p in path.path], ahead, atol=1e-12)
+    ids = {tuple(bytes(thing.object_id.uuid) for thing in message.objects) for _, message in found[OBJECTS] + found[TRACKS]}
+    assert len(ids) == 1 and len(set(*ids)) == len(scenario.vehicles)
+
+
+def test_objects_of_a_drive_are_the_same_messages():
+    """What `traffic` says of one instant is what a bag says of it: one writer for both."""
+    scenario = crossing()
+    encoder = AutowareEncoder(scenario)
+    for k in (0, 17, len(scenario.time) - 1):
+        states = np.column_stack(
+            [
+                scenario.position[:, k],
+                scenario.heading[:, k],
+                scenario.speed[:, k],
+                scenario.acceleration[:, k],
+                encoder.yaw_rate[:, k],
+            ]
+        )
+        whole = range(k, min(k + 101, len(scenario.time)), 5)
+        paths = [np.column_stack([scenario.position[n, whole], scenario.heading[n, whole]]) for n in range(len(states))]
+        assert encode_predicted_objects(scenario.vehicles, states, paths, scenario.frame_id, 9) == encoder.predicted_objects(k, 9)
+
+
+def test_the_ego_is_at_its_rear_axle():
+    ego = one_vehicle()
+    for k, (_, message) in enumerate(decoded(crossing(), ego)[EGO]):
+        assert message.child_frame_id == "base_link" and message.header.frame_id == "map"
+        pose, yaw = message.pose.pose, ego.heading[0, k]
+        back = 0.3 * ego.vehicles[0].length
+        axle = ego.position[0, k] - back * np.array([np.cos(yaw), np.sin(yaw)])
+        assert np.allclose([pose.position.x, pose.position.y, pose.position.z], [*axle, 0.0], atol=1e-9)
+        assert message.twist.twist.linear.x == ego.speed[0, k]
+
+
+def test_a_vehicle_that_is_not_there_is_in_no_message():
+    scenario = crossing(present=[[0, 30], [12, 60]])
+    for k, (_, message) in enumerate(decoded(scenario)[TRACKS]):
+        assert len(message.objects) == int(k <= 30) + int(k >= 12)
+
+
+def test_hashes_are_those_that_rosidl_computes(tmp_path):
+    """The second way: the generator of a Jazzy build, from the texts to IDL to the hash of REP 2011."""
+    share = Path(sys.prefix) / "share"
+    adapter = pytest.importorskip("rosidl_adapter.msg", reason="the ROS wheels are not installed: make install")
+    from rosidl_generator_type_description import generate_type_hash
+
+    if not (share / "geometry_msgs" / "msg" / "Pose.json").is_file():
+        pytest.skip("the ROS wheels are not installed: a sourced Jazzy has its type descriptions elsewhere")
+    (tmp_path / "msg").mkdir()
+    for kind, text in DEFINITIONS.items():
+        (tmp_path / f"{kind.removeprefix(PACKAGE + '/')}.msg").write_text(text)
+    files = [Path(f"{kind.removeprefix(PACKAGE + '/')}.msg") for kind in DEFINITIONS]
+    idl = [adapter.convert_msg_to_idl(tmp_path, PACKAGE, file, tmp_path / "msg") for file in files]
+    arguments = {
+        "package_name": PACKAGE,
+        "output_dir": str(tmp_path / "out"),
+        "idl_tuples": [f"{tmp_path}:{file.relative_to(tmp_path)}" for file in idl],
+        "include_paths": [
+            f"{name}:{share / name}" for name in ("std_msgs", "geometry_msgs", "builtin_interfaces", "unique_identifier_msgs")
+        ],
+    }
+    (tmp_path / "arguments.json").write_text(json.dumps(arguments))
+    generate_type_hash(str(tmp_path / "arguments.json"))
+    for kind in (PREDICTED, TRACKED):
+        made = json.loads((tmp_path / "out" / f"{kind.removeprefix(PACKAGE + '/')}.json").read_text())
+        hashes = {entry["type_name"]: entry["hash_string"] for entry in made["type_hashes"]}
+        assert hashes[kind] == definition(kind)[1]

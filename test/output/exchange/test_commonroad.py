@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""CommonRoad files: the schema's rules, the motion to the nanometre, the ego's problem; and back again as a log."""
+
+from dataclasses import replace
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from small_scenarios import crossing, moving, one_vehicle
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.output.exchange.cases import Case, Exported
+from scenario_gen.output.exchange.commonroad import write_commonroad
+from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.derived_lanes import derived_lanes
+from scenario_gen.output.exchange.importing import read_scenario_file
+from scenario_gen.output.exchange.motion import at_times
+
+
+def case_of(scenario, ego=None, lane_map=None):
+    one = Exported(3, 7, "ab" * 32, scenario, ego, driven=False)
+    lanes = lane_map or derived_lanes([scenario, *([ego] if ego else [])], None, 3.5, 20.0)
+    return Case(1, "/case_1", "some road", 1_767_225_600 * 10**9, (one,), lanes), one
+
+
+def written(tmp_path, scenario, ego=None, export=ExportConfig()):
+    data, notes = write_commonroad(*case_of(scenario, ego), export)
+    path = tmp_path / "one.xml"
+    path.write_bytes(data)
+    assert data == write_commonroad(*case_of(scenario, ego), export)[0]
+    return path, ET.fromstring(data), notes
+
+
+def number(element, way):
+    return float(element.find(way).text)
+
+
+def test_the_structure_is_that_of_2020a(tmp_path):
+    _, root, notes = written(tmp_path, crossing())
+    assert notes == ()
+    assert root.attrib["commonRoadVersion"] == "2020a" and root.attrib["benchmarkID"] == "ZAM_SomeRoad-1_4_T-1"
+    assert root.attrib["date"] == "2026-01-01" and float(root.attrib["timeStepSize"]) == 0.1
+    tags = list(dict.fromkeys(child.tag for child in root))
+    assert tags == ["location", "scenarioTags", "lanelet", "dynamicObstacle", "planningProblem"]  # the schema's sequence
+    ids = [element.attrib["id"] for element in root if "id" in element.attrib]
+    assert len(ids) == len(set(ids)) and {element.attrib["ref"] for element in root.iter() if "ref" in element.attrib} <= set(ids)
+    for lanelet in root.iter("lanelet"):
+        assert len(lanelet.findall("leftBound/point")) == len(lanelet.findall("rightBound/point")) >= 2
+    assert all("e" not in element.text.lower() for element in root.iter() if element.tag in ("x", "y", "exact"))  # xs:decimal
+
+
+def test_obstacles_are_at_the_centre_of_their_shape_at_every_step(tmp_path):
+    scenario = crossing(present=[[0, 60], [0, 41]])
+    _, root, _ = written(tmp_path, scenario)
+    for n, obstacle in enumerate(root.iter("dynamicObstacle")):
+        states = [obstacle.find("initialState"), *obstacle.findall("trajectory/state")]
+        assert len(states) == scenario.present[n, 1] + 1  # who leaves early is gone then
+        assert number(obstacle, "shape/rectangle/length") == pytest.approx(scenario.vehicles[n].length, abs=1e-9)
+        for k, state in enumerate(states):
+            assert int(state.find("time/exact").text) == k
+            found = [number(state, f"position/point/{axis}") for axis in "xy"]
+            assert np.allclose(found, scenario.position[n, k], atol=1e-9)
+            assert number(state, "velocity/exact") == pytest.approx(scenario.speed[n, k], abs=1e-9)
+            assert number(state, "orientation/exact") == pytest.approx(scenario.heading[n, k], abs=1e-9)
+
+
+def test_the_ego_has_a_problem_with_a_wide_window_of_time(tmp_path):
+    ego = one_vehicle()
+    _, root, _ = written(tmp_path, crossing(), ego)
+    (problem,) = root.iter("planningProblem")
+    start = problem.find("initialState")
+    assert [child.tag for child in start if child.tag in ("yawRate", "slipAngle")] == ["yawRate", "slipAngle"]  # demanded
+    assert np.allclose([number(start, f"position/point/{axis}") for axis in "xy"], ego.position[0, 0], atol=1e-9)
+    goal = problem.find("goalState")
+    assert number(goal, "time/intervalStart") <= 1 and number(goal, "time/intervalEnd") * 0.1 >= 2.0 * ego.time[-1]
+    rectangle = goal.find("position/rectangle")
+    assert np.allclose([number(rectangle, f"center/{axis}") for axis in "xy"], ego.position[0, -1], atol=1e-9)
+    assert number(goal, "orientation/intervalStart") < number(rectangle, "orientation") < number(goal, "orientation/intervalEnd")
+    assert "placeholder" not in (tmp_path / "one.xml").read_text()
+
+
+def test_without_an_ego_the_placeholder_says_so_and_is_in_nobodys_way(tmp_path):
+    scenario = crossing()
+    path, root, _ = written(tmp_path, scenario)
+    assert "a placeholder: nobody is left out" in path.read_text()
+    (problem,) = root.iter("planningProblem")
+    place = [number(problem, f"initialState/position/point/{axis}") for axis in "xy"]
+    assert number(problem, "initialState/velocity/exact") == 0.0
+    assert np.hypot(*(scenario.position - place).reshape(-1, 2).T).min() > 8.0
+
+
+def test_uneven_steps_are_resampled_and_that_is_said(tmp_path):
+    fine = crossing()
+    uneven = at_times(fine, np.concatenate([np.linspace(0.0, 3.0, 31), np.linspace(3.08, 5.96, 37)]))
+    path, _, notes = written(tmp_path, uneven)
+    assert "resampled at 0.1 s" in notes[0] and "0.060 s are left out" in notes[0]
+    tracks = read_scenario_file(path).tracks
+    for n, track in enumerate(tracks):
+        assert np.abs(track.rows[:, 1:3] - fine.position[n, : len(track.rows)]).max() < 1e-3
+
+
+def test_who_arrives_late_is_refused_by_name(tmp_path):
+    with pytest.raises(RefusedError, match=r"vehicle 2 arrives late.*openscenario"):
+        written(tmp_path, crossing(present=[[0, 60], [8, 60]]))
+
+
+def test_who_arrives_late_is_written_where_that_is_asked_for(tmp_path):
+    scenario = crossing(present=[[0, 60], [8, 51]])
+    path, _, notes = written(tmp_path, scenario, export=ExportConfig(late="written"))
+    assert "vehicle 2 arrives late" in notes[0]
+    track = read_scenario_file(path).tracks[1]
+    assert np.allclose(track.rows[:, 0], scenario.time[8:52], atol=1e-9)
+    assert np.abs(track.rows[:, 1:3] - scenario.position[1, 8:52]).max() < 1e-6
+
+
+@pytest.mark.parametrize("late", ["refused", "written"])
+def test_an_ego_that_arrives_late_is_refused(tmp_path, late):
+    ego = replace(one_vehicle(), present=np.array([[5, 61]]))
+    with pytest.raises(RefusedError, match=r"the ego, vehicle ego, arrives 0.5 s late"):
+        written(tmp_path, crossing(), ego, export=ExportConfig(late=late))
+
+
+def test_the_goal_of_an_ego_that_leaves_early_is_where_it_leaves(tmp_path):
+    ego = replace(one_vehicle(), present=np.array([[0, 40]]))
+    _, root, _ = written(tmp_path, crossing(), ego)
+    goal = root.find("planningProblem/goalState/position/rectangle")
+    assert np.allclose([number(goal, f"center/{axis}") for axis in "xy"], ego.position[0, 40], atol=1e-9)
+
+
+def test_trucks_are_trucks(tmp_path):
+    truck = moving([[0.0, 0.0, 0.0, 5.0, 0.0, 0.0]], vehicles=[type(one_vehicle().vehicles[0])("9", 12.0, 2.5)])
+    assert [element.text for element in written(tmp_path, truck)[1].iterfind("dynamicObstacle/type")] == ["truck"]
+
+
+def test_what_was_written_is_read_back(tmp_path):
+    scenario = crossing(present=[[0, 60], [0, 41]])
+    path, _, _ = written(tmp_path, scenario)
+    for n, track in enumerate(read_scenario_file(path).tracks):
+        last = int(scenario.present[n, 1]) + 1
+        assert np.allclose(track.rows[:, 0], scenario.time[:last], atol=1e-9)
+        assert np.abs(track.rows[:, 1:3] - scenario.position[n, :last]).max() < 1e-6
+        assert np.abs(track.rows[:, 3] - scenario.speed[n, :last]).max() < 1e-6
+        assert (track.length, track.width) == pytest.approx((scenario.vehicles[n].length, scenario.vehicles[n].width), abs=1e-9)

@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""scenario-gen export and import as commands: every format, the same bytes twice, some scenarios, an ego, and what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import Reader
+from typer.testing import CliRunner
+
+from scenario_gen.bags.recordings.read import read_recording
+from scenario_gen.bags.storage.definitions import type_store
+from scenario_gen.base.errors import InputError
+from scenario_gen.cli.commands import app
+from scenario_gen.logs import read_log
+from scenario_gen.output.exchange.cases import read_cases
+from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.export import export_bag, MANIFEST, TARGETS
+from scenario_gen.output.exchange.importing import import_file
+
+
+def bytes_of(folder):
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_the_same_bag_gives_the_same_bytes(small_bag, tmp_path, target):
+    for name in ("one", "two"):
+        made = export_bag(small_bag, tmp_path / name, target)
+        assert made.scenarios == 4
+    first, second = (bytes_of(tmp_path / name) for name in ("one", "two"))
+    assert first.keys() == second.keys() and all(first[name] == second[name] for name in first if "metadata" not in name)
+    manifest = json.loads(first[MANIFEST])
+    assert [entry["lanes"] for entry in manifest["scenarios"]] == ["derived"] * 2 + ["true"] * 2
+    assert {entry["sha256"] for entry in manifest["scenarios"]} == {
+        sha256 for namespace in read_recording(small_bag).namespaces.values() for sha256 in namespace.hashes
+    }
+    for entry in manifest["scenarios"]:
+        assert all((tmp_path / "one" / name).exists() for name in entry["files"])
+
+
+def test_a_chosen_one_with_an_ego_by_the_command(small_bag, tmp_path):
+    out = tmp_path / "out"
+    arguments = ["export", str(small_bag), "--to", "autoware", "--out", str(out), "--index", "2", "--namespace", "t"]
+    result = CliRunner().invoke(app, [*arguments, "--ego", "2"], catch_exceptions=False)
+    assert result.exit_code == 0 and "1 scenarios" in result.output
+    (folder,) = [path for path in out.iterdir() if path.is_dir()]
+    with Reader(folder) as reader:  # as others read it
+        counts = {connection.topic: connection.msgcount for connection in reader.connections}
+        for connection, _, data in reader.messages():
+            type_store().deserialize_cdr(data, connection.msgtype)
+    assert set(counts) == {
+        "/localization/kinematic_state",
+        "/perception/object_recognition/objects",
+        "/perception/object_recognition/tracking/objects",
+    }
+    (entry,) = json.loads((out / MANIFEST).read_text())["scenarios"]
+    assert (entry["index"], entry["ego"], entry["vehicles"]) == (2, "2", ["1"])
+
+
+def test_lanes_do_not_depend_on_what_is_chosen(small_bag):
+    everything = read_cases(small_bag)
+    for case in read_cases(small_bag, indices=[2]):
+        (same,) = [one for one in everything if one.number == case.number]
+        assert all(np.array_equal(a.left, b.left) for a, b in zip(case.lanes, same.lanes, strict=True))
+
+
+def test_round_trips_close(small_bag, tmp_path):
+    scenarios = {(case.namespace, one.index): one for case in read_cases(small_bag) for one in case.scenarios}
+    for target in ("commonroad", "openscenario"):
+        out = tmp_path / target
+        export_bag(small_bag, out, target)
+        manifest = json.loads((out / MANIFEST).read_text())
+        for k, entry in enumerate(manifest["scenarios"]):
+            table = tmp_path / f"{target}{k}.csv"
+            tracks = import_file(out / entry["files"][0], table).tracks
+            scenario = scenarios[entry["namespace"], entry["index"]].others
+            for n, track in enumerate(tracks):
+                assert np.abs(track.rows[:, 1:3] - scenario.position[n]).max() < 1e-3
+                assert np.abs(track.rows[:, 3] - scenario.speed[n]).max() < 1e-2
+        (encounter,) = read_log(table).encounters  # a log like any other
+        assert len(encounter.vehicles) == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--to", "lanelet2"], "none of commonroad, openscenario, autoware"),
+        (["--to", "commonroad", "--ego", "9"], "has no vehicle '9' to be the ego; there are: 1, 2"),
+        (["--to", "commonroad", "--index", "77"], "no scenario of index"),
+        (["--to", "commonroad", "--namespace", "x"], "no scenarios in namespace 'x'"),
+        (["--to", "commonroad", "--set", "run_out=-1"], "run_out"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(small_bag, tmp_path, options, said):
+    with pytest.raises(InputError) as error:
+        CliRunner().invoke(app, ["export", str(small_bag), "--out", str(tmp_path / "o"), *options], catch_exceptions=False)
+    assert said in str(error.value)
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_bag_may_not_be_replaced_by_its_export(small_bag):
+    with pytest.raises(InputError):
+        export_bag(small_bag, small_bag, "commonroad", ExportConfig())

@@ -1,0 +1,153 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""OpenSCENARIO and OpenDRIVE: references, reference points and edges, which no schema sees; the road's geometry; and back."""
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from small_scenarios import crossing, one_vehicle
+from test_commonroad import case_of
+
+from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.importing import read_scenario_file
+from scenario_gen.output.exchange.lanes import lanes_of
+from scenario_gen.output.exchange.opendrive import write_opendrive
+from scenario_gen.output.exchange.openscenario import write_openscenario
+from scenario_gen.output.exchange.road_lanes import true_lanes
+from scenario_gen.roads import RoadConfig
+from scenario_gen.roads.build import build_road
+
+
+def written(scenario, ego=None, export=ExportConfig()):
+    data = write_openscenario(*case_of(scenario, ego), "road.xodr", export)
+    assert data == write_openscenario(*case_of(scenario, ego), "road.xodr", export)
+    return data, ET.fromstring(data)
+
+
+def test_every_reference_leads_somewhere_and_no_condition_waits_for_an_edge():
+    _, root = written(crossing(present=[[0, 60], [9, 44]]), one_vehicle())
+    header = root.find("FileHeader").attrib
+    assert (header["revMajor"], header["revMinor"], header["date"]) == ("1", "2", "2026-01-01T00:00:00")
+    assert root.find("RoadNetwork/LogicFile").attrib["filepath"] == "road.xodr"
+    names = {entity.attrib["name"] for entity in root.iter("ScenarioObject")}
+    assert names == {"vehicle_1", "vehicle_2", "Ego"}
+    assert {element.attrib["entityRef"] for element in root.iter() if "entityRef" in element.attrib} == names
+    conditions = list(root.iter("Condition"))
+    assert conditions and {condition.attrib["conditionEdge"] for condition in conditions} == {"none"}
+    assert {float(condition.attrib["delay"]) for condition in conditions} == {0.0}
+
+
+@pytest.mark.parametrize("mode", ["position", "follow"])
+def test_vertices_are_the_rear_axle_in_absolute_time(mode):
+    scenario = crossing()
+    _, root = written(scenario, export=ExportConfig(following=mode))
+    for n, follow in enumerate(root.iter("FollowTrajectoryAction")):
+        assert follow.find("TrajectoryFollowingMode").attrib["followingMode"] == mode
+        assert follow.find("TimeReference/Timing").attrib == {"domainAbsoluteRelative": "absolute", "scale": "1", "offset": "0"}
+        center = root.findall("Entities/ScenarioObject")[n].find("Vehicle/BoundingBox/Center").attrib
+        ahead = float(center["x"])
+        assert ahead == pytest.approx(0.3 * scenario.vehicles[n].length) and float(center["y"]) == 0.0
+        axles = root.findall("Entities/ScenarioObject")[n].find("Vehicle/Axles")
+        assert float(axles.find("RearAxle").attrib["positionX"]) == 0.0
+        for k, vertex in enumerate(follow.iter("Vertex")):
+            world = {key: float(value) for key, value in vertex.find("Position/WorldPosition").attrib.items()}
+            assert float(vertex.attrib["time"]) == pytest.approx(scenario.time[k], abs=1e-9)
+            assert world["h"] == pytest.approx(scenario.heading[n, k], abs=1e-9)
+            centre = world["x"] + ahead * np.cos(world["h"]), world["y"] + ahead * np.sin(world["h"])
+            assert np.allclose(centre, scenario.position[n, k], atol=1e-8)
+    places = [private.find(".//TeleportAction/Position/WorldPosition").attrib for private in root.iter("Private")]
+    first = [follow.find(".//Vertex/Position/WorldPosition").attrib for follow in root.iter("FollowTrajectoryAction")]
+    assert places == first  # everybody starts where its trajectory does
+
+
+def test_who_is_not_there_is_added_and_deleted():
+    scenario = crossing(present=[[0, 60], [9, 44]])
+    _, root = written(scenario)
+    assert [private.attrib["entityRef"] for private in root.iter("Private")] == ["vehicle_1"]
+    times = {
+        condition.attrib["name"]: float(condition.find("ByValueCondition/SimulationTimeCondition").attrib["value"])
+        for condition in root.iter("Condition")
+    }
+    assert times["vehicle_2_arrival"] == times["vehicle_2_start"] == 0.9 and times["vehicle_2_departure"] == 4.4
+    assert root.find(".//EntityAction[@entityRef='vehicle_2']/AddEntityAction") is not None
+    assert root.find(".//EntityAction[@entityRef='vehicle_2']/DeleteEntityAction") is not None
+
+
+def test_the_ego_is_placed_and_has_a_goal_but_no_trajectory():
+    ego = one_vehicle()
+    _, root = written(crossing(), ego)
+    assert {ref.attrib["entityRef"] for ref in root.iter("EntityRef")} == {"vehicle_1", "vehicle_2"}
+    (private,) = [one for one in root.iter("Private") if one.attrib["entityRef"] == "Ego"]
+    goal = private.find(".//AcquirePositionAction/Position/WorldPosition").attrib
+    back = 0.3 * ego.vehicles[0].length
+    end = ego.position[0, -1] - back * np.array([np.cos(ego.heading[0, -1]), np.sin(ego.heading[0, -1])])
+    assert np.allclose([float(goal["x"]), float(goal["y"])], end, atol=1e-8)
+
+
+def test_what_was_written_is_read_back_and_others_speeds_are_derived(tmp_path):
+    scenario = crossing(present=[[0, 60], [9, 44]])
+    data, _ = written(scenario, one_vehicle())
+    for remove, most in ((b"", 1e-6), (b"speed_mps", 1e-2)):
+        path = tmp_path / f"one{len(remove)}.xosc"
+        path.write_bytes(data.replace(remove, b"theirs") if remove else data)
+        made = read_scenario_file(path)
+        assert "Ego left out: it follows no trajectory" in made.notes
+        for n, track in enumerate(made.tracks):
+            there = slice(int(scenario.present[n, 0]), int(scenario.present[n, 1]) + 1)
+            assert np.allclose(track.rows[:, 0], scenario.time[there], atol=1e-9)
+            assert np.abs(track.rows[:, 1:3] - scenario.position[n, there]).max() < 1e-6
+            assert np.abs(track.rows[:, 3] - scenario.speed[n, there])[1:].max() < most
+
+
+def along(geometry, s):
+    """Return x, y, heading at s from the beginning of an OpenDRIVE geometry element, by the standard."""
+    x, y, hdg, length = (float(geometry.attrib[name]) for name in ("x", "y", "hdg", "length"))
+    poly = geometry.find("paramPoly3")
+    if poly is None:
+        u, v, turn = s, 0.0, 0.0
+    else:
+        c = {name: float(value) for name, value in poly.attrib.items() if name != "pRange"}
+        p = s / length
+        u, v = (c[f"a{w}"] + c[f"b{w}"] * p + c[f"c{w}"] * p**2 + c[f"d{w}"] * p**3 for w in "UV")
+        du, dv = (c[f"b{w}"] + 2 * c[f"c{w}"] * p + 3 * c[f"d{w}"] * p**2 for w in "UV")
+        turn = np.arctan2(dv, du)
+    return x + u * np.cos(hdg) - v * np.sin(hdg), y + u * np.sin(hdg) + v * np.cos(hdg), hdg + turn
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_the_road_network_is_smooth_and_its_lanes_are_ours(side):
+    config = RoadConfig(lanes=2, traffic_side=side)
+    lane_map = true_lanes(build_road("t_intersection", None, config), "t_intersection", None, config, [], 15.0)
+    data = write_opendrive(lane_map, "t", 0)
+    assert data == write_opendrive(lane_map, "t", 0)
+    root = ET.fromstring(data)
+    roads = {road.attrib["id"]: road for road in root.iter("road")}
+    assert {road.attrib["rule"] for road in roads.values()} == {"RHT" if side == "right" else "LHT"}
+    edges = {}
+    for road in roads.values():
+        s, end = 0.0, None
+        for geometry in road.iter("geometry"):
+            assert float(geometry.attrib["s"]) == pytest.approx(s, abs=1e-6)
+            start = along(geometry, 0.0)
+            if end is not None:
+                assert np.allclose(start[:2], end[:2], atol=1e-6)
+                assert abs(np.angle(np.exp(1j * (start[2] - end[2])))) < 1e-6  # no kink
+            length = float(geometry.attrib["length"])
+            points = np.array([along(geometry, s)[:2] for s in np.linspace(0.0, length, 200)])
+            assert np.hypot(*np.diff(points, axis=0).T).sum() == pytest.approx(length, rel=1e-4)
+            end = along(geometry, length)
+            s += length
+        assert float(road.attrib["length"]) == pytest.approx(s, abs=1e-6)
+        edges[road.attrib["id"]] = end
+        for link in road.findall("link/*"):
+            assert link.attrib["elementId"] in roads if link.attrib["elementType"] == "road" else True
+    junction = root.find("junction")
+    for connection in junction.iter("connection"):
+        lanes = {lane.attrib["id"] for lane in roads[connection.attrib["connectingRoad"]].iter("lane")}
+        arms = {lane.attrib["id"] for lane in roads[connection.attrib["incomingRoad"]].iter("lane")}
+        links = connection.findall("laneLink")
+        assert len(links) == 1 and all(one.attrib["to"] in lanes and one.attrib["from"] in arms for one in links)
+    driving = [lane for lane in root.iter("lane") if lane.attrib["type"] == "driving"]
+    assert len(driving) == len(lanes_of(lane_map))

@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a hostile log or bag writes into its names runs nothing: pages have no script but ours and say each name as it is."""
+
+from base64 import b64encode
+from dataclasses import replace
+from hashlib import sha256
+from html.parser import HTMLParser
+import re
+
+from browser_tab import DESKTOP, Tab
+from evaluation_worlds import report_case
+import pytest
+
+from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
+from scenario_gen.output.report.page import render, ReportInput, write_report
+from scenario_gen.output.reproduce import run_case, write_page
+from scenario_gen.types.generation import UNIFORM
+
+RUNS = "top.ran=1"
+HOSTILE = (
+    f"</script><script>{RUNS}</script>",
+    f'</script><img src=x onerror="{RUNS}">',
+    f'"><svg onload="{RUNS}">',
+    f"' onmouseover='{RUNS}' autofocus onfocus='{RUNS}' x='",
+    f"</style></title></textarea><iframe srcdoc='<script>{RUNS}</script>'>",
+    f'<a href="javascript:{RUNS}">press</a>',
+    "{{7*7}}{% raw %}${7*7}%{x}<%= 7*7 %>",
+    "\u202egnp.txt\u2066<b>\x1b[31m\x07",
+    "<!--<script>",
+    "\u2028alert(1)\u2029]]>",
+)
+
+
+class Elements(HTMLParser):
+    """What a browser would make of the page's text: its scripts, its policy, its attributes."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.scripts, self.attributes, self.tags, self._kind = [], [], [], None
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes += attrs
+        if tag == "meta" and ("http-equiv", "Content-Security-Policy") in attrs:
+            self.policy = dict(attrs)["content"]
+        if tag == "script":
+            self._kind = dict(attrs).get("type", "")
+            self.scripts.append([self._kind, ""])
+
+    def handle_endtag(self, tag):
+        self._kind = None if tag == "script" else self._kind
+
+    def handle_data(self, data):
+        if self._kind is not None:
+            self.scripts[-1][1] += data
+
+
+def hostile_case(names):
+    """The case of the report with hostile names wherever a log or a bag has its say."""
+    case = report_case(4, name=names[0])
+    ids = names[1:3]
+
+    def renamed(vehicles):
+        return tuple(replace(vehicle, id=known) for vehicle, known in zip(vehicles, ids, strict=True))
+
+    def made(group):
+        return replace(
+            group,
+            scenarios=tuple(replace(s, vehicles=renamed(s.vehicles), frame_id=names[0]) for s in group.scenarios),
+            adaptations=names,
+        )
+
+    segmentation = replace(case.segmentation, descriptions=names[:3])
+    return replace(
+        case,
+        encounter=replace(case.encounter, vehicles=renamed(case.encounter.vehicles)),
+        segmentation=segmentation,
+        road=replace(case.road, name=names[3]),
+        fit=replace(
+            case.fit,
+            vehicles=renamed(case.fit.vehicles),
+            fitted=tuple(replace(f, manoeuvre=names[4]) for f in case.fit.fitted),
+            notes=names,
+        ),
+        generated=made(case.generated),
+        references={name: made(group) for name, group in case.references.items()},
+        evaluation=replace(
+            case.evaluation,
+            vehicles=ids,
+            rows=tuple(replace(row, notes=(*row.notes, *names)) for row in case.evaluation.rows),
+        ),
+        oracle=replace(case.oracle, vehicles=renamed(case.oracle.vehicles)),
+        refusals={UNIFORM: names[5]},
+    )
+
+
+def hostile_report():
+    return ReportInput([hostile_case(HOSTILE), hostile_case(HOSTILE[3:])], HOSTILE[0], HOSTILE, {name: name for name in HOSTILE})
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("hostile")
+    write_report(folder / "report.html", hostile_report())
+    case = run_case(read_log([bundled("c")]).encounters[0], count=2, seed=7)
+    case = replace(case, encounter=replace(case.encounter, name=HOSTILE[0]), refused={name: name for name in HOSTILE})
+    write_page(folder, [case], quality=HOSTILE, provenance={name: name for name in HOSTILE})
+    return folder
+
+
+@pytest.mark.parametrize("name", ["report.html", "reproduce.html"])
+def test_the_policy_names_each_script_and_allows_no_other(pages, name):
+    found = Elements((pages / name).read_text(encoding="utf-8"))
+    ours = [text for kind, text in found.scripts if not kind]
+    (data,) = (text for kind, text in found.scripts if kind == "application/json")
+    assert "<" not in data
+    allowed = re.search(r"script-src ([^;]*)", found.policy).group(1).split()
+    assert allowed == [f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'" for text in ours]
+    assert "unsafe-eval" not in found.policy and "default-src 'none'" in found.policy
+    assert not [key for key, _ in found.attributes if key.startswith("on")], "no event handler stands in the page"
+    assert not {"img", "svg", "iframe", "a", "object", "embed", "base", "form"} & set(found.tags)
+
+
+def test_the_policy_depends_on_nothing_of_the_log():
+    policies = {Elements(render(report)).policy for report in (ReportInput([report_case(2)]), hostile_report())}
+    assert len(policies) == 1
+
+
+class Watched(Tab):
+    """A tab that also keeps what the policy had to stop, and every dialog."""
+
+    def __init__(self, browser, file, size):
+        self.dialogs = []
+        super().__init__(browser, file, size)
+
+    def ran(self):
+        return self.page.evaluate("'ran' in window") or bool(self.dialogs)
+
+
+@pytest.mark.parametrize("name", ["report.html", "reproduce.html"])
+def test_hostile_names_run_nothing_and_the_page_works(browser, pages, name):
+    tab = Watched(browser, pages / name, DESKTOP)
+    tab.page.on("dialog", lambda dialog: (tab.dialogs.append(dialog.message), dialog.dismiss()))
+    tab.page.wait_for_timeout(300)
+    if name == "report.html":
+        for case in (0, 1):
+            tab.page.locator(f'[data-show="{case}"] button').click()
+            part = tab.page.locator(f'[data-case="{case}"]')
+            assert part.locator(".js-plotly-plot").count() > 3
+            part.locator('[data-role="scrub"]').fill("500")
+            for chart in part.locator(".js-plotly-plot .main-svg:first-child").all()[:3]:
+                chart.hover(force=True)  # plotly writes names and sentences beside the pointer
+                tab.page.wait_for_timeout(60)
+        assert HOSTILE[1] in tab.page.locator('[data-case="0"] [data-role="readout"]').inner_text()
+        assert tab.page.title() == HOSTILE[0]
+    assert HOSTILE[6] in tab.page.locator("body").inner_text(), "it is said as it is"
+    assert tab.troubles == [], "no error, and nothing that the policy had to stop"
+    assert not tab.ran()
+    assert tab.asked() == [(pages / name).as_uri()]
+    tab.page.close()
+
+
+def test_a_script_that_gets_in_all_the_same_is_not_run(browser, pages, tmp_path):
+    """Were escaping forgotten somewhere, the policy would stop what comes in: a script, a handler, an address, eval."""
+    text = (pages / "report.html").read_text(encoding="utf-8")
+    inside = "".join(HOSTILE[:6]) + f'<img src="data:," onerror="{RUNS}"><button id="b" onclick="{RUNS}">b</button>'
+    page = tmp_path / "broken.html"
+    page.write_text(text.replace("<main>", f"<main>{inside}", 1), encoding="utf-8")
+    tab = Watched(browser, page, DESKTOP)
+    tab.page.on("dialog", lambda dialog: (tab.dialogs.append(dialog.message), dialog.dismiss()))
+    tab.page.locator("#b").dispatch_event("click")
+    tab.page.wait_for_timeout(200)
+    assert not tab.ran()
+    assert any("Content Security Policy" in trouble for trouble in tab.troubles)
+    tab.page.close()

@@ -1,0 +1,132 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The report's page as text and data; how it behaves in a browser is in test_evaluation_browser.py."""
+
+from base64 import b64decode
+from dataclasses import replace
+import io
+import json
+import re
+
+from evaluation_worlds import cross_road, report_case
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+import numpy as np
+import pytest
+from rich.console import Console
+
+from scenario_gen.bags.recordings.read import read_recording
+from scenario_gen.method.evaluation import feature_matrix
+from scenario_gen.method.evaluation.motion import at_count
+from scenario_gen.output.report.data import case_data, MATRIX_SIZE, pack, runs
+from scenario_gen.output.report.page import render, ReportInput, write_report
+from scenario_gen.output.report.summary import summary
+from scenario_gen.output.results import write_results
+from scenario_gen.types.fit import Loss
+
+
+@pytest.fixture(scope="module")
+def page():
+    cases = [report_case(), report_case(4, "a <script>alert(1)</script> name", without=False)]
+    return render(ReportInput(cases, "Title & more", ("12 rows dropped",), {"log": "demo.mcap", "seed": "7"}))
+
+
+def without_plotly(page):
+    return "".join(part for part in re.split(r"(<script>.*?</script>)", page, flags=re.S) if len(part) < 1_000_000)
+
+
+def test_the_page_asks_for_nothing_outside_itself(page):
+    own = without_plotly(page)
+    assert "default-src 'none'" in own
+    assert not re.search(r"""(src|href)\s*=\s*["'](?!data:)""", own)
+    assert "http" not in own.replace("http-equiv", "")
+
+
+def test_names_are_escaped_and_figures_are_there(page):
+    assert "alert(1)</script>" not in page and "Title &amp; more" in page
+    for text in ("12 rows dropped", "demo.mcap", "anchor 1 moved by 0.12 m", "the clock was stretched", "lateral acceleration"):
+        assert text in page
+    assert "There is no such set: no route exists." in page
+    assert "<b>16</b> of 16 scenarios asked for, from 26 candidates" in page
+
+
+def test_the_same_input_gives_the_same_bytes(tmp_path, page):
+    case = report_case(3)
+    write_report(tmp_path / "a.html", ReportInput([case]))
+    assert (tmp_path / "a.html").read_text(encoding="utf-8") == render(ReportInput([report_case(3)]))
+    assert (tmp_path / "a.html").stat().st_size < 6_000_000
+
+
+def test_the_data_can_be_read_back(page):
+    data = json.loads(re.search(r'id="data">(.*?)</script>', page, flags=re.S).group(1))
+    assert [list(case["arms"]) for case in data] == [["with", "without", "oracle"], ["with", "oracle"]]
+    assert data[0]["arms"]["with"]["states"]["shape"][:2] == [12, 2]
+    assert data[0]["template"]["bounds"] == [0.0, 4.0, 8.0, 12.0] and data[0]["template"]["labels"] == [0, 1, 0]
+
+
+@given(arrays(np.float64, (5, 3, 4), elements=st.floats(-1000, 1000)))
+def test_packing_loses_less_than_a_sixty_thousandth(values):
+    packed = pack(values)
+    whole = np.frombuffer(b64decode(packed["data"]), "<u2").reshape(packed["shape"])
+    found = np.array(packed["low"]) + np.array(packed["step"]) * whole
+    extent = np.ptp(values.reshape(-1, 4), axis=0)
+    assert (np.abs(found - values) <= extent / 60000 + 1e-6).all()
+
+
+@given(arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 9))))
+def test_runs_give_the_mask_back(mask):
+    lengths = runs(mask)
+    assert (np.repeat(np.arange(len(lengths)) % 2 == 1, lengths) == mask.ravel()).all()
+
+
+def test_matrices_are_the_mean_feature():
+    case = report_case(3)
+    entry = case_data(case, 50)["features"][0]
+    found = np.frombuffer(b64decode(entry["position"]["with"]), np.uint8).reshape(MATRIX_SIZE, MATRIX_SIZE) / 255
+    motions = [at_count(scenario, MATRIX_SIZE) for scenario in case.generated.scenarios]
+    np.testing.assert_allclose(found, np.mean([feature_matrix(*m.position) for m in motions], axis=0), atol=0.003)
+
+
+def test_a_fine_road_is_made_coarse():
+    road = cross_road()
+    fine = type(road)("fine", np.kron(road.drivable, np.ones((4, 4), bool)), 0.125, road.origin, road.entries, road.exits)
+    case = report_case(2)
+    drawn = case_data(type(case)(**{**vars(case), "road": fine}), 1)["road"]
+    assert max(drawn["size"]) <= 900 and drawn["cell"] * drawn["size"][0] == pytest.approx(140.0, abs=0.5)
+    share = sum(drawn["runs"][1::2]) / sum(drawn["runs"])
+    assert share == pytest.approx(road.drivable.mean(), abs=0.01)
+
+
+def test_what_the_fitting_lost_and_how_far_a_route_is_from_it_are_said(tmp_path):
+    case = report_case(3)
+    lost = Loss("conflict", ("west", "south"), "vehicles west and south have crossing paths in the template only")
+    fitted = tuple(replace(one, turned=(0.1, 0.35)) for one in case.fit.fitted)
+    routes = (
+        replace(case.routes[0], joined=3, searched=0, farthest=0.04),
+        replace(case.routes[1], joined=2, searched=1, farthest=2.25),
+    )
+    case = replace(case, fit=replace(case.fit, lost=(lost,), fitted=fitted), routes=routes)
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(summary([case]))
+    write_results(tmp_path, [case], seed=1, title="", quality=(), provenance={})
+    figures = json.loads((tmp_path / "evaluation.json").read_text())["cases"][0]
+    for text in (console.export_text(), (tmp_path / "report.html").read_text(encoding="utf-8")):
+        assert lost.said in text and "vehicle south: its route passes 2.2 m from its fitted path" in text
+        assert "5 legs joined at once, 1 searched for, at most 2.25 m from the fitted paths" in text
+    assert "6°, 20°" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert figures["fit"]["lost"] == [{"kind": "conflict", "vehicles": ["west", "south"], "said": lost.said}]
+    assert figures["fit"]["vehicles"]["west"]["turned_on_road_deg"] == 20.1
+    assert figures["routes"]["south"]["farthest_from_fit_m"] == 2.25
+    read = read_recording(tmp_path / "bag").namespaces[""]
+    assert read.fit[0].lost == (lost,) and read.fit[0].notes == case.fit.notes  # a remark about a route is not a note
+    assert [route.figures() for route in read.fit[1]] == [route.figures() for route in routes]
+
+
+def test_the_summary_fits_on_a_screen():
+    console = Console(width=110, record=True, file=io.StringIO())
+    console.print(summary([report_case(5), report_case(4, "with [brackets]", without=False)]))
+    text = console.export_text()
+    assert "5/5" in text and "with [brackets]" in text and "6 overlap" in text
+    assert len(text.splitlines()) < 15 and max(map(len, text.splitlines())) <= 110

@@ -1,0 +1,189 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The report in headless Chromium: no errors, no requests, it plays, scrubs and switches; nothing is wider than a phone."""
+
+from base64 import b64decode
+from dataclasses import replace
+import io
+
+from browser_tab import DESKTOP, PHONE, Tab
+from evaluation_worlds import ego_case, report_case
+from PIL import Image
+import pytest
+
+from scenario_gen.output.report.page import ReportInput, write_report
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    write_report(
+        path,
+        ReportInput(
+            [report_case(6), report_case(4, "a_name_without_any_space_" * 4, without=False)], provenance={"log": "a" * 64}
+        ),
+    )
+    return path
+
+
+class Report(Tab):
+    """The report, its parts found by their roles."""
+
+    def part(self, role, case=0):
+        return self.page.locator(f'[data-case="{case}"] [data-role="{role}"]')
+
+    def time(self, case=0):
+        return float(self.part("clock", case).inner_text().split("/")[0])
+
+    def wait(self, condition):
+        """Wait until something holds; half a minute is enough for a busy machine."""
+        for _ in range(600):
+            if condition():
+                return
+            self.page.wait_for_timeout(50)
+        raise AssertionError("waited for half a minute")
+
+    def picture(self, role, case=0):
+        """The canvas as text: two pictures are equal if and only if their texts are."""
+        return self.part(role, case).evaluate("canvas => canvas.toDataURL()")
+
+
+@pytest.fixture
+def tab(browser, report):
+    tab = Report(browser, report, DESKTOP)
+    yield tab
+    tab.page.close()
+
+
+def test_it_loads_without_errors_or_requests(tab, report):
+    tab.page.wait_for_timeout(300)
+    assert tab.troubles == []
+    assert tab.asked() == [report.as_uri()]
+    assert tab.page.locator('[data-case="0"] .js-plotly-plot').count() == 10  # template, two arms, motion, six matrices
+    for role in ("stage", "template-map", "routes", "samples-with", "samples-without"):
+        pixels = Image.open(io.BytesIO(b64decode(tab.picture(role).partition(",")[2])))
+        assert len(pixels.getcolors(1_000_000)) > 10, role
+
+
+def test_the_table_of_figures_fits_a_desktop(tab):
+    table = tab.page.locator('[data-case="0"] .metrics')
+    assert table.evaluate("t => t.scrollWidth <= t.parentElement.clientWidth")
+    heading = table.locator("tr.group th").first
+    assert heading.evaluate("t => t.clientWidth > 0.9 * t.closest('table').clientWidth")  # spans all columns
+
+
+def test_it_plays_pauses_and_stops_at_the_end(tab):
+    assert tab.time() == 0.0
+    tab.part("play").click()
+    tab.wait(lambda: tab.time() > 0.2)
+    tab.part("play").click()
+    paused = tab.time()
+    tab.page.wait_for_timeout(200)
+    assert tab.time() == paused
+    tab.part("pace").select_option("4")
+    tab.part("scrub").fill("970")
+    tab.part("play").click()
+    tab.wait(lambda: tab.time() == 12.0)
+    tab.wait(lambda: tab.part("play").get_attribute("aria-label") == "play")
+
+
+def test_scrubbing_moves_the_cars_and_names_the_primitive(tab):
+    before = tab.picture("stage")
+    tab.part("scrub").fill("500")
+    assert tab.time() == 6.0
+    assert tab.picture("stage") != before
+    assert tab.part("primitive").inner_text() == "2 of 3: west drives on, south drives slowly"
+    assert "10.0 m/s" in tab.part("readout").inner_text()
+
+
+def test_samples_and_sets_can_be_chosen(tab):
+    assert tab.part("sample").locator("option").count() == 6
+    before = tab.picture("stage")
+    tab.part("next").click()
+    assert tab.part("sample").evaluate("s => s.selectedIndex") == 1
+    assert tab.picture("stage") != before
+    tab.part("previous").click()
+    tab.part("previous").click()
+    assert tab.part("sample").evaluate("s => s.selectedIndex") == 5
+    tab.part("arm").select_option("oracle")
+    assert tab.part("sample").locator("option").count() == 1
+    alone = tab.picture("stage")
+    tab.part("arm").select_option("without")
+    assert tab.picture("stage") != alone
+    crowd = tab.picture("stage")
+    tab.part("ghosts").uncheck()
+    assert tab.picture("stage") != crowd
+    far = tab.picture("stage")
+    tab.part("follow").check()
+    assert tab.picture("stage") != far
+    assert tab.troubles == []
+
+
+def test_another_case_opens(tab):
+    tab.page.locator('[data-show="1"] button').click()
+    assert tab.page.locator('[data-case="1"]').is_visible() and not tab.page.locator('[data-case="0"]').is_visible()
+    assert "There is no such set" in tab.page.locator('[data-case="1"]').inner_text()
+    tab.part("scrub", 1).fill("250")
+    assert tab.time(1) == 3.0 and tab.troubles == []
+
+
+def test_the_keyboard_drives_it(tab):
+    tab.page.keyboard.press("ArrowRight")
+    assert tab.part("sample").evaluate("s => s.selectedIndex") == 1
+    tab.page.keyboard.press("Space")
+    tab.wait(lambda: tab.time() > 0.1)
+    tab.page.keyboard.press("Space")
+    paused = tab.time()
+    tab.page.wait_for_timeout(200)
+    assert tab.time() == paused
+
+
+def test_a_phone_shows_all_of_it(browser, report):
+    tab = Report(browser, report, PHONE)
+    tab.page.wait_for_timeout(300)
+    assert tab.troubles == []
+    wide = "all => all.filter(e => e.getBoundingClientRect().right > innerWidth + 1).map(e => e.outerHTML.slice(0, 90))"
+    for case in (0, 1):
+        tab.page.locator(f'[data-show="{case}"] button').click()
+        tab.page.wait_for_timeout(100)
+        assert tab.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+        assert tab.page.locator("section:not([hidden])").locator("canvas, .chart svg, button, select").evaluate_all(wide) == []
+    tab.page.set_viewport_size({"width": 800, "height": 600})  # turned
+    tab.wait(lambda: abs(tab.part("stage", 1).evaluate("c => c.width / c.clientWidth") - 1.0) < 0.02)
+    tab.page.close()
+
+
+def test_an_ego_is_drawn_as_its_witness(browser, tmp_path):
+    """The vehicle that is left out has a dashed outline and line of its own; nothing else breaks, with one vehicle left."""
+    path = tmp_path / "ego.html"
+    write_report(path, ReportInput([ego_case(4)]))
+    tab = Report(browser, path, DESKTOP)
+    tab.page.wait_for_timeout(300)
+    assert tab.troubles == []
+    assert "Vehicle west is left out for a planner under test" in tab.page.locator("main").inner_text()
+    before = tab.picture("stage")
+    tab.part("play").click()
+    tab.wait(lambda: tab.picture("stage") != before)
+    assert tab.troubles == []
+    tab.page.close()
+
+
+def test_who_arrives_late_is_not_shown_before(browser, tmp_path):
+    case = report_case(3, without=False)
+
+    def late(motion):
+        present = motion.present.copy()
+        present[1, 0] = 60
+        return replace(motion, present=present)
+
+    made = replace(case.generated, scenarios=tuple(map(late, case.generated.scenarios)))
+    write_report(
+        tmp_path / "late.html", ReportInput([replace(case, encounter=late(case.encounter), generated=made, oracle=None)])
+    )
+    tab = Report(browser, tmp_path / "late.html", DESKTOP)
+    tab.page.wait_for_timeout(300)
+    assert "not there" in tab.part("readout").inner_text()
+    tab.part("scrub").fill("800")
+    assert "not there" not in tab.part("readout").inner_text() and tab.troubles == []
+    tab.page.close()

@@ -1,0 +1,270 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Every scenario of a bag is checked anew, against what the bag itself says of its request."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from msg_conventions.scenarios import digest, encode_scenario
+from msg_conventions.topics import topic_entry
+from scenario_gen.bags.recordings.read import read_recording
+from scenario_gen.bags.recordings.write import result_messages, write_recording
+from scenario_gen.bags.storage.bag import read_messages
+from scenario_gen.bags.storage.metadata import qos_yaml
+from scenario_gen.bags.storage.writer import atomic_bag
+from scenario_gen.base.errors import InputError
+from scenario_gen.cli.commands import app
+from scenario_gen.closed_loop.trials import read_trials
+from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
+from scenario_gen.method.nearest import attempt
+from scenario_gen.method.sampling import SamplingConfig
+from scenario_gen.method.segmentation import segment
+from scenario_gen.method.validity import Limits
+from scenario_gen.output.review.evaluation import bag_results
+from scenario_gen.output.review.regenerate import regenerate_scenario
+from scenario_gen.output.review.validation import ALTERED, NO_WITNESS, UNUSABLE, validate_bag
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.roads import build_road
+from scenario_gen.types.request import Request
+from scenario_gen.types.scenario import BoundaryStates
+
+
+@pytest.fixture(scope="module")
+def run():
+    """A real run: the synthetic merging case on a straight road."""
+    (encounter,) = read_log([bundled("c")]).encounters
+    config = PipelineConfig(sampling=SamplingConfig(variety="narrow"))
+    road = build_road("straight", encounter, config.road)
+    return attempt(encounter, segment(encounter, config.segmentation, 7), road, config, Request(), count=4, seed=7)
+
+
+def rewritten(bag, target, change, without=()):
+    """Copy a bag; `change(k, scenario bytes)` gives the bytes of scenario k."""
+    index = 0
+    with atomic_bag(target) as writer:
+        for message in read_messages(bag):
+            if message.topic.rpartition("/")[2] in without:
+                continue
+            kind, quality = topic_entry(message.topic)
+            writer.add_topic(message.topic, kind, qos_yaml(quality))
+            data = message.data
+            if message.topic.endswith("/scenarios"):
+                data, index = change(index, data), index + 1
+            writer.write(message.topic, data, message.stamp_ns)
+    return target
+
+
+def test_what_is_published_is_valid(run, tmp_path):
+    (found,) = validate_bag(write_recording(tmp_path / "run", {"/here": run}))
+    assert (found.namespace, found.scenarios, found.invalid) == ("/here", 4, 0)
+    assert found.left_out == {} and found.found == {}
+
+
+def test_each_fault_is_found_with_its_cause_and_place(run, tmp_path):
+    good = run.generated.scenarios
+    moved = [s.position.copy() for s in good]
+    moved[1][:] += (0.0, 400.0)  # far off the road, and off what was asked
+    moved[2][1] = moved[2][0]  # one on top of the other
+    bad = [replace(scenario, position=position) for scenario, position in zip(good, moved, strict=True)]
+    elsewhere = replace(good[3], frame_id="elsewhere")
+    stamp = run.encounter.start_ns
+    messages = [encode_scenario(s, stamp) for s in (*bad[:3], elsewhere)]
+    bag = rewritten(write_recording(tmp_path / "run", {"/here": run}), tmp_path / "bad", lambda k, _: messages[k])
+    (found,) = validate_bag(bag)
+    assert (found.scenarios, found.invalid) == (4, 3)
+    assert found.found["off_road"].scenario == 1
+    assert found.found["boundary_state"].count == 2
+    assert found.found["overlap"].scenario == 2
+    assert found.found[UNUSABLE].scenario == 3
+    assert "elsewhere" in found.found[UNUSABLE].message
+
+
+def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
+    """The bundled case b has a yielder; hold it to more than it was held to."""
+    (encounter,) = read_log([bundled("b")]).encounters
+    config = PipelineConfig()
+    road = build_road("t_intersection", encounter, config.road)
+    made = attempt(encounter, segment(encounter, config.segmentation, 7), road, config, Request(), count=4, seed=7)
+    assert [edge.name("12") for edge in made.generated.reactions] == ["2 yields to 1"]
+    bag = write_recording(tmp_path / "b", {"/here": made})
+    (kept,) = validate_bag(bag)
+    (edge,) = made.generated.reactions
+    assert kept.found == {} and kept.proven == {edge.words("12"): 4}
+    (found,) = validate_bag(bag, Limits(anticipation=0.0, patience=0.0))
+    assert set(found.found) == {"reaction"}
+    assert found.proven == {edge.words("12"): 4 - found.found["reaction"].count}
+    (measured,) = bag_results(bag)  # evaluate holds them to the same
+    assert measured.published == 4 and measured.generated.reactions == (edge,)
+    assert measured.reacting["edges"] == [edge.document("12") | {"kept": True}]
+    assert bag_results(bag, limits=Limits(anticipation=0.0, patience=0.0))[0].generated.refused["reaction"] >= 1
+    (summary,) = read_recording(bag).namespaces["/here"].summaries
+    assert summary.reactions == tuple(made.reacting["edges"])
+    assert "has cleared; allowed are" in found.found["reaction"].message
+
+
+def test_what_the_bag_does_not_say_is_said(run, tmp_path):
+    silent = ("tracks", "map", "fit", "info")  # scenarios/info knows what was asked, too
+    bag = rewritten(write_recording(tmp_path / "run", {"/here": run}), tmp_path / "bare", lambda _, data: data, silent)
+    (found,) = validate_bag(bag)
+    assert found.invalid == 0
+    assert sorted(sentence.partition(":")[0] for sentence in found.left_out) == [
+        "boundary_state",
+        "off_road",
+        "passing_order",
+        "sha256",
+        "stop_not_kept",
+    ]
+    assert set(found.left_out.values()) == {4}
+
+
+def test_a_scenario_is_held_against_what_was_asked_of_itself(run, tmp_path):
+    """A request with states of its own does not change `fit`: its `scenarios/info` says what they were."""
+    fit = replace(run.fit, asked=BoundaryStates(run.fit.asked.start + np.array((0.0, 5.0, 0.0, 0.0)), run.fit.asked.end))
+    (found,) = validate_bag(write_recording(tmp_path / "other", replace(run, fit=fit)))
+    assert found.found["boundary_state"].count == 4
+    without_fit = rewritten(tmp_path / "other", tmp_path / "info", lambda _, data: data, ("fit",))
+    assert validate_bag(without_fit)[0].found["boundary_state"].count == 4
+    own = rewritten(write_recording(tmp_path / "run", {"/here": run}), tmp_path / "own", lambda _, data: data, ("fit",))
+    assert validate_bag(own)[0].found == {} and validate_bag(own)[0].left_out == {}
+
+
+def test_a_vehicle_may_be_left_out_and_the_order_of_the_others_is_free(run, tmp_path):
+    def swapped(k, _data):
+        scenario, order = run.generated.scenarios[k], [1, 0] if k else [1]
+        arrays = {name: getattr(scenario, name)[order] for name in ("position", "heading", "speed", "acceleration", "present")}
+        vehicles = tuple(np.array(scenario.vehicles, dtype=object)[order])
+        return encode_scenario(replace(scenario, vehicles=vehicles, **arrays), run.encounter.start_ns)
+
+    (found,) = validate_bag(rewritten(write_recording(tmp_path / "run", {"/here": run}), tmp_path / "ego", swapped, ("info",)))
+    unknown = ("sha256: there is no entry on scenarios/info", "boundary_state: it is not known what was asked")
+    assert found.found == {} and found.left_out == dict.fromkeys(unknown, 4)
+
+
+def test_scenarios_that_are_not_as_published_are_named(run, tmp_path):
+    """A scenario moved by a nanometre is still valid by itself; only its account knows better."""
+    bag = write_recording(tmp_path / "run", {"/here": run})
+    other = replace(run.generated.scenarios[2], position=run.generated.scenarios[2].position + 1e-9)
+    changed = rewritten(
+        bag, tmp_path / "changed", lambda k, data: encode_scenario(other, run.encounter.start_ns) if k == 2 else data
+    )
+    (found,) = validate_bag(changed)
+    assert (found.scenarios, found.invalid) == (4, 1)
+    assert list(found.found) == [ALTERED]
+    assert (found.found[ALTERED].count, found.found[ALTERED].scenario) == (1, 2)
+    index = run.generated.scenarios[2].index
+    assert f"message 2 has SHA-256 {digest(encode_scenario(other, run.encounter.start_ns))[:12]}" in found.found[ALTERED].message
+    assert f"index {index} of request 1 was published as" in found.found[ALTERED].message
+    answer = CliRunner().invoke(app, ["validate", str(changed)])
+    assert answer.exit_code == 1 and ALTERED in answer.output
+
+
+def several_maps(run, target):
+    """A bag in which the road moved by 1 km after the first set; the stamps are the same."""
+    far = replace(run.road, origin=run.road.origin + np.array((0.0, 1000.0)))
+    moved = tuple(replace(s, position=s.position + np.array((0.0, 1000.0))) for s in run.generated.scenarios)
+    states = [s + np.array((0.0, 1000.0, 0.0, 0.0)) for s in (run.fit.asked.start, run.fit.asked.end)]
+    later = replace(run, road=far, generated=replace(run.generated, scenarios=moved))
+    later = replace(later, fit=replace(run.fit, asked=BoundaryStates(*states)))
+    with atomic_bag(target) as writer:
+        for k, one in enumerate((run, later)):
+            for topic, data, stamp in result_messages(one, str(k + 1)):
+                kind, quality = topic_entry(topic)
+                writer.add_topic(f"/here/{topic}", kind, qos_yaml(quality))
+                writer.write(f"/here/{topic}", data, stamp + k * 10**12)
+    return target
+
+
+def test_a_scenario_is_held_against_its_own_map(run, tmp_path):
+    bag = several_maps(run, tmp_path / "two")
+    (found,) = validate_bag(bag)
+    assert (found.scenarios, found.invalid, found.left_out) == (8, 0, {})
+    assert bag_results(bag)[0].evaluation.value("scenarios", "off_road_rate") == 0.0
+
+
+def test_a_scenario_whose_entry_was_lost_is_unaccounted(run, tmp_path):
+    """The last chunk of a recording is lost, and with it what `scenarios/info` said last."""
+    bag = write_recording(tmp_path / "run", {"/here": run})
+    infos = [m.data for m in read_messages(bag) if m.topic.endswith("/scenarios/info")]
+    cut = without_infos(bag, tmp_path / "cut", infos[-3:])
+    (found,) = validate_bag(cut)
+    assert (found.scenarios, found.invalid, found.unaccounted, found.found) == (4, 0, 2, {})
+    answer = CliRunner().invoke(app, ["validate", str(cut)])
+    assert answer.exit_code == 0 and "2 unaccounted" in answer.output
+    (case,) = bag_results(cut)
+    assert any("2 of 4 scenarios are unaccounted" in note for note in case.evaluation.row("scenarios").notes)
+    assert "unaccounted" in case.evaluation.to_json()
+    first = without_infos(bag, tmp_path / "first", infos[:1])  # one in the middle, beside one that was altered
+    other = encode_scenario(replace(run.generated.scenarios[2], seed=1, frame_id="elsewhere"), run.encounter.start_ns)
+    (found,) = validate_bag(rewritten(first, tmp_path / "altered", lambda k, data: other if k == 2 else data))
+    assert (found.unaccounted, found.found[ALTERED].count, found.found[ALTERED].scenario) == (1, 1, 2)
+
+
+def test_a_scenario_without_account_is_held_against_no_map_where_there_are_several(run, tmp_path):
+    bag = several_maps(run, tmp_path / "two")
+    lost = [m.data for m in read_messages(bag) if m.topic.endswith("/scenarios/info")][-2:]
+    (found,) = validate_bag(without_infos(bag, tmp_path / "cut", lost))
+    assert (found.scenarios, found.invalid, found.unaccounted) == (8, 0, 1)
+    assert found.left_out["off_road: no road is known"] == 1
+
+
+def without_infos(bag, target, infos):
+    """Copy a bag without these messages of `scenarios/info`."""
+    with atomic_bag(target) as writer:
+        for message in read_messages(bag):
+            if not message.topic.endswith("/scenarios/info") or message.data not in infos:
+                kind, quality = topic_entry(message.topic)
+                writer.add_topic(message.topic, kind, qos_yaml(quality))
+                writer.write(message.topic, message.data, message.stamp_ns)
+    return target
+
+
+def test_the_command_answers_with_its_exit_code(run, tmp_path):
+    bag = write_recording(tmp_path / "run", {"/here": run})
+    assert CliRunner().invoke(app, ["validate", str(bag)]).exit_code == 0
+    cut = rewritten(bag, tmp_path / "cut", lambda k, data: data[:200] if k == 2 else data)
+    answer = CliRunner().invoke(app, ["validate", str(cut)])
+    assert answer.exit_code == 1
+    assert "3 of 4" in answer.output and UNUSABLE in answer.output
+    with pytest.raises(InputError, match="no such bag"):
+        validate_bag(tmp_path / "none")
+    with pytest.raises(InputError, match="nothing to check"):
+        validate_bag(rewritten(bag, tmp_path / "empty", lambda _, data: data, ("scenarios",)))
+
+
+def test_an_ego_is_checked_with_its_witness(run, tmp_path):
+    """The witness is a part of what is proven: one that hits another is found, one that is lost or altered is said."""
+    slot = attempt(run.encounter, run.segmentation, run.road, PipelineConfig(), Request(ego="2"), count=3, seed=4)
+    whole = validate_bag(write_recording(tmp_path / "whole", slot))[0]
+    assert (whole.scenarios, whole.found, whole.left_out) == (3, {}, {})
+
+    def bag_with(name, change):
+        with atomic_bag(tmp_path / name) as bag:
+            for message in read_messages(tmp_path / "whole"):
+                data = change(message.data) if message.topic == "/ego/witness" else message.data
+                if data is not None:
+                    bag.add_topic(message.topic, message.type, qos_yaml(topic_entry(message.topic)[1]))
+                    bag.write(message.topic, data, message.stamp_ns)
+        return tmp_path / name
+
+    (lost,) = validate_bag(bag_with("lost", lambda _: None))
+    assert (lost.found, lost.left_out) == ({}, {NO_WITNESS: 3})
+    (altered,) = validate_bag(bag_with("altered", lambda data: data[:-8] + bytes(8)))
+    assert altered.found[ALTERED].count == 3
+    with pytest.raises(InputError, match="the witness with SHA-256"):
+        regenerate_scenario(tmp_path / "lost", slot.generated.scenarios[0].index)
+    with pytest.raises(InputError, match="whose witness is not in the bag"):
+        read_trials(tmp_path / "lost")
+    hitting = tuple(replace(one, witness=on_top_of(one)) for one in slot.generated.scenarios)
+    (hit,) = validate_bag(write_recording(tmp_path / "hit", replace(slot, generated=replace(slot.generated, scenarios=hitting))))
+    assert hit.found["overlap"].count == 3
+
+
+def on_top_of(scenario):
+    """The scenario's witness where its first vehicle is."""
+    arrays = {name: getattr(scenario, name)[:1] for name in ("position", "heading", "speed", "acceleration", "present")}
+    return replace(scenario.witness, time=scenario.time, **arrays)

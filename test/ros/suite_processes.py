@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Real nodes in real processes, and a client to talk to them."""
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+import json
+import os
+from pathlib import Path
+import sys
+import threading
+import time
+
+from node_server import start_nodes
+
+from scenario_gen.ros.plumbing.domain import this_host_only
+
+ROOT = Path(__file__).resolve().parents[2]
+RESOURCES = ROOT / "scenario_gen" / "resources"
+os.environ.setdefault("AMENT_PREFIX_PATH", sys.prefix)
+os.environ.update(this_host_only())
+
+
+class Processes:
+    """Nodes as forked processes, as the demo runs them, by name with their ROS arguments; `namespaces` of those that have any."""
+
+    def __init__(
+        self, folder: Path, domain: int, nodes: dict[str, list[str]], namespaces: dict[str, tuple[str, ...]] | None = None
+    ):
+        self.folder = folder
+        spaces = {node: [w for name in (namespaces or {}).get(node, ()) for w in ("--namespace", name)] for node in nodes}
+        specification = [
+            {"node": node, "arguments": [*spaces[node], "--ros-args", *arguments], "log": str(folder / f"{node}.log")}
+            for node, arguments in nodes.items()
+        ]
+        (folder / "suite.json").write_text(json.dumps(specification))
+        environment = {"ROS_DOMAIN_ID": str(domain), "RCUTILS_COLORIZED_OUTPUT": "0", "ROS_LOG_DIR": str(folder)}
+        self.process = start_nodes("forked", str(folder / "suite.json"), **environment)
+        assert json.loads(self.process.stdout.readline())["event"] == "loaded"
+        started = [json.loads(self.process.stdout.readline()) for _ in nodes]
+        self.pids = {event["node"]: event["pid"] for event in started}
+
+    def end(self) -> dict[str, int]:
+        """End all nodes as Ctrl-C does; return their exit codes."""
+        self.process.stdin.close()
+        events = [json.loads(line) for line in self.process.stdout]
+        self.process.wait(180.0)
+        return {event["node"]: event["code"] for event in events if event["event"] == "exited"}
+
+    def log(self, node: str) -> str:
+        return (self.folder / f"{node}.log").read_text()
+
+
+class Client:
+    """A node of the test's own that hears topics raw and calls services."""
+
+    def __init__(self, domain: int):
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = rclpy.create_node("test_client", context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.heard: dict[str, list[bytes]] = defaultdict(list)
+        self._publishers, self._callers = {}, {}
+        self.thread = threading.Thread(target=self.executor.spin, daemon=True)
+        self.thread.start()
+
+    def hear(self, *topics: str) -> None:
+        for topic in topics:
+            self.also(topic, lambda _: None)
+
+    def also(self, topic: str, callback) -> None:
+        """Hear a topic, and call back after each message."""
+        message, quality = self._kind_of(topic)
+
+        def take(data: bytes) -> None:
+            self.heard[topic].append(data)
+            callback(data)
+
+        self.node.create_subscription(message, topic, take, quality, raw=True)
+
+    def announce(self, topic: str) -> None:
+        if topic not in self._publishers:
+            message, quality = self._kind_of(topic)
+            self._publishers[topic] = self.node.create_publisher(message, topic, quality)
+
+    def say(self, topic: str, data: bytes) -> None:
+        self.announce(topic)
+        self._publishers[topic].publish(data)
+
+    @staticmethod
+    def _kind_of(topic: str):
+        from msg_conventions.topics import topic_entry
+        from scenario_gen.ros.plumbing.topics import message_class, qos
+
+        kind, quality = topic_entry(topic)
+        return message_class(kind), qos(quality)
+
+    def wait(self, topic: str, count: int = 1, timeout: float = 180.0) -> list[bytes]:
+        self.until(lambda: len(self.heard[topic]) >= count, f"{count} messages on {topic}", timeout)
+        return self.heard[topic]
+
+    def until(self, condition, what: str, timeout: float = 180.0) -> None:
+        deadline = time.monotonic() + timeout
+        while not condition():
+            assert time.monotonic() < deadline, f"waited {timeout} s for {what}"
+            time.sleep(0.02)
+
+    def call_later(self, kind, name: str, request):
+        if name not in self._callers:  # one for all calls of a service, so that they arrive in order
+            self._callers[name] = self.node.create_client(kind, name)
+        assert self._callers[name].wait_for_service(120.0), name
+        return self._callers[name].call_async(request)
+
+    def call(self, kind, name: str, request, timeout: float = 180.0):
+        future = self.call_later(kind, name, request)
+        self.until(future.done, f"an answer of {name}", timeout)
+        return future.result()
+
+    def close(self) -> None:
+        self.executor.shutdown(timeout_sec=2.0)
+        self.thread.join(2.0)
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+
+def whole_chain(folder: Path, domain: int, nodes: Iterable[str], *, count: int) -> Iterator[Processes]:
+    """Run nodes on one log, with sets of `count` scenarios and a bag in `folder`; a test that has not ended them has failed."""
+    arguments: dict[str, list[str]] = {node: [] for node in nodes}
+    arguments["log_player"] = ["-p", f"log_path:={RESOURCES / 'synthetic_c'}"]
+    arguments["road_server"] = ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"]
+    arguments["gp_sampler"] = ["-p", f"count:={count}", "-p", "seed:=7"]
+    arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
+    made = Processes(folder, domain, arguments)
+    yield made
+    if made.process.poll() is None:
+        made.process.kill()

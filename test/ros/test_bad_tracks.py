@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tracks that no road user drove hurt nobody: every node says what is wrong with them, and serves the next good ones."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from suite_processes import Processes, RESOURCES
+
+from msg_conventions.diagnostics import decode_diagnostics, Level
+from msg_conventions.fits import decode_fit
+from msg_conventions.streams import encode_fix, encode_speed
+from msg_conventions.tracks import encode_tracks
+from scenario_gen.logs import read_log
+from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.presence import ALWAYS
+
+pytestmark = pytest.mark.dds
+NODES = {
+    "road_server": ["-p", "road_name:=corridor", "-p", "wait_for_tracks:=true"],
+    "segmenter": [],
+    "planner": [],
+    "gp_sampler": ["-p", "count:=1"],
+    "evaluator": [],
+}
+GIBIBYTE = 1 << 20  # kB
+
+
+def _offset(encounter: Encounter, metres: float) -> bytes:
+    position = encounter.position.copy()
+    position[1, :, 1] += metres
+    return encode_tracks(replace(encounter, position=position))
+
+
+def _repeated(encounter: Encounter, samples: int) -> bytes:
+    """The first sample over and over, a thousand times a second."""
+    return encode_tracks(
+        replace(
+            encounter,
+            dt_ns=1_000_000,
+            position=np.repeat(encounter.position[:, :1], samples, axis=1),
+            heading=np.repeat(encounter.heading[:, :1], samples, axis=1),
+            speed=np.repeat(encounter.speed[:, :1], samples, axis=1),
+            present=ALWAYS,
+        )
+    )
+
+
+def _peak(pid: int) -> int:
+    """The most memory [kB] that a process has had."""
+    lines = (Path("/proc") / str(pid) / "status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
+
+
+def test_bad_tracks_are_named_by_every_node_and_the_next_good_ones_are_served(tmp_path, domain, client):
+    (good,) = read_log(RESOURCES / "synthetic_c").encounters
+    client.hear("/diagnostics", "/fit", "/report")
+    made = Processes(tmp_path, domain, NODES)
+    try:
+        client.say("/tracks", encode_tracks(good))
+        client.wait("/report")
+        for data, words in (
+            (_offset(good, 1e4), "never nearer than"),
+            (_offset(good, 1e7), "never nearer than"),
+            (_repeated(good, 100_000), "bytes, at most"),
+            (_repeated(good, 25_000), "50000 samples, 45000 are possible"),
+        ):
+            client.heard["/diagnostics"].clear()
+            client.say("/tracks", data)
+            for node in NODES:
+                client.until(lambda node=node, words=words: _named(client, node, words), f"{words!r} of {node}")
+        later = replace(good, start_ns=good.start_ns + 10**9)
+        client.say("/tracks", encode_tracks(later))
+        client.wait("/report", 2)
+        assert decode_fit(client.heard["/fit"][-1])[0] == later.start_ns
+        assert {node: _peak(pid) for node, pid in made.pids.items() if _peak(pid) >= GIBIBYTE} == {}
+        client.until(lambda: _levels(client) == dict.fromkeys(NODES, Level.OK), "the end of what was wrong with the tracks")
+    finally:
+        codes = made.end()
+    assert codes == dict.fromkeys(NODES, 0)
+
+
+def _levels(client) -> dict[str, Level]:
+    """What each node said last of its tracks."""
+    statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
+    return {s.name[1:].removesuffix(": tracks"): s.level for s in statuses if s.name.endswith(": tracks")}
+
+
+def _named(client, node: str, words: str) -> bool:
+    statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
+    return any(s.level is Level.ERROR and s.name == f"/{node}: tracks" and words in s.message for s in statuses)
+
+
+def test_streams_of_vehicles_far_apart_are_named_and_the_next_good_ones_become_tracks(tmp_path, domain, client):
+    """A vehicle that is 10 km off, then one that is off the globe; then a drive side by side."""
+    client.hear("/diagnostics", "/tracks")
+    topics = [f"/vehicle_{name}/{kind}" for name in ("1", "2") for kind in ("fix", "speed")]
+    for topic in topics:
+        client.announce(topic)
+    made = Processes(tmp_path, domain, {"segmenter": ["-p", "live.silence:=1.0"]})
+    try:
+        client.until(lambda: all(client.node.count_subscribers(topic) for topic in topics), "the segmenter's subscriptions")
+        client.heard.clear()
+        for start, north, words in ((1, 0.09, "no two vehicles are within"), (2, 90.0, "only vehicle 1 has usable positions")):
+            _drive(client, start * 10**18, north)
+            client.until(lambda words=words: any(words in text for text in _errors(client)), words)
+        assert not client.heard["/tracks"]
+        _drive(client, 3 * 10**18 // 2, 4e-5)
+        client.wait("/tracks")
+        assert _peak(made.pids["segmenter"]) < GIBIBYTE
+    finally:
+        assert made.end() == {"segmenter": 0}
+
+
+def _drive(client, start_ns: int, north: float) -> None:
+    """Ten seconds of two vehicles, the second one so many degrees north of the first."""
+    for k in range(100):
+        stamp = start_ns + k * 100_000_000
+        for name, offset in (("1", 0.0), ("2", north)):
+            client.say(f"/vehicle_{name}/fix", encode_fix(42.0 + offset, -83.0 + 1e-5 * k, stamp, "a"))
+            client.say(f"/vehicle_{name}/speed", encode_speed(8.3, stamp, "a"))
+
+
+def _errors(client) -> list[str]:
+    statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
+    return [s.message for s in statuses if s.level is Level.ERROR]

@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Long work ends where it stands when nobody waits for it any more, and is the same when somebody does."""
+
+import threading
+
+import pytest
+
+from scenario_gen.base.cancelling import cancellable, CancelledError, stop_if_cancelled
+from scenario_gen.base.errors import ScenarioGenError
+from scenario_gen.logs import read_log
+from scenario_gen.method.fitting import fit_template
+from scenario_gen.method.routing import plan_routes
+from scenario_gen.method.segmentation import segment
+from scenario_gen.roads import build_road
+from scenario_gen.ros.plumbing.worker import Worker
+
+CASE = "scenario_gen/resources/synthetic_c"
+
+
+def test_every_stage_of_a_node_can_be_cancelled(request):
+    def read():  # anew: what is derived of an encounter is derived once
+        return read_log(request.config.rootpath / CASE).encounters[0]
+
+    encounter = read()
+    segmentation, road = segment(encounter), build_road("straight", encounter)
+    fit = fit_template(encounter, segmentation, road)
+    for work in (
+        lambda: segment(encounter),
+        lambda fresh=read(): build_road("straight", fresh),
+        lambda fresh=read(): fit_template(fresh, segmentation, road),
+        lambda: plan_routes(road, fit),
+    ):
+        with cancellable(lambda: True), pytest.raises(CancelledError):
+            work()
+    stop_if_cancelled()  # outside, nothing is
+
+
+def test_a_newer_job_ends_the_running_one_of_its_name_and_nobody_is_told():
+    failures, done, started = [], [], threading.Event()
+    worker = Worker(lambda name, error: failures.append((name, error)))
+
+    def endless(_):
+        started.set()
+        while True:
+            stop_if_cancelled()
+
+    worker.submit("tracks", endless)
+    assert started.wait(60.0)
+    finished = threading.Event()
+    worker.submit("tracks", lambda cancelled: (done.append(cancelled()), finished.set()))
+    assert finished.wait(60.0)
+    worker.close(60.0)
+    assert done == [False] and failures == []
+    assert issubclass(CancelledError, ScenarioGenError)

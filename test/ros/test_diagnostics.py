@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a node says of itself on /diagnostics: all of it every second, at once what changes, and no longer than it is so."""
+
+from collections.abc import Iterator
+import time
+
+import pytest
+from suite_processes import Client
+
+from msg_conventions.diagnostics import decode_diagnostics, Level, of_template, Status, template_of
+from scenario_gen.ros.plumbing.diagnostics import ALSO, AT_ONCE, bounded, family, LARGEST, MOST
+
+pytestmark = pytest.mark.dds
+NODE = "/reporter"
+
+
+class Reporter:
+    """A node that has something to say, spun in this process by whoever waits; and what is heard of it."""
+
+    def __init__(self, domain: int, client: Client):
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+
+        from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
+
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = rclpy.create_node(NODE[1:], context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.client = client
+        client.hear("/diagnostics")
+        self.diagnostics = NodeDiagnostics(self.node)
+        self.until(self.heard, "its first words")
+
+    def heard(self) -> list[tuple[int, dict[str, Status]]]:
+        """Stamps and statuses by subject, of every message."""
+        decoded = [decode_diagnostics(data) for data in list(self.client.heard["/diagnostics"])]
+        return [(stamp, {status.name.partition(": ")[2]: status for status in every}) for stamp, every in decoded]
+
+    def newest(self) -> dict[str, Status]:
+        return self.heard()[-1][1]
+
+    def until(self, condition, what: str) -> None:
+        self.client.until(lambda: self.executor.spin_once(0.02) or condition(), what)
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+
+@pytest.fixture
+def reporter(domain: int, client: Client) -> Iterator[Reporter]:
+    made = Reporter(domain, client)
+    yield made
+    made.close()
+
+
+def test_all_is_said_every_second_stamped_now(reporter: Reporter):
+    from diagnostic_msgs.msg import DiagnosticArray
+    from rclpy.qos import QoSPresetProfiles
+
+    before, aggregated = time.time_ns(), []
+    quality = QoSPresetProfiles.SYSTEM_DEFAULT.value  # diagnostic_aggregator's
+    reporter.client.node.create_subscription(DiagnosticArray, "/diagnostics", aggregated.append, quality)
+    reporter.diagnostics.status(Level.OK, "a road", "road", {"cells": "7"}, 5_000_000_006, log=False)
+    reporter.diagnostics.status(Level.WARN, "moved", "fit of 1", {}, log=False)
+    reporter.until(lambda: {"road", "fit of 1"} <= set(reporter.newest()), "both at once")
+    count = len(reporter.heard())
+    reporter.until(lambda: len(reporter.heard()) >= count + 2, "two more messages")
+    for stamp, statuses in reporter.heard()[count:]:
+        assert before <= stamp <= time.time_ns()
+        assert statuses["road"].values == {"cells": "7", "template_stamp": "5.000000006"}
+        assert template_of(statuses["road"], stamp) == 5_000_000_006
+        assert template_of(statuses["fit of 1"], stamp) == stamp
+        assert {status.name.partition(":")[0] for status in statuses.values()} == {NODE}
+    reporter.until(lambda: aggregated, "what an aggregator hears")
+    assert all(message.header.stamp.sec > 0 for message in aggregated), "it warns of messages without a stamp"
+
+
+def test_what_is_over_goes_back_to_ok_when_it_was_seen(reporter: Reporter):
+    reporter.diagnostics.failed("tracks", ValueError("no quaternion"))
+    reporter.diagnostics.resolve("tracks")
+    reporter.until(lambda: "tracks" in reporter.newest(), "the error")
+    reporter.until(lambda: reporter.newest()["tracks"].level is Level.OK, "its end")
+    levels = [statuses["tracks"].level for _, statuses in reporter.heard() if "tracks" in statuses]
+    assert levels.count(Level.ERROR) >= 3, "whoever looks once a second sees it"
+    assert reporter.newest()["tracks"].message == "over: ValueError: no quaternion"
+    reporter.diagnostics.failed("plan 7", ValueError("once"))
+    reporter.diagnostics.failed("plan 8", ValueError("again"))
+    reporter.until(lambda: reporter.newest().get("plan", Status("", Level.OK, "")).values.get("times") == "2", "the second one")
+    assert reporter.newest()["plan"].values == {"error": "ValueError", "job": "8", "times": "2"}
+    reporter.diagnostics.status(Level.OK, "planned", "plan", {}, log=False)
+    reporter.until(lambda: reporter.newest()["plan"].message == "planned", "good news, at once")
+
+
+def test_a_report_takes_the_place_of_the_one_before(reporter: Reporter):
+    reporter.diagnostics.report(*(Status(f"{NODE}: fit{of}", Level.OK, "") for of in ("", " of 1", " of 2")), stamp_ns=1)
+    reporter.diagnostics.report(Status(f"{NODE}: segmentation", Level.OK, ""))
+    reporter.diagnostics.report(*(Status(f"{NODE}: fit{of}", Level.OK, "") for of in ("", " of 3")), stamp_ns=2)
+    reporter.until(lambda: set(reporter.newest()) == {"fit", "fit of 3", "segmentation"}, "the newer report alone")
+    reporter.diagnostics.enable(False)
+    reporter.diagnostics.state("inactive")
+    reporter.diagnostics.status(Level.OK, "too late", "fit", {}, log=False)
+    reporter.until(lambda: set(reporter.newest()) == {"state"}, "nothing but the state")
+
+
+def test_of_a_storm_all_is_named_in_few_messages(reporter: Reporter):
+    count = len(reporter.heard())
+    for k in range(MOST + ALSO):
+        reporter.diagnostics.status(Level.ERROR, f"finding {k}", "tracks", {}, log=False)
+        reporter.diagnostics.status(Level.OK, "", f"thing_{k}", {}, log=False)
+    reporter.until(lambda: reporter.newest().get("tracks", Status("", Level.OK, "")).message == f"finding {k}", "the last one")
+    heard = reporter.heard()[count:]
+    assert len(heard) < 50
+    assert all(len(statuses) <= MOST for _, statuses in heard)
+    said = {words for _, statuses in heard if "tracks" in statuses for words in _findings(statuses["tracks"])}
+    assert {f"finding {n}" for n in range(k - ALSO, k + 1)} <= said
+    assert reporter.newest()["tracks"].level is Level.ERROR, "of too many, what is well is left out"
+
+
+def test_what_comes_too_fast_waits_for_half_a_second_at_most(reporter: Reporter):
+    while not reporter.diagnostics._regular:  # the next tick is one between two regular messages
+        reporter.diagnostics._tick()
+    for k in range(AT_ONCE + 5):
+        reporter.diagnostics.status(Level.ERROR, f"finding {k}", "tracks", {}, log=False)
+    reporter.diagnostics._tick()
+    assert not reporter.diagnostics._regular
+    reporter.client.until(lambda: reporter.newest().get("tracks", Status("", Level.OK, "")).message == f"finding {k}", "the last")
+
+
+def _findings(status: Status) -> list[str]:
+    return [status.message, *(text for key, text in status.values.items() if key.startswith("also."))]
+
+
+def test_a_status_is_bounded():
+    large = bounded(Status("n: x", Level.WARN, "\x1b" * 10_000, {str(k): "v" * 1000 for k in range(1000)}))
+    assert len(large.message) < 9_000 and "\x1b" not in large.message
+    assert sum(map(len, large.values.values())) < LARGEST + 100
+    assert large.values["left_out"].startswith("935 values")
+    assert family("/a/planner: fit of 7") == family("/a/planner: fit") == "/a/planner: fit"
+
+
+def test_a_template_is_told_by_stamps_of_any_age():
+    for stamp in (0, 1, 999_999_999, 10**9, 1_795_311_199_103_000_000):
+        assert template_of(of_template(Status("", Level.OK, ""), stamp), 7) == stamp
+    for text in ("", "1", "1.5", "x.000000001", "1.00000000x", "-1.000000000"):
+        assert template_of(Status("", Level.OK, "", {"template_stamp": text}), 7) == 7

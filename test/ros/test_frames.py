@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the player tells on /tf and /tf_static, heard by a client and a recorder, and read by other libraries than ours."""
+
+from bag_examples import hand_made_run
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+import numpy as np
+import pytest
+from rosbags.typesys import get_typestore, Stores
+
+from msg_conventions.frames import decode_frames, encode_frames, TYPE
+from msg_conventions.scenarios import encode_scenario
+from msg_conventions.tracks import encode_tracks
+from msg_conventions.trajectory import decode
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.bags.storage.bag import bag_topics
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+@pytest.fixture(scope="module")
+def run():
+    return hand_made_run()
+
+
+@pytest.fixture(scope="module")
+def bag(run, tmp_path_factory):
+    return write_recording(tmp_path_factory.mktemp("frames") / "bag", run)
+
+
+def test_bytes_are_those_of_rosbags_and_are_read_back():
+    poses = np.array([[1.5, -2.25, 0.5], [3.0, 4.0, -3.0]])
+    data = encode_frames(poses, ["vehicle_1", "vehicle_long_2"], "map", 17)
+    assert bytes(STORE.serialize_cdr(STORE.deserialize_cdr(data, TYPE), TYPE)) == data
+    found = decode_frames(data)
+    assert [one[:3] for one in found] == [(17, "map", "vehicle_1"), (17, "map", "vehicle_long_2")]
+    assert np.allclose([one[3] for one in found], poses, rtol=0.0, atol=1e-12)
+
+
+def test_a_type_that_is_not_installed_has_the_name_and_hash_of_the_real_one(client):
+    client.hear("/tf")
+    (offer,) = client.node.get_subscriptions_info_by_topic("/tf")
+    assert offer.topic_type == TYPE
+    assert str(offer.topic_type_hash) == STORE.hash_rihs01(TYPE)
+
+
+@pytest.mark.dds
+@pytest.mark.parametrize("topic", [pytest.param("tracks", marks=pytest.mark.long), "scenarios"])
+def test_a_motion_is_told_sample_by_sample(start, client, run, bag, tmp_path, topic):
+    """Poses are the trajectory's, stamps the clock's, and every footprint's frame hangs on the map."""
+    from std_srvs.srv import Trigger
+
+    kept = tmp_path / "kept"
+    footprints = ("/vehicle_1/footprint", "/vehicle_bus_2/footprint")
+    recorder = start("recorder", bag=kept, topics="/tf(_static)?|/vehicle_.*/footprint")
+    player = start("player", bag=bag, frames=topic, scenario=0 if topic == "tracks" else 3, paused=True, rate=20.0, clock=True)
+    client.hear("/tf", "/tf_static", *footprints)
+    for name in ("/tf", "/tf_static"):
+        client.until(lambda name=name: client.node.count_publishers(name) == 1, f"a publisher of {name}")
+        client.until(lambda name=name: client.node.count_subscribers(name) >= 2 + (name == "/tf"), f"who hears {name}")
+    assert client.call(Trigger, "/player/resume", Trigger.Request()).success
+    output, _ = player.communicate(timeout=180.0)
+    assert player.returncode == 0 and "Traceback" not in output, output
+    client.wait("/tf", 61)
+    client.until(lambda: _counted(client, "/tf") == 61, "61 messages in the bag")
+    recorder.terminate()
+    assert recorder.wait(180.0) == 0
+
+    sent = encode_tracks(run.encounter) if topic == "tracks" else encode_scenario(run.generated.scenarios[3], 0)
+    told = decode(sent, topic)
+    begin = run.encounter.start_ns if topic == "tracks" else _logged(bag, 3)
+    messages = [STORE.deserialize_cdr(data, TYPE) for data in client.heard["/tf"]]
+    for i, child in enumerate(("vehicle_1", "vehicle_bus_2")):
+        mine = [message.transforms[i] for message in messages]
+        assert {(one.header.frame_id, one.child_frame_id) for one in mine} == {(told.frame_id, child)}
+        stamps = [one.header.stamp.sec * 10**9 + one.header.stamp.nanosec for one in mine]
+        assert stamps == (begin + told.time_ns).tolist()
+        places = [(one.transform.translation.x, one.transform.translation.y) for one in mine]
+        assert places == [tuple(place) for place in told.position[i]]
+        turned = np.array([2.0 * np.arctan2(one.transform.rotation.z, one.transform.rotation.w) for one in mine])
+        assert np.allclose(np.cos(turned - told.heading[i]), 1.0, rtol=0.0, atol=1e-12)
+
+    assert {one.name: one.type for one in bag_topics(kept)} == {
+        "/tf": TYPE,
+        "/tf_static": TYPE,
+        **dict.fromkeys(footprints, "geometry_msgs/msg/PolygonStamped"),
+    }
+    tree, drawn = {}, {}
+    with (kept / "kept_0.mcap").open("rb") as stream:
+        for _, channel, _, message in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            for one in getattr(message, "transforms", ()):
+                assert tree.setdefault(one.child_frame_id, one.header.frame_id) == one.header.frame_id
+            if hasattr(message, "polygon"):
+                drawn.setdefault(channel.topic, []).append(message)
+    assert tree == {"local_enu": "map", "vehicle_1": told.frame_id, "vehicle_bus_2": told.frame_id}
+    assert set(drawn) == set(footprints) and {one.header.frame_id for ones in drawn.values() for one in ones} <= set(tree)
+
+
+@pytest.mark.dds
+def test_of_two_players_the_later_tells_no_frames(start, client, bag):
+    """Frames are one for a whole ROS domain, whatever the namespaces: who has told less of them gives in and says so."""
+    client.hear("/tf")
+    first = start("player", bag=bag, loop=True, rate=5.0)
+    client.wait("/tf", 30)
+    second = start("player", "-r", "__ns:=/other", bag=bag, loop=True)
+    assert second.stdout is not None
+    while "another publisher of /tf publishes vehicle_1, vehicle_bus_2" not in (line := second.stdout.readline()):
+        assert line, "it ended"
+    count = len(client.heard["/tf"])
+    client.wait("/tf", count + 50)  # the first goes on
+    first.terminate()
+    output, _ = first.communicate(timeout=180.0)
+    assert first.returncode == 0 and "another publisher" not in output, output
+
+
+@pytest.mark.dds
+def test_a_motion_that_is_not_there_is_refused_if_it_was_asked_for(start, bag):
+    asked = {
+        "has no motion on fit/none": {"frames": "fit/none"},
+        "has 5 messages, counted from 0": {"frames": "scenarios", "scenario": 5},
+    }
+    started = {said: start("player", bag=bag, paused=True, **words) for said, words in asked.items()}
+    for said, process in started.items():
+        output, _ = process.communicate(timeout=180.0)
+        assert process.returncode == 2 and said in output and "Traceback" not in output, output
+
+
+def _counted(client, topic):
+    from msg_conventions.diagnostics import decode_diagnostics
+
+    if "/diagnostics" not in client.heard:
+        client.heard["/diagnostics"] = []
+        client.hear("/diagnostics")
+    said = [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
+    return max((int(one.values[topic]) for one in said if topic in one.values), default=0)
+
+
+def _logged(bag, number):
+    from scenario_gen.bags.storage.bag import read_messages
+
+    return [message.stamp_ns for message in read_messages(bag, lambda name: name.endswith("scenarios"))][number]

@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Vehicles that stream, a segmenter that hears them, and /clock: changepoints while they drive, scenarios when they have."""
+
+import time
+
+import numpy as np
+import pytest
+from suite_processes import Client, Processes, RESOURCES
+
+from msg_conventions import trajectory
+from msg_conventions.changepoints import decode_changepoints
+from msg_conventions.diagnostics import decode_diagnostics, Level
+from msg_conventions.streams import encode_fix, encode_speed
+from msg_conventions.tracks import decode_tracks
+from scenario_gen.logs import read_log
+from scenario_gen.logs.geodesy import latitude_longitude
+
+pytestmark = pytest.mark.dds
+LOG = RESOURCES / "synthetic_c"
+SIM_TIME = ["-p", "use_sim_time:=true"]
+STREAM = ["-p", "stream:=true", "-p", "rate:=12.0", "-p", "wait_matching_subscriptions:=2"]
+NODES = {
+    "log_player": [*SIM_TIME, *STREAM, "-p", f"log_path:={LOG}"],
+    # a busy machine delivers some topics later than others, and now and then nothing for a while
+    "segmenter": [*SIM_TIME, "-p", "live.late:=3.0", "-p", "live.silence:=6.0"],
+    "road_server": [*SIM_TIME, "-p", "road_name:=straight", "-p", "wait_for_tracks:=true"],
+    "planner": SIM_TIME,
+    "gp_sampler": [*SIM_TIME, "-p", "count:=2", "-p", "seed:=7"],
+}
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory, domain):
+    made = Processes(tmp_path_factory.mktemp("live"), domain, NODES)
+    yield made
+    assert made.end() == dict.fromkeys(NODES, 0)
+
+
+def test_changepoints_come_while_the_vehicles_drive_and_scenarios_afterwards(suite, client):
+    """At twelve times the real speed, with the time of /clock."""
+    from std_srvs.srv import Trigger
+
+    (encounter,) = read_log(LOG).encounters
+    order = []
+    client.also("/changepoints/live", lambda _: order.append("live"))
+    client.also("/tracks", lambda _: order.append("tracks"))
+    # the log player waits for two listeners of every stream
+    client.hear("/vehicle_1/fix", "/vehicle_1/speed", "/vehicle_2/fix", "/vehicle_2/speed", "/changepoints", "/scenarios")
+    found = [trajectory.decode(data, "live") for data in client.wait("/changepoints/live", 2)]
+    template = decode_tracks(client.wait("/tracks")[0])
+    assert order[:2] == ["live", "live"] and "tracks" in order
+    for message in found:
+        assert message.stamp_ns == encounter.start_ns
+        assert [vehicle.id for vehicle in message.vehicles] == ["1", "2"]
+    assert abs(found[0].time_ns[0] * 1e-9 - 4.0) < 0.6  # the case's first changepoint
+    assert (template.start_ns, template.duration) == (encounter.start_ns, pytest.approx(encounter.duration, abs=0.2))
+    moved = template.position - encounter.position[:, : len(template.time)]
+    assert np.ptp(moved, axis=(0, 1)).max() < 0.2  # smoothed once more, about another origin
+    points = decode_changepoints(client.wait("/changepoints")[0], template).changepoints * 0.1
+    assert np.abs(points[:, None] - np.array([4.0, 8.0, 12.0])).min(axis=1).max() < 0.6
+    client.wait("/scenarios", 2)
+    assert client.call(Trigger, "/segmenter/segment", Trigger.Request()).message == "started"  # the streams have ended: tracks
+    assert len(set(client.wait("/changepoints", 2))) == 1
+
+
+def test_a_changepoint_does_not_wait_for_what_follows(suite, client):
+    """Twelve seconds of sixteen are said, and no more: the changepoint at four seconds comes, and then what they amount to."""
+    (encounter,) = read_log(LOG).encounters
+    places = latitude_longitude(encounter)
+    start, order = 10**18, []
+
+    def note(data: bytes) -> None:
+        message = trajectory.decode(data, "order")
+        if 0 <= message.stamp_ns - start < 10**9:
+            order.append(message)
+
+    client.also("/changepoints/live", note)
+    client.also("/tracks", note)
+    topics = [f"/vehicle_{name}/{kind}" for name in ("5", "6") for kind in ("fix", "speed")]
+    for topic in topics:
+        client.announce(topic)
+    client.until(lambda: all(client.node.count_subscribers(topic) for topic in topics), "the segmenter's subscriptions")
+    for k in range(120):
+        time.sleep(0.01)  # ten times the real speed, so that no topic runs far ahead of the others
+        stamp = start + k * encounter.dt_ns
+        for i, name in enumerate(("5", "6")):
+            client.say(f"/vehicle_{name}/fix", encode_fix(*places[i, k], stamp, "a"))
+            client.say(f"/vehicle_{name}/speed", encode_speed(encounter.speed[i, k], stamp, "a"))
+    client.until(lambda: any(len(message.time_ns) >= 110 for message in order), "the tracks of what was said")
+    first, tracks = order[0], order[-1]
+    assert [vehicle.id for vehicle in first.vehicles] == [vehicle.id for vehicle in tracks.vehicles] == ["5", "6"]
+    assert len(first.time_ns) == 1 and abs(first.time_ns[0] * 1e-9 - 4.0) < 0.6
+
+
+def test_streams_with_all_that_can_be_wrong_do_not_end_it(suite, client):
+    """Disorder, repetition, NaN, no fix, damaged bytes, wrong types, stamps of another time: then an encounter after all."""
+    from std_msgs.msg import String
+    from std_srvs.srv import Trigger
+
+    client.hear("/tracks", "/diagnostics")
+    client.wait("/tracks")
+    misfit = client.node.create_publisher(String, "/vehicle_8/fix", 10)
+    topics = [f"/vehicle_{name}/{kind}" for name in ("3", "4") for kind in ("fix", "speed")]
+    for topic in topics:
+        client.announce(topic)
+    client.until(lambda: all(client.node.count_subscribers(topic) for topic in topics), "the segmenter's subscriptions")
+    start = 2 * 10**18
+    for k in np.random.Generator(np.random.PCG64(2)).permutation(10):  # what came before is of another time
+        client.say("/vehicle_3/speed", encode_speed(8.0, start - int(k), "a"))
+    for k in range(120):
+        tick = k - k % 3 + (2, 0, 1)[k % 3]  # out of order by threes
+        stamp = start + tick * 100_000_000
+        for name, north in (("3", 0.0), ("4", 4e-5)):
+            place = encode_fix(42.0 + north, -83.0 + 1e-5 * tick, stamp, "a")
+            if k % 7 == 1:
+                place = encode_fix(np.nan, -83.0, stamp, "a")
+            if k % 7 == 2:  # no fix: the status is the first byte behind the header
+                place = place[:18] + b"\xff" + place[19:] if place[18:19] == b"\x00" else place
+            client.say(f"/vehicle_{name}/fix", place)
+            client.say(f"/vehicle_{name}/speed", encode_speed(np.nan if k % 11 == 5 else 0.83, stamp, "a"))
+            if k % 10 == 3:
+                client.say(f"/vehicle_{name}/fix", place)
+                client.say(f"/vehicle_{name}/fix", b"\x00\x01\x00\x00\x07")
+                client.say(f"/vehicle_{name}/fix", encode_fix(42.0, -83.0, stamp + 3600 * 10**9, "a"))
+    misfit.publish(String(data="no fix"))
+    client.say("/vehicle_4/fix", b"\x00\x01\x00\x00" + bytes(8))  # the last message of the longest queue
+    for words in ("/vehicle_4/fix: the message ends at byte 8", "/vehicle_8/fix is a std_msgs"):
+        client.until(lambda words=words: any(s.level is Level.ERROR and words in s.message for s in said(client)), words)
+    heard = len(client.heard["/tracks"])
+    assert "streams" in client.call(Trigger, "/segmenter/segment", Trigger.Request()).message
+    template = decode_tracks(client.wait("/tracks", heard + 1)[-1])
+    assert [vehicle.id for vehicle in template.vehicles] == ["3", "4"]
+    assert abs(template.start_ns - start) < 10**9
+    assert template.duration > 10.0
+
+
+def said(client: Client):
+    return [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]

@@ -1,0 +1,226 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""No scenario is lost on the way, not in a large request nor for one that hangs; and what is lost is said everywhere."""
+
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+
+from lengths import LONG
+from node_server import Forked, start_nodes
+import numpy as np
+import pytest
+from suite_processes import Client, Processes, RESOURCES
+from typer.testing import CliRunner
+import yaml
+
+from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status
+from msg_conventions.scenario_info import encode_info, scenario_entry
+from msg_conventions.scenarios import digest, encode_scenario
+from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.cli.commands import app
+from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.scenario import BoundaryStates, Scenario
+
+pytestmark = pytest.mark.dds
+MANY = 3000 if LONG else 1100  # more than publishers remember
+HANGING = """
+import scenario_gen.ros.nodes
+import rclpy
+from std_msgs.msg import String
+rclpy.init()
+node = rclpy.create_node("hanging")
+node.create_subscription(String, "/hang", lambda _: None, 10, raw=True)
+rclpy.spin(node)
+"""
+
+
+def _statuses(client: Client) -> list[Status]:
+    return [status for data in list(client.heard["/diagnostics"]) for status in decode_diagnostics(data)[1]]
+
+
+def _recorded(client: Client, topic: str) -> int:
+    counts = [int(s.values.get(topic, 0)) for s in _statuses(client) if s.name == "/recorder: recorded"]
+    return max(counts, default=0)
+
+
+def _generate(client: Client, **values):
+    from rcl_interfaces.srv import SetParametersAtomically
+    from rclpy.parameter import Parameter
+
+    parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]
+    request = SetParametersAtomically.Request(parameters=parameters)
+    return client.call(SetParametersAtomically, "/gp_sampler/generate", request, timeout=600.0).result
+
+
+def test_a_large_request_arrives_whole(tmp_path, domain, client):
+    bag = tmp_path / "bag"
+    nodes = {
+        "recorder": ["-p", f"bag:={bag}", "-p", "compress:=false"],
+        "gp_sampler": ["-p", "generate_on_input:=false"],
+        "planner": [],
+        "segmenter": [],
+        "road_server": ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"],
+        "log_player": ["-p", f"log_path:={RESOURCES / 'synthetic_c'}"],
+    }
+    client.hear("/diagnostics")
+    suite = Processes(tmp_path, domain, nodes)
+    try:
+        client.until(lambda: _generate(client, count=1).successful, "the sampler's inputs")
+        answer = _generate(client, count=MANY, seed=3)
+        assert answer.successful and f"{MANY} of {MANY} scenarios" in answer.reason, answer.reason
+        assert not [s.message for s in _statuses(client) if "pace of" in s.name], "nobody hangs"
+        client.until(lambda: _recorded(client, "/scenarios/info") >= MANY + 2, "the recorder to have all", 600.0)
+        assert not [s.message for s in _statuses(client) if s.name == "/recorder: losses" and "lost" in s.message]
+    finally:
+        assert suite.end() == dict.fromkeys(nodes, 0)
+    (scenarios,) = [topic for topic in bag_topics(bag) if topic.name == "/scenarios"]
+    assert scenarios.count == MANY + 1
+    messages = read_messages(bag, lambda topic: topic in ("/scenarios", "/scenarios/info"), BagConfig(most_bytes=2**40))
+    came, told = set(), []
+    for message in messages:
+        if message.topic == "/scenarios":
+            came.add(digest(message.data))
+        else:
+            told += [s.values for s in decode_diagnostics(message.data)[1] if "sha256" in s.values]
+    assert {values["sha256"] for values in told} == came
+    assert len({values["index"] for values in told if values["seed"] == "3"}) == MANY
+
+
+def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, client):
+    """It is said once, what it may lack is said when it goes on, and others are waited for again then."""
+    from rclpy.duration import Duration
+    from std_msgs.msg import String
+
+    from msg_conventions.cdr import CdrWriter
+    from scenario_gen.ros.plumbing.topics import Pace
+
+    publisher, told = client.node.create_publisher(String, "/hang", 5), []
+    pace = Pace(publisher, 5, 0.2, told.append)
+    hanging = subprocess.Popen([sys.executable, "-c", HANGING], env=os.environ | {"ROS_DOMAIN_ID": str(domain)})
+    try:
+        client.until(lambda: publisher.get_subscription_count() == 1, "the subscriber that will hang")
+
+        def publish() -> None:
+            pace.wait(lambda: False)
+            publisher.publish(CdrWriter().string("x").finish())
+
+        for _ in range(20):
+            publish()
+        client.until(lambda: publisher.wait_for_all_acked(Duration()), "what it acknowledges while it runs")
+        pace.end()
+        told.clear()
+        hanging.send_signal(signal.SIGSTOP)
+        for _ in range(20):  # seconds before DDS gives it up by itself
+            publish()
+        assert told == [0]
+        hanging.send_signal(signal.SIGCONT)
+        client.until(lambda: publisher.wait_for_all_acked(Duration()), "what it acknowledges when it goes on")
+        publish()
+        first, second = told
+        assert first == 0 and 10 <= second <= 20
+    finally:
+        hanging.kill()
+        hanging.wait()
+
+
+def _recorder(domain: int, bag: Path) -> Forked:
+    return start_nodes("start", "recorder", "--ros-args", "-p", f"bag:={bag}", ROS_DOMAIN_ID=str(domain))
+
+
+def _scenario(k: int) -> Scenario:
+    """A car that drives straight on; its message has 0.2 MB."""
+    clock = np.arange(1400) * 0.1
+    place = np.stack([clock * 10.0 + k, 0.0 * clock], axis=-1)[None]
+    speed = np.full((1, len(clock)), 10.0)
+    return Scenario((Vehicle("car"),), clock, place, 0.0 * speed, speed, 0.0 * speed, seed=1, index=k)
+
+
+def test_what_is_lost_is_said_in_all_places(domain, tmp_path):
+    """A publisher that waits for nobody, and a recorder that sleeps meanwhile."""
+    count, bag = 200 if LONG else 60, tmp_path / "bag"
+    client = Client(domain)
+    client.hear("/diagnostics")
+    client.announce("/scenarios/info")
+    from rclpy.qos import QoSProfile
+    from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+    hasty = client.node.create_publisher(MultiDOFJointTrajectory, "/scenarios", QoSProfile(depth=2))
+    recorder = _recorder(domain, bag)
+    try:
+        client.until(lambda: hasty.get_subscription_count() == 1, "a subscriber of /scenarios")
+        client.until(lambda: client.node.count_subscribers("/scenarios/info") == 1, "a subscriber of /scenarios/info")
+
+        def publish(k: int) -> None:
+            scenario = _scenario(k)
+            data = encode_scenario(scenario, 0)
+            hasty.publish(data)
+            asked = BoundaryStates(np.zeros((len(scenario.vehicles), 4)), np.zeros((len(scenario.vehicles), 4)))
+            entry = scenario_entry(scenario, data, "1", "/x", template=scenario.vehicles, asked=asked)
+            client.say("/scenarios/info", encode_info(entry, 0))
+
+        publish(0)
+        client.until(lambda: _recorded(client, "/scenarios") == 1, "the first scenario in the bag")
+        recorder.send_signal(signal.SIGSTOP)
+        for k in range(1, count):
+            publish(k)
+        recorder.send_signal(signal.SIGCONT)
+        publish(count)
+        numbers = dict.fromkeys(("published", "requested", "candidates"), str(count + 1))
+        closing = {"request": "1", "seed": "1", **numbers}
+        client.say("/scenarios/info", encode_diagnostics([Status("/x: request", Level.OK, "", closing)], 0))
+
+        def told() -> str:
+            losses = [s.values for s in _statuses(client) if s.name == "/recorder: losses" and s.level is Level.WARN]
+            words = [values.get("/scenarios", "") for values in losses]
+            return next((said for said in words if "lost" in said and "are missing" in said), "")
+
+        client.until(told, "the recorder's warning")
+        recorder.send_signal(signal.SIGINT)
+        output, _ = recorder.communicate(timeout=180.0)
+        assert recorder.returncode == 0 and "Traceback" not in output, output
+    finally:
+        recorder.kill()
+        recorder.communicate()
+        client.close()
+    there = len([message for message in read_messages(bag) if message.topic == "/scenarios"])
+    sentence = f"request 1: {there} of {count + 1} scenarios are there, {count + 1 - there} are missing"
+    assert 0 < there < count
+    assert f"{count + 1 - there} lost" in told() and sentence in told()
+    assert sentence in output
+    info = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert info["custom_data"]["scenario_gen.lost:/scenarios"] == told()
+    answer = CliRunner().invoke(app, ["validate", str(bag)])
+    assert sentence in answer.output.replace("\n", " ") and "by its recorder" in answer.output, answer.output
+
+
+def test_a_killed_recorder_keeps_what_came_before_its_last_seconds(domain, tmp_path):
+    """Far less than a chunk, and then nothing: it is on the disk all the same."""
+    bag, client = tmp_path / "bag", Client(domain)
+    client.hear("/diagnostics")
+    recorder = _recorder(domain, bag)
+    try:
+        client.until(lambda: any(s.name == "/recorder: recorded" for s in _statuses(client)), "the recorder")
+        client.announce("/report")
+        client.until(lambda: client.node.count_subscribers("/report") == 1, "a subscriber")
+        data = encode_diagnostics([Status("/evaluator: row", Level.OK, "")], 0)
+        client.say("/report", data)
+        client.until(lambda: _recorded(client, "/report") == 1, "the message in the bag")
+        client.until(lambda: _saved(bag, tmp_path, data), "the message on the disk")
+        recorder.kill()
+        recorder.wait()
+        assert _saved(bag, tmp_path, data)
+    finally:
+        recorder.kill()
+        recorder.communicate()
+        client.close()
+
+
+def _saved(bag: Path, folder: Path, data: bytes) -> bool:
+    saved = folder / "saved"
+    answer = CliRunner().invoke(app, ["reindex", str(bag), "--out", str(saved)])
+    return answer.exit_code == 0 and data in [message.data for message in read_messages(saved)]

@@ -1,0 +1,124 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A set knows its map: another road while sets are at work leaves nothing of the old one beside the new."""
+
+import json
+
+from lengths import LONG
+from nav_msgs.srv import LoadMap
+import pytest
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.parameter import Parameter
+from suite_processes import Client, whole_chain
+
+from msg_conventions.diagnostics import decode_diagnostics, Level
+from msg_conventions.hashes import decode_hashes, hash_of
+from msg_conventions.lanes import decode_lanes
+from scenario_gen.bags.storage.bag import read_messages
+from scenario_gen.output.review.validation import validate_bag
+
+pytestmark = pytest.mark.dds
+LOADS = 10 if LONG else 2
+NODES = ("log_player", "road_server", "segmenter", "planner", "gp_sampler", "recorder")
+TINY = "image: tiny.pgm\nresolution: 0.5\norigin: [0.0, 0.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory, domain):
+    """The whole chain, with sets long enough to be disturbed."""
+    yield from whole_chain(tmp_path_factory.mktemp("maps"), domain, NODES, count=20)
+
+
+def _infos(client: Client) -> list[dict[str, str]]:
+    return [decode_diagnostics(data)[1][0].values for data in list(client.heard["/scenarios/info"])]
+
+
+def _closed(client: Client, hashed: str) -> bool:
+    return any("published" in values and values["map_hash"] == hashed for values in _infos(client))
+
+
+def _another_road(client: Client, width: float) -> str:
+    """Load the straight road with lanes of another width; return its hash."""
+    parameter = Parameter("road.lane_width", value=width).to_parameter_msg()
+    request = SetParameters.Request(parameters=[parameter])
+    assert client.call(SetParameters, "/road_server/set_parameters", request).results[0].successful
+    before = len(client.heard["/map"])
+    assert client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url="straight")).result == 0
+    return hash_of("map", client.wait("/map", before + 1)[-1])
+
+
+def test_nothing_of_an_old_map_is_said_beside_the_new_one(suite, client):
+    client.hear("/scenarios/info", "/map", "/fit/info")
+    hashes = [hash_of("map", client.wait("/map")[0])]
+    for k in range(LOADS):
+        if k % 3 == 0:  # amid its publication; else while the planner or the sampler is at work, or before
+            client.until(lambda: any(v.get("map_hash") == hashes[-1] for v in _infos(client)), "a scenario on this map")
+        hashes.append(_another_road(client, 3.5 + 0.05 * (k + 1)))
+    client.until(lambda: _closed(client, hashes[-1]), "the set on the last map")
+    assert len(set(hashes)) == LOADS + 1
+    order = [hashes.index(values["map_hash"]) for values in _infos(client)]
+    assert order == sorted(order), "a scenario on an older map came after one on a newer"
+    assert len({values["template_hash"] for values in _infos(client)}) == 1
+    assert decode_hashes(client.heard["/fit/info"][-1], "fit/info")["map"] == hashes[-1]
+
+
+def test_routes_of_an_old_map_are_not_driven_on_one_that_the_planner_refuses(suite, client, tmp_path):
+    client.hear("/scenarios/info", "/map", "/diagnostics")
+    client.until(lambda: _infos(client) and "published" in _infos(client)[-1], "the last set")
+    (tmp_path / "tiny.pgm").write_bytes(b"P5 20 20 255\n" + b"\xff" * 400)
+    (tmp_path / "tiny.yaml").write_text(TINY)
+    assert client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=str(tmp_path / "tiny.yaml"))).result == 0
+
+    def refused() -> bool:
+        statuses = [s for data in list(client.heard["/diagnostics"]) for s in decode_diagnostics(data)[1]]
+        return any(s.name == "/planner: plan" and s.level is Level.ERROR for s in statuses)
+
+    client.until(refused, "the planner's refusal")
+    before = len(client.heard["/scenarios/info"])
+    reasons = []
+
+    def is_told() -> bool:
+        answer = client.call(SetParametersAtomically, "/gp_sampler/generate", SetParametersAtomically.Request()).result
+        reasons.append(answer.reason)
+        return not answer.successful and "fit/info of this map" in answer.reason
+
+    client.until(is_told, f"a refusal that says why, of {reasons}")
+    assert len(client.heard["/scenarios/info"]) == before
+
+
+def _straight_lanes() -> str:
+    """A CommonRoad map of two lanes in each direction, 1 km long."""
+
+    def bound(tag: str, y: float, ends: tuple[float, float]) -> str:
+        return f"<{tag}>" + "".join(f"<point><x>{x}</x><y>{y}</y></point>" for x in ends) + f"</{tag}>"
+
+    lanes = ""
+    for k, y in enumerate((-7.0, -3.5, 0.0, 3.5)):
+        east = k < 2
+        ends = (0.0, 1000.0) if east else (1000.0, 0.0)
+        left, right = (y + 3.5, y) if east else (y, y + 3.5)
+        lanes += f'<lanelet id="{k + 1}">{bound("leftBound", left, ends)}{bound("rightBound", right, ends)}</lanelet>'
+    return f'<commonRoad commonRoadVersion="2020a" timeStepSize="0.1">{lanes}</commonRoad>'
+
+
+def test_lanes_of_a_vector_map_travel_from_the_road_server_to_the_sampler(suite, client, tmp_path):
+    client.hear("/scenarios/info", "/map", "/fit/info", "/road/lanes")
+    (tmp_path / "lanes.xml").write_text(_straight_lanes())
+    before = len(client.heard["/map"])
+    assert client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=str(tmp_path / "lanes.xml"))).result == 0
+    own = hash_of("map", client.wait("/map", before + 1)[-1])
+    client.until(lambda: _closed(client, own), "a set on the lanes")
+    network = decode_lanes(client.heard["/road/lanes"][-1])[1]
+    assert len(network.lanes) == 4
+    together = decode_hashes(client.heard["/fit/info"][-1], "fit/info")
+    assert together["road/lanes"] == hash_of("road/lanes", client.heard["/road/lanes"][-1])
+
+
+def test_the_bag_is_valid_with_each_scenario_on_its_own_map(suite):
+    assert suite.end() == dict.fromkeys(NODES, 0)
+    bag = suite.folder / "bag"
+    (found,) = validate_bag(bag)
+    assert (found.invalid, found.unaccounted, found.found) == (0, 0, {}), json.dumps(found.left_out)
+    assert not any("off_road" in sentence for sentence in found.left_out)
+    assert len({hash_of("map", m.data) for m in read_messages(bag) if m.topic == "/map"}) == LOADS + 3

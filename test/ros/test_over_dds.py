@@ -1,0 +1,212 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The nodes in processes of their own, over DDS."""
+
+import math
+import time
+
+import pytest
+from suite_processes import Client, RESOURCES, whole_chain
+
+from msg_conventions.diagnostics import decode_diagnostics, Level
+from msg_conventions.fits import decode_fit
+from msg_conventions.roads import decode_map
+from msg_conventions.scenarios import decode_scenario, digest, encode_scenario
+from scenario_gen.bags.storage.bag import read_messages
+from scenario_gen.logs import read_log
+from scenario_gen.pipeline import generate, PipelineConfig
+
+pytestmark = pytest.mark.dds
+LOG = RESOURCES / "synthetic_c"
+CHAIN = ("log_player", "segmenter", "planner", "gp_sampler", "road_server", "evaluator", "recorder")
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory, domain):
+    """All nodes, at work on one log; ended as Ctrl-C does, and then looked at."""
+    yield from whole_chain(tmp_path_factory.mktemp("suite"), domain, CHAIN, count=4)
+
+
+def _generate(client: Client, name: str = "/gp_sampler/generate", **values):
+    from rcl_interfaces.srv import SetParametersAtomically
+    from rclpy.parameter import Parameter
+
+    parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]
+    return client.call_later(SetParametersAtomically, name, SetParametersAtomically.Request(parameters=parameters))
+
+
+def test_a_late_joiner_gets_everything(suite, client):
+    client.hear("/scenarios", "/scenarios/info")
+    client.wait("/scenarios/info", 5, timeout=120.0)
+    late = Client(client.context.get_domain_id())
+    try:
+        late.hear("/map", "/tracks", "/changepoints", "/posterior", "/fit", "/vehicle_1/route", "/scenarios", "/report")
+        for topic in ("/map", "/tracks", "/changepoints", "/posterior", "/fit", "/vehicle_1/route", "/report"):
+            late.wait(topic)
+        assert late.wait("/scenarios", 4) == client.wait("/scenarios", 4)
+        rows = {s.name: s.values for s in decode_diagnostics(late.heard["/report"][0])[1]}
+        assert math.isfinite(float(rows["/evaluator: with changepoints"]["e_position"]))
+    finally:
+        late.close()
+
+
+def test_the_origin_of_the_tracks_frame_is_said(suite, client):
+    client.hear("/diagnostics")
+
+    def origins():
+        said = [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
+        return {status.values["origin"] for status in said if status.name == "/log_player: encounter"}
+
+    client.until(origins, "the log player's word on its encounter")
+    (encounter,) = read_log(LOG).encounters
+    assert origins() == {"{!r},{!r}".format(*encounter.origin)}
+
+
+def test_in_process_gives_the_same_bytes(suite, client):
+    client.hear("/scenarios")
+    heard = client.wait("/scenarios", 4)
+    (encounter,) = read_log(LOG).encounters
+    case = generate(encounter, "straight", PipelineConfig(), count=4, seed=7)
+    assert [digest(encode_scenario(s, encounter.start_ns)) for s in case.generated.scenarios] == [
+        digest(data) for data in heard[:4]
+    ]
+
+
+def test_concurrent_requests_get_their_own_answers(suite, client):
+    client.hear("/scenarios", "/scenarios/info")
+    client.wait("/scenarios/info", 5)
+    before = len(client.heard["/scenarios/info"])
+    counts = {seed: 1 + seed % 3 for seed in range(100, 108)}
+    futures = {seed: _generate(client, count=count, seed=seed) for seed, count in counts.items()}
+    for seed, future in futures.items():
+        client.until(future.done, f"the answer for seed {seed}")
+        result = future.result().result
+        assert result.successful, result.reason
+        assert f"{counts[seed]} of {counts[seed]} scenarios" in result.reason
+    assert len({future.result().result.reason.split(":")[0] for future in futures.values()}) == len(counts)
+    client.wait("/scenarios/info", before + sum(counts.values()) + len(counts))
+    infos = [decode_diagnostics(data)[1][0] for data in client.heard["/scenarios/info"]]
+    by_digest = {digest(data): data for data in client.heard["/scenarios"]}
+    for seed, count in counts.items():
+        own = [info.values for info in infos if info.values["seed"] == str(seed) and "sha256" in info.values]
+        assert [int(values["index"]) for values in own] == list(range(count))
+        for values in own:
+            decode_scenario(by_digest[values["sha256"]])
+
+
+def test_bad_requests_are_refused_with_a_reason_and_the_next_one_is_served(suite, client):
+    client.hear("/scenarios/info")
+    client.wait("/scenarios/info", 5)
+    for values, reason in (({"count": -1}, "count"), ({"no_such": 1}, "no_such"), ({"count": "many"}, "type int")):
+        future = _generate(client, **values)
+        client.until(future.done, "an answer")
+        assert not future.result().result.successful
+        assert reason in future.result().result.reason
+    future = _generate(client, count=1)
+    client.until(future.done, "an answer")
+    assert future.result().result.successful
+
+
+def test_parameters_are_checked_on_set_with_a_reason(suite, client):
+    from rcl_interfaces.srv import SetParameters
+    from rclpy.parameter import Parameter
+
+    request = SetParameters.Request(parameters=[Parameter("sampling.no_such", value=1).to_parameter_msg()])
+    assert not client.call(SetParameters, "/gp_sampler/set_parameters", request).results[0].successful
+    request = SetParameters.Request(parameters=[Parameter("road.traffic_side", value="up").to_parameter_msg()])
+    (result,) = client.call(SetParameters, "/road_server/set_parameters", request).results
+    assert not result.successful
+    assert "left" in result.reason
+
+
+def test_maps_are_served_and_bad_ones_refused(suite, client):
+    from nav_msgs.srv import GetMap, LoadMap
+
+    client.hear("/map", "/diagnostics")
+    (grid, *_) = client.wait("/map")
+    answer = client.call(GetMap, "/road_server/get_map", GetMap.Request())
+    assert (answer.map.info.width, answer.map.info.height) == decode_map(grid)[1].drivable.shape[::-1]
+    for url in ("file:///no/such/map.yaml", "nonsense", "package://no_such_package/map.yaml"):
+        answer = client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=url))
+        assert answer.result in (LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST, LoadMap.Response.RESULT_INVALID_MAP_METADATA)
+    client.until(
+        lambda: any("nonsense" in s.message for data in client.heard["/diagnostics"] for s in decode_diagnostics(data)[1]),
+        "the reason on /diagnostics",
+    )
+
+
+def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
+    from nav_msgs.srv import GetPlan
+    from std_srvs.srv import Trigger
+
+    client.hear("/diagnostics", "/fit")
+    asked = decode_fit(client.wait("/fit")[0])[2]
+    request = GetPlan.Request()
+    request.start.header.frame_id, request.start.header.stamp.sec = "map", 123
+    request.start.pose.position.x, request.start.pose.position.y = asked.start[0, :2]
+    request.goal.pose.position.x, request.goal.pose.position.y = asked.end[0, :2]
+    plan = client.call(GetPlan, "/planner/get_plan", request).plan
+    assert len(plan.poses) >= 2
+    assert plan.header.stamp.sec == 123
+    assert plan.poses[0].pose.position.x == request.start.pose.position.x
+    assert plan.poses[-1].pose.position.y == request.goal.pose.position.y
+    assert client.call(Trigger, "/planner/explain", Trigger.Request()).message.startswith("123.000000000: a path was found")
+    for stamp, (field, value, reason) in enumerate(
+        (
+            ("tolerance", -1.0, "tolerance"),
+            ("frame", "elsewhere", "elsewhere"),
+            ("x", math.nan, "finite"),
+        )
+    ):
+        bad = GetPlan.Request(start=request.start, goal=request.goal)
+        bad.start.header.stamp.sec = stamp
+        if field == "tolerance":
+            bad.tolerance = value
+        elif field == "frame":
+            bad.start.header.frame_id = value
+        else:
+            bad.start.header.frame_id = "map"
+            bad.start.pose.position.x = value
+        assert not client.call(GetPlan, "/planner/get_plan", bad).plan.poses
+        client.until(
+            lambda reason=reason: any(
+                s.name.startswith("/planner") and reason in s.message
+                for data in client.heard["/diagnostics"]
+                for s in decode_diagnostics(data)[1]
+            ),
+            f"{reason} on /diagnostics",
+        )
+        told = client.call(Trigger, "/planner/explain", Trigger.Request())
+        (own, *_) = [line for line in told.message.splitlines() if line.startswith(f"{stamp}.000000000: ")]
+        assert reason in own and not told.success
+
+
+def test_a_damaged_message_is_said_and_survived(suite, client):
+    """Garbage under the right type: the segmenter complains and goes on."""
+    from std_srvs.srv import Trigger
+
+    client.hear("/diagnostics", "/changepoints")
+    client.wait("/changepoints")
+
+    def complained() -> bool:
+        statuses = [s for data in client.heard["/diagnostics"] for s in decode_diagnostics(data)[1]]
+        return any(s.level is Level.ERROR and s.name.startswith("/segmenter") for s in statuses)
+
+    deadline = time.monotonic() + 180.0
+    while not complained() and time.monotonic() < deadline:
+        client.say("/tracks", b"\x00\x01\x00\x00" + bytes(40))
+        time.sleep(0.5)
+    assert complained()
+    assert client.call(Trigger, "/segmenter/segment", Trigger.Request()).success
+
+
+def test_ctrl_c_ends_everything_cleanly_and_the_bag_is_whole(suite):
+    codes = suite.end()
+    assert codes == dict.fromkeys(CHAIN, 0)
+    for node in CHAIN:
+        assert "Traceback" not in suite.log(node), suite.log(node)
+        if node != "recorder":
+            assert "effective parameters" in suite.log(node)
+    recorded = {message.topic for message in read_messages(suite.folder / "bag")}
+    assert {"/map", "/tracks", "/changepoints", "/fit", "/vehicle_1/route", "/scenarios", "/scenarios/info"} <= recorded

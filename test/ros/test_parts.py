@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The parts of the nodes that need no other process."""
+
+from pathlib import Path
+import threading
+
+import pytest
+from rclpy.parameter import Parameter
+import yaml
+
+from msg_conventions.cdr import CdrWriter
+from msg_conventions.hashes import encode_hashes
+from msg_conventions.lanes import encode_lanes
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.parameters import flatten
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.ros.nodes.road_server import road_of_url
+from scenario_gen.ros.plumbing.inputs import Inputs
+from scenario_gen.ros.plumbing.ros_parameters import default_yaml, descriptor, with_values
+from scenario_gen.ros.plumbing.run_suite import Job, parameters, SECTIONS
+from scenario_gen.ros.plumbing.start import node_class
+from scenario_gen.ros.plumbing.worker import Worker
+
+STAGE_NODES = ("segmenter", "planner", "gp_sampler", "log_player", "road_server", "evaluator")
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def _message(stamp: int) -> bytes:
+    return CdrWriter().header(stamp, "map").finish()
+
+
+def test_inputs_are_complete_only_with_equal_stamps():
+    inputs = Inputs(("tracks", "changepoints"), ("map",))
+    assert inputs.missing() == ["changepoints", "map", "tracks"]
+    inputs.put("tracks", _message(1))
+    inputs.put("map", _message(99))
+    inputs.put("changepoints", _message(0))
+    assert inputs.missing() == ["changepoints"]
+    inputs.put("changepoints", _message(1))
+    assert inputs.complete() is not None
+    inputs.put("tracks", _message(2))  # a new template: the old changepoints wait for their like
+    assert inputs.missing() == ["changepoints"]
+    inputs.expect(["vehicle_1/route"])
+    assert inputs.missing() == ["vehicle_1/route", "changepoints"]
+    inputs.forget(["vehicle_1/route"])
+    inputs.put("changepoints", _message(2))
+    assert set(inputs.complete()) == {"tracks", "changepoints", "map"}
+
+
+def test_inputs_are_complete_only_if_they_are_those_that_belong_together():
+    inputs = Inputs(("tracks", "fit", "fit/info"), ("map",))
+    one, other = (CdrWriter().header(1, frame).finish() for frame in ("map", "odom"))
+    messages = {"tracks": _message(1), "map": one, "fit": _message(1)}
+    for topic, data in messages.items():
+        inputs.put(topic, data)
+    assert inputs.missing() == ["fit/info"]
+    inputs.put("fit/info", encode_hashes("fit", messages, 1))
+    complete = inputs.complete()
+    assert complete is not None and not inputs.replaced(complete)
+    inputs.put("map", other)  # the fit is not to this map, even if the planner never says another
+    assert inputs.missing() == ["fit/info of this map"]
+    assert inputs.complete() is None and inputs.replaced(complete)
+    with pytest.raises(InputError, match="fit/info"):
+        inputs.put("fit/info", _message(1))
+    inputs.put("fit/info", encode_hashes("fit", messages | {"map": other}, 1))
+    assert inputs.complete() is not None
+
+
+def test_lanes_count_only_where_an_info_names_them_and_are_waited_for_there():
+    inputs = Inputs(("tracks", "map"), (), ("road/lanes",))
+    messages = {"tracks": _message(1), "map": _message(1)}
+    for topic, data in messages.items():
+        inputs.put(topic, data)
+    assert set(inputs.complete()) == {"tracks", "map"}  # of a map server that knows no lanes
+    lanes = encode_lanes(None, "map", 1)
+    inputs.put("road/lanes", lanes)
+    assert inputs.missing() == ["road/info of this road/lanes"]
+    inputs.put("road/info", encode_hashes("road", messages | {"road/lanes": lanes + bytes(3)}, 1))  # as DDS fills it up
+    assert set(inputs.complete()) == {"tracks", "map", "road/info", "road/lanes"}
+    inputs.put("road/info", encode_hashes("road", messages, 1))
+    assert "road/lanes" not in inputs.complete()
+    inputs.put("road/info", encode_hashes("road", messages | {"road/lanes": lanes}, 1))
+    inputs.forget(["road/lanes"])
+    assert inputs.missing() == ["road/info of this road/lanes"]
+
+
+def test_a_waiting_job_is_replaced_and_a_running_one_cancelled():
+    done, failures, gate = [], [], threading.Event()
+    worker = Worker(lambda name, error: failures.append((name, str(error))))
+    started = threading.Event()
+
+    def long(cancelled):
+        started.set()
+        gate.wait(60.0)
+        done.append(("long", cancelled()))
+
+    worker.submit("a", long)
+    assert started.wait(60.0)
+    worker.submit("b", lambda cancelled: done.append(("old", cancelled())))
+    worker.submit("b", lambda cancelled: done.append(("new", cancelled())))
+    worker.submit("a", lambda cancelled: done.append(("again", cancelled())))
+    worker.submit("c", lambda _: 1 / 0)
+    gate.set()
+    finished = threading.Event()
+    worker.submit("end", lambda _: finished.set())
+    assert finished.wait(60.0)
+    assert done == [("long", True), ("new", False), ("again", False)]
+    assert failures == [("c", "division by zero")]
+    worker.close()
+
+
+def test_cancelled_jobs_still_answer():
+    answers, gate, started = [], threading.Event(), threading.Event()
+    worker = Worker(lambda *_: None)
+    worker.submit("first", lambda _: (started.set(), gate.wait(60.0)))
+    assert started.wait(60.0)
+    worker.submit("second", lambda cancelled: answers.append(cancelled()))
+    assert worker.cancel() == ["first", "second"]
+    gate.set()
+    worker.close(60.0)
+    assert answers == [True]
+
+
+def test_every_parameter_has_a_descriptor_with_its_range():
+    for name, (entry, _value) in flatten(PipelineConfig()).items():
+        made = descriptor(entry)
+        assert made.description, name
+        if isinstance(entry.default, float) and entry.metadata["low"] is not None:
+            assert made.floating_point_range[0].from_value == entry.metadata["low"]
+        if entry.metadata["choices"]:
+            assert entry.metadata["choices"][0] in made.additional_constraints
+
+
+def test_values_are_checked_and_whole_numbers_are_numbers():
+    config = PipelineConfig()
+    assert with_values(config, [Parameter("road.lane_width", value=4)]).road.lane_width == 4.0
+    with pytest.raises(InputError, match=r"lane_width.*at least"):
+        with_values(config, [Parameter("road.lane_width", value=-4.0)])
+
+
+def test_urls_of_load_map():
+    assert road_of_url("file:///maps/a%20b.yaml") == "/maps/a b.yaml"
+    assert road_of_url("straight") == "straight"
+    with pytest.raises(InputError, match="no_such_package"):
+        road_of_url("package://no_such_package/map.yaml")
+    with pytest.raises(InputError, match="file://"):
+        road_of_url("http://example.org/map.yaml")
+
+
+def test_the_suite_hands_every_stage_parameter_to_a_node(tmp_path):
+    body = parameters([Job("/x", tmp_path / "log", "straight", 3)], PipelineConfig(), 5, 7, tmp_path / "bag")
+    given = {name for node in body.values() for name in node["ros__parameters"]}
+    stages = {head for heads in SECTIONS.values() for head in heads}
+    assert {name for name in flatten(PipelineConfig()) if name.split(".")[0] in stages} <= given
+    assert body["/x/gp_sampler"]["ros__parameters"]["count"] == 5
+    assert body["/x/log_player"]["ros__parameters"]["encounter"] == 3
+
+
+def test_default_yaml_holds_the_defaults():
+    text = (ROOT / "config" / "default.yaml").read_text()
+    nested = yaml.safe_load(text)["/**"]["ros__parameters"]
+    flat = {f"{head}.{name}": value for head, body in nested.items() for name, value in body.items()}
+    assert flat == {name: value for name, (_, value) in flatten(PipelineConfig()).items()}
+    assert text == default_yaml(), "run: python -m scenario_gen.ros.plumbing.ros_parameters > config/default.yaml"
+
+
+def test_nodes_are_thin():
+    def lines(path):
+        return len(path.read_text().partition('"""')[2].splitlines())  # below the licence
+
+    for path in (ROOT / "scenario_gen" / "ros" / "nodes").glob("*.py"):
+        assert lines(path) <= 330, path
+    for name in STAGE_NODES:
+        assert lines(ROOT / "scenario_gen" / "ros" / "nodes" / f"{name}.py") <= 200, name
+
+
+def test_the_kernels_of_a_node_are_those_of_packages_that_are_there():
+    for name in STAGE_NODES:
+        for stage in node_class(name).STAGES:
+            assert ROOT.joinpath("scenario_gen", *stage.split(".")).is_dir(), f"{name}: {stage}"

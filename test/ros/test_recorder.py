@@ -1,0 +1,274 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The recorder and the player as processes: types of no concern to the suite, a kill, and bags of genuine rosbag2."""
+
+from collections import Counter
+from pathlib import Path
+import signal
+import subprocess
+
+from mcap.reader import make_reader
+import pytest
+from rosbags.rosbag2 import Reader
+from suite_processes import Client, RESOURCES
+from typer.testing import CliRunner
+import yaml
+
+from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.cli.commands import app
+
+pytestmark = pytest.mark.dds
+
+QUEUE = 1000
+
+
+def publisher(client: Client, kind: type, topic: str):
+    """A publisher that somebody hears already."""
+    made = client.node.create_publisher(kind, topic, QUEUE)
+    client.until(lambda: made.get_subscription_count() > 0, f"a subscriber of {topic}")
+    return made
+
+
+CHUNK = 1 << 20  # bytes
+
+
+def size(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.glob("*.mcap"))
+
+
+def ended(process: "subprocess.Popen[str]") -> None:
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=180.0)
+    assert process.returncode == 0 and "Traceback" not in output, output
+
+
+def test_any_type_is_recorded_as_it_was_sent(start, client, tmp_path):
+    from geometry_msgs.msg import Point32, PolygonStamped
+    from rclpy.serialization import serialize_message
+    from sensor_msgs.msg import Imu
+
+    bag = tmp_path / "bag"
+    recorder = start("recorder", bag=bag, topics="/(imu|area)", compress=False)
+    imu, area = publisher(client, Imu, "/imu"), publisher(client, PolygonStamped, "/area")
+    sent = {"/imu": [], "/area": []}
+    for k in range(50):
+        reading = Imu(orientation_covariance=[float(k)] * 9)
+        reading.angular_velocity.z = 0.1 * k
+        outline = PolygonStamped()
+        outline.header.frame_id = "map"
+        outline.polygon.points = [Point32(x=float(n)) for n in range(k)]
+        for topic, out, message in (("/imu", imu, reading), ("/area", area, outline)):
+            sent[topic].append(serialize_message(message))
+            out.publish(sent[topic][-1])  # these bytes: what fills CDR's gaps may differ from one serialisation to the next
+    whole = sum(len(data) for messages in sent.values() for data in messages)
+    client.until(lambda: counted(client, "/area") == 50 and counted(client, "/imu") == 50, f"{whole} bytes in the bag")
+    ended(recorder)
+    assert {topic.name: topic.type for topic in bag_topics(bag)} == {
+        "/imu": "sensor_msgs/msg/Imu",
+        "/area": "geometry_msgs/msg/PolygonStamped",
+    }
+    for topic, messages in sent.items():
+        assert [m.data for m in read_messages(bag, lambda name, topic=topic: name == topic)] == messages
+    with (bag / "bag_0.mcap").open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    texts = {schema.name: schema.data.decode() for schema in summary.schemas.values()}
+    assert (
+        "orientation_covariance" in texts["sensor_msgs/msg/Imu"] and "MSG: geometry_msgs/Vector3" in texts["sensor_msgs/msg/Imu"]
+    )
+    assert all(c.metadata["topic_type_hash"].startswith("RIHS01_") for c in summary.channels.values())
+
+
+def counted(client: Client, topic: str, node: str = "/recorder") -> int:
+    """How many messages of a topic a recorder says are in its bag."""
+    from msg_conventions.diagnostics import decode_diagnostics
+
+    if "/diagnostics" not in client.heard:
+        client.heard["/diagnostics"] = []
+        client.hear("/diagnostics")
+    said = [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
+    return max((int(s.values[topic]) for s in said if s.name == f"{node}: recorded" and topic in s.values), default=0)
+
+
+def test_a_killed_recorder_loses_its_last_chunk_only(start, client, tmp_path):
+    """`kill -9` in the midst of it; `scenario-gen reindex` makes a bag of it that other readers open."""
+    from sensor_msgs.msg import CompressedImage
+
+    bag, saved = tmp_path / "bag", tmp_path / "saved"
+    recorder = start("recorder", bag=bag, topics="/picture", compress=False)
+    picture = publisher(client, CompressedImage, "/picture")
+    data = bytes(50_000)
+    sent = 0
+    while size(bag) < 3 * CHUNK:
+        assert sent < 1000, f"{size(bag)} bytes after {sent} messages of {len(data)}"
+        message = CompressedImage(format=str(sent), data=data)
+        picture.publish(message)
+        sent += 1
+        client.until(lambda due=sent - 40: counted(client, "/picture") >= due, "the recorder to keep up")
+    written = size(bag)
+    recorder.send_signal(signal.SIGKILL)
+    assert recorder.wait(180.0) == -signal.SIGKILL
+    assert not (bag / "metadata.yaml").exists()
+    answer = CliRunner().invoke(app, ["reindex", str(bag), "--out", str(saved)])
+    assert answer.exit_code == 0, answer.output
+    with Reader(saved) as reader:
+        formats = [bytes(raw) for _, _, raw in reader.messages()]
+        assert reader.message_count == len(formats)
+    with (saved / "saved_0.mcap").open("rb") as stream:
+        assert sum(1 for _ in make_reader(stream).iter_messages()) == len(formats)
+    assert (written - CHUNK) // len(data) - 1 <= len(formats) <= sent
+    assert f"{len(formats)} messages" in answer.output
+    for k, raw in enumerate(formats):  # none is missing before the end
+        assert str(k).encode() + b"\0" in raw[:40]
+
+
+def test_a_full_disk_ends_the_recording_and_says_so(start, client, tmp_path):
+    """The node lives on, as others in its process do; what is whole in the bag is saved elsewhere."""
+    from sensor_msgs.msg import CompressedImage
+
+    from msg_conventions.diagnostics import decode_diagnostics, Level
+
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=4m", "tmpfs", str(disk)]
+    made = subprocess.run(mount, capture_output=True, text=True, check=False)
+    if made.returncode:
+        pytest.skip(f"no file system can be mounted here: {made.stderr.strip()}")
+    try:
+        recorder = start("recorder", bag=disk / "bag", topics="/picture", compress=False)
+        picture = publisher(client, CompressedImage, "/picture")
+        client.heard["/diagnostics"] = []
+        client.hear("/diagnostics")
+
+        def errors():
+            statuses = [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
+            return [
+                status.message for status in statuses if status.name == "/recorder: recording" and status.level is Level.ERROR
+            ]
+
+        for k in range(120):  # 6 MB
+            picture.publish(CompressedImage(format=str(k), data=bytes(50_000)))
+            client.until(lambda due=k - 40: errors() or counted(client, "/picture") >= due, "the recorder to keep up")
+        client.until(errors, "an error of the recorder")
+        assert "No space left on device" in errors()[0] and "bag_0.mcap" in errors()[0]
+        assert recorder.poll() is None
+        ended(recorder)
+        saved = CliRunner().invoke(app, ["reindex", str(disk / "bag"), "--out", str(tmp_path / "saved")])
+        assert saved.exit_code == 0, saved.output
+        assert 40 <= len(list(read_messages(tmp_path / "saved"))) <= 80
+    finally:
+        recorder.kill()
+        recorder.wait()
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("storage", [pytest.param("mcap", marks=pytest.mark.long), "sqlite3"])
+def test_a_bag_of_genuine_rosbag2_is_played_and_recorded_again(start, client, data, tmp_path, storage):
+    """What `ros2 bag record` wrote goes through the player and the recorder unchanged, and is split by size."""
+    from std_srvs.srv import Trigger
+
+    source, copy = data / "bags" / storage / "talker", tmp_path / "copy"
+    player = start("player", bag=source, topics="/topic", paused=True, rate=100.0)
+    recorder = start("recorder", bag=copy, topics="/topic", split_bytes=100)
+    client.until(lambda: client.node.count_subscribers("/topic") > 0, "a subscriber of /topic")
+    client.until(lambda: client.node.count_publishers("/topic") > 0, "a publisher of /topic")
+    assert client.call(Trigger, "/player/resume", Trigger.Request()).success
+    client.until(lambda: counted(client, "/topic") == 10, "ten messages in the bag")
+    ended(recorder)
+    ended(player)
+    played = [m.data for m in read_messages(source, lambda name: name == "/topic")]
+    assert [m.data for m in read_messages(copy)] == played
+    info = yaml.safe_load((copy / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert info["message_count"] == 10 and len(info["relative_file_paths"]) > 1
+
+
+@pytest.mark.data
+def test_the_player_takes_other_names_and_other_qualities_of_service(start, client, data):
+    from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+
+    bag = data / "bags" / "mcap" / "talker"
+    overrides = ("reliability:=best_effort", "durability:=transient_local", "depth:=3")
+    words = [word for policy in overrides for word in ("-p", f"qos_overrides./topic.publisher.{policy}")]
+    start("player", "-r", "/topic:=/here/other", *words, bag=bag, topics="/topic", paused=True)
+    client.until(lambda: client.node.count_publishers("/here/other") > 0, "the topic under its other name")
+    (offer,) = client.node.get_publishers_info_by_topic("/here/other")
+    assert offer.qos_profile.reliability == ReliabilityPolicy.RELIABLE  # the override names the topic as it is published
+    assert client.node.count_publishers("/topic") == 0
+    words = [word.replace("/topic.", "/here/other.") for word in words]
+    start("player", "-r", "/topic:=/here/other", "-r", "__node:=second", *words, bag=bag, topics="/topic", paused=True)
+    client.until(lambda: client.node.count_publishers("/here/other") == 2, "the second player")
+    offers = [info.qos_profile for info in client.node.get_publishers_info_by_topic("/here/other")]
+    changed = (ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.TRANSIENT_LOCAL)
+    assert changed in {(found.reliability, found.durability) for found in offers}
+
+
+def test_a_recorder_keeps_to_its_namespace(start, client, tmp_path):
+    """By default it records the suite's topics there, ego/* too, and what is of the whole domain; at the root those of all."""
+    from geometry_msgs.msg import TransformStamped  # in place of tf2_msgs, which is not among the wheels; the name decides
+    from nav_msgs.msg import Odometry
+    from rosgraph_msgs.msg import Clock
+    from std_msgs.msg import String
+
+    kinds = {"/a/ego/start": Odometry, "/a/deep/ego/goal": Odometry, "/b/ego/start": Odometry, "/ab/ego/start": Odometry}
+    kinds |= {"/clock": Clock, "/tf": TransformStamped, "/tf_static": TransformStamped, "/a/other": String, "/other": String}
+    recorders = {
+        "/": start("recorder", bag=tmp_path / "root", compress=False),
+        "/a": start("recorder", "-r", "__ns:=/a", bag=tmp_path / "own", compress=False),
+    }
+    heard = {topic: len(recorders) for topic in ("/a/ego/start", "/a/deep/ego/goal", "/clock", "/tf", "/tf_static")}
+    heard |= {"/b/ego/start": 1, "/ab/ego/start": 1}
+    made = {topic: client.node.create_publisher(kind, topic, QUEUE) for topic, kind in kinds.items()}
+    for topic, count in heard.items():
+        client.until(lambda out=made[topic], n=count: out.get_subscription_count() == n, f"{count} subscribers of {topic}")
+    for topic, out in made.items():
+        out.publish(kinds[topic]())
+    wanted = {"/": set(heard), "/a": set(heard) - {"/b/ego/start", "/ab/ego/start"}}
+    for space, topics in wanted.items():
+        node = f"{space.rstrip('/')}/recorder"
+        client.until(lambda n=node, t=topics: all(counted(client, one, n) == 1 for one in t), f"{len(topics)} messages of {node}")
+    for process in recorders.values():
+        ended(process)
+    bags = {"/": tmp_path / "root", "/a": tmp_path / "own"}
+    assert {space: {m.topic for m in read_messages(bag)} - {"/diagnostics"} for space, bag in bags.items()} == wanted
+
+
+def test_the_player_ends_when_all_is_played_and_heard(start, client):
+    from std_srvs.srv import Trigger
+
+    from msg_conventions.topics import topic_entry
+
+    bag = RESOURCES / "synthetic_c"
+    played = [m for m in read_messages(bag) if topic_entry(m.topic)[0] == "sensor_msgs/msg/NavSatFix"]
+    topics = sorted({f"/{m.topic.lstrip('/')}" for m in played})
+    process = start("player", bag=bag, paused=True, rate=1000.0, clock=True)
+    client.hear(*topics)
+    for topic in topics:
+        client.until(lambda name=topic: client.node.count_publishers(name) == 1, f"a publisher of {topic}")
+    client.until(lambda: client.node.count_publishers("/clock") == 1, "one publisher of /clock")
+    assert client.call(Trigger, "/player/resume", Trigger.Request()).success
+    output, _ = process.communicate(timeout=180.0)
+    assert process.returncode == 0 and "played" in output and "Traceback" not in output, output
+    assert {topic: len(client.heard[topic]) for topic in topics} == Counter(f"/{m.topic.lstrip('/')}" for m in played)
+
+
+def test_the_player_stays_if_it_is_told_to(start, client):
+    bag = RESOURCES / "synthetic_c"
+    process = start("player", bag=bag, rate=1000.0, stay=True)
+    assert process.stdout is not None
+    while "played" not in (line := process.stdout.readline()):
+        assert line, "it ended"
+    client.until(lambda: ("player", "/") in client.node.get_node_names_and_namespaces(), "the player in the graph")
+    assert process.poll() is None
+    ended(process)
+
+
+def test_a_player_whose_bag_breaks_off_says_so_by_its_exit_code(start, tmp_path):
+    source = next((RESOURCES / "synthetic_c").glob("*.mcap"))
+    bag = tmp_path / "broken.mcap"
+    data = bytearray(source.read_bytes())
+    data[len(data) // 2 : len(data) // 2 + 64] = bytes(64)
+    bag.write_bytes(data)
+    process = start("player", bag=bag, rate=1000.0)
+    output, _ = process.communicate(timeout=180.0)
+    assert process.returncode == 2 and "Traceback" not in output, output

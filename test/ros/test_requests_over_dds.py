@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""An ego slot and start and end states, asked of the node: the bytes of the same request in process, and all of it in the bag."""
+
+import re
+
+import pytest
+from suite_processes import Processes, RESOURCES
+
+from msg_conventions.diagnostics import decode_diagnostics
+from msg_conventions.ego import decode_state, ego_messages
+from msg_conventions.scenarios import digest, encode_scenario
+from scenario_gen.base.errors import InputError
+from scenario_gen.logs import read_log
+from scenario_gen.method.evaluation import EvaluationConfig
+from scenario_gen.output.review.regenerate import regenerate_scenario
+from scenario_gen.output.review.validation import validate_bag
+from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.types.request import Request
+
+pytestmark = pytest.mark.dds
+LOG, ROAD, SEED = RESOURCES / "synthetic_b", "t_intersection", 7
+CHAIN = ("log_player", "segmenter", "planner", "gp_sampler", "road_server", "recorder")
+MOVED = {"starts": "2: 53 4.57 0 9.5", "goals": "1: 19 8.07 3.1413 11"}
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory, domain):
+    """All nodes but the evaluator, at work on one log."""
+    folder = tmp_path_factory.mktemp("requests")
+    arguments = {node: ["-p", f"seed:={SEED}"] if node in ("segmenter", "planner", "gp_sampler") else [] for node in CHAIN}
+    arguments["log_player"] = ["-p", f"log_path:={LOG}"]
+    arguments["road_server"] = ["-p", f"road_name:={ROAD}", "-p", "wait_for_tracks:=true"]
+    arguments["gp_sampler"] += ["-p", "count:=2"]
+    arguments["recorder"] = ["-p", f"bag:={folder / 'bag'}"]
+    made = Processes(folder, domain, arguments)
+    yield made
+    if made.process.poll() is None:
+        made.process.kill()
+
+
+def ask(client, **values):
+    """Call ~/generate with these parameters; its result."""
+    from rcl_interfaces.srv import SetParametersAtomically
+    from rclpy.parameter import Parameter
+
+    parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]
+    request = SetParametersAtomically.Request(parameters=parameters)
+    future = client.call_later(SetParametersAtomically, "/gp_sampler/generate", request)
+    client.until(future.done, "an answer")
+    return future.result().result
+
+
+def in_process(count, **asked):
+    (encounter,) = read_log(LOG).encounters
+    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False))
+    case = generate(encounter, ROAD, config, count=count, seed=SEED, request=Request(**asked))
+    return encounter, case.generated
+
+
+def published(client, result):
+    """Digests of the scenarios of an answered request, and their accounts."""
+    request = re.match(r"request (\d+)", result.reason)[1]
+
+    def accounts():
+        every = [s for data in client.heard["/scenarios/info"] for s in decode_diagnostics(data)[1]]
+        return [s.values for s in every if s.values["request"] == request]
+
+    client.until(lambda: any("published" in values for values in accounts()), "the account")
+    own = [values for values in accounts() if "sha256" in values]
+    client.until(lambda: {v["sha256"] for v in own} <= {digest(data) for data in client.heard["/scenarios"]}, "the scenarios")
+    return [values["sha256"] for values in own], own
+
+
+def test_the_same_bytes_as_in_process_with_an_ego(suite, client):
+    client.hear("/scenarios", "/scenarios/info", "/ego/start", "/ego/goal", "/ego/witness")
+    client.wait("/scenarios/info", 3, timeout=120.0)
+    result = ask(client, ego="1", count=3)
+    assert result.successful, result.reason
+    encounter, made = in_process(3, ego="1")
+    digests, accounts = published(client, result)
+    assert digests == [digest(encode_scenario(s, encounter.start_ns)) for s in made.scenarios]
+    witnesses = [digest(encode_scenario(s.witness, encounter.start_ns)) for s in made.scenarios]
+    assert [values["ego_witness"] for values in accounts] == witnesses
+    client.until(lambda: set(witnesses) <= set(map(digest, client.heard["/ego/witness"])), "the witnesses")
+    for topic, data in ego_messages(made.ego, "map", encounter.start_ns):
+        assert client.wait(f"/{topic}")[-1] == data, topic
+    stamp, frame, child, state = decode_state(client.heard["/ego/start"][-1])
+    assert (stamp, frame, child) == (encounter.start_ns, "map", "vehicle_1")
+    assert all(values["ego"] == "1" and values["ego_start"] == str(state.tolist()) for values in accounts)
+
+
+def test_the_same_bytes_as_in_process_with_states(suite, client):
+    client.hear("/scenarios", "/scenarios/info")
+    client.wait("/scenarios/info", 3, timeout=120.0)
+    result = ask(client, count=3, **MOVED)
+    assert result.successful, result.reason
+    encounter, made = in_process(3, **MOVED)
+    assert published(client, result)[0] == [digest(encode_scenario(s, encounter.start_ns)) for s in made.scenarios]
+    plain = ask(client, count=2)
+    assert published(client, plain)[0] == [digest(encode_scenario(s, encounter.start_ns)) for s in in_process(2)[1].scenarios], (
+        "states are valid for their call only"
+    )
+
+
+def test_what_is_impossible_is_refused_and_the_nearest_is_possible(suite, client):
+    client.hear("/scenarios", "/scenarios/info")
+    client.wait("/scenarios/info", 3, timeout=120.0)
+    result = ask(client, count=2, goals="1: 19 18.07 3.1413 11")
+    assert not result.successful
+    assert "off the road" in result.reason
+    nearest = re.search(r"goals:='([^']*)'", result.reason.partition("Nearest possible: ")[2])[1]
+    taken = ask(client, count=2, goals=nearest)
+    assert taken.successful and "2 of 2" in taken.reason
+    for values, said in (({"ego": "9"}, "there are: 1, 2"), ({"starts": "1: a"}, "starts"), ({"goals": "7: 0 0 0"}, "'7'")):
+        refused = ask(client, **values)
+        assert not refused.successful and said in refused.reason
+
+
+def test_all_of_it_is_in_the_bag(suite, client):
+    client.hear("/scenarios", "/scenarios/info")
+    client.wait("/scenarios/info", 3, timeout=120.0)
+    results = [ask(client, ego="2", count=2), ask(client, count=2, **MOVED)]
+    digests = [published(client, result)[0] for result in results]
+    suite.end()
+    bag = suite.folder / "bag"
+    (found,) = validate_bag(bag)
+    assert (found.invalid, found.found, found.left_out) == (0, {}, {})
+    for result, own in zip(results, digests, strict=True):
+        request = re.match(r"request (\d+)", result.reason)[1]
+        assert [regenerate_scenario(bag, k, request=request).sha256 for k in range(2)] == own
+    with pytest.raises(InputError, match="choose one: --namespace '' --request 1"):
+        regenerate_scenario(bag, 0)
+    with pytest.raises(InputError, match="does not say which log"):
+        regenerate_scenario(bag, 0, request="1", log=LOG)

@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""ROS parameters as the tools of ROS give them: numbers for texts, whole numbers for real ones, what they dumped."""
+
+from dataclasses import dataclass, field
+
+from hypothesis import given, strategies
+from node_server import start_nodes
+import pytest
+import rclpy
+from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_value_to_python
+from suite_processes import Client, RESOURCES
+import yaml
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.parameters import flatten
+from scenario_gen.logs import LogConfig
+from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters, meant, values_of_call, with_values
+from scenario_gen.ros.plumbing.sampling_answer import Config
+
+DECLARED = {name: entry for name, (entry, _) in flatten(Config()).items()}
+RESERVED = "start_type_description_service"  # read-only, of every rclpy node
+
+
+@given(strategies.integers(0, 2**63 - 1))
+def test_a_number_is_taken_for_an_id(number):
+    assert with_values(Config(), [Parameter("ego", value=number)]).ego == str(number)
+
+
+@given(strategies.floats(allow_nan=False, allow_infinity=False))
+def test_a_real_number_is_taken_as_any_tool_writes_it(number):
+    entry = DECLARED["limits.time_resolution"]
+    assert meant(entry, str(number)) == number
+    assert meant(entry, yaml.safe_load(yaml.safe_dump(number))) == number
+    assert type(meant(entry, int(number))) is float
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("ego", True), ("limits.max_speed", "fast"), ("limits.max_speed", True), ("count", "5"), ("count", 5.0)]
+)
+def test_what_can_only_be_a_mistake_is_refused(name, value):
+    with pytest.raises(InputError, match=name.rpartition(".")[2]):
+        with_values(Config(), [Parameter(name, value=value)])
+
+
+@dataclass(frozen=True)
+class Stages:
+    log: LogConfig = field(default_factory=LogConfig)
+
+
+def test_former_names_are_taken(domain):
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = rclpy.create_node("a", context=context, parameter_overrides=[Parameter("log.longest", value=30.0)])
+    try:
+        assert ConfigParameters(node, Stages()).config.log.max_duration == 30.0
+        assert node.get_parameter("log.max_duration").value == 30.0 and not node.has_parameter("log.longest")
+        with pytest.warns(FutureWarning, match=r"log\.shortest is called log\.min_duration now"):
+            assert values_of_call(Stages(), [Parameter("log.shortest", value=7.0).to_parameter_msg()]).log.min_duration == 7.0
+    finally:
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+
+
+def dumped(client: Client, node: str) -> dict[str, object]:
+    """What `ros2 param dump` asks for: every parameter of a node and its value."""
+    from rcl_interfaces.srv import GetParameters, ListParameters
+
+    names = client.call(ListParameters, f"{node}/list_parameters", ListParameters.Request()).result.names
+    values = client.call(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=names)).values
+    return dict(zip(names, map(parameter_value_to_python, values), strict=True))
+
+
+def loaded(client: Client, node: str, path) -> dict[str, str]:
+    """What `ros2 param load` does with a file; return what was refused and why."""
+    from rcl_interfaces.srv import SetParameters
+
+    messages = list(parameter_dict_from_yaml_file(str(path)).values())
+    results = client.call(SetParameters, f"{node}/set_parameters", SetParameters.Request(parameters=messages)).results
+    return {message.name: result.reason for message, result in zip(messages, results, strict=True) if not result.successful}
+
+
+@pytest.mark.dds
+def test_every_node_loads_what_was_dumped_of_it(domain, client, tmp_path):
+    """And each parameter has the type that is declared, whatever was given."""
+    values = {
+        "ego": "21202",
+        "log.vehicles": "21202",
+        "starts": "'21202: 10.5 -1.75 0.0 8.0; 2: 3 4 1.5'",
+        "limits.max_speed": "40",
+        "limits.time_resolution": "1.0e-06",
+        "log.origin": "48.1,11.5",
+        "autostart": "false",
+    }
+    words = [word for name, value in values.items() for word in ("-p", f"{name}:={value}")]
+    where = {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(tmp_path)}
+    process = start_nodes("start", "suite", "--namespace", "/a", "--ros-args", *words, **where)
+    bag = ("-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "paused:=true")
+    player = start_nodes("start", "player", "--ros-args", "-r", "__ns:=/a", *bag, **where)
+    try:
+        for name in ("gp_sampler", "log_player", "road_server", "segmenter", "planner", "evaluator", "recorder", "player"):
+            node = f"/a/{name}"
+            before = dumped(client, node)
+            assert RESERVED in before
+            file = tmp_path / f"{name}.yaml"
+            file.write_text(yaml.dump({node: {"ros__parameters": before}}))
+            assert loaded(client, node, file) == {}, name
+            after = dumped(client, node)
+            assert {key: (type(value), value) for key, value in after.items()} == {
+                key: (type(value), value) for key, value in before.items()
+            }
+            if name == "gp_sampler":
+                assert before["ego"] == "21202" and before["starts"] == "21202:10.5 -1.75 0.0 8.0; 2:3 4 1.5"
+                assert type(before["limits.max_speed"]) is float and before["limits.time_resolution"] == 1e-6
+                file.write_text(yaml.dump({node: {"ros__parameters": {RESERVED: False, "ego": 7, "limits": {"max_speed": 30}}}}))
+                assert set(loaded(client, node, file)) == {RESERVED}, "what is read-only is not changed"
+                changed = dumped(client, node)
+                assert (changed["ego"], changed["limits.max_speed"], changed[RESERVED]) == ("7", 30.0, True)
+                assert type(changed["limits.max_speed"]) is float
+            if name == "log_player":
+                assert before["log.vehicles"] == "21202"
+    finally:
+        for one in (process, player):
+            one.terminate()
+        assert [one.wait(60.0) for one in (process, player)] == [0, 0]

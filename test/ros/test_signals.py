@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Every executable ends without a traceback, whenever it is asked to."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+from node_server import Forked, start_nodes
+import pytest
+from suite_processes import RESOURCES
+
+from scenario_gen.bags.storage.bag import read_messages
+
+pytestmark = pytest.mark.dds
+
+
+def _started(node: str, domain: int, *arguments: str) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, "-m", "scenario_gen.ros.plumbing.start", node, "--ros-args", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=os.environ | {"ROS_DOMAIN_ID": str(domain), "PYTHONUNBUFFERED": "1"},
+    )
+
+
+def _forked(node: str, domain: int, *arguments: str) -> Forked:
+    return start_nodes("start", node, "--ros-args", *arguments, ROS_DOMAIN_ID=str(domain))
+
+
+ENDS = {"once": (signal.SIGINT,), "twice": (signal.SIGINT, signal.SIGINT), "terminated": (signal.SIGTERM,)}
+
+
+def test_a_recorder_closes_its_bag(domain, tmp_path):
+    """Three recorders of one player, each ended in its own way."""
+    player = _forked("player", domain, "-p", f"bag:={RESOURCES / 'synthetic_c'}", "-p", "rate:=50.0", "-p", "loop:=true")
+    recording = ("-p", "topics:=/?vehicle_.*", "-p", "compress:=false")
+    recorders = {
+        name: _forked("recorder", domain, "-r", f"__node:={name}", "-p", f"bag:={tmp_path / name}", *recording) for name in ENDS
+    }
+    try:
+        deadline = time.monotonic() + 180.0
+        files = [tmp_path / name / f"{name}_0.mcap" for name in ENDS]
+        while not all(file.is_file() and file.stat().st_size > 100_000 for file in files):
+            assert time.monotonic() < deadline, "nothing was recorded"
+            time.sleep(0.1)
+        for name, signals in ENDS.items():
+            for number in signals:
+                recorders[name].send_signal(number)
+                time.sleep(0.05)
+        for process in recorders.values():
+            output, _ = process.communicate(timeout=120.0)
+            assert "Traceback" not in output, output
+            assert process.returncode == 0
+    finally:
+        player.send_signal(signal.SIGTERM)
+        output, _ = player.communicate(timeout=120.0)
+        for process in recorders.values():
+            process.kill()
+    assert "Traceback" not in output, output
+    for name in ENDS:
+        assert len(list(read_messages(tmp_path / name))) > 100
+
+
+def test_ctrl_c_while_the_libraries_load(domain):
+    process = _started("gp_sampler", domain)
+    time.sleep(0.7)
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=120.0)
+    assert "Traceback" not in output
+    assert process.returncode in (0, 130, -2)
+
+
+STUCK = """
+from scenario_gen.base.interrupts import hear
+hear()
+import ctypes
+import sys
+from scenario_gen.ros.plumbing import process
+from rclpy.node import Node
+process.ENDING = 1.0
+class Stuck(Node):
+    def __init__(self, namespace):
+        super().__init__("stuck", namespace=namespace)
+    def autostart(self):
+        print("ready", flush=True)
+    def close(self):
+        print("closed")
+        hold("close")
+    def destroy_node(self):
+        hold("destroy_node")
+def hold(place):
+    if place == sys.argv[1]:
+        ctypes.PyDLL(None).sleep(600)
+process.run_nodes([Stuck], ["stuck"])
+"""
+
+
+@pytest.mark.parametrize(("place", "code"), [("destroy_node", 0), ("close", 1)])
+def test_a_node_ends_when_something_waits_for_ever_holding_the_lock_of_python(domain, place, code):
+    """Where it was stuck is said; it is no failure once all that was to be kept is kept."""
+    environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
+    process = subprocess.Popen(
+        [sys.executable, "-c", STUCK, place], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment
+    )
+    try:
+        assert process.stdout is not None and process.stdout.readline() == "ready\n"
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=120.0)
+    finally:
+        process.kill()
+    assert process.returncode == code
+    assert "Timeout" in output and f"in {place}" in output, output
+
+
+def test_a_bad_start_is_one_message_and_exit_code_2(domain, tmp_path):
+    (tmp_path / "text.mcap").write_text("no bag")
+    for node, arguments, words in (
+        ("road_server", ("-p", "road.lane_width:=-1.0"), "lane_width"),
+        ("player", ("-p", f"bag:={tmp_path / 'text.mcap'}"), "text.mcap"),
+        ("recorder", ("-p", f"bag:={tmp_path}"), "exists"),
+    ):
+        process = _forked(node, domain, *arguments)
+        output, _ = process.communicate(timeout=120.0)
+        assert process.returncode == 2
+        assert words in output
+        assert "Traceback" not in output, output

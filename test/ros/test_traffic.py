@@ -1,0 +1,264 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The node `traffic`: a planner over DDS in lock-step, whatever is wrong with its commands, and the verdict."""
+
+from dataclasses import replace
+import json
+import math
+import sys
+
+from bag_examples import hand_made_run
+import numpy as np
+import pytest
+
+from msg_conventions.cdr import CdrWriter
+from msg_conventions.diagnostics import decode_diagnostics, Level
+from msg_conventions.driving import decode_odometry, encode_odometry, encode_twist
+from msg_conventions.ego import decode_state
+from msg_conventions.frames import decode_frames
+from msg_conventions.paths import encode_path
+from msg_conventions.roads import decode_map
+from scenario_gen.bags.recordings.write import result_messages, write_recording
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.simulation import ClosedLoop
+from scenario_gen.closed_loop.tracking import of_twist
+from scenario_gen.closed_loop.verdict import judge
+from scenario_gen.ros.plumbing.ego_commands import FIRST_STAMP
+from scenario_gen.types.ego import with_witness
+from scenario_gen.types.names import token
+from scenario_gen.types.scenario import EgoSlot
+
+pytestmark = pytest.mark.dds
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    return write_recording(tmp_path_factory.mktemp("traffic") / "bag", hand_made_run())
+
+
+@pytest.fixture
+def traffic(start, client, bag):
+    """A running node in lock-step that this client steers."""
+
+    def run(**parameters):
+        process = start("traffic", bag=bag, lock_step=True, **parameters)
+        client.hear("verdicts", "vehicle_1/odom", "vehicle_bus_2/odom", "/tf", "/clock", "traffic/local_map", "/diagnostics")
+        for topic in ("ego/cmd_vel", "ego/odom", "ego/path"):
+            client.announce(topic)
+        for topic in ("ego/cmd_vel", "ego/odom", "ego/path", "verdicts"):
+            count = client.node.count_publishers if topic == "verdicts" else client.node.count_subscribers
+            client.until(lambda count=count, topic=topic: count(topic) >= 1, topic)
+        return process
+
+    return run
+
+
+def step(client):
+    from std_srvs.srv import Trigger
+
+    answer = client.call(Trigger, "/traffic/step", Trigger.Request())
+    assert answer.success, answer.message
+    return json.loads(answer.message)
+
+
+class Slow:
+    """The planner: 3 m/s, straight on."""
+
+    def reset(self, task):
+        self.step = task.step
+
+    def act(self, seen):
+        return of_twist(seen.ego, 3.0, 0.0, self.step)
+
+
+def test_a_planner_in_lock_step_gets_the_verdict_that_it_gets_in_process(traffic, client, tmp_path):
+    from std_srvs.srv import Trigger
+
+    traffic(results=tmp_path / "results")
+    for _ in range(2):  # and once more after a reset
+        said = {"over": False}
+        while not said["over"]:
+            client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
+            said = step(client)
+        assert not client.call(Trigger, "/traffic/step", Trigger.Request()).success
+        assert client.call(Trigger, "/traffic/reset", Trigger.Request()).success
+    client.wait("verdicts", 2)
+    first, second = (decode_diagnostics(data)[1][0] for data in client.heard["verdicts"])
+    assert first == second
+
+    run = hand_made_run()
+    loop = ClosedLoop(run.generated.scenarios[0], 0, run.road, ClosedLoopConfig())
+    expected = judge(loop, loop.drive(Slow())).document()
+    values = {key: json.loads(value) for key, value in first.values.items() if key != "first_faults"}
+    assert values == json.loads(json.dumps(expected))
+    assert (tmp_path / "results" / "drives.json").is_file() and (tmp_path / "results" / "junit.xml").is_file()
+
+    told = [decode_odometry(data) for data in client.heard["vehicle_1/odom"][:10]]
+    stamps = sorted({stamp for stamp, _, _ in told})  # where everyone is at the start may have been told twice
+    assert np.diff(stamps).tolist() == [100_000_000] * (len(stamps) - 1) and len(stamps) > 5
+    assert all(frame == run.road.frame_id and np.isfinite(state).all() for _, frame, state in told)
+    assert {child for _, _, child, _ in decode_frames(client.heard["/tf"][0])} == {"vehicle_1", "vehicle_bus_2"}
+    grid = decode_map(client.heard["traffic/local_map"][0])[1]
+    assert not grid.drivable.all() and grid.drivable.any()
+
+
+def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, client):
+    process = traffic(patience=0.2)
+    far = np.array([1e5, 0.0, 0.0, 0.0])
+    frame = hand_made_run().road.frame_id
+    wrong = {
+        "not finite": ("ego/cmd_vel", encode_twist(float("nan"), 0.0)),
+        "jumped": ("ego/odom", encode_odometry(far, 0.0, "base_link", frame, 0)),
+        "is not that of the scenario": ("ego/odom", encode_odometry(far, 0.0, "base_link", "odom", 0)),
+        "damaged": ("ego/cmd_vel", encode_twist(1.0, 0.0)[:20]),
+        "must ascend": ("ego/path", encode_path(np.zeros((2, 3)), np.zeros(2, dtype=np.int64), frame, 0)),
+    }
+    for topic, data in wrong.values():
+        client.say(topic, data)
+        step(client)
+    for _ in range(8):
+        step(client)  # silent
+    found = set()
+
+    def all_said():
+        for data in client.heard["/diagnostics"]:
+            for status in decode_diagnostics(data)[1]:
+                if status.level is Level.WARN:
+                    found.update(text for text in (*wrong, "s old") if text in status.message)
+        return len(found) >= 3
+
+    client.until(all_said, "faults on /diagnostics")
+    assert process.poll() is None
+    said = {"over": False}
+    while not said["over"]:
+        client.say("ego/cmd_vel", encode_twist(3.0, 0.0))  # a step waits for no silent ego
+        said = step(client)
+    client.wait("verdicts")
+    values = decode_diagnostics(client.heard["verdicts"][-1])[1][0].values
+    assert int(values["faults"]) >= 5
+    faults = str(values["first_faults"])
+    assert "not finite" in faults and "jumped" in faults and "is not that of the scenario" in faults
+
+
+def test_two_egos_and_a_late_one_are_said(traffic, client):
+    """A second node that commands, and commands whose stamp is old: the drive goes on, and the verdict says both."""
+    import rclpy
+
+    from scenario_gen.ros.plumbing.topics import create_publisher
+
+    process = traffic()
+    client.announce("ego/cmd_vel_stamped")
+    client.until(lambda: client.node.count_subscribers("ego/cmd_vel_stamped") >= 1, "ego/cmd_vel_stamped")
+    other = rclpy.create_node("second_planner", context=client.node.context)
+    try:
+        publisher = create_publisher(other, "ego/cmd_vel")
+        client.until(lambda: client.node.count_publishers("ego/cmd_vel") >= 2 and publisher.get_subscription_count() >= 1, "both")
+        for _ in range(12):
+            client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
+            step(client)
+    finally:
+        other.destroy_node()
+    stale = CdrWriter().header(FIRST_STAMP, "base_link").pack("d", 3.0, *[0.0] * 5).finish()  # of the drive's begin
+    said = {"over": False}
+    while not said["over"]:
+        client.say("ego/cmd_vel_stamped", stale)
+        said = step(client)
+    values = decode_diagnostics(client.wait("verdicts")[-1])[1][0].values
+    faults = str(values["first_faults"])
+    assert "several egos" in faults and "second_planner" in faults and int(values["faults"]) > 20
+    client.until(lambda: any(b"s old" in data for data in client.heard["/diagnostics"]), "the late command on /diagnostics")
+    assert process.poll() is None
+
+
+def test_live_scenarios_are_driven_on_the_road_that_they_name(start, client):
+    """What gp_sampler publishes: a map, witnesses, scenarios, entries, of which another may come before what it belongs to."""
+    from std_srvs.srv import Trigger
+
+    run = hand_made_run()
+    slot = EgoSlot(run.encounter.vehicles[1], np.zeros(4), np.ones(4))
+    parted = tuple(with_witness(one, 1) for one in run.generated.scenarios)
+    live = replace(run, generated=replace(run.generated, scenarios=parted, ego=slot))
+    messages = [(topic, data) for topic, data, _ in result_messages(live)]
+    start("traffic", lock_step=True)
+    topics = ("map", "scenarios/info", "scenarios", "ego/witness")
+    for topic in topics:
+        client.announce(topic)
+        client.until(lambda topic=topic: client.node.count_subscribers(topic) >= 1, topic)
+    client.hear("ego/goal", "traffic/local_map", "verdicts")
+    for wanted in topics:  # entries before scenarios, witnesses last
+        for topic, data in messages:
+            if topic == wanted:
+                client.say(topic, data)
+    _, _, child, goal = decode_state(client.wait("ego/goal")[0])
+    witness = parted[0].witness
+    assert child == f"vehicle_{token(slot.vehicle.id)}"
+    assert goal[:2] == pytest.approx(witness.position[0, -1])
+    client.announce("ego/cmd_vel")
+    client.until(lambda: client.node.count_subscribers("ego/cmd_vel") >= 1, "ego/cmd_vel")
+    said = {"over": False}
+    while not said["over"]:
+        client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
+        said = step(client)
+    client.wait("traffic/local_map")
+    assert client.call(Trigger, "/traffic/next", Trigger.Request()).success
+
+
+class ByPlace:
+    """The planner: a speed that depends on where it is, so that an answer to another odometry than the last one shows."""
+
+    def reset(self, task):
+        self.step = task.step
+
+    def act(self, seen):
+        return of_twist(seen.ego, 3.0 + math.sin(seen.ego.x), 0.0, self.step)
+
+
+PLANNER = """
+import math
+import sys
+
+import rclpy
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+
+rclpy.init()
+node = rclpy.create_node("by_place")
+command = node.create_publisher(Twist, "ego/cmd_vel", 10)
+
+
+def act(heard):
+    twist = Twist()
+    twist.linear.x = 3.0 + math.sin(heard.pose.pose.position.x)
+    command.publish(twist)
+
+
+node.create_subscription(Odometry, sys.argv[1], act, 10)
+rclpy.spin(node)
+"""
+
+
+def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(bag, tmp_path):
+    """`scenario-gen drive --ros`: any node that answers its odometry with a command; what it is not is said."""
+    from typer.testing import CliRunner
+
+    from scenario_gen.cli.commands import app
+
+    program = tmp_path / "by_place.py"
+    program.write_text(PLANNER)
+    words = ["drive", str(bag), "--count", "2", "--set", "bars.goals=0.0"]
+    words += [word for bar in ("collisions", "at_fault", "off_road") for word in ("--set", f"bars.{bar}=1.0")]
+    for out, more in (
+        ("over_dds", ["--ros", "--planner", f"{sys.executable} {program} vehicle_1/odom"]),
+        ("in_process", ["--planner", "test_traffic:ByPlace", "--workers", "1"]),
+    ):
+        told = CliRunner().invoke(app, [*words, "--out", str(tmp_path / out), *more])
+        assert told.exit_code == 0, told.output
+    over_dds, in_process = (json.loads((tmp_path / out / "drives.json").read_text()) for out in ("over_dds", "in_process"))
+    assert over_dds["drives"] == in_process["drives"] and len(in_process["drives"]) == 2
+    for command, said in (
+        (f"{sys.executable} -c 'print(7)'", "it ended with code 0; it said: 7"),
+        ("no_such_program", "No such"),
+    ):
+        refused = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "none"), "--ros", "--planner", command])
+        assert said in str(refused.exception), refused.output

@@ -1,0 +1,197 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Many callers from processes of their own, and calls that are answered while long work runs."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+
+from lengths import LONG
+import pytest
+from suite_processes import Processes, RESOURCES
+
+from msg_conventions.diagnostics import decode_diagnostics
+from msg_conventions.scenarios import digest
+
+pytestmark = pytest.mark.dds
+CALLER = """
+import json, sys
+import scenario_gen.ros.nodes
+import rclpy
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.parameter import Parameter
+rclpy.init()
+node = rclpy.create_node(f"caller_{sys.argv[1]}")
+client = node.create_client(SetParametersAtomically, "gp_sampler/generate")
+assert client.wait_for_service(60.0)
+values = {"seed": int(sys.argv[1]), "count": int(sys.argv[2])}
+request = SetParametersAtomically.Request(parameters=[Parameter(k, value=v).to_parameter_msg() for k, v in values.items()])
+future = client.call_async(request)
+rclpy.spin_until_future_complete(node, future, timeout_sec=90.0)
+result = future.result().result
+print(json.dumps([result.successful, result.reason]))
+"""
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory, domain):
+    nodes = {
+        "log_player": ["-p", f"log_path:={RESOURCES / 'synthetic_c'}"],
+        "road_server": ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"],
+        "segmenter": [],
+        "planner": [],
+        "gp_sampler": ["-p", "generate_on_input:=false"],
+    }
+    made = Processes(tmp_path_factory.mktemp("load"), domain, nodes)
+    yield made
+    made.end()
+
+
+def _generate(client, wait=True, **values):
+    """Ask for scenarios; return the future, with its result if `wait`."""
+    from rcl_interfaces.srv import SetParametersAtomically
+    from rclpy.parameter import Parameter
+
+    parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]
+    request = SetParametersAtomically.Request(parameters=parameters)
+    future = client.call_later(SetParametersAtomically, "/gp_sampler/generate", request)
+    if wait:
+        client.until(future.done, "an answer of the sampler")
+    return future
+
+
+@pytest.mark.slow
+def test_callers_from_many_processes_get_their_own_answers(suite, domain, client):
+    client.until(lambda: _generate(client, count=1).result().result.successful, "the sampler's inputs")
+    client.hear("/scenarios", "/scenarios/info")
+    client.wait("/scenarios/info", 2)
+    client.heard.clear()
+    counts = {seed: 1 + seed % 3 for seed in range(500, 520 if LONG else 504)}
+    environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
+    callers = {
+        seed: subprocess.Popen(
+            [sys.executable, "-c", CALLER, str(seed), str(count)], stdout=subprocess.PIPE, text=True, env=environment
+        )
+        for seed, count in counts.items()
+    }
+    said = {seed: caller.communicate(timeout=120.0)[0] for seed, caller in callers.items()}
+    assert all(said.values()), (
+        f"callers without an answer: {[seed for seed in said if not said[seed]]}\n{suite.log('gp_sampler')}"
+    )
+    answers = {seed: json.loads(words) for seed, words in said.items()}
+    for seed, (successful, reason) in answers.items():
+        assert successful, reason
+        assert f"{counts[seed]} of {counts[seed]} scenarios" in reason
+    requests = {seed: reason.partition(":")[0].split()[-1] for seed, (_, reason) in answers.items()}
+    assert len(set(requests.values())) == len(counts)
+    client.wait("/scenarios/info", sum(counts.values()) + len(counts))
+    client.wait("/scenarios", sum(counts.values()))
+    heard = {digest(data) for data in client.heard["/scenarios"]}
+    infos = [decode_diagnostics(data)[1][0].values for data in client.heard["/scenarios/info"]]
+    for seed, request in requests.items():
+        own = [values for values in infos if values["request"] == request and "sha256" in values]
+        assert {values["seed"] for values in own} == {str(seed)}
+        assert len(own) == counts[seed]
+        assert all(values["sha256"] in heard for values in own)
+
+
+def test_a_map_is_served_while_another_is_loaded(suite, domain, client):
+    """load_map works off the executor's thread, so calls come between, and every caller gets the map that was asked for."""
+    from nav_msgs.srv import GetMap, LoadMap
+
+    client.hear("/map")
+    client.wait("/map")
+    loads = {
+        url: client.call_later(LoadMap, "/road_server/load_map", LoadMap.Request(map_url=url)) for url in ("four_way", "straight")
+    }
+    between = client.call(GetMap, "/road_server/get_map", GetMap.Request())
+    assert between.map.info.width > 0
+    sizes = {}
+    for url, future in loads.items():
+        client.until(future.done, url)
+        assert future.result().result == LoadMap.Response.RESULT_SUCCESS
+        sizes[url] = future.result().map.info.height
+    assert sizes["four_way"] > sizes["straight"]
+
+
+def test_long_work_says_how_far_it_is_lets_others_be_served_and_can_be_cancelled(suite, client):
+    from nav_msgs.srv import GetMap, GetPlan
+    from rcl_interfaces.srv import ListParameters, SetParametersAtomically
+    from rclpy.parameter import Parameter
+    from std_srvs.srv import Trigger
+
+    client.hear("/diagnostics")
+    client.until(lambda: _generate(client, count=1).result().result.successful, "the sampler's inputs")
+    running = _generate(client, wait=False, count=20_000)
+    waiting = _generate(client, wait=False, count=2, seed=3)
+    name = "/gp_sampler: progress"
+    client.until(lambda: any(s.name == name and s.values.get("requested") == "20000" for s in _said(client)), "progress")
+    assert client.call(ListParameters, "/gp_sampler/list_parameters", ListParameters.Request()).result.names
+    assert client.call(GetMap, "/road_server/get_map", GetMap.Request()).map.data
+    client.call(GetPlan, "/planner/get_plan", GetPlan.Request())
+    assert not running.done(), "the others were to be served while it ran"
+    third = _generate(client, wait=False, count=20_000, request="third")
+    one = SetParametersAtomically.Request(parameters=[Parameter("request", value="third").to_parameter_msg()])
+    client.until(lambda: client.call(SetParametersAtomically, "/gp_sampler/cancel_request", one).result.successful, "its end")
+    client.until(third.done, "the answer of one that waited, though others did not end")
+    assert third.result().result.reason == "request third: cancelled" and not running.done()
+    refused = client.call(SetParametersAtomically, "/gp_sampler/cancel_request", one).result
+    assert not refused.successful and "no request 'third' is open; open: " in refused.reason
+    cancelled = set()
+
+    def ended() -> bool:  # the second request may come after the first call
+        cancelled.update(re.findall(r"request \d+", client.call(Trigger, "/gp_sampler/cancel", Trigger.Request()).message))
+        return running.done() and waiting.done()
+
+    client.until(ended, "the answers of what was cancelled")
+    assert len(cancelled) == 2
+    for future in (running, waiting):
+        assert not future.result().result.successful
+        assert "cancelled" in future.result().result.reason
+    assert not client.call(Trigger, "/gp_sampler/cancel", Trigger.Request()).success
+    assert _generate(client, count=1).result().result.successful
+
+
+def test_empty_maps_nan_tracks_and_wrong_types_are_said_and_survived(suite, client):
+    """The last test of the module, for it plays havoc with the inputs; then the road comes again, and all is well."""
+    import struct
+
+    from nav_msgs.srv import GetPlan, LoadMap
+    from std_msgs.msg import String
+
+    from msg_conventions.cdr import CdrWriter
+
+    client.hear("/diagnostics", "/tracks", "/map")
+    tracks = client.wait("/tracks")[0]
+    empty = CdrWriter().header(0, "map").stamp(0).pack("f", 0.2).pack("I", 0, 0).pack("d", *[0.0] * 6, 1.0).pack("I", 0).finish()
+    heard = len(client.wait("/map"))
+    client.say("/map", empty)
+    client.wait("/map", heard + 1)
+    client.until(lambda: _refused(client, GetPlan, "map"), "the empty map to be refused")
+    client.say("/tracks", _with_nan(tracks, struct))
+    for node in ("/segmenter", "/road_server"):
+        client.until(lambda node=node: any(s.name.startswith(node) and "not finite" in s.message for s in _said(client)), node)
+    client.node.create_publisher(String, "/changepoints", 1).publish(String(data="of a wrong type"))
+    client.say("/tracks", tracks)
+    answer = client.call(LoadMap, "/road_server/load_map", LoadMap.Request(map_url="straight"))
+    assert answer.result == LoadMap.Response.RESULT_SUCCESS
+    client.until(lambda: _generate(client, count=1).result().result.successful, "the sampler to be served again")
+
+
+def _said(client):
+    return [status for data in client.heard["/diagnostics"] for status in decode_diagnostics(data)[1]]
+
+
+def _refused(client, kind, reason: str) -> bool:
+    """Ask for a plan; say whether it was empty, and why."""
+    plan = client.call(kind, "/planner/get_plan", kind.Request()).plan
+    said = [s.message for s in _said(client) if s.name.startswith("/planner: get_plan")]
+    return not plan.poses and any(reason in words for words in said)
+
+
+def _with_nan(tracks: bytes, struct) -> bytes:
+    """The same tracks with one coordinate that is no number: the last acceleration, before the last point's time."""
+    return tracks[:-16] + struct.pack("<d", float("nan")) + tracks[-8:]

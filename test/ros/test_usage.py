@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the executables answer to --help, without starting anything."""
+
+from dataclasses import fields
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+from scenario_gen.ros.plumbing.process import asks_for_help
+from scenario_gen.ros.plumbing.ros_parameters import help_of
+from scenario_gen.ros.plumbing.start import node_class, NODES
+
+
+@pytest.mark.dds
+def test_the_player_lists_its_parameters():
+    command = [sys.executable, "-m", "scenario_gen.ros.plumbing.start", "player", "--help"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120.0, check=False)
+    assert done.returncode == 0 and done.stderr == ""
+    assert "[--namespace NAME]... [--ros-args -p PARAMETER:=VALUE ...]" in done.stdout
+    assert "  rate := 1.0\n      how many times as fast as it was recorded" in done.stdout
+    for name in ("bag", "topics", "rate", "start_offset", "loop", "paused", "clock"):
+        assert f"  {name} := " in done.stdout
+
+
+@pytest.mark.dds
+def test_help_may_be_read_in_part():
+    command = f"{sys.executable} -m scenario_gen.ros.plumbing.start suite --help | head -n 3"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=120.0, check=False)
+    assert done.stderr == "" and "suite: all nodes in one process" in done.stdout
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_every_node_lists_all_of_its_parameters(name):
+    module = importlib.import_module(f"scenario_gen.ros.nodes.{name}")
+    text = help_of(name, (node_class(name),))
+    for entry in fields(module.Config):
+        assert f"  {entry.name} := " in text or f"  {entry.name}." in text
+
+
+def test_help_behind_ros_args_is_not_ours():
+    assert asks_for_help(["player", "--help"]) and asks_for_help(["player", "-h", "--ros-args", "-p", "bag:=x"])
+    assert not asks_for_help(["player", "--ros-args", "-p", "bag:=x"])
