@@ -19,7 +19,7 @@ PACKAGE = ROOT / "scenario_gen"
 # The data flow, first to last: a room is a folder of scenario_gen, a stage a folder or a module of scenario_gen/method.
 ROOMS = ("base", "numerics", "types", "bags", "logs", "template", "roads", "method", "pipeline")
 ORDER = (*ROOMS, "output", "closed_loop", "corpus", "ros", "cli", "__main__")
-STAGES = ("segmentation", "fitting", "routing", "sampling", "validity", "evaluation", "config", "checked", "nearest")
+STAGES = ("segmentation", "fitting", "routing", "validity", "sampling", "evaluation", "config", "attempt", "nearest")
 RANK = {name: rank for rank, name in enumerate(ORDER)}
 STAGE_RANK = {name: rank for rank, name in enumerate(STAGES)}
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])

@@ -10,6 +10,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.sampling.directed import Aim, CHUNK, FAIR, GOOD, Measures, PATIENCE, PLAIN, Seen, STAGE, STAGES
+from scenario_gen.method.sampling.plan import Cancelled
 from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.template.interaction import closest_crossing, Conflict, find_conflicts, pair_conflict
@@ -21,7 +22,6 @@ from scenario_gen.types.scenario import Cause, Scenario, Verdict
 from scenario_gen.types.target import Target
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
-Cancelled = Callable[[], bool]
 
 ANY = 1 << 30  # conflicts: with one clock for all a road alone says which there are
 MOST_BEYOND = 3.0  # s
