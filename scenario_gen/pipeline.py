@@ -14,10 +14,7 @@ from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.sampling import Callbacks, Progress, sample_scenarios
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import road_and_template
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.request import Request
-from scenario_gen.types.road import Road
+from scenario_gen.types import Encounter, GenerationResult, Request, Road
 
 __all__ = ["PipelineConfig", "generate"]
 

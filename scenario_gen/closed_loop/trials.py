@@ -24,12 +24,9 @@ from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
-from scenario_gen.method.evaluation.bootstrap import wilson
+from scenario_gen.method.evaluation import wilson
+from scenario_gen.types import Interval, Road, Scenario, token
 from scenario_gen.types.ego import together
-from scenario_gen.types.evaluation import Interval
-from scenario_gen.types.names import token
-from scenario_gen.types.road import Road
-from scenario_gen.types.scenario import Scenario
 
 MakePlanner = Callable[[], Planner]
 

@@ -34,12 +34,11 @@ from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.tasks import arriving, check_out, spread, Told
 from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation.criticality import criticality
-from scenario_gen.method.evaluation.motion import at_period
+from scenario_gen.method.evaluation import at_period, criticality
 from scenario_gen.method.fitting import LostConflictError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road, road_and_template
-from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types import GenerationResult
 
 BATCH = "batch.json"
 TEMPLATES = 10  # of one task

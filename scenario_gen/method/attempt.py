@@ -11,12 +11,8 @@ from scenario_gen.method.evaluation import MEASURED, MEASURES, replay, uniform_c
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.sampling import Callbacks, sample_scenarios
-from scenario_gen.template.interaction import Wait
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.generation import GenerationResult, NARROW, UNIFORM, WITHOUT
-from scenario_gen.types.request import Request
-from scenario_gen.types.road import Road
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.template import Wait
+from scenario_gen.types import Encounter, GenerationResult, NARROW, Request, Road, Segmentation, UNIFORM, WITHOUT
 
 
 @dataclass(frozen=True, eq=False)

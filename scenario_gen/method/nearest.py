@@ -17,18 +17,11 @@ from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.fitting import fit_template, LostConflictError
 from scenario_gen.method.sampling import Cancelled, TargetError
 from scenario_gen.method.segmentation import segment
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, wrap_angle
+from scenario_gen.numerics import exact, Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.roads import build_road, BUILT_IN, road_and_template
-from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room
-from scenario_gen.roads.ways import draw_route
-from scenario_gen.template.separation import footprint_gap
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.names import vehicle_index
-from scenario_gen.types.request import ENDS, Request, State
-from scenario_gen.types.road import Road
+from scenario_gen.roads import build_road, BUILT_IN, draw_route, footprint_fits, nearest_pose_with_room, road_and_template
+from scenario_gen.template import footprint_gap
+from scenario_gen.types import ENDS, GenerationResult, Request, Road, State, Vehicle, vehicle_index
 
 P = ParamSpec("P")
 BISECTIONS = 7

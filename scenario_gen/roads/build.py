@@ -26,14 +26,8 @@ from scenario_gen.roads.shaped import (
     PLAIN_LINE,
 )
 from scenario_gen.roads.vector.read import is_vector_map, READERS, vector_road
-from scenario_gen.template.frenet import main_line, to_frenet
-from scenario_gen.template.separation import own_paths
-from scenario_gen.template.side import mirrored, traffic_side
-from scenario_gen.template.size import refuse_too_large
-from scenario_gen.template.tracks import clean_tracks, Track
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.lanes import MIRRORED
-from scenario_gen.types.road import Road
+from scenario_gen.template import clean_tracks, main_line, mirrored, own_paths, refuse_too_large, to_frenet, Track, traffic_side
+from scenario_gen.types import Encounter, MIRRORED, Road
 
 
 def build_road(name_or_path: str, encounter: Encounter | None = None, config: RoadConfig = RoadConfig()) -> Road:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types.scenario import Scenario
 
 _ROWS = ("position", "heading", "speed", "acceleration")

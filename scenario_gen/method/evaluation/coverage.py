@@ -11,12 +11,10 @@ import numpy as np
 
 from scenario_gen.method.evaluation.evaluate import measured
 from scenario_gen.method.evaluation.measures import figures_of, most_critical, PairFigures
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.template.manoeuvre import manoeuvre_of
-from scenario_gen.types.coverage import Coverage, Spread
+from scenario_gen.numerics import Floats
+from scenario_gen.template import manoeuvre_of
+from scenario_gen.types import Coverage, Encounter, Scenario, Spread
 from scenario_gen.types.ego import together
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.scenario import Scenario
 
 EDGES = (0.0, 0.5, 1.0, 2.0, 4.0)  # s of PET
 BINS = ("below 0 s", "0 … 0.5 s", "0.5 … 1 s", "1 … 2 s", "2 … 4 s", "4 s and more", "no crossing")

@@ -12,11 +12,8 @@ from scenario_gen.method.sampling.plan import Callbacks, Plan
 from scenario_gen.method.sampling.prepare import kept_reactions
 from scenario_gen.method.sampling.sample import draw_scenarios
 from scenario_gen.method.validity import Checker, Limits
-from scenario_gen.template.interaction import Wait, waits_to_keep
-from scenario_gen.template.reactions import reactions_of
-from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.lanes import MIRRORED
-from scenario_gen.types.request import Request
+from scenario_gen.template import reactions_of, Wait, waits_to_keep
+from scenario_gen.types import GenerationResult, MIRRORED, Request
 
 
 def sample_scenarios(

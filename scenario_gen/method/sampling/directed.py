@@ -20,11 +20,8 @@ import math
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.scenario import Cause, Scenario
-from scenario_gen.types.target import Pair, Target, UNITS
+from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.types import Cause, Encounter, Pair, Scenario, Target, UNITS
 
 Measure = Callable[[Scenario, str, Pair | None], float]  # a figure of a scenario; NaN if it has none
 

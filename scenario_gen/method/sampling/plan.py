@@ -6,12 +6,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from scenario_gen.template.interaction import Wait
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import BoundaryStates, EgoSlot, Scenario
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.template import Wait
+from scenario_gen.types import BoundaryStates, EgoSlot, Encounter, Road, Route, Scenario, Segmentation
 
 Progress = Callable[[int, int, int], None]  # of scenarios so far, scenarios wanted, candidates so far
 Cancelled = Callable[[], bool]

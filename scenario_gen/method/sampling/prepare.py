@@ -36,17 +36,9 @@ from scenario_gen.method.sampling.speed_profile.stops import (
     standing_within,
 )
 from scenario_gen.method.sampling.time_warp import Clock, TimeWarp
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats
-from scenario_gen.template.interaction import Wait, WAIT_SPEED
-from scenario_gen.template.reactions import reactions_of
-from scenario_gen.template.separation import least_gaps
-from scenario_gen.template.tracks import clean_tracks, Track
-from scenario_gen.types.encounter import Encounter, Vehicle
-from scenario_gen.types.reaction import FOLLOW, ReactionGraph
-from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import BoundaryStates
+from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.template import clean_tracks, least_gaps, reactions_of, Track, Wait, WAIT_SPEED
+from scenario_gen.types import BoundaryStates, Encounter, FOLLOW, ReactionGraph, Road, Route, Vehicle
 
 _STRETCHES = 9
 _MOST_SCALE = 4.0  # a template speed is scaled at most so much; beyond it, lengths alone decide

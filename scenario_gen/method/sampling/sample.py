@@ -29,10 +29,7 @@ from scenario_gen.method.sampling.sampler import (
     place_of,
     Sampler,
 )
-from scenario_gen.types.reaction import NOT_KEPT
-from scenario_gen.types.request import Request
-from scenario_gen.types.scenario import Cause, EgoSlot, Scenario, ScenarioSet
-from scenario_gen.types.target import Reached
+from scenario_gen.types import Cause, EgoSlot, NOT_KEPT, Reached, Request, Scenario, ScenarioSet
 
 KEPT = 1000  # scenarios up to which a set stays in memory
 LEAST_COUNT = 20  # where clocks are free: scenarios for which candidates are drawn at least, so that levels can be tried

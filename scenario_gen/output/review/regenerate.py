@@ -17,18 +17,14 @@ from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.folders import Kind, sha256_of
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.method.evaluation.measures import MEASURES
+from scenario_gen.method.evaluation import MEASURES
 from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.routing import plan_routes, PlanningConfig
 from scenario_gen.method.sampling import checker_of, plan_of, regenerate, SamplingConfig
 from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.method.validity import Limits
-from scenario_gen.template.side import mirrored
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.request import Request
-from scenario_gen.types.scenario import Scenario
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.template import mirrored
+from scenario_gen.types import Encounter, GenerationResult, Request, Scenario, Segmentation
 
 TEMPLATE = ("tracks", "changepoints", "map", "fit")
 

@@ -21,16 +21,10 @@ from scenario_gen.bags.storage.bag import within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, Limits
-from scenario_gen.numerics.arrays import Bools
-from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits, orders_asked, Wait
-from scenario_gen.template.reactions import reactions_of
+from scenario_gen.numerics import Bools
+from scenario_gen.template import Conflict, find_conflicts, find_waits, orders_asked, reactions_of, Wait
+from scenario_gen.types import at_ends, BoundaryStates, Cause, Encounter, Reaction, Road, Scenario, tokens
 from scenario_gen.types.ego import together
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.names import tokens
-from scenario_gen.types.presence import at_ends
-from scenario_gen.types.reaction import Reaction
-from scenario_gen.types.road import Road
-from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario
 
 UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
 NO_WITNESS = f"the ego: its witness is not on {WITNESS}"

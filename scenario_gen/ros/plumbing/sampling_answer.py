@@ -20,11 +20,7 @@ from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import Callbacks, sample_scenarios, SamplingConfig
 from scenario_gen.method.validity import Limits
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.names import tokens
-from scenario_gen.types.request import Request
-from scenario_gen.types.scenario import BoundaryStates, EgoSlot, Scenario, ScenarioSet
+from scenario_gen.types import BoundaryStates, EgoSlot, Encounter, GenerationResult, Request, Scenario, ScenarioSet, tokens
 
 Answer = tuple[GenerationResult, RequestSummary]  # what a request came to; its scenarios are published by then
 Send = Callable[[str, bytes], None]  # of topic and CDR bytes
