@@ -324,7 +324,7 @@ def _over_dds() -> "OverDds":
         InputError: ROS 2 is not in this environment.
     """
     try:
-        from scenario_gen.ros.plumbing.drive_over_dds import drive_over_dds
+        from scenario_gen.cli.drive import drive_over_dds
     except ImportError as error:
         raise InputError(f"ROS 2 is not in this environment ({error}); source it, or leave --ros out") from error
     return drive_over_dds
@@ -398,7 +398,7 @@ def save_bag(
 @app.command()
 def doctor() -> None:
     """Say what is wrong with this environment: Python, packages, ROS, DDS, QoS of visible topics, kernels."""
-    from scenario_gen.ros.plumbing.doctor import main as examined
+    from scenario_gen.cli.doctor import main as examined
 
     raise typer.Exit(examined())
 
