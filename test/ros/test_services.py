@@ -96,6 +96,6 @@ def test_a_caller_that_is_never_matched_is_given_up_and_others_are_served_meanwh
     before = server.attempts
     client.until(lambda: server.spun_until(lambda: server.attempts > before + 2), "more attempts")
     assert not said
-    now[0] = services.PATIENCE
+    now[0] = process.PATIENCE
     client.until(lambda: server.spun_until(lambda: bool(said)), "the end of patience")
     assert "its answer is dropped" in said[0]
