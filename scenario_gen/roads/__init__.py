@@ -3,8 +3,7 @@
 
 """Occupancy grids, their entries and exits, and the readers of map formats."""
 
-from scenario_gen.roads.build import build_road, road_and_template
-from scenario_gen.roads.builtin import BUILT_IN
+from scenario_gen.roads.build import build_road, BUILT_IN, road_and_template
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.types.road import Road
 

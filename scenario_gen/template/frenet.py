@@ -55,6 +55,11 @@ class FrenetTracks:
     lanes: int
     between: tuple[int, int] = (0, 0)
 
+    def span(self, tracks: tuple[Track, ...]) -> tuple[float, float]:
+        """The lowest and highest station [m] that a footprint reaches."""
+        half = np.array([[track.vehicle.length / 2.0] for track in tracks])
+        return float((self.station - half).min()), float((self.station + half).max())
+
     def spread(self) -> "FrenetTracks":
         """The same with the lanes between oncoming vehicles counted."""
         ahead, against = self.between
@@ -87,8 +92,7 @@ def main_line(frenet: FrenetTracks, tracks: tuple[Track, ...]) -> MainLine:
 
     It is straight where no vehicle turns by more than 10°; else the reference line without its wiggles.
     """
-    half = np.array([[track.vehicle.length / 2.0] for track in tracks])
-    low, high = float((frenet.station - half).min()), float((frenet.station + half).max())
+    low, high = frenet.span(tracks)
     if max(abs(turn_of(track)) for track in tracks) <= _STRAIGHT:
         shape = Curve(np.array([[0.0, 0.0, 0.0], [high - low, 0.0, 0.0]]))
         return MainLine(shape, frozen([low, high]), frozen([0.0, high - low]))

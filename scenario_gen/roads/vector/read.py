@@ -23,7 +23,7 @@ from scenario_gen.template.tracks import Track
 from scenario_gen.types.lanes import LaneNetwork
 from scenario_gen.types.road import Road
 
-READERS = {".osm": read_lanelet2, ".xodr": read_opendrive, ".xml": read_commonroad}
+FORMATS = {".osm": read_lanelet2, ".xodr": read_opendrive, ".xml": read_commonroad}
 PARTS = ("lanelet", "junction", "box")
 _AROUND = 40.0  # metres around lanes that are asked for
 _NAMED = 12  # ids that a message lists
@@ -32,14 +32,14 @@ _NAMED = 12  # ids that a message lists
 def split(name: str) -> tuple[Path, str]:
     """Return the path and the part of `path#part`; a file whose name has a # stands for itself."""
     path, mark, part = name.rpartition("#")
-    if not mark or Path(name).suffix.lower() in READERS:
+    if not mark or Path(name).suffix.lower() in FORMATS:
         return Path(name), ""
     return Path(path), part
 
 
 def is_vector_map(name: str) -> bool:
     """Return whether a road's name is the path of a vector map."""
-    return split(name)[0].suffix.lower() in READERS
+    return split(name)[0].suffix.lower() in FORMATS
 
 
 def read_network(path: Path) -> LaneNetwork:
@@ -60,7 +60,7 @@ def read_network(path: Path) -> LaneNetwork:
 @lru_cache(maxsize=2)
 def _read(path: Path, _changed: int, _size: int) -> LaneNetwork:
     with reading(path):
-        return READERS[path.suffix.lower()](path)
+        return FORMATS[path.suffix.lower()](path)
 
 
 def chosen_lanes(network: LaneNetwork, part: str) -> tuple[int, ...]:
