@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.markup import Element
 from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Bools, Floats, Ints, runs
 from scenario_gen.types.lanes import Lane, LaneNetwork
@@ -58,6 +59,35 @@ class Draft:
                 raise InputError(f"{self.place}: lane {self.id}: {len(names)} lanes {what}; at most {MOST_LINKS} are read")
 
 
+@dataclass(frozen=True)
+class MapLanes:
+    """What a reader finds in a file.
+
+    Attributes:
+        drafts: its lanes for cars.
+        notes: how it was read.
+        left_out: how many lanes for others were passed over.
+    """
+
+    drafts: Sequence[Draft]
+    notes: tuple[str, ...]
+    left_out: int = 0
+
+
+def by_id(elements: Iterable[Element]) -> dict[str, Element]:
+    """Return elements by their attribute `id`.
+
+    Raises:
+        InputError: an id is there twice.
+    """
+    found: dict[str, Element] = {}
+    for element in elements:
+        first = found.setdefault(element.get("id"), element)
+        if first is not element:
+            raise InputError(f"{element.place}: {element.tag} {element.get('id')} is there twice, first on line {first.line}")
+    return found
+
+
 def refuse_too_many_lanes(count: int, place: str) -> None:
     """Refuse a map, or a part of it, before its lanes are made.
 
@@ -80,12 +110,13 @@ def refuse_too_long(sections: int, place: str) -> None:
         )
 
 
-def network_of(name: str, drafts: Sequence[Draft], notes: Iterable[str]) -> LaneNetwork:
+def network_of(name: str, found: MapLanes) -> LaneNetwork:
     """Return the network of what a reader found; neighbours that are no lanes for cars are left out.
 
     Raises:
         InputError: there is no lane, an id is there twice, or a border is no line.
     """
+    drafts, notes = found.drafts, found.notes
     if not drafts:
         raise InputError(f"map {name}: no lane that cars may use")
     index: dict[str, int] = {}
@@ -105,7 +136,9 @@ def network_of(name: str, drafts: Sequence[Draft], notes: Iterable[str]) -> Lane
             tuple(dict.fromkeys(index[other] for other in names if other in index)) for names in (draft.successors, draft.beside)
         )
         lanes.append(Lane(draft.id, left, right, after, beside, draft.speed_limit, draft.junction))
-    network = LaneNetwork(name, tuple(lanes), tuple(notes))
+    if found.left_out:
+        notes += (f"{found.left_out} lanelets are for others than cars and were left out",)
+    network = LaneNetwork(name, tuple(lanes), notes)
     return network if any(lane.junction for lane in lanes) else with_junctions(network)
 
 

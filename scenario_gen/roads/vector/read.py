@@ -3,6 +3,8 @@
 
 """One door to vector maps: `map.osm`, `map.xodr` or `map.xml`, and which part of it, behind a `#`."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -10,20 +12,41 @@ import numpy as np
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError, of_system, reading
-from scenario_gen.base.markup import finite
+from scenario_gen.base.markup import Element, finite, read_xml
 from scenario_gen.numerics.arrays import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.vector.commonroad import read_commonroad
-from scenario_gen.roads.vector.lanelet2 import read_lanelet2
-from scenario_gen.roads.vector.network import extent, part_of
-from scenario_gen.roads.vector.opendrive import read_opendrive
+from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
+from scenario_gen.roads.vector.network import extent, MapLanes, network_of, part_of
 from scenario_gen.roads.vector.place import best_part
 from scenario_gen.roads.vector.raster import road_of
 from scenario_gen.template.tracks import Track
 from scenario_gen.types.lanes import LaneNetwork
 from scenario_gen.types.road import Road
 
-FORMATS = {".osm": read_lanelet2, ".xodr": read_opendrive, ".xml": read_commonroad}
+
+@dataclass(frozen=True)
+class MapFormat:
+    """A format of vector maps.
+
+    Attributes:
+        name: of a file in it, with its article.
+        root: the name of its root element.
+        lanes_of: finds the lanes below the root.
+        skipped: elements that are passed over with all they hold.
+    """
+
+    name: str
+    root: str
+    lanes_of: Callable[[Element], MapLanes]
+    skipped: frozenset[str] = frozenset()
+
+
+FORMATS = {
+    ".osm": MapFormat("a Lanelet2 map", "osm", lanelet2.lanes_of),
+    ".xodr": MapFormat("an OpenDRIVE map", "OpenDRIVE", opendrive.lanes_of),
+    ".xml": MapFormat("a CommonRoad file", "commonRoad", commonroad.lanes_of, commonroad.SKIPPED),
+}
+"""By the ending of a file's name."""
 PARTS = ("lanelet", "junction", "box")
 _AROUND = 40.0  # metres around lanes that are asked for
 _NAMED = 12  # ids that a message lists
@@ -59,8 +82,12 @@ def read_network(path: Path) -> LaneNetwork:
 
 @lru_cache(maxsize=2)
 def _read(path: Path, _changed: int, _size: int) -> LaneNetwork:
+    form = FORMATS[path.suffix.lower()]
     with reading(path):
-        return FORMATS[path.suffix.lower()](path)
+        root = read_xml(path, f"map {path}", form.skipped)
+        if root.tag != form.root:
+            raise InputError(f"{root.place}: the root of {form.name} is <{form.root}>")
+        return network_of(path.stem, form.lanes_of(root))
 
 
 def chosen_lanes(network: LaneNetwork, part: str) -> tuple[int, ...]:
