@@ -20,7 +20,8 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Floats, Ints, runs
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1
-from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
+from scenario_gen.types.derived import once_per_object
+from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.presence import ALWAYS
 from scenario_gen.types.segmentation import Segmentation
 
@@ -80,7 +81,7 @@ class Conflict:
         return self.entry_second - self.entry_first
 
 
-@once_per_encounter
+@once_per_object
 def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
     """Return the waits of every vehicle, in order of vehicle and time.
 

@@ -17,7 +17,8 @@ from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Bools, Floats, wrap_angle
 from scenario_gen.template.answers import SLOWEST, time_gaps
 from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits
-from scenario_gen.types.encounter import Encounter, once_per_encounter
+from scenario_gen.types.derived import once_per_object
+from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.reaction import FOLLOW, Reaction, ReactionGraph, YIELD
 
 FAR = 60.0  # m, within which one follows
@@ -40,7 +41,7 @@ _SLOWS_BY, _SLOWS_TO, _BENDS = 2.0, 0.6, 0.7  # m/s, share of the speed, and wha
 _NEAR = 25.0  # m from the shared area, within which one waits for it
 
 
-@once_per_encounter
+@once_per_object
 def reactions_of(encounter: Encounter) -> ReactionGraph:
     """Return who reacts to whom."""
     follows = _nearest_leaders(encounter)

@@ -14,7 +14,8 @@ from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.template.tracks import clean_tracks, presence_of, Track
-from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
+from scenario_gen.types.derived import once_per_object
+from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.presence import together
 
 _ROUNDS = 400
@@ -195,7 +196,7 @@ OWN_CLEARANCE = 0.5  # metres between footprints
 OWN_MAX_SHIFT = 3.0
 
 
-@once_per_encounter
+@once_per_object
 def own_paths(encounter: Encounter) -> Separation:
     """Clean the template's paths and separate its vehicles.
 
@@ -212,7 +213,7 @@ def own_paths(encounter: Encounter) -> Separation:
     return replace(separation, notes=(*notes, *separation.notes))
 
 
-@once_per_encounter
+@once_per_object
 def least_gaps(encounter: Encounter) -> Floats:
     """Return the least gap (N,) [m] of each vehicle to any other, negative if they overlap; inf if it is never beside one."""
     poses = np.concatenate([encounter.position, encounter.heading[..., None]], axis=-1)

@@ -20,7 +20,8 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
+from scenario_gen.types.derived import once_per_object
+from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.presence import ALWAYS
 
 _WAVELENGTHS = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)  # metres at which the filter halves an oscillation
@@ -99,7 +100,7 @@ def presence_of(track: Track) -> Bools:
     return np.asarray((at >= track.present[0]) & (at <= track.present[1]))
 
 
-@once_per_encounter
+@once_per_object
 def clean_tracks(encounter: Encounter) -> tuple[Track, ...]:
     """Return one cleaned track per vehicle."""
     return tuple(_clean(encounter, i) for i in range(len(encounter.vehicles)))

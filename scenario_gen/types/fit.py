@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Bools, canonical_poses, Floats, frozen, Ints
+from scenario_gen.numerics.arrays import Bools, canonical_poses, Floats, freeze, frozen, Ints
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import BoundaryStates
 
@@ -36,9 +36,7 @@ class FittedVehicle:
     path: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "anchors", canonical_poses(self.anchors))
-        object.__setattr__(self, "moved", frozen(self.moved))
-        object.__setattr__(self, "path", frozen(self.path))
+        freeze(self, anchors=canonical_poses(self.anchors), moved=frozen(self.moved), path=frozen(self.path))
 
     def figures(self) -> dict[str, Any]:
         """Return what the fitting decided, ready for JSON: manoeuvre, scale, largest move [m], turns [deg, left positive]."""

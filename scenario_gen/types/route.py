@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from scenario_gen.numerics.arrays import canonical_poses, Floats, frozen, frozen_ints, Ints
+from scenario_gen.numerics.arrays import canonical_poses, Floats, freeze, frozen, frozen_ints, Ints
 
 FAR_OFF = 1.5
 """Metres between a route and its fitted path from which on it is said."""
@@ -37,9 +37,8 @@ class Route:
     farthest: float = float("nan")
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", canonical_poses(self.points, continuous=True))
-        object.__setattr__(self, "anchor", frozen_ints(self.anchor))
-        object.__setattr__(self, "length", frozen(self.length))
+        points = canonical_poses(self.points, continuous=True)
+        freeze(self, points=points, anchor=frozen_ints(self.anchor), length=frozen(self.length))
 
     def figures(self) -> dict[str, Any]:
         """Return what is known of how it was planned, ready for JSON: legs, anchors left out, distance to the fitted path [m]."""

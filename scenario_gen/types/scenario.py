@@ -10,7 +10,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Bools, canonical_heading, canonical_poses, Floats, frozen, Ints
+from scenario_gen.numerics.arrays import Bools, canonical_heading, canonical_poses, Floats, freeze, frozen, Ints
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
 from scenario_gen.types.reaction import Reaction, ReactionGraph
@@ -56,15 +56,12 @@ class Scenario:
     facts: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("position", "speed", "acceleration"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
-        object.__setattr__(self, "time", frozen(np.round(self.time, 9)))  # whole nanoseconds, as on the wire
-        object.__setattr__(self, "heading", canonical_heading(self.heading))
         n, t = len(self.vehicles), len(self.time)
-        object.__setattr__(self, "present", canonical_presence(self.present, n, t, f"scenario {self.index}"))
-        if not always(self.present, t):
-            for name in ("position", "heading", "speed", "acceleration"):
-                object.__setattr__(self, name, frozen(held(getattr(self, name), self.present)))
+        present = canonical_presence(self.present, n, t, f"scenario {self.index}")
+        freeze(self, time=frozen(np.round(self.time, 9)), present=present)  # whole nanoseconds, as on the wire
+        freeze(self, heading=held(canonical_heading(self.heading), present))
+        for name in ("position", "speed", "acceleration"):
+            freeze(self, **{name: held(frozen(getattr(self, name)), present)})
 
     @property
     def all_present(self) -> bool:
@@ -91,9 +88,8 @@ class BoundaryStates:
     freed: Floats = field(default_factory=lambda: np.zeros((0, 2, 2)))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "freed", frozen(self.freed if len(self.freed) else np.zeros((len(self.start), 2, 2))))
-        object.__setattr__(self, "start", canonical_poses(self.start))
-        object.__setattr__(self, "end", canonical_poses(self.end))
+        freed = self.freed if len(self.freed) else np.zeros((len(self.start), 2, 2))
+        freeze(self, freed=frozen(freed), start=canonical_poses(self.start), end=canonical_poses(self.end))
 
 
 class Cause(StrEnum):

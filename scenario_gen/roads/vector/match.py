@@ -18,6 +18,7 @@ import numpy as np
 from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Floats, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
+from scenario_gen.numerics.plane import angle_between, edge_lengths
 from scenario_gen.roads.vector.search import Spot
 from scenario_gen.template.path_crossing import path_crossing, PathCrossing
 from scenario_gen.template.tracks import Track
@@ -34,12 +35,7 @@ _CAPPED = 100.0  # m²
 _YAW = 20.0  # m² per unit of 1 - cos
 _OWN_TURN = 40.0  # m² per rad²
 _CHANGING = 4  # chains, the most alike, between which a change of lanes is looked for
-_PRIOR, _CROSSED, _BEYOND, _FOLLOWED = (
-    0.5,
-    1.0,
-    0.25,
-    2.0,
-)  # weights: where the place says; crossings driven, or beyond the ends; gaps
+_PRIOR, _CROSSED, _BEYOND, _FOLLOWED = 0.5, 1.0, 0.25, 2.0  # weights: the place; crossings driven, or beyond the ends; gaps
 _WORTH = 1.5  # m² that a change of lanes must gain
 _TURN = math.radians(40.0)  # a chain may turn by this much more or less than the vehicle in the template
 _CROSS = math.radians(15.0)  # least angle of a crossing
@@ -101,11 +97,10 @@ class Chains:
 
     def __init__(self, network: LaneNetwork) -> None:
         self.network = network
-        self.length = [float(exact.hypot(*np.diff(lane.centre, axis=0).T).sum()) for lane in network.lanes]
+        self.length = [float(edge_lengths(lane.centre).sum()) for lane in network.lanes]
         self.points = np.concatenate([lane.centre[:-1] for lane in network.lanes])
-        steps = [np.diff(lane.centre, axis=0) for lane in network.lanes]
-        self.yaws = np.concatenate([exact.arctan2(step[:, 1], step[:, 0]) for step in steps])
-        self.owner = np.repeat(np.arange(len(steps)), [len(step) for step in steps])
+        self.yaws = np.concatenate([lane.yaw for lane in network.lanes])
+        self.owner = np.repeat(np.arange(len(network.lanes)), [len(lane.yaw) for lane in network.lanes])
         self._curves: dict[tuple[int, ...], Curve] = {}
 
     def curve(self, chain: tuple[int, ...]) -> Curve:
@@ -113,6 +108,10 @@ class Chains:
         if chain not in self._curves:
             self._curves[chain] = middle(np.concatenate([self.network.lanes[k].centre for k in chain]))
         return self._curves[chain]
+
+    def after(self, chain: Sequence[int]) -> list[int]:
+        """The lanes that follow a chain and are not in it."""
+        return [k for k in self.network.lanes[chain[-1]].successors if k not in chain]
 
     def near(self, pose: Floats) -> list[int]:
         """Lanes that pass a pose (3,) x, y [m], yaw [rad] nearby, about its way; the nearest first."""
@@ -138,7 +137,7 @@ class Chains:
             if not open_chains:
                 break
             chain, length = open_chains.pop(0)
-            after = [k for k in self.network.lanes[chain[-1]].successors if k not in chain]
+            after = self.after(chain)
             if not after or length > travelled + self.length[first] + _FORTH:
                 yield tuple(k for k in before if k not in chain) + chain
             else:
@@ -260,7 +259,8 @@ def changed_curve(one: Curve, other: Curve, at: Floats) -> Curve | None:
 
 def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[Course]:
     """Shift the beginnings so that crossings and gaps on one lane are as far along as in the template (least squares)."""
-    rows: list[tuple[dict[int, float], float, float]] = [({i: 1.0}, course.start, _PRIOR) for i, course in enumerate(courses)]
+    one_each = np.eye(len(courses))
+    rows = [(one_each[i], course.start, _PRIOR) for i, course in enumerate(courses)]  # factors, value, weight
     for a, one in enumerate(tracks):
         for b in range(a):
             two = tracks[b]
@@ -271,8 +271,8 @@ def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[
                     want = np.array([courses[a].start + scale * crossing.first, courses[b].start + scale * crossing.second])
                     at = found[int(np.argmin(np.abs(found - want).sum(axis=1)))]
                     weight = _CROSSED if _driven(crossing, one, two) else _BEYOND
-                    rows.append(({a: 1.0}, float(at[0]) - scale * crossing.first, weight))
-                    rows.append(({b: 1.0}, float(at[1]) - scale * crossing.second, weight))
+                    rows.append((one_each[a], float(at[0]) - scale * crossing.first, weight))
+                    rows.append((one_each[b], float(at[1]) - scale * crossing.second, weight))
             for first, second in ((a, b), (b, a)):
                 gap = _follows(tracks[first], tracks[second])
                 if gap is None:
@@ -280,13 +280,9 @@ def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[
                 station, offset = courses[second].curve.project(courses[first].curve.at(np.array([courses[first].start]))[:, :2])
                 if abs(float(offset[0])) < _SAME:  # of `first`, its start lies so far along the course of `second`
                     shift = float(station[0]) - courses[first].start
-                    rows.append(({first: 1.0, second: -1.0}, scale * gap - shift, _FOLLOWED))
-    matrix, value = np.zeros((len(rows), len(courses))), np.zeros(len(rows))
-    for row, (terms, wanted, weight) in enumerate(rows):
-        for i, factor in terms.items():
-            matrix[row, i] = weight * factor
-        value[row] = weight * wanted
-    solution = exact.lstsq(matrix, value)
+                    rows.append((one_each[first] - one_each[second], scale * gap - shift, _FOLLOWED))
+    factors, values, weights = (np.array(column) for column in zip(*rows, strict=True))
+    solution = exact.lstsq(weights[:, None] * factors, weights * values)
     return [replace(course, start=float(s)) for course, s in zip(courses, solution, strict=True)]
 
 
@@ -299,7 +295,7 @@ def _follows(one: Track, two: Track) -> float | None:
     """How far along the path of `two` the path of `one` begins, if it begins on it."""
     start = one.curve.at(0.0)
     station, offset = two.curve.project(start[None, :2])
-    turned = abs(float(wrap_angle(np.asarray(two.curve.at(float(station[0]))[2] - start[2]))))
+    turned = abs(angle_between(two.curve.at(float(station[0]))[2], start[2]))
     on = abs(float(offset[0])) < _SAME and turned < math.radians(30.0) and 0.0 <= station[0] <= two.travelled
     return float(station[0]) if on else None
 
@@ -325,10 +321,9 @@ def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], s
             reason = reason or f"the lanes turn vehicle {track.vehicle.id} by {math.degrees(turn):.0f}° more than in the template"
         poses = _placed(track, spot)
         fitted = course.curve.at(np.linspace(course.start, course.end, len(poses)))
-        miss = np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1])
-        cost += float(np.minimum(miss, _CAPPED).mean() + _YAW * (1.0 - exact.cos(fitted[:, 2] - poses[:, 2])).mean()) / len(
-            tracks
-        )
+        miss = np.minimum(np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1]), _CAPPED)
+        turned = 1.0 - exact.cos(fitted[:, 2] - poses[:, 2])
+        cost += float(miss.mean() + _YAW * turned.mean()) / len(tracks)
     for a, one in enumerate(tracks):
         for b, two in enumerate(tracks[:a]):
             crossing = path_crossing(one, two)
