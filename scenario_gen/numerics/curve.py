@@ -10,6 +10,7 @@ import numpy as np
 
 from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Floats, frozen, Ints
+from scenario_gen.numerics.plane import edge_lengths, edge_yaws, unit, unit_left
 
 TOGETHER = 64  # positions that are projected at once, on the edges that can be nearest to any of them
 
@@ -30,18 +31,15 @@ class Curve:
     @classmethod
     def through(cls, xy: Floats) -> "Curve":
         """Lay a curve on points (M, 2) [m]; the yaw of each is the mean direction of its two neighbouring edges."""
-        step = np.diff(xy, axis=0)
-        keep = np.concatenate(([True], exact.hypot(step[:, 0], step[:, 1]) > 1e-9))
-        xy = xy[keep]
-        edge = np.unwrap(exact.arctan2(np.diff(xy[:, 1]), np.diff(xy[:, 0])))
+        xy = xy[np.concatenate(([True], edge_lengths(xy) > 1e-9))]
+        edge = np.unwrap(edge_yaws(xy))
         yaw = np.concatenate((edge[:1], (edge[1:] + edge[:-1]) / 2.0, edge[-1:]))
         return cls(np.column_stack((xy, yaw)))
 
     @cached_property
     def station(self) -> Floats:
         """(M,) arc length [m] of each point."""
-        step = np.diff(self.points[:, :2], axis=0)
-        return frozen(np.concatenate(([0.0], np.cumsum(exact.hypot(step[:, 0], step[:, 1])))))
+        return frozen(np.concatenate(([0.0], np.cumsum(edge_lengths(self.points[:, :2])))))
 
     @property
     def length(self) -> float:
@@ -53,15 +51,13 @@ class Curve:
         s = np.asarray(station, dtype=np.float64)
         pose = np.stack([np.interp(s, self.station, self.points[:, k]) for k in range(3)], axis=-1)
         beyond = np.minimum(s, 0.0) + np.maximum(s - self.length, 0.0)
-        pose[..., 0] += beyond * exact.cos(pose[..., 2])
-        pose[..., 1] += beyond * exact.sin(pose[..., 2])
+        pose[..., :2] += beyond[..., None] * unit(pose[..., 2])
         return pose
 
     def beside(self, station: Floats, offset: Floats) -> Floats:
         """Poses (..., 3) at arc lengths and offsets [m, left positive]; the yaw is the curve's own."""
         pose = self.at(station)
-        pose[..., 0] -= offset * exact.sin(pose[..., 2])
-        pose[..., 1] += offset * exact.cos(pose[..., 2])
+        pose[..., :2] += offset[..., None] * unit_left(pose[..., 2])
         return pose
 
     def project(self, xy: Floats) -> tuple[Floats, Floats]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Bools, Floats, wrap_angle
+from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.template.answers import SLOWEST, time_gaps
 from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits
 from scenario_gen.types.derived import once_per_object
@@ -100,8 +101,7 @@ def is_behind(encounter: Encounter, who: int, whom: int) -> Bools:
     yaw_a, yaw_b = encounter.heading[who], encounter.heading[whom]
     both = encounter.there[who] & encounter.there[whom]
     between = b - a
-    cos, sin = exact.cos(yaw_a), exact.sin(yaw_a)
-    along, across = between[:, 0] * cos + between[:, 1] * sin, between[:, 1] * cos - between[:, 0] * sin
+    along, across = ahead_and_left(between, yaw_a)
     alike = np.abs(wrap_angle(yaw_b - yaw_a)) < _ALIKE
     straight = (along > 0.0) & (np.abs(across) < _LANE) & alike
     step = max(round(0.5 / encounter.dt), 1)

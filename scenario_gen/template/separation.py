@@ -13,6 +13,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Floats, frozen
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import ahead_and_left, unit
 from scenario_gen.template.tracks import clean_tracks, presence_of, Track
 from scenario_gen.types.derived import once_per_object
 from scenario_gen.types.encounter import Encounter, Vehicle
@@ -61,7 +62,7 @@ def footprint_gap(a: Vehicle, poses_a: Floats, b: Vehicle, poses_b: Floats) -> t
     gap = np.full(len(between), -np.inf)
     axis = np.zeros((len(between), 2))
     for yaw in (poses_a[:, 2], poses_a[:, 2] + np.pi / 2.0, poses_b[:, 2], poses_b[:, 2] + np.pi / 2.0):
-        n = np.column_stack((exact.cos(yaw), exact.sin(yaw)))
+        n = unit(yaw)
         along = (between * n).sum(axis=1)
         reach = _reach(a, poses_a[:, 2] - yaw) + _reach(b, poses_b[:, 2] - yaw)
         separation = np.abs(along) - reach
@@ -113,7 +114,7 @@ def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sid
         gap_now, i, j, at, normal = worst
         if i < 0:
             break
-        levers = np.array([_lever(poses[i][at, 2], normal), -_lever(poses[j][at, 2], normal)])
+        levers = np.array([ahead_and_left(normal, poses[i][at, 2]), ahead_and_left(-normal, poses[j][at, 2])])
         power = (ease * np.square(levers)).sum()
         if power < 1e-6:
             raise RefusedError(_too_close(tracks[i], tracks[j], gap_now, clearance, max_shift))
@@ -161,13 +162,6 @@ def _worst(tracks: Sequence[Track], poses: Sequence[Floats], i: int, j: int) -> 
     gap = np.where(presence_of(tracks[i]) & presence_of(tracks[j]), gap, np.inf)
     at = int(np.argmin(gap))
     return float(gap[at]), i, j, at, axis[at]
-
-
-def _lever(yaw: float, normal: Floats) -> Floats:
-    """How far a unit shift along and to the left moves a vehicle along `normal`."""
-    return np.array(
-        [exact.cos(yaw) * normal[0] + exact.sin(yaw) * normal[1], -exact.sin(yaw) * normal[0] + exact.cos(yaw) * normal[1]]
-    )
 
 
 def _place(track: Track, shift: Floats) -> Track:

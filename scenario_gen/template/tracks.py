@@ -20,6 +20,7 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import polyline_of, unit
 from scenario_gen.types.derived import once_per_object
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.presence import ALWAYS
@@ -127,7 +128,7 @@ def _cleaned(encounter: Encounter, i: int, position: Floats, heading: Floats, sp
     if claimed[-1] < _STILL or spread < _STILL:
         centre = position.mean(axis=0)
         yaw = float(exact.arctan2(exact.sin(heading).mean(), exact.cos(heading).mean()))
-        curve = Curve(np.array([[*centre, yaw], [centre[0] + exact.cos(yaw), centre[1] + exact.sin(yaw), yaw]]))
+        curve = Curve(np.array([[*centre, yaw], [*(centre + unit(yaw)), yaw]]))
         deviation = float(exact.hypot(*(position - centre).T).max())
         return Track(encounter.vehicles[i], curve, frozen(np.zeros(len(speed))), speed, True, deviation)
     best: tuple[float, Curve, Floats, float] | None = None
@@ -174,8 +175,7 @@ def _eased(curve: Curve) -> Curve:
         bend[1:] += excess[:-1] / 2.0
         bend[:-1] += excess[1:] / 2.0
     yaw = even[0, 2] + np.concatenate(([0.0], np.cumsum(bend)))
-    middle = (yaw[1:] + yaw[:-1]) / 2.0
-    xy = np.vstack(([0.0, 0.0], np.cumsum(step * np.column_stack((exact.cos(middle), exact.sin(middle))), axis=0)))
+    xy = polyline_of(yaw, step)
     xy += (even[:, :2] - xy).mean(axis=0)
     return Curve(np.column_stack((xy, yaw)))
 

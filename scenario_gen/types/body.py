@@ -3,8 +3,10 @@
 
 """What a vehicle's footprint says of its body: where its rear axle is, what kind it is, how high; for formats that ask."""
 
-from scenario_gen.numerics import exact
+import numpy as np
+
 from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics.plane import unit
 from scenario_gen.types.encounter import Vehicle
 
 REAR_AXLE = 0.3  # of the length, from the footprint's centre back: 1.44 m of a car of 4.8 m
@@ -30,7 +32,4 @@ def rear_axle(vehicle: Vehicle) -> float:
 
 def shifted(position: Floats, heading: Floats, ahead: float) -> Floats:
     """Return points (..., 2) [m] that lie `ahead` metres along headings (...) [rad] from positions (..., 2) [m]."""
-    moved = position.copy()
-    moved[..., 0] += ahead * exact.cos(heading)
-    moved[..., 1] += ahead * exact.sin(heading)
-    return moved
+    return np.asarray(position + ahead * unit(heading))
