@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from scenario_gen.types.pieces import split_pieces
+
 FOLLOW, YIELD = "follow", "yield"
 DOUBTFUL = 0.5  # confidence below which an edge is said to be doubtful
 _FOLLOWS, _YIELDS = " follows ", " yields to "  # of names
@@ -109,5 +111,5 @@ class ReactionGraph:
 
 def yielders_of(names: str, ids: Sequence[str]) -> tuple[tuple[int, int], ...]:
     """Return (who, whom) of the yielding reactions that an entry names ("2 yields to 1; 3 follows 2"), of vehicles `ids`."""
-    pairs = [name.split(_YIELDS) for name in names.split("; ") if _YIELDS in name]
+    pairs = [name.split(_YIELDS) for name in split_pieces(names) if _YIELDS in name]
     return tuple((ids.index(who), ids.index(whom)) for who, whom in pairs if who in ids and whom in ids)
