@@ -43,6 +43,7 @@ from scenario_gen.numerics.exact.splines import BSpline, bspline_basis, CubicSpl
 
 __all__ = [
     "BSpline", "Columns", "CubicSpline", "arctan", "arctan2", "bspline_basis", "cholesky", "compact", "cos", "cubic_spline",
-    "dot", "exp", "gram", "hypot", "lgamma", "log", "lstsq", "matmul", "moving_max", "moving_mean", "moving_min", "ndtr", "ndtri", "power",
-    "qr", "root", "sin", "solve_banded", "solve_positive", "solve_triangular", "standard_normal", "tan", "tanh",
+    "dot", "exp", "gram", "hypot", "lgamma", "log", "lstsq", "matmul", "moving_max", "moving_mean", "moving_min", "ndtr",
+    "ndtri", "power", "qr", "root", "sin", "solve_banded", "solve_positive", "solve_triangular", "standard_normal", "tan",
+    "tanh",
 ]  # fmt: skip
