@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Floats, frozen, Ints
-from scenario_gen.numerics.plane import edge_lengths, edge_yaws, unit, unit_left
+from scenario_gen.numerics.plane import edge_lengths, edge_yaws, meeting_shares, unit, unit_left
 
 TOGETHER = 64  # positions that are projected at once, on the edges that can be nearest to any of them
 
@@ -111,11 +111,7 @@ def crossings(first: Curve, second: Curve, min_angle: float = 0.35) -> Floats:
     """Stations (K, 2) at which `first` crosses `second` at an angle of at least `min_angle` [rad], in order along `first`."""
     a, b = first.points[:, :2], second.points[:, :2]
     u, v = np.diff(a, axis=0), np.diff(b, axis=0)
-    w = b[None, :-1] - a[:-1, None]
-    det = u[:, None, 0] * v[None, :, 1] - u[:, None, 1] * v[None, :, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = (w[..., 0] * v[None, :, 1] - w[..., 1] * v[None, :, 0]) / det
-        q = (w[..., 0] * u[:, None, 1] - w[..., 1] * u[:, None, 0]) / det
+    t, q, det = meeting_shares(a[:-1, None], u[:, None], b[None, :-1], v[None])
     sine = np.abs(det) / (exact.hypot(u[:, 0], u[:, 1])[:, None] * exact.hypot(v[:, 0], v[:, 1])[None, :])
     hit = (t >= 0.0) & (t < 1.0) & (q >= 0.0) & (q < 1.0) & (sine >= exact.sin(min_angle))
     i, j = np.nonzero(hit)

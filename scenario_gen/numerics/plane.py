@@ -55,6 +55,16 @@ def edge_yaws(points: Floats) -> Floats:
     return exact.arctan2(step[:, 1], step[:, 0])
 
 
+def meeting_shares(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return where lines p + t u and q + s v (..., 2) meet: t and s (...), not finite if they are parallel, and u x v."""
+    w = q - p
+    cross = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        t = (w[..., 0] * v[..., 1] - w[..., 1] * v[..., 0]) / cross
+        s = (w[..., 0] * u[..., 1] - w[..., 1] * u[..., 0]) / cross
+    return t, s, cross
+
+
 def polyline_of(yaw: Floats, step: Floats | float) -> Floats:
     """Return the points (M, 2), from the origin, of a path whose heading is `yaw` (M,) at the ends of steps (M - 1,) or one."""
     middle = (yaw[1:] + yaw[:-1]) / 2.0

@@ -11,7 +11,7 @@ and turn as far as before. Standing
 phases collapse to a point, time enters only through u(t), and no sample turns back.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -23,7 +23,6 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import polyline_of, unit
 from scenario_gen.types.derived import once_per_object
 from scenario_gen.types.encounter import Encounter, Vehicle
-from scenario_gen.types.presence import ALWAYS
 
 _WAVELENGTHS = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)  # metres at which the filter halves an oscillation
 _MAX_CURVATURE = 0.2  # 1/m, a car's tightest turn but for a little
@@ -55,12 +54,8 @@ class Track:
     speed: Floats
     still: bool
     deviation: float
-    present: Ints = field(default_factory=lambda: ALWAYS[:0, 0])
-    recorded_turn: float = math.nan
-
-    def __post_init__(self) -> None:
-        if len(self.present) != 2:
-            object.__setattr__(self, "present", frozen_ints([0, len(self.progress) - 1]))
+    present: Ints
+    recorded_turn: float
 
     @property
     def travelled(self) -> float:
@@ -111,26 +106,34 @@ def _clean(encounter: Encounter, i: int) -> Track:
     """Clean one vehicle's motion while it is there."""
     first, last = encounter.present[i].tolist()
     there = slice(first, last + 1)
-    before, after = first, encounter.speed.shape[1] - 1 - last
-    track = _cleaned(encounter, i, encounter.position[i, there], encounter.heading[i, there], encounter.speed[i, there])
-    return replace(
-        track,
-        progress=frozen(np.pad(track.progress, (before, after), mode="edge")),
+    heading, speed = encounter.heading[i, there], encounter.speed[i, there]
+    claimed = np.concatenate(([0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 * encounter.dt)))
+    spread = float(exact.hypot(*np.ptp(encounter.position[i, there], axis=0)))
+    still = bool(claimed[-1] < _STILL or spread < _STILL)
+    cleaned = _standing if still else _smoothed
+    curve, progress, deviation = cleaned(encounter.position[i, there], heading, speed, claimed)
+    return Track(
+        vehicle=encounter.vehicles[i],
+        curve=curve,
+        progress=frozen(np.pad(progress, (first, encounter.speed.shape[1] - 1 - last), mode="edge")),
         speed=encounter.speed[i],
+        still=still,
+        deviation=deviation,
         present=frozen_ints([first, last]),
-        recorded_turn=math.nan if track.still else float(encounter.heading[i, last] - encounter.heading[i, first]),
+        recorded_turn=math.nan if still else float(heading[-1] - heading[0]),
     )
 
 
-def _cleaned(encounter: Encounter, i: int, position: Floats, heading: Floats, speed: Floats) -> Track:
-    claimed = np.concatenate(([0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 * encounter.dt)))
-    spread = float(exact.hypot(*np.ptp(position, axis=0)))
-    if claimed[-1] < _STILL or spread < _STILL:
-        centre = position.mean(axis=0)
-        yaw = float(exact.arctan2(exact.sin(heading).mean(), exact.cos(heading).mean()))
-        curve = Curve(np.array([[*centre, yaw], [*(centre + unit(yaw)), yaw]]))
-        deviation = float(exact.hypot(*(position - centre).T).max())
-        return Track(encounter.vehicles[i], curve, frozen(np.zeros(len(speed))), speed, True, deviation)
+def _standing(position: Floats, heading: Floats, speed: Floats, _claimed: Floats) -> tuple[Curve, Floats, float]:
+    """The path of a vehicle that stands, its progress, and how far its positions lie from it."""
+    centre = position.mean(axis=0)
+    yaw = float(exact.arctan2(exact.sin(heading).mean(), exact.cos(heading).mean()))
+    curve = Curve(np.array([[*centre, yaw], [*(centre + unit(yaw)), yaw]]))
+    return curve, np.zeros(len(speed)), float(exact.hypot(*(position - centre).T).max())
+
+
+def _smoothed(position: Floats, heading: Floats, speed: Floats, claimed: Floats) -> tuple[Curve, Floats, float]:
+    """The drivable path of positions (T, 2) at distances (T,) that the speed claims, the progress, and the largest deviation."""
     best: tuple[float, Curve, Floats, float] | None = None
     for wavelength in _WAVELENGTHS:
         stop_if_cancelled()
@@ -153,7 +156,7 @@ def _cleaned(encounter: Encounter, i: int, position: Floats, heading: Floats, sp
         curve = _eased(curve)
         progress = share * curve.length
         deviation = float(exact.hypot(*(curve.at(progress)[:, :2] - position).T).max())
-    return Track(encounter.vehicles[i], _aligned(curve, heading, speed, progress), frozen(progress), speed, False, deviation)
+    return _aligned(curve, heading, speed, progress), progress, deviation
 
 
 def _eased(curve: Curve) -> Curve:

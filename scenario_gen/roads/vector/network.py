@@ -14,6 +14,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
 from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Bools, Floats, Ints, runs
+from scenario_gen.numerics.plane import edge_lengths, meeting_shares
 from scenario_gen.types.lanes import Lane, LaneNetwork
 
 _SECTION = 1.0  # metres between cross-sections at most
@@ -127,7 +128,7 @@ def network_of(name: str, found: MapLanes) -> LaneNetwork:
     lanes, total = [], 0
     for draft in drafts:
         left, right = (draft.left, draft.right) if draft.paired else cross_sections(draft.left, draft.right, draft.place)
-        longest = max(float(exact.hypot(*np.diff(border, axis=0).T).sum()) for border in (left, right))
+        longest = max(float(edge_lengths(border).sum()) for border in (left, right))
         if not longest <= MOST_SECTIONS * _SECTION:  # nor is it NaN
             raise InputError(f"{draft.place}: lane {draft.id} has a border of {longest / 1000.0:.3g} km; check the coordinates")
         total += max(len(left), math.ceil(longest / _SECTION))
@@ -150,10 +151,8 @@ def cross_sections(left: Floats, right: Floats, where: str) -> tuple[Floats, Flo
     """
     borders, shares, longest = [], [], 0.0
     for name, border in (("left", left), ("right", right)):
-        step = exact.hypot(*np.diff(border, axis=0).T) if len(border) > 1 else np.zeros(0)
-        keep = np.concatenate(([True], step > 1e-6)) if len(border) else np.zeros(0, dtype=np.bool_)
-        points = border[keep]
-        length = np.concatenate(([0.0], np.cumsum(exact.hypot(*np.diff(points, axis=0).T)))) if len(points) > 1 else np.zeros(1)
+        points = border[np.concatenate(([True], edge_lengths(border) > 1e-6))] if len(border) else border
+        length = np.concatenate(([0.0], np.cumsum(edge_lengths(points))))
         if length[-1] < _SHORTEST:
             raise InputError(f"{where}: the {name} border has {len(border)} point(s) and no length; a line is needed")
         borders.append(points)
@@ -252,12 +251,8 @@ def _cross(p: Floats, u: Floats, q: Floats, v: Floats, first: Ints, second: Ints
         first: (K, C) of each edge of one: 1 if it is the first of its lane, 2 if it is the last, 3 if it is both.
         second: the same of the other.
     """
-    w = q[:, None] - p[:, :, None]
-    u, v = u[:, :, None], v[:, None]
-    det = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        t = (w[..., 0] * v[..., 1] - w[..., 1] * v[..., 0]) / det
-        s = (w[..., 0] * u[..., 1] - w[..., 1] * u[..., 0]) / det
+    t, s, _ = meeting_shares(p[:, :, None], u[:, :, None], q[:, None], v[:, None])
+    with np.errstate(invalid="ignore"):
         hit = (t >= 0.0) & (t < 1.0) & (s >= 0.0) & (s < 1.0)
     hit &= (first[:, :, None] & second[:, None]) == 0  # two first edges part, and two last ones meet, there
     return np.asarray(hit.any(axis=(1, 2)))
