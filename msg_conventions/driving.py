@@ -30,9 +30,8 @@ from msg_conventions.pictures import COLOURS, CUBE, DELETE_ALL
 from msg_conventions.roads import OCCUPIED, pose_rows, poses_of
 from msg_conventions.trajectory import decode
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Bools, Floats
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.names import tokens
+from scenario_gen.numerics import Bools, Floats
+from scenario_gen.types import tokens, Vehicle
 
 TWIST_TYPE, ODOMETRY_TYPE, CLOCK_TYPE = "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry", "rosgraph_msgs/msg/Clock"
 _COVARIANCE = 36

@@ -20,9 +20,8 @@ import numpy as np
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.roads import pose_rows, poses_of
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.names import token
-from scenario_gen.types.scenario import EgoSlot
+from scenario_gen.numerics import Floats
+from scenario_gen.types import EgoSlot, token
 
 WITNESS = "ego/witness"
 STATE_TYPE = "nav_msgs/msg/Odometry"

@@ -19,8 +19,8 @@ import numpy as np
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.trajectory import FARTHEST
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.lanes import Lane, LaneNetwork
+from scenario_gen.numerics import Floats
+from scenario_gen.types import Lane, LaneNetwork
 
 MARKER_TYPE = "visualization_msgs/msg/Marker"
 TOPIC = "road/lanes"

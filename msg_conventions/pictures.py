@@ -10,10 +10,8 @@ import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.roads import pose_rows
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.names import tokens
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.numerics import Floats
+from scenario_gen.types import Scenario, tokens, Vehicle
 
 FOOTPRINT_TYPE = "geometry_msgs/msg/PolygonStamped"
 MARKERS_TYPE = "visualization_msgs/msg/MarkerArray"

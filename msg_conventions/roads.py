@@ -17,8 +17,8 @@ from msg_conventions.lanes import decode_lanes
 from msg_conventions.trajectory import FARTHEST
 from msg_conventions.yaw import check_quaternions, half_angle, yaw
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.road import Road
+from scenario_gen.numerics import Floats
+from scenario_gen.types import Road
 
 MAP_TYPE = "nav_msgs/msg/OccupancyGrid"
 POSES_TYPE = "geometry_msgs/msg/PoseArray"

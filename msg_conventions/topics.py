@@ -6,7 +6,7 @@
 import re
 
 from msg_conventions import autoware, changepoints, diagnostics, driving, ego, frames, lanes, paths, pictures, roads, trajectory
-from scenario_gen.types.qos import Quality
+from scenario_gen.types import Quality
 
 FIX_TYPE = "sensor_msgs/msg/NavSatFix"
 TWIST_TYPE = "geometry_msgs/msg/TwistStamped"

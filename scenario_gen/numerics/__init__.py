@@ -2,3 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """Arrays, curves, compiled kernels, and `exact`, the one door to arithmetic that is the same on every CPU; nothing of traffic."""
+
+from scenario_gen.numerics.arrays import (
+    Bools,
+    canonical_heading,
+    canonical_poses,
+    Floats,
+    freeze,
+    frozen,
+    frozen_bools,
+    frozen_ints,
+    Ints,
+    runs,
+    sealed,
+    wrap_angle,
+)
+
+__all__ = [
+    "Bools", "Floats", "Ints", "canonical_heading", "canonical_poses", "freeze", "frozen", "frozen_bools", "frozen_ints", "runs",
+    "sealed", "wrap_angle",
+]  # fmt: skip

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.numerics.plane import angle_between, unit, unit_left
 from scenario_gen.roads.ways import relative
-from scenario_gen.types.road import Road
+from scenario_gen.types import Road
 
 _PARALLEL = np.radians(3.0)
 _LEVEL = 0.5  # metres along the arm by which the ends of its lanes may differ

@@ -8,17 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, wrap_angle
+from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
 from scenario_gen.numerics.plane import corners, unit
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.sketch import ARM_COUNT, lane_ends, LANE_GAP, PlannedArm, ROOM, SHORTEST, Sketch, SLACK
-from scenario_gen.template.frenet import to_frenet
-from scenario_gen.template.path_crossing import path_crossing
-from scenario_gen.template.separation import own_paths
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.road import Road
+from scenario_gen.template import own_paths, path_crossing, to_frenet, Track
+from scenario_gen.types import Encounter, Road
 
 _VERGE = 2.0  # metres of kerb drawn beside a road
 _PAPER_LANE = 100.0  # cells

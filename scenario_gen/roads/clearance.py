@@ -5,11 +5,9 @@
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, sealed
+from scenario_gen.numerics import Bools, exact, Floats, sealed
 from scenario_gen.numerics.kernels import B2, F, F2, kernel, OUT2, OUTB1
-from scenario_gen.types.derived import once_per_object
-from scenario_gen.types.road import Road
+from scenario_gen.types import once_per_object, Road
 
 CONTACT = 1e-9  # [cells] what lies nearer than this touches
 

@@ -13,12 +13,10 @@ import math
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints, sealed
+from scenario_gen.numerics import exact, Floats, Ints, sealed
 from scenario_gen.roads.clearance import clearance_in_cells, segment_free, segments_free, to_metres
 from scenario_gen.roads.labels import labelled
-from scenario_gen.types.derived import once_per_object
-from scenario_gen.types.road import Road
+from scenario_gen.types import once_per_object, Road
 
 
 @once_per_object

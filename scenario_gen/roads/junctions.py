@@ -13,8 +13,7 @@ import numpy as np
 import shapely
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import angle_between, unit, unit_left
 from scenario_gen.roads.arms import RING_ROOM
@@ -23,10 +22,8 @@ from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.shaped import fitting_width
 from scenario_gen.roads.sketch import ARM_COUNT, lane_ends, LANE_GAP, PlannedArm, ROOM, SHORTEST, Sketch, SLACK
 from scenario_gen.roads.ways import draw_ring_route, draw_route
-from scenario_gen.template.manoeuvre import sharpness_of, turn_of
-from scenario_gen.template.tracks import clean_tracks, Track
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.road import Road
+from scenario_gen.template import clean_tracks, sharpness_of, Track, turn_of
+from scenario_gen.types import Encounter, Road
 
 _RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane
 _RING_LATERAL, _RING_FASTEST = 3.0, 4.0  # m/s² at the template's fastest: as it is sized, and at most

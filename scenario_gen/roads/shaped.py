@@ -16,11 +16,8 @@ from scenario_gen.numerics.plane import unit
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.sketch import ARM_COUNT, lane_ends, PlannedArm, ROOM, SHORTEST, Sketch, SLACK
 from scenario_gen.roads.ways import draw_route, extended
-from scenario_gen.template.frenet import FrenetTracks, main_line, MainLine, to_frenet
-from scenario_gen.template.manoeuvre import sharpness_of
-from scenario_gen.template.tracks import clean_tracks, Track
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.road import Road
+from scenario_gen.template import clean_tracks, FrenetTracks, main_line, MainLine, sharpness_of, to_frenet, Track
+from scenario_gen.types import Encounter, Road
 
 _RAMP_ANGLE = np.radians(12.0)
 _BEND = np.radians(20.0)  # of a curve whose template does not bend

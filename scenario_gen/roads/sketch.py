@@ -9,13 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from PIL import Image, ImageDraw
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics import Bools, exact, Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import corners, unit, unit_left
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.labels import labelled
-from scenario_gen.types.road import Road
+from scenario_gen.types import Road
 
 ARM_COUNT = {"straight": 2, "curve": 2, "t_intersection": 3, "four_way": 4, "roundabout": 4}
 ROOM = 6.0  # metres kept free behind the first and before the last footprint

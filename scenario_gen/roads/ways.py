@@ -12,8 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, angle_between, place, polyline_of, unit
 

@@ -11,14 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, unit
 from scenario_gen.template.tracks import clean_tracks, presence_of, Track
-from scenario_gen.types.derived import once_per_object
-from scenario_gen.types.encounter import Encounter, Vehicle
-from scenario_gen.types.presence import together
+from scenario_gen.types import Encounter, once_per_object, together, Vehicle
 
 _ROUNDS = 400
 _ALONG = 0.3  # how readily a vehicle is set forward or back on its path

@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import unit
 from scenario_gen.types.encounter import Vehicle
 

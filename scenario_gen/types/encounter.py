@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Bools, canonical_heading, Floats, freeze, frozen, Ints
+from scenario_gen.numerics import Bools, canonical_heading, Floats, freeze, frozen, Ints
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, finite
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.network import Draft, MapLanes, refuse_too_many_lanes
 
 SKIPPED = frozenset(

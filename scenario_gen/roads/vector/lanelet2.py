@@ -18,9 +18,8 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, finite
-from scenario_gen.logs.geodesy import local_frame
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.logs import local_frame
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.roads.vector.network import by_id, Draft, MapLanes, refuse_too_long, refuse_too_many_lanes
 
 _FOR_CARS = ("road", "highway", "play_street", "exit")  # subtypes that cars may use, if no participant is named

@@ -12,10 +12,9 @@ import shapely
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, Ints, runs
+from scenario_gen.numerics import Bools, exact, Floats, Ints, runs
 from scenario_gen.numerics.plane import edge_lengths, meeting_shares
-from scenario_gen.types.lanes import Lane, LaneNetwork
+from scenario_gen.types import Lane, LaneNetwork
 
 _SECTION = 1.0  # metres between cross-sections at most
 _SHORTEST = 0.05  # metres of a border

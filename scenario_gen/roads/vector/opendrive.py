@@ -16,8 +16,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.numerics.plane import unit_left
 from scenario_gen.roads.vector.network import (
     by_id,

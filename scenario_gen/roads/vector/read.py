@@ -13,15 +13,14 @@ import numpy as np
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError, of_system, reading
 from scenario_gen.base.markup import Element, finite, read_xml
-from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
 from scenario_gen.roads.vector.network import extent, MapLanes, network_of, part_of
 from scenario_gen.roads.vector.place import best_part
 from scenario_gen.roads.vector.raster import road_of
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.lanes import LaneNetwork
-from scenario_gen.types.road import Road
+from scenario_gen.template import Track
+from scenario_gen.types import LaneNetwork, Road
 
 
 @dataclass(frozen=True)

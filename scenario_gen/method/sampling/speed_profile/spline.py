@@ -13,8 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, frozen, frozen_ints, Ints
+from scenario_gen.numerics import Bools, exact, Floats, frozen, frozen_ints, Ints
 
 KNOT_SPACING = 0.4  # s; what a driver does with the pedals is slower
 MOST_KNOTS = 600  # of long encounters the knots are farther apart
