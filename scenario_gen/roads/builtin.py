@@ -12,7 +12,7 @@ from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
 from scenario_gen.numerics.plane import corners, unit
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.sketch import ARM_COUNT, lane_ends, LANE_GAP, PlannedArm, ROOM, SHORTEST, Sketch, SLACK
-from scenario_gen.template import own_paths, path_crossing, to_frenet, Track
+from scenario_gen.template import own_paths, pair_crossings, to_frenet, Track
 from scenario_gen.types import Encounter, Road
 
 _VERGE = 2.0  # metres of kerb drawn beside a road
@@ -108,12 +108,10 @@ def layout_for(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) 
 
 def junction_centre(tracks: tuple[Track, ...]) -> Floats:
     """(2,) [m] the middle of where paths cross and where they turn; of where vehicles are nearest if they do neither."""
-    points = []
+    found = list(pair_crossings(tracks))
+    points: list[Floats] = []
     for i, a in enumerate(tracks):
-        for b in tracks[:i]:
-            crossing = path_crossing(a, b)
-            if crossing is not None:
-                points.append(a.curve.at(crossing.first)[:2])
+        points += [a.curve.at(crossing.first)[:2] for k, _, crossing in found if k == i]
         if a.turns and not points:
             yaw = a.curve.points[:, 2]
             middle = int(np.argmin(np.abs(yaw - (yaw[0] + yaw[-1]) / 2.0)))

@@ -19,7 +19,7 @@ from scenario_gen.numerics import exact, Floats, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.plane import angle_between, edge_lengths
 from scenario_gen.roads.vector.search import Spot
-from scenario_gen.template import path_crossing, PathCrossing, Track
+from scenario_gen.template import pair_crossings, Track
 from scenario_gen.types import LaneNetwork
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
@@ -259,18 +259,17 @@ def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[
     """Shift the beginnings so that crossings and gaps on one lane are as far along as in the template (least squares)."""
     one_each = np.eye(len(courses))
     rows = [(one_each[i], course.start, _PRIOR) for i, course in enumerate(courses)]  # factors, value, weight
-    for a, one in enumerate(tracks):
+    crossing_of = {(a, b): crossing for a, b, crossing in pair_crossings(tracks)}
+    for a in range(len(tracks)):
         for b in range(a):
-            two = tracks[b]
-            crossing = path_crossing(one, two)
-            if crossing is not None:
-                found = crossings(courses[a].curve, courses[b].curve, _CROSS)
-                if len(found):
-                    want = np.array([courses[a].start + scale * crossing.first, courses[b].start + scale * crossing.second])
-                    at = found[int(np.argmin(np.abs(found - want).sum(axis=1)))]
-                    weight = _CROSSED if _driven(crossing, one, two) else _BEYOND
-                    rows.append((one_each[a], float(at[0]) - scale * crossing.first, weight))
-                    rows.append((one_each[b], float(at[1]) - scale * crossing.second, weight))
+            crossing = crossing_of.get((a, b))
+            found = crossings(courses[a].curve, courses[b].curve, _CROSS) if crossing else ()
+            if crossing and len(found):
+                along = scale * np.array([crossing.first, crossing.second])
+                wanted = np.array([courses[a].start, courses[b].start]) + along
+                at = found[int(np.argmin(np.abs(found - wanted).sum(axis=1)))] - along
+                weight = _CROSSED if crossing.driven else _BEYOND
+                rows += [(one_each[a], float(at[0]), weight), (one_each[b], float(at[1]), weight)]
             for first, second in ((a, b), (b, a)):
                 gap = _follows(tracks[first], tracks[second])
                 if gap is None:
@@ -282,11 +281,6 @@ def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[
     factors, values, weights = (np.array(column) for column in zip(*rows, strict=True))
     solution = exact.lstsq(weights[:, None] * factors, weights * values)
     return [replace(course, start=float(s)) for course, s in zip(courses, solution, strict=True)]
-
-
-def _driven(crossing: PathCrossing, one: Track, two: Track) -> bool:
-    """Whether both vehicles drive as far as their crossing."""
-    return 0.0 <= crossing.first <= one.travelled and 0.0 <= crossing.second <= two.travelled
 
 
 def _follows(one: Track, two: Track) -> float | None:
@@ -322,14 +316,13 @@ def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], s
         miss = np.minimum(np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1]), _CAPPED)
         turned = 1.0 - exact.cos(fitted[:, 2] - poses[:, 2])
         cost += float(miss.mean() + _YAW * turned.mean()) / len(tracks)
-    for a, one in enumerate(tracks):
-        for b, two in enumerate(tracks[:a]):
-            crossing = path_crossing(one, two)
-            if crossing is None or len(crossings(courses[a].curve, courses[b].curve, _CROSS)):
-                continue
-            cost += _LOST
-            if _driven(crossing, one, two):
-                reason = reason or f"vehicles {two.vehicle.id} and {one.vehicle.id} cross in the template, and not on these lanes"
+    for a, b, crossing in pair_crossings(tracks):
+        if len(crossings(courses[a].curve, courses[b].curve, _CROSS)):
+            continue
+        cost += _LOST
+        if crossing.driven:
+            ids = f"{tracks[b].vehicle.id} and {tracks[a].vehicle.id}"
+            reason = reason or f"vehicles {ids} cross in the template, and not on these lanes"
     aside = [pressed_aside(course, track) for course, track in zip(courses, tracks, strict=True)]
     for (_, forced), track in zip(aside, tracks, strict=True):
         if forced > _NO_GRIP:

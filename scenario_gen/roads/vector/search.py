@@ -9,6 +9,7 @@ squared distance of the template's samples from the nearest lane of their direct
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 import math
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import exact, Floats, Ints, wrap_angle
-from scenario_gen.template import path_crossing, Track
+from scenario_gen.template import pair_crossings, Track
 from scenario_gen.types import LaneNetwork, once_per_object
 
 _CELL = 1.0  # metres
@@ -159,11 +160,8 @@ def _samples(tracks: tuple[Track, ...]) -> tuple[Floats, Floats]:
 def _anchors(tracks: tuple[Track, ...]) -> list[Floats]:
     """Poses of the template that are laid onto lanes: where paths cross, and the begin, middle and end of the longest paths."""
     found: list[Floats] = []
-    for a, one in enumerate(tracks):
-        for two in tracks[:a]:
-            crossing = path_crossing(one, two)
-            if crossing is not None and len(found) < 4:
-                found += [one.curve.at(crossing.first), two.curve.at(crossing.second)]
+    for a, b, crossing in islice(pair_crossings(tracks), 2):
+        found += [tracks[a].curve.at(crossing.first), tracks[b].curve.at(crossing.second)]
     for track in sorted(tracks, key=lambda track: -track.travelled)[:2]:
         found += [track.curve.at(share * track.travelled) for share in (0.05, 0.5, 0.95)]
     return found
