@@ -33,7 +33,7 @@ def build_road(name_or_path: str, encounter: Encounter | None = None, config: Ro
 
     Raises:
         InputError: no such road, a map that cannot be used, or an obstacle that stands nowhere on it.
-        RefusedError: `corridor`, and the recorded vehicles overlap so far that they cannot be told apart.
+        RefusedError: `corridor`, and the recorded vehicles overlap so far that they cannot be separated.
     """
     return with_obstacles(_bare_road(name_or_path, encounter, config), read_obstacles(config.obstacles))
 

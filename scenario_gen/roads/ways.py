@@ -20,11 +20,11 @@ Fits = Callable[[Floats], bool]
 
 _STEP = 0.25  # metres
 _PARALLEL = np.radians(8.0)
-_BLENDED = np.radians(35.0)  # a turn by up to this can also be made while changing to the line of the exit
+_BLENDED = np.radians(35.0)  # a turn by up to this is also possible while changing to the line of the exit
 _RAMP = 1.0 / 3.0  # share of a bend's length on which its curvature rises, and falls again
 _SHORT_RAMP = 0.12
 _TIGHTEST = 0.2  # 1/m
-_LADDER = (1.0, 0.8, 1.25, 0.64, 1.56, 0.5, 1.95, 2.4)  # times the curvature asked for
+_LADDER = (1.0, 0.8, 1.25, 0.64, 1.56, 0.5, 1.95, 2.4)  # times the requested curvature
 _PLAIN = 0.09  # 1/m, where nothing is known of the vehicle
 _LAST = (0.13, 0.155, 0.18, _TIGHTEST)  # 1/m, with short ramps: what a car can just drive
 _STEEPEST_SHIFT = 0.05  # 1/m, curvature of a change of lanes on the way
@@ -49,7 +49,7 @@ def draw_route(entry: Floats, leave: Floats, fits: Fits, sharpness: float | None
     if abs(turn) < _PARALLEL:
         return _accepted(_beside(entry, ahead, left, turn), fits) if ahead > 1.0 else None
     if abs(turn) > np.pi - _PARALLEL:
-        return None  # a U-turn: where along the road is for the template to say, see draw_u_turn
+        return None  # a U-turn: the template says where along the road, see draw_u_turn
     along_exit = left / exact.sin(turn)  # from the lines' intersection to the exit
     along_entry = ahead - along_exit * exact.cos(turn)
     wanted = sharpness or _PLAIN
@@ -179,7 +179,7 @@ def _bend(turn: float, curvature: float, ramp: float) -> Floats:
     x = np.linspace(0.0, 1.0, count + 1)
     rise = np.minimum(np.square(np.minimum(x, ramp)) / (2.0 * ramp) + np.maximum(x - ramp, 0.0), 1.0 - ramp)
     fall = np.square(np.maximum(x - (1.0 - ramp), 0.0)) / (2.0 * ramp)
-    share = np.where(x > 1.0 - ramp, x - ramp / 2.0 - fall, rise) / (1.0 - ramp)  # of the turn that is made
+    share = np.where(x > 1.0 - ramp, x - ramp / 2.0 - fall, rise) / (1.0 - ramp)  # of the turn
     return frozen(np.column_stack((polyline_of(turn * share, length / count), turn * share)))
 
 

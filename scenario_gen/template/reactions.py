@@ -205,7 +205,7 @@ def _best_lag(own: Floats, other: Floats, behind: Bools, dt: float) -> tuple[flo
     return lag, explained * explained
 
 
-_STANDARD_LAG = 1.2  # s, of a follower whose record does not tell
+_STANDARD_LAG = 1.2  # s, of a follower whose record does not show it
 
 
 def _standard_error(a: Floats, b: Floats) -> float:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a vehicle's footprint says of its body: where its rear axle is, what kind it is, how high; for formats that ask."""
+"""What is assumed of a vehicle's body from its footprint: kind, height, rear axle; for formats that need them."""
 
 import numpy as np
 
@@ -16,17 +16,17 @@ CAR_HEIGHT, TRUCK_HEIGHT = 1.5, 3.2  # metres
 
 
 def is_truck(vehicle: Vehicle) -> bool:
-    """Whether it is so long that it is taken for a truck; logs do not say."""
+    """Whether it is so long that it counts as a truck; logs do not hold the kind."""
     return vehicle.length >= TRUCK_LENGTH
 
 
 def height(vehicle: Vehicle) -> float:
-    """Height in metres, by kind; logs do not say."""
+    """Height in metres, by kind; logs do not hold it."""
     return TRUCK_HEIGHT if is_truck(vehicle) else CAR_HEIGHT
 
 
 def rear_axle(vehicle: Vehicle) -> float:
-    """Metres from the footprint's centre back to the middle of the rear axle; logs do not say, so it is a share of the length."""
+    """Metres from the footprint's centre back to the middle of the rear axle; a share of the length, for logs do not hold it."""
     return REAR_AXLE * vehicle.length
 
 

@@ -69,7 +69,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class CheckCounts:
-    """What the checker said about the candidates of one row: how many there were, and how many fell by their first cause."""
+    """The checker's account of the candidates of one row: how many there were, and how many were refused, by first cause."""
 
     candidates: int
     refused: Mapping[Cause, int] = field(default_factory=dict)
@@ -86,7 +86,7 @@ class CheckCounts:
         return cls(len(verdicts), Counter(verdict.violations[0].cause for verdict in verdicts if not verdict.valid))
 
     def share_of(self, causes: Sequence[Cause]) -> tuple[int, int]:
-        """Return how many candidates fell by one of `causes`, and the number of candidates."""
+        """Return how many candidates were refused for one of `causes`, and the number of candidates."""
         return sum(self.refused.get(cause, 0) for cause in causes), self.candidates
 
 

@@ -72,9 +72,9 @@ class Fit:
 
     Attributes:
         vehicles: N identities and footprints.
-        fitted: N fitted vehicles; none where only the states asked are known.
+        fitted: N fitted vehicles; none where only the requested states are known.
         anchor_index: (K + 2,) sample index in the template of each anchor (0, changepoints, T - 1).
-        asked: start and end states asked of every scenario (after repair).
+        asked: start and end states requested of every scenario (after repair).
         notes: what was decided, in sentences (an entry chosen and why, an anchor moved by how much).
         lost: what of the template's turns, conflicts and neighbours is lost on this road; none where nothing is.
     """

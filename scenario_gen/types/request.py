@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How an ego slot and start and end states are asked for: as text, the same on the command line and as ROS parameters."""
+"""A request for an ego slot, states, targets, a choice, an order: the same text on the command line and in ROS parameters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ _FORM = "id: x y yaw [speed]"
 
 @dataclass(frozen=True)
 class Request(Parameters):
-    """What one request asks for."""
+    """All that one request may demand."""
 
     ego: str = parameter("", "id of the vehicle that is left out for a planner under test; its track is given instead")
     starts: str = parameter(
@@ -51,12 +51,12 @@ class Request(Parameters):
 
     @property
     def targets(self) -> tuple[Target, ...]:
-        """The ranges asked for."""
+        """The requested ranges."""
         return read_targets(self.target)
 
     @property
     def moves(self) -> bool:
-        """Whether start or end states are asked for, so that the template must be fitted and planned anew."""
+        """Whether start or end states are requested, so that the template must be fitted and planned anew."""
         return bool(self.starts or self.goals)
 
     @property
@@ -65,7 +65,7 @@ class Request(Parameters):
         return replace(self, target="", choose="natural", order="keep")
 
     def states(self, end: str) -> dict[str, State]:
-        """Return the states asked for at one end ("starts" or "goals"), by vehicle id.
+        """Return the requested states at one end ("starts" or "goals"), by vehicle id.
 
         Raises:
             InputError: the text is not of the form; the message names the parameter and the piece.
@@ -78,7 +78,7 @@ class Request(Parameters):
         return replace(self, **{end: text})
 
     def rows(self, end: str, encounter: Encounter) -> Floats:
-        """Return the states at one end as the fitting takes them: (N, 4), NaN where nothing is asked.
+        """Return the states at one end as the fitting takes them: (N, 4), NaN where nothing is requested.
 
         Raises:
             InputError: a vehicle is not the encounter's; the message lists those that are.

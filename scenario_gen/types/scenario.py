@@ -76,11 +76,11 @@ class Scenario:
 
 @dataclass(frozen=True, eq=False)
 class BoundaryStates:
-    """What was asked of each vehicle's first and last instant.
+    """What was requested of each vehicle's first and last instant.
 
     Attributes:
         start, end: (N, 4) x [m], y [m], yaw [rad], speed [m/s].
-        freed: (N, 2, 2) metres and m/s by which a scenario's start and end may differ from that; 0 where it was asked for.
+        freed: (N, 2, 2) metres and m/s by which a scenario's start and end may differ from that; 0 where it was requested.
     """
 
     start: Floats
@@ -99,7 +99,7 @@ class Cause(StrEnum):
     OVERLAP = "overlap"  # two footprints touch at some instant
     OFF_ROAD = "off_road"  # a footprint leaves drivable space
     WRONG_WAY = "wrong_way"  # a vehicle drives against its lane
-    BOUNDARY_STATE = "boundary_state"  # start or end differs from what was asked
+    BOUNDARY_STATE = "boundary_state"  # start or end differs from what was requested
     SPEED = "speed"  # negative or above the limit
     LONGITUDINAL_ACCELERATION = "longitudinal_acceleration"
     LATERAL_ACCELERATION = "lateral_acceleration"
@@ -109,7 +109,7 @@ class Cause(StrEnum):
     REACTION = "reaction"  # who reacts in the template goes too early, too late, or at another distance
     CONFLICT_LOST = "conflict_lost"  # the stretch in which all are there leaves out a conflict of the template
     NOT_FINITE = "not_finite"
-    OUT_OF_RANGE = "out_of_range"  # not in the range that was asked for; it was not checked
+    OUT_OF_RANGE = "out_of_range"  # not in the requested range; it was not checked
 
     @classmethod
     def _missing_(cls, value: object) -> "Cause | None":
@@ -146,7 +146,7 @@ class Verdict:
 
 @dataclass(frozen=True, eq=False)
 class EgoSlot:
-    """A vehicle that is left out for a planner, and the states (4,) x [m], y [m], yaw [rad], speed [m/s] that are asked of it."""
+    """A vehicle that is left out for a planner, and the states (4,) x [m], y [m], yaw [rad], speed [m/s] required of it."""
 
     vehicle: Vehicle
     start: Floats

@@ -65,7 +65,7 @@ class Reached:
     """What directed sampling came to.
 
     Attributes:
-        targets: what was asked.
+        targets: what was requested.
         stages: of the adaptation; candidates: of all of them.
         share: estimated share of natural candidates that are valid and in the range, with its 95 % interval low, high.
         directed: whether a proposal was used; else candidates are as without a target, and all weights are 1.

@@ -15,7 +15,9 @@ from scenario_gen.roads.vector.raster import covered
 from scenario_gen.types import Lane, once_per_object, Road, Vehicle
 
 _BINS = 16  # of directions
-_ALLOWED = np.pi / 2.0 + np.pi / _BINS  # a pose turned from a lane by more drives against it; half a bin is not told apart
+_ALLOWED = (
+    np.pi / 2.0 + np.pi / _BINS
+)  # a pose turned from a lane by more drives against it; the bins' width leaves half a bin open
 _ALL = np.uint16(0xFFFF)
 _ALONG = np.radians(60.0)  # a path uses a lane from whose direction it is turned by less
 _AT_ONCE = 4096  # cells

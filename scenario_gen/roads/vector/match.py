@@ -10,7 +10,7 @@ to crossings and between vehicles on one lane (least squares, weighted).
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import islice, product
 import math
 
 import numpy as np
@@ -91,7 +91,7 @@ class Match:
 
 
 class Chains:
-    """The chains of lanes of one network, and their middles, made once."""
+    """The chains of lanes of one network, and their middles, each computed once."""
 
     def __init__(self, network: LaneNetwork) -> None:
         self.network = network
@@ -192,13 +192,12 @@ def _course(chains: Chains, track: Track, spot: Spot, scale: float) -> Course | 
         return None
     cost, curve, _ = tried[ranked[0]]
     used = ranked[0]
-    for one in ranked[:_CHANGING] if not track.still else ():
-        for other in ranked[:_CHANGING]:
-            change = _change(tried[one][2], tried[other][2])
-            if change is not None and change[1] < cost - _WORTH and _beside(chains.network, one, other):
-                changed = changed_curve(tried[one][1], tried[other][1], poses[change[0], :2])
-                if changed is not None:
-                    cost, curve, used = change[1], changed, tuple(dict.fromkeys((*one, *other)))
+    for before, after in product(ranked[:_CHANGING], repeat=2) if not track.still else ():
+        change = _change(tried[before][2], tried[after][2])
+        if change is not None and change[1] < cost - _WORTH and _beside(chains.network, before, after):
+            changed = changed_curve(tried[before][1], tried[after][1], poses[change[0], :2])
+            if changed is not None:
+                cost, curve, used = change[1], changed, tuple(dict.fromkeys((*before, *after)))
     station, _ = curve.project(poses[:, :2])
     start = float(np.median(station - np.linspace(0.0, driven, len(station))))
     return Course(used, curve, start, scale * track.progress)
@@ -233,24 +232,24 @@ def _change(before: Floats, after: Floats) -> tuple[int, float] | None:
     return (k, float(forth[k]) / len(before)) if 2 <= k < len(before) - 3 else None
 
 
-def _beside(network: LaneNetwork, one: tuple[int, ...], other: tuple[int, ...]) -> bool:
+def _beside(network: LaneNetwork, chain: tuple[int, ...], other: tuple[int, ...]) -> bool:
     """Whether traffic may change from a chain to another."""
-    return any(k in network.lanes[lane].beside for lane in one for k in other)
+    return any(k in network.lanes[lane].beside for lane in chain for k in other)
 
 
-def changed_curve(one: Curve, other: Curve, at: Floats) -> Curve | None:
+def changed_curve(first: Curve, second: Curve, at: Floats) -> Curve | None:
     """A curve that changes smoothly (x³(10 − 15x + 6x²)) from one curve to another around a place (2,) [m]."""
-    station = float(one.project(at[None])[0][0])
-    _, offset = other.project(one.at(np.array([station]))[:, :2])
+    station = float(first.project(at[None])[0][0])
+    _, offset = second.project(first.at(np.array([station]))[:, :2])
     width = abs(float(offset[0]))
     reach = math.sqrt(max(width, 0.1) * _BLEND / _SHIFT)
-    s = np.arange(0.0, one.length + 1e-9, _STEP)
-    here = one.at(s)
-    there, _ = other.project(here[:, :2])
+    s = np.arange(0.0, first.length + 1e-9, _STEP)
+    here = first.at(s)
+    there, _ = second.project(here[:, :2])
     x = np.clip((s - station) / reach + 0.5, 0.0, 1.0)
     share = exact.power(x, 3) * (10.0 - 15.0 * x + 6.0 * np.square(x))
-    target = other.at(there)[:, :2]
-    kept = (s < station) | ((there > 0.0) & (there < other.length))
+    target = second.at(there)[:, :2]
+    kept = (s < station) | ((there > 0.0) & (there < second.length))
     mixed = (here[:, :2] + share[:, None] * (target - here[:, :2]))[kept]
     return Curve.through(mixed) if len(mixed) > 3 else None
 
@@ -283,12 +282,12 @@ def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[
     return [replace(course, start=float(s)) for course, s in zip(courses, solution, strict=True)]
 
 
-def _follows(one: Track, two: Track) -> float | None:
-    """How far along the path of `two` the path of `one` begins, if it begins on it."""
-    start = one.curve.at(0.0)
-    station, offset = two.curve.project(start[None, :2])
-    turned = abs(angle_between(two.curve.at(float(station[0]))[2], start[2]))
-    on = abs(float(offset[0])) < _SAME and turned < math.radians(30.0) and 0.0 <= station[0] <= two.travelled
+def _follows(track: Track, leader: Track) -> float | None:
+    """How far along the leader's path the track's path begins, if it begins on it."""
+    start = track.curve.at(0.0)
+    station, offset = leader.curve.project(start[None, :2])
+    turned = abs(angle_between(leader.curve.at(float(station[0]))[2], start[2]))
+    on = abs(float(offset[0])) < _SAME and turned < math.radians(30.0) and 0.0 <= station[0] <= leader.travelled
     return float(station[0]) if on else None
 
 

@@ -89,7 +89,7 @@ def by_id(elements: Iterable[Element]) -> dict[str, Element]:
 
 
 def refuse_too_many_lanes(count: int, place: str) -> None:
-    """Refuse a map, or a part of it, before its lanes are made.
+    """Refuse a map, or a part of it, before its lanes are drawn.
 
     Raises:
         InputError: it has more than `MOST_LANES`.
@@ -99,7 +99,7 @@ def refuse_too_many_lanes(count: int, place: str) -> None:
 
 
 def refuse_too_long(sections: int, place: str) -> None:
-    """Refuse a map, or a part of it, before its cross-sections are made.
+    """Refuse a map, or a part of it, before its cross-sections are computed.
 
     Raises:
         InputError: it has more than `MOST_SECTIONS`.
@@ -224,17 +224,18 @@ def _crossing(network: LaneNetwork) -> Iterator[tuple[int, int]]:
     boxes = shapely.box(*np.nanmin(ends, axis=1).T, *np.nanmax(ends, axis=1).T)
     tree, compared = shapely.STRtree(boxes), 0
     for k in range(0, len(boxes), _QUERIED):
-        one, two = tree.query(boxes[k : k + _QUERIED])
-        one = one + k
-        one, two = one[owner[one] < owner[two]], two[owner[one] < owner[two]]
-        compared += len(one)
+        first, second = tree.query(boxes[k : k + _QUERIED])
+        first = first + k
+        ordered = owner[first] < owner[second]
+        first, second = first[ordered], second[ordered]
+        compared += len(first)
         if compared > _MOST_COMPARED:
             raise InputError(
                 f"map {network.name}: its lanes lie upon each other in more than {_MOST_COMPARED} places, as at lane "
-                f"{network.lanes[owner[one[0]]].id}; check the coordinates"
+                f"{network.lanes[owner[first[0]]].id}; check the coordinates"
             )
-        for n in range(0, len(one), _COMPARED):
-            a, b = one[n : n + _COMPARED], two[n : n + _COMPARED]
+        for n in range(0, len(first), _COMPARED):
+            a, b = first[n : n + _COMPARED], second[n : n + _COMPARED]
             hit = _cross(start[a], step[a], start[b], step[b], edge[a], edge[b])
             yield from zip(owner[a[hit]].tolist(), owner[b[hit]].tolist(), strict=True)
 

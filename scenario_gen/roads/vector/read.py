@@ -47,7 +47,7 @@ FORMATS = {
 }
 """By the ending of a file's name."""
 PARTS = ("lanelet", "junction", "box")
-_AROUND = 40.0  # metres around lanes that are asked for
+_AROUND = 40.0  # metres around lanes that are requested
 _NAMED = 12  # ids that a message lists
 
 
@@ -102,8 +102,8 @@ def chosen_lanes(network: LaneNetwork, part: str) -> tuple[int, ...]:
         rows = [k for k, known in enumerate(own) if known and known == name]
         if not rows:
             known = list(dict.fromkeys(value for value in own if value))
-            said = ", ".join(known[:_NAMED]) + (f" and {len(known) - _NAMED} more" if len(known) > _NAMED else "")
-            raise InputError(f"map {network.name} has no {kind} {shown(name, 40)!r} that cars may use; it has {said or 'none'}")
+            listed = ", ".join(known[:_NAMED]) + (f" and {len(known) - _NAMED} more" if len(known) > _NAMED else "")
+            raise InputError(f"map {network.name} has no {kind} {shown(name, 40)!r} that cars may use; it has {listed or 'none'}")
         found += rows
     return tuple(dict.fromkeys(found))
 
@@ -135,11 +135,11 @@ def refuse_unknown_part(name: str, part: str) -> None:
 
 
 def vector_road(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -> Road:
-    """Return the road of a vector map, or of the part of it that is asked for, or else that suits the template best.
+    """Return the road of a vector map, or of the requested part of it, or else that suits the template best.
 
     Args:
         name: the path, and behind a `#` box=x0,y0,x1,y1, lanelet=ID or junction=ID (several with commas).
-        tracks: of the template; None: the whole map, or what lies around the lanes that are asked for.
+        tracks: of the template; None: the whole map, or what lies around the requested lanes.
         config: cell size, and the most cells.
 
     Raises:
