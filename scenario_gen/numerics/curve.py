@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Floats, frozen, Ints
-from scenario_gen.numerics.plane import edge_lengths, edge_yaws, meeting_shares, unit, unit_left
+from scenario_gen.numerics.plane import edge_lengths, edge_yaws, meeting_shares
 
 TOGETHER = 64  # positions that are projected at once, on the edges that can be nearest to any of them
 
@@ -51,13 +51,15 @@ class Curve:
         s = np.asarray(station, dtype=np.float64)
         pose = np.stack([np.interp(s, self.station, self.points[:, k]) for k in range(3)], axis=-1)
         beyond = np.minimum(s, 0.0) + np.maximum(s - self.length, 0.0)
-        pose[..., :2] += beyond[..., None] * unit(pose[..., 2])
+        pose[..., 0] += beyond * exact.cos(pose[..., 2])
+        pose[..., 1] += beyond * exact.sin(pose[..., 2])
         return pose
 
     def beside(self, station: Floats, offset: Floats) -> Floats:
         """Poses (..., 3) at arc lengths and offsets [m, left positive]; the yaw is the curve's own."""
         pose = self.at(station)
-        pose[..., :2] += offset[..., None] * unit_left(pose[..., 2])
+        pose[..., 0] -= offset * exact.sin(pose[..., 2])
+        pose[..., 1] += offset * exact.cos(pose[..., 2])
         return pose
 
     def project(self, xy: Floats) -> tuple[Floats, Floats]:
