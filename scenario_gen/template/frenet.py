@@ -15,7 +15,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Bools, exact, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.template.manoeuvre import turn_of
-from scenario_gen.template.tracks import presence_of, smoothing_spline, Track
+from scenario_gen.template.tracks import smoothing_spline, Track
 
 _ALONG = np.radians(50.0)  # a vehicle along the road is never turned from it by more
 _SAME_LANE = 1.75  # metres of offset within which two vehicles may share a lane
@@ -217,7 +217,7 @@ def _lanes(tracks: tuple[Track, ...], direction: Ints, station: Floats, offset: 
         done = np.clip((right[i] - ends[i, 0]) / (ends[i, 1] - ends[i, 0]), 0.0, 1.0)
         change[i] = np.maximum.accumulate(done)
     there = np.stack((change < 0.5, (change >= 0.5) | ~changes[:, None]), axis=1)  # when each is in its first, in its last lane
-    there &= np.stack([presence_of(track) for track in tracks])[:, None]
+    there &= np.stack([track.there for track in tracks])[:, None]
     lane = np.zeros((len(tracks), 2), dtype=np.int64)
     for sign in (1, -1):
         members = np.flatnonzero(direction == sign)

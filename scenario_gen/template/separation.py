@@ -14,7 +14,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, unit
-from scenario_gen.template.tracks import clean_tracks, presence_of, Track
+from scenario_gen.template.tracks import clean_tracks, Track
 from scenario_gen.types import Encounter, once_per_object, together, Vehicle
 
 _ROUNDS = 400
@@ -137,7 +137,7 @@ def _near_pairs(tracks: Sequence[Track], poses: Sequence[Floats], room: float) -
     found = []
     for i in range(len(tracks)):
         for j in range(i):
-            both = presence_of(tracks[i]) & presence_of(tracks[j])
+            both = tracks[i].there & tracks[j].there
             reach = (diagonal[i] + diagonal[j]) / 2.0
             if both.any() and exact.hypot(*(poses[i] - poses[j])[both, :2].T).min() < room + reach:
                 found.append((i, j))
@@ -155,7 +155,7 @@ class _Gap(NamedTuple):
 
 def _least_gap(tracks: Sequence[Track], poses: Sequence[Floats], i: int, j: int) -> _Gap:
     gap, axis = footprint_gap(tracks[i].vehicle, poses[i], tracks[j].vehicle, poses[j])
-    gap = np.where(presence_of(tracks[i]) & presence_of(tracks[j]), gap, np.inf)
+    gap = np.where(tracks[i].there & tracks[j].there, gap, np.inf)
     at = int(np.argmin(gap))
     return _Gap(float(gap[at]), (i, j), at, axis[at])
 

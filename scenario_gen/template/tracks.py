@@ -12,6 +12,7 @@ phases collapse to a point, time enters only through u(t), and no sample turns b
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 import math
 
 import numpy as np
@@ -20,7 +21,7 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.numerics import Bools, exact, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import polyline_of, unit
-from scenario_gen.types import Encounter, once_per_object, Vehicle
+from scenario_gen.types import Encounter, mask, once_per_object, Vehicle
 
 _WAVELENGTHS = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)  # metres at which the filter halves an oscillation
 _MAX_CURVATURE = 0.2  # 1/m, a car's tightest turn but for a little
@@ -55,6 +56,11 @@ class Track:
     present: Ints
     recorded_turn: float
 
+    @cached_property
+    def there(self) -> Bools:
+        """(T,) whether it is there at each sample."""
+        return np.asarray(mask(self.present[None], len(self.progress))[0])
+
     @property
     def travelled(self) -> float:
         """Metres driven in all."""
@@ -86,12 +92,6 @@ class Track:
     def turns(self) -> bool:
         """True if it turns as at a junction: by more than 45° within 30 m (a bend of the road is gentler)."""
         return abs(self.turning(30.0)) > _TURN
-
-
-def presence_of(track: Track) -> Bools:
-    """(T,) whether a vehicle is there at each sample."""
-    at = np.arange(len(track.progress))
-    return np.asarray((at >= track.present[0]) & (at <= track.present[1]))
 
 
 @once_per_object
