@@ -36,14 +36,14 @@ class PlannedArm:
     outward: int
 
     def lane(self, k: int, config: RoadConfig, *, inward: bool) -> Floats:
-        """The pose (3,) of lane k, counted from the dividing line, heading as its traffic does."""
+        """The pose (3,) [m, m, rad] of lane k, counted from the dividing line, heading as its traffic does."""
         left = (k + 0.5) * config.lane_width * (1.0 if inward == (config.traffic_side == "right") else -1.0)
         yaw = self.pose[2]
         return np.array([*(self.pose[:2] + left * unit_left(yaw)), yaw + np.pi if inward else yaw])
 
 
 def lane_ends(arms: Sequence[PlannedArm], config: RoadConfig) -> tuple[Floats, Floats]:
-    """The entries (E, 3) and exits (X, 3) of some arms."""
+    """The entries (E, 3) and exits (X, 3) [m, m, rad] of some arms."""
     entries = [arm.lane(k, config, inward=True) for arm in arms for k in range(arm.inward)]
     return np.array(entries), np.array([arm.lane(k, config, inward=False) for arm in arms for k in range(arm.outward)])
 
