@@ -16,7 +16,10 @@ Derived = TypeVar("Derived")
 def once_per_object(
     function: Callable[Concatenate[Subject, Others], Derived],
 ) -> Callable[Concatenate[Subject, Others], Derived]:
-    """Keep what a function derives from its first argument, by the positional ones behind it; a refusal is not kept."""
+    """Keep what a function derives from its first argument, by the positional ones behind it; a refusal is not kept.
+
+    What it returns must not refer to that argument: both would stay for good.
+    """
     kept: WeakKeyDictionary[Subject, dict[tuple[object, ...], Derived]] = WeakKeyDictionary()
 
     @wraps(function)

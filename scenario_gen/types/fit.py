@@ -90,5 +90,5 @@ class Fit:
         """Return what is lost, and by vehicle what was decided, ready for JSON."""
         return {
             "lost": [{"kind": loss.kind, "vehicles": list(loss.vehicles), "said": loss.said} for loss in self.lost],
-            "vehicles": {v.id: one.figures() for v, one in zip(self.vehicles, self.fitted, strict=False)},
+            "vehicles": {vehicle.id: fitted.figures() for vehicle, fitted in zip(self.vehicles, self.fitted, strict=False)},
         }

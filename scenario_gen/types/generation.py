@@ -84,7 +84,7 @@ class GenerationResult:
         for row in self.compared[1:]:
             better = []
             for metric, what in ERRORS.items():
-                own, other = (self.evaluation.value(one, metric) for one in (self.row, row))
+                own, other = (self.evaluation.value(name, metric) for name in (self.row, row))
                 if math.isfinite(own - other) and round(other, 3) < round(own, 3):
                     better.append(f"E {what} {other:.3f} against {own:.3f}")
             if better:

@@ -202,7 +202,7 @@ class _Joints:
         ]
 
     def lane(self, key: Key) -> _Lane | None:
-        """The lane of a key, if there is such a one."""
+        """The lane of a key; None if there is none."""
         road, section, lane = key
         return self.roads[road].sections[section].lanes.get(lane)
 

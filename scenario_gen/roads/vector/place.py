@@ -6,6 +6,7 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import islice
 
 import numpy as np
@@ -17,7 +18,7 @@ from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.search import at_home, find_spots
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.template import separate, Track
-from scenario_gen.types import LaneNetwork, once_per_object
+from scenario_gen.types import LaneNetwork
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
 _SPOTS = 15  # placements as one piece, and
@@ -30,7 +31,7 @@ _FORTH = 20.0  # metres of the lanes before and after it
 _SHIFT = 3.0  # metres by which paths may be shifted to be clear of each other
 
 
-@once_per_object
+@lru_cache(maxsize=4)  # `once_per_object` would keep a network for good, for its chains refer to it
 def chains_of(network: LaneNetwork) -> Chains:
     """Return the chains of a network, the same for the same network."""
     return Chains(network)
