@@ -16,7 +16,7 @@ Derived = TypeVar("Derived")
 def once_per_object(
     function: Callable[Concatenate[Subject, Others], Derived],
 ) -> Callable[Concatenate[Subject, Others], Derived]:
-    """Keep what a function derives from its first argument, by the positional ones behind it; a refusal is not kept.
+    """Keep what a function derives from its first argument, by its others; a refusal is not kept.
 
     What it returns must not refer to that argument: both would stay for good.
     """
@@ -24,9 +24,9 @@ def once_per_object(
 
     @wraps(function)
     def derived(subject: Subject, /, *args: Others.args, **kwargs: Others.kwargs) -> Derived:
-        known = kept.setdefault(subject, {})
-        if args not in known:
-            known.setdefault(args, function(subject, *args, **kwargs))
-        return known[args]
+        known, key = kept.setdefault(subject, {}), (*args, *sorted(kwargs.items()))
+        if key not in known:
+            known.setdefault(key, function(subject, *args, **kwargs))
+        return known[key]
 
     return derived

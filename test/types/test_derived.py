@@ -27,7 +27,8 @@ def test_it_is_computed_once_for_an_object_and_its_other_arguments():
     first, second = Subject(), Subject()
     assert derive(first, 1) is derive(first, 1)
     assert derive(first, 2) == [2] and derive(second, 1) is not derive(first, 1)
-    assert calls == [(first, 1), (first, 2), (second, 1)]
+    assert derive(second, number=3) == [3] and derive(second, number=4) == [4]
+    assert calls == [(first, 1), (first, 2), (second, 1), (second, 3), (second, 4)]
 
 
 def test_it_goes_with_the_object():
