@@ -4,6 +4,7 @@
 """What every reader of logs delivers: observations per vehicle, with the place each of them came from, within bounds."""
 
 from bisect import bisect_right
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -43,6 +44,25 @@ class Observations:
     speed_row: Ints
     length: float = np.nan
     width: float = np.nan
+
+    @classmethod
+    def of_rows(
+        cls, name: str, stamps: Ints, states: Floats, rows: Ints, size: tuple[float, float], *, measured: bool = True
+    ) -> "Observations":
+        """Return the observations of a log each of whose rows is a fix and, if it was `measured`, a speed.
+
+        Args:
+            name: the vehicle.
+            stamps: (F,) nanoseconds.
+            states: (F, 4) position (two columns), heading and speed, as above.
+            rows: (F,) rows of the log.
+            size: length and width, metres or NaN.
+            measured: whether the log has speeds.
+        """
+        n_speeds = len(rows) if measured else 0
+        return cls(
+            name, stamps, states[:, :2], rows, states[:, 2], stamps[:n_speeds], states[:n_speeds, 3], rows[:n_speeds], *size
+        )
 
 
 @dataclass
@@ -105,6 +125,12 @@ class RawLog:
         """Name the file and line (or topic and message) of a row."""
         segment = self.segments[bisect_right([s.first for s in self.segments], row) - 1]
         return f"{segment.label}, {segment.unit} {segment.number + row - segment.first}"
+
+
+def left_out_note(counts: Mapping[str, int], kinds: str) -> tuple[str, ...]:
+    """Return the note on road users that were left out, none if `counts` by their class is empty; `kinds` names who is read."""
+    counted = ", ".join(f"{count} × {kind or 'unknown'}" for kind, count in sorted(counts.items()))
+    return (f"who is no {kinds} was left out: {counted}",) if counted else ()
 
 
 def natural(name: str) -> tuple[int, int, str]:

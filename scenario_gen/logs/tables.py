@@ -183,21 +183,10 @@ def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> O
         values = values[np.isfinite(values) & (values > 0.0) & (values < LARGEST)]
         return float(np.median(values)) if len(values) else math.nan
 
+    states = np.column_stack([column(quantity) for quantity in (*position, "heading", "speed")])
     stamps: Ints = group["time"].to_numpy(np.int64)
     rows: Ints = group["row"].to_numpy(np.int64)
-    measured = slice(None) if "speed" in group else slice(0, 0)
-    return Observations(
-        id=name,
-        fix_ns=stamps,
-        fix=np.column_stack([column(position[0]), column(position[1])]),
-        fix_row=rows,
-        heading=column("heading"),
-        speed_ns=stamps[measured],
-        speed=column("speed")[measured],
-        speed_row=rows[measured],
-        length=median("length"),
-        width=median("width"),
-    )
+    return Observations.of_rows(name, stamps, states, rows, (median("length"), median("width")), measured="speed" in group)
 
 
 def read_messages(path: Path, before: int, config: LogConfig) -> pd.DataFrame:

@@ -16,7 +16,7 @@ OF_TARGETS = {
     "parquet": ("logs/parquet.py",),
     "argoverse2": ("logs/adapters/tracks.py",),
     "commonroad_log": ("logs/adapters/commonroad.py",),
-    "mcap_log": ("bags/recordings/samples.py", "bags/recordings/tracked.py", "bags/storage/bag.py"),
+    "mcap_log": ("bags/vehicles.py", "bags/storage/bag.py"),
     "sqlite_log": ("bags/storage/sqlite.py",),
     "mcap_reader": ("bags/storage/mcap.py", "bags/storage/records.py"),
     "metadata": ("bags/storage/files.py", "base/documents.py"),

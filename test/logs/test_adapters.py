@@ -115,9 +115,10 @@ def tracked(folder):
     """Write a bag of autoware_perception_msgs/TrackedObjects."""
     from rosbags.rosbag2 import StoragePlugin, Writer
 
-    from scenario_gen.bags.recordings.tracked import LABELS, store, TRACKED
+    from scenario_gen.bags.storage.definitions import type_store
+    from scenario_gen.bags.vehicles import KINDS, TRACKED
 
-    types = store().types
+    types = type_store().types
 
     def make(name, **values):
         return types[name](**values)
@@ -131,7 +132,7 @@ def tracked(folder):
 
     path = folder / "perception"
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-        connection = bag.add_connection("/perception/object_recognition/tracking/objects", TRACKED, typestore=store())
+        connection = bag.add_connection("/perception/object_recognition/tracking/objects", TRACKED, typestore=type_store())
         for k, t in enumerate(T):
             objects = []
             for track, label in (("7", "car"), ("8", "bus"), ("9", "pedestrian")):
@@ -155,7 +156,7 @@ def tracked(folder):
                     footprint=make("geometry_msgs/msg/Polygon", points=[]),
                     dimensions=size,
                 )
-                kind = make("autoware_perception_msgs/msg/ObjectClassification", label=LABELS.index(label), probability=0.9)
+                kind = make("autoware_perception_msgs/msg/ObjectClassification", label=KINDS.index(label), probability=0.9)
                 doubt = make("autoware_perception_msgs/msg/ObjectClassification", label=0, probability=0.1)
                 number = make("unique_identifier_msgs/msg/UUID", uuid=np.full(16, int(track), dtype=np.uint8))
                 objects.append(
@@ -170,7 +171,7 @@ def tracked(folder):
                 )
             stamp = make("builtin_interfaces/msg/Time", sec=int(t), nanosec=round((t % 1.0) * 1e9))
             message = make(TRACKED, header=make("std_msgs/msg/Header", stamp=stamp, frame_id="map"), objects=objects)
-            bag.write(connection, round(t * 1e9), store().serialize_cdr(message, TRACKED))
+            bag.write(connection, round(t * 1e9), type_store().serialize_cdr(message, TRACKED))
     return path, {"pedestrian"}
 
 

@@ -10,7 +10,7 @@ import heapq
 import io
 from pathlib import Path
 import tempfile
-from typing import Any
+from typing import Any, BinaryIO
 
 import zstandard
 
@@ -88,7 +88,7 @@ class StoredBag:
         else:
             with _place(file):
                 storage.complete()
-            topics = {c.id: (c.topic, _type(storage, c.schema_id), c.encoding) for c in storage.channels.values()}
+            topics = {c.id: (c.topic, _type(storage, c.schema_id), c.message_encoding) for c in storage.channels.values()}
             own = _of(topics, wanted, file)
             logged = _strictly(file, storage.in_order(set(own))) if own else iter(())
         for stamp, number, data in logged:
@@ -213,15 +213,18 @@ def _unpacked(file: Path, stack: ExitStack, allowance: Allowance) -> Path:
     """
     target = stack.enter_context(scratch(Path(tempfile.gettempdir()))) / file.stem
     with file.open("rb") as packed, target.open("wb") as whole:
-        with guarded(f"{file}: cannot be decompressed", remedy="copy it again"):
-            reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
-        while True:
-            with guarded(f"{file}: cannot be decompressed", remedy="copy it again"):
-                block = reader.read(COPIED)
-            if not block:
-                return target
+        for block in _blocks(packed, file):
             allowance.unpack(len(block))
             whole.write(block)
+    return target
+
+
+def _blocks(packed: BinaryIO, file: Path) -> Iterator[bytes]:
+    """Yield what a compressed file holds, piece by piece."""
+    with guarded(f"{file}: cannot be decompressed", remedy="copy it again"):
+        reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
+        while block := reader.read(COPIED):
+            yield block
 
 
 @contextmanager

@@ -10,30 +10,27 @@ import heapq
 from typing import BinaryIO
 
 from mcap.opcode import Opcode
+from mcap.records import Channel, Header, Schema, Statistics
 import numpy as np
 
 from scenario_gen.bags.storage.config import Allowance
 from scenario_gen.bags.storage.records import (
-    Channel,
     ChunkHead,
     content,
     Contents,
     DamagedError,
     decompress,
+    Fields,
     HEAD,
     LATEST,
     MAGIC,
     MESSAGE,
     Messages,
-    read_channel,
     read_chunk_head,
     read_contents,
-    read_counts,
-    read_header,
     read_schema,
     Record,
     records,
-    Schema,
     TAIL_BYTES,
 )
 
@@ -105,10 +102,10 @@ class McapFile:
             schema = read_schema(content(self.file, record, most), record.start)
             self.schemas[schema.id] = schema
         elif record.opcode == Opcode.CHANNEL:
-            channel = read_channel(content(self.file, record, most), record.start)
+            channel = Channel.read(Fields(content(self.file, record, most), record.start))
             self.channels[channel.id] = channel
         elif record.opcode == Opcode.STATISTICS:
-            self.counts = read_counts(content(self.file, record, most), record.start)
+            self.counts = Statistics.read(Fields(content(self.file, record, most), record.start)).channel_message_counts
 
     def learn(self, contents: Contents) -> None:
         """Take the schemas and channels of a chunk."""
@@ -204,7 +201,7 @@ def open_mcap(file: BinaryIO, size: int, allowance: Allowance) -> McapFile:
     first = next(whole)
     if first.opcode != Opcode.HEADER:
         raise DamagedError(first.start, "no header at the beginning of the file")
-    profile = read_header(content(file, first, allowance.config.most_chunk_bytes), first.start)
+    profile = Header.read(Fields(content(file, first, allowance.config.most_chunk_bytes), first.start)).profile
     if profile != "ros2":
         raise DamagedError(first.start, f"the profile is {profile[:40]!r}, not 'ros2'")
     for record in whole:

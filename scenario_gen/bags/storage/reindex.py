@@ -11,12 +11,14 @@ import heapq
 from pathlib import Path
 from typing import Any
 
+from mcap.records import Channel, Schema
+
 from scenario_gen.bags.storage.config import Allowance, BagConfig
 from scenario_gen.bags.storage.definitions import definition
 from scenario_gen.bags.storage.files import METADATA
 from scenario_gen.bags.storage.mcap import Logged, McapFile
 from scenario_gen.bags.storage.metadata import profiles
-from scenario_gen.bags.storage.records import Channel, DamagedError, Schema
+from scenario_gen.bags.storage.records import DamagedError
 from scenario_gen.bags.storage.salvage import Gap, Salvage, salvage
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
 from scenario_gen.base.documents import read_yaml, shown
@@ -161,8 +163,8 @@ def _announce(bag: BagWriter, whole: McapFile, types: dict[str, str]) -> dict[in
         name = f"topic {shown(channel.topic)}"
         if not kind:
             lost = f"the type of {name} is not described in what is left"
-        elif channel.encoding != "cdr":
-            lost = f"{name} is encoded as {shown(channel.encoding)!r}, not as 'cdr'"
+        elif channel.message_encoding != "cdr":
+            lost = f"{name} is encoded as {shown(channel.message_encoding)!r}, not as 'cdr'"
         elif kind != types[channel.topic]:
             lost = f"{name} is of two types, {shown(types[channel.topic])} and {shown(kind)}"
         else:
@@ -177,9 +179,9 @@ def _announced(bag: BagWriter, channel: Channel, kind: str, schema: Schema | Non
     try:
         definition(kind)
     except InputError as error:
-        if schema is None or not schema.text:
+        if schema is None or not schema.data:
             return str(error)
-        known = (schema.encoding, schema.text)  # a type that is not installed here, as the recorder described it
+        known = (schema.encoding, schema.data.decode())  # a type that is not installed here, as the recorder described it
     qos, type_hash = (channel.metadata.get(key, "") for key in ("offered_qos_profiles", "topic_type_hash"))
     bag.add_topic(channel.topic, kind, qos if profiles(qos) else "", type_hash, known)
     return ""

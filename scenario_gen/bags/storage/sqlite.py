@@ -45,13 +45,7 @@ class SqliteFile:
 
     def _rows(self, query: str, values: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         with guarded(f"{self._what}: damaged", remedy="copy it again, or save what is whole with `sqlite3 FILE .recover`"):
-            cursor = self._connection.execute(query, values)
-        while True:
-            with guarded(f"{self._what}: damaged", remedy="copy it again, or save what is whole with `sqlite3 FILE .recover`"):
-                row = cursor.fetchone()
-            if row is None:
-                return
-            yield row
+            yield from iter(self._connection.execute(query, values).fetchone, None)
 
     def _topics(self) -> tuple[Table, ...]:
         for table, needed in NEEDED.items():
