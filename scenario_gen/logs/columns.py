@@ -46,7 +46,7 @@ class Column:
     """A column of the table, the factor to our unit, and whether it is a heading clockwise from north."""
 
     name: str
-    factor: float
+    factor: float = 1.0
     clockwise: bool = False
 
 

@@ -36,17 +36,12 @@ def read_columns(path: Path, before: int, config: LogConfig) -> tuple[pd.DataFra
     """
     schema = read_schema(path)
     columns = find_columns(list(schema.names), path, config.columns)
-    batches = read_batches(path, schema, sorted({column.name for column in columns.values()}), before, config)
-    frame, found = {}, {}
     for quantity, column in columns.items():
-        with guarded(f"{path}, column {column.name!r} ({quantity}) cannot be read"):
-            values = pa.chunked_array([batch.column(column.name) for batch in batches])
-        factor = unit_of(values.type) if quantity == "time" else None
-        check_kind(values, quantity, column, path)
-        with guarded(f"{path}, column {column.name!r} ({quantity}) cannot be read"):
-            frame[column.name] = to_series(values)
-        found[quantity] = column if factor is None else replace(column, factor=factor)
-    return pd.DataFrame(frame), found
+        kind = schema.field(column.name).type
+        check_kind(kind, quantity, column, path)
+        if quantity == "time" and (factor := unit_of(kind)) is not None:
+            columns[quantity] = replace(column, factor=factor)
+    return read_table(path, sorted({column.name for column in columns.values()}), before, config), columns
 
 
 def read_schema(path: Path) -> pa.Schema:
@@ -123,13 +118,13 @@ def unit_of(kind: pa.DataType) -> float | None:
     return None
 
 
-def check_kind(values: pa.ChunkedArray, quantity: str, column: Column, path: Path) -> None:
+def check_kind(kind: pa.DataType, quantity: str, column: Column, path: Path) -> None:
     """Refuse a column that holds neither numbers nor texts, nor times where those are wanted.
 
     Raises:
         InputError: it does; names the column and its type.
     """
-    kind = values.type.value_type if pa.types.is_dictionary(values.type) else values.type
+    kind = kind.value_type if pa.types.is_dictionary(kind) else kind
     sound = is_text(kind) or any(
         is_kind(kind) for is_kind in (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.types.is_null)
     )

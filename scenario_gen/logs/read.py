@@ -3,18 +3,19 @@
 
 """From a path to encounters: choose the reader, clean, smooth, cut."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
+from importlib import import_module
 from itertools import combinations
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from scenario_gen.bags.storage.files import files_of
 from scenario_gen.base.errors import guarded, InputError, needs, reading
-from scenario_gen.logs.adapters import commonroad
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.config import LogConfig, picked
@@ -28,7 +29,6 @@ from scenario_gen.types.presence import cut
 
 TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
 SPMD_FIELDS = 19  # of a line; `tables.COLUMNS` names them
-Reader = Callable[[Sequence[Path], LogConfig], RawLog]
 
 
 @dataclass(frozen=True)
@@ -268,32 +268,45 @@ def is_known(path: Path, name: str) -> bool:
     return recognised(path) == name
 
 
-PUBLIC = ("argoverse2", "interaction", "ind", "highd")
-ACCEPTS: dict[str, Callable[[Path], bool]] = {  # asked in this order: a headerless table is SPMD
-    "bag": is_bag,
-    "commonroad": is_commonroad,
-    "spmd": is_spmd,
-    **{name: partial(is_known, name=name) for name in PUBLIC},
-    "table": is_table,
+@dataclass(frozen=True)
+class Format:
+    """A format of logs.
+
+    Attributes:
+        accepts: whether a path is of it.
+        module: of `scenario_gen.logs`, whose function `read` reads it; its libraries take up to a second to load.
+        options: further arguments of `read`.
+        needs: the extra of the libraries, and their names.
+    """
+
+    accepts: Callable[[Path], bool]
+    module: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+    needs: tuple[str, ...] = ()
+
+    def read(self, paths: Sequence[Path], config: LogConfig) -> RawLog:
+        """Read one log.
+
+        Raises:
+            InputError: it cannot be read.
+            MissingExtraError: a library is not installed.
+        """
+        if self.needs:
+            needs(*self.needs)
+        log: RawLog = import_module(f"scenario_gen.logs.{self.module}").read(paths, config, **self.options)
+        return log
+
+
+FORMATS = {  # tried in this order: a table without a header is SPMD
+    "bag": Format(is_bag, "bag", needs=("bags", "lz4", "mcap", "rosbags", "zstandard")),
+    "commonroad": Format(is_commonroad, "adapters.commonroad"),
+    "spmd": Format(is_spmd, "tables", {"spmd": True}),
+    **{
+        name: Format(partial(is_known, name=name), "adapters.tracks", {"name": name})
+        for name in ("argoverse2", "interaction", "ind", "highd")
+    },
+    "table": Format(is_table, "tables"),
 }
-
-
-def reader(name: str) -> Reader:
-    """Return the reader of a format; its libraries are loaded only now, for each takes up to a second."""
-    if name == "bag":
-        needs("bags", "lz4", "mcap", "rosbags", "zstandard")
-        from scenario_gen.logs import bag
-
-        return bag.read
-    if name == "commonroad":
-        return commonroad.read
-    if name in PUBLIC:
-        from scenario_gen.logs.adapters import tracks
-
-        return partial(tracks.read, name=name)
-    from scenario_gen.logs import tables
-
-    return partial(tables.read, spmd=name == "spmd")
 
 
 def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
@@ -304,15 +317,14 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
     """
     with guarded(str(paths[0]), OSError):  # no permission, a name too long, a file that goes away
         files = [file for path in paths for file in present(path)]
-        formats = ACCEPTS if config.format == "auto" else {config.format: lambda _: True}
-        name = next((name for name, accepts in formats.items() if all(accepts(file) for file in files)), "")
-    if not name:
+        known = FORMATS.get(config.format) or next((f for f in FORMATS.values() if all(map(f.accepts, files))), None)
+    if known is None:
         raise InputError(
             f"{paths[0]} is none of the known logs: {', '.join(TABLES)} tables and SPMD files, "
             "CommonRoad scenarios, rosbag2 folders, .mcap, .db3; set the parameter format if its name misleads"
         )
     with reading(files[0]):
-        return reader(name)(files, config)
+        return known.read(files, config)
 
 
 def present(path: Path) -> list[Path]:

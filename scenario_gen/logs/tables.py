@@ -17,6 +17,7 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, LONGEST_HEADER, Observations, RawLog, Segment
 from scenario_gen.numerics.arrays import Floats, Ints
 
+PARQUET = (".parquet", ".pq")
 LONGEST = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
 LONGEST_NUMBER = 300  # characters
 LARGEST = 100.0  # m: what is longer is no vehicle
@@ -42,23 +43,32 @@ def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> Raw
     for path in paths:
         size += path.stat().st_size
         check_size(str(path), size, row, config)
-        unit, first = "line", 1 if spmd else 2
-        if spmd:
-            frames.append(read_messages(path, row, config))
-        elif path.suffix.lower() in (".parquet", ".pq"):
-            needs("parquet", "pyarrow")
-            from scenario_gen.logs.parquet import read_columns
-
-            frames.append(to_numbers(*read_columns(path, row, config), path))
-            unit, first = "row", 1
-        else:
-            frame = read_text(path, row, config)
-            frames.append(to_numbers(frame, find_columns([str(name) for name in frame.columns], path, config.columns), path))
-        segments.append(Segment(row, str(path), unit, first))
+        frames.append(read_messages(path, row, config) if spmd else read_columns(path, row, config))
+        segments.append(segment_of(path, row, header=not spmd))
         row += len(frames[-1])
     if len({"lat" in frame for frame in frames}) > 1:
         raise InputError(f"{paths[0]} and the files beside it mix latitude/longitude and x/y; read them one by one")
     return from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
+
+
+def read_columns(path: Path, before: int, config: LogConfig) -> pd.DataFrame:
+    """Read the needed columns of one table in our units; `before` rows were read from other files.
+
+    Raises:
+        InputError: as `read`.
+    """
+    if path.suffix.lower() in PARQUET:
+        needs("parquet", "pyarrow")
+        from scenario_gen.logs import parquet
+
+        return to_numbers(*parquet.read_columns(path, before, config), path)
+    frame = read_text(path, before, config)
+    return to_numbers(frame, find_columns([str(name) for name in frame.columns], path, config.columns), path)
+
+
+def segment_of(path: Path, row: int, *, header: bool = True) -> Segment:
+    """Return the place of a file's rows, the first of which is `row` of the log; text may have no line of names."""
+    return Segment(row, str(path), "row", 1) if path.suffix.lower() in PARQUET else Segment(row, str(path), "line", 1 + header)
 
 
 def read_text(path: Path, before: int, config: LogConfig, **options: Any) -> pd.DataFrame:

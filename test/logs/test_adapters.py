@@ -205,10 +205,10 @@ def test_what_was_written_is_read(tmp_path, name):
         assert np.allclose(encounter.heading[n], heading, atol=0.05)
 
 
-def test_every_column_has_a_unit_and_every_format_its_source():
-    for known in FORMATS.values():
-        assert known.source and all(quantity.unit for quantity in known.columns.values())
-        assert LogConfig(format=known.name).format == known.name
+def test_every_column_has_a_factor_and_every_format_its_source():
+    for name, known in FORMATS.items():
+        assert known.source and all(0.0 < column.factor < np.inf for column in known.columns.values())
+        assert LogConfig(format=name).format == name
 
 
 def test_what_is_missing_is_named(tmp_path):
@@ -241,7 +241,7 @@ def test_pedestrians_of_no_known_kind_are_counted_too(tmp_path):
 def test_what_nobody_foresaw_names_the_file(tmp_path, monkeypatch):
     """A reader that fails in a way of its own is an error of ours all the same, which the fuzzing counts as a finding."""
     path, _ = argoverse2(tmp_path)
-    monkeypatch.setattr(tracks, "nanoseconds", lambda *_: {}["gone"])
+    monkeypatch.setattr(tracks, "to_numbers", lambda *_: {}["gone"])
     with pytest.raises(UnforeseenError, match=r"scenario_s1\.parquet cannot be read: KeyError 'gone'"):
         read_log(path)
 
