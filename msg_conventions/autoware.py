@@ -17,7 +17,8 @@ import hashlib
 import numpy as np
 
 from msg_conventions.cdr import CdrWriter
-from msg_conventions.roads import pose_rows
+from msg_conventions.odometry import encode_odometry
+from msg_conventions.poses import pose_rows
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types.body import height, is_truck, rear_axle, shifted
 from scenario_gen.types.encounter import Vehicle
@@ -121,21 +122,15 @@ def encode_predicted_objects(
 def encode_kinematic_state(vehicle: Vehicle, state: Floats, frame_id: str, stamp_ns: int) -> bytes:
     """Return the ego as Odometry; `state` (6,) x, y [m], yaw [rad], speed [m/s], acceleration [m/s²], yaw rate [rad/s]."""
     axle = shifted(state[:2], state[2], -rear_axle(vehicle))
-    writer = CdrWriter().header(stamp_ns, frame_id).string(BASE_LINK)
-    writer.pack("d", *pose_rows(np.array([[*axle, state[2]]]))[0]).raw(_NO_COVARIANCE)
-    return _twist(writer, float(state[3]), float(state[5])).finish()
+    return encode_odometry(np.array([*axle, *state[2:4]]), float(state[5]), BASE_LINK, frame_id, stamp_ns)
 
 
 def _kinematics(writer: CdrWriter, vehicle: Vehicle, pose: Floats, speed: float, acceleration: float, rate: float) -> None:
     """Append id, existence, class, pose (7,), twist and acceleration."""
     writer.raw(uuid_of(vehicle)).pack("f", 1.0).pack("I", 1).pack("B", TRUCK if is_truck(vehicle) else CAR).pack("f", 1.0)
     writer.pack("d", *pose).raw(_NO_COVARIANCE)
-    _twist(writer, speed, rate)
+    writer.pack("d", speed, 0.0, 0.0, 0.0, 0.0, rate).raw(_NO_COVARIANCE)
     writer.pack("d", acceleration, *[0.0] * 5).raw(_NO_COVARIANCE)
-
-
-def _twist(writer: CdrWriter, speed: float, rate: float) -> CdrWriter:
-    return writer.pack("d", speed, 0.0, 0.0, 0.0, 0.0, rate).raw(_NO_COVARIANCE)
 
 
 def _path(writer: CdrWriter, poses: Floats) -> None:

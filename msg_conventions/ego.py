@@ -17,16 +17,13 @@ import json
 
 import numpy as np
 
-from msg_conventions.cdr import CdrReader, CdrWriter
-from msg_conventions.roads import pose_rows, poses_of
+from msg_conventions.odometry import decode_odometry, encode_odometry
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types.names import token
 from scenario_gen.types.scenario import EgoSlot
 
 WITNESS = "ego/witness"
-STATE_TYPE = "nav_msgs/msg/Odometry"
-_COVARIANCE = 36
 
 
 def encode_state(state: Floats, child_frame_id: str, frame_id: str, stamp_ns: int) -> bytes:
@@ -37,9 +34,7 @@ def encode_state(state: Floats, child_frame_id: str, frame_id: str, stamp_ns: in
     """
     if not np.isfinite(state).all():
         raise InputError("a state with a value that is not finite cannot be sent")
-    writer = CdrWriter().header(stamp_ns, frame_id).string(child_frame_id)
-    writer.pack("d", *pose_rows(state[None, :3])[0], *[0.0] * _COVARIANCE)
-    return writer.pack("d", float(state[3]), *[0.0] * (5 + _COVARIANCE)).finish()
+    return encode_odometry(state, 0.0, child_frame_id, frame_id, stamp_ns)
 
 
 def decode_state(data: bytes, what: str = "state") -> tuple[int, str, str, Floats]:
@@ -48,14 +43,8 @@ def decode_state(data: bytes, what: str = "state") -> tuple[int, str, str, Float
     Raises:
         InputError: the message is damaged, or a value is not finite.
     """
-    reader = CdrReader(data, what)
-    stamp_ns, frame_id = reader.framed_header()
-    child = reader.string()
-    row = reader.floats(7 + _COVARIANCE)
-    speed = float(reader.floats(6 + _COVARIANCE)[0])
-    if not np.isfinite(speed):
-        raise InputError(f"{what}: the speed is not finite")
-    return stamp_ns, frame_id, child, np.append(poses_of(row[None, :7], what)[0], speed)
+    stamp_ns, frame_id, child, state = decode_odometry(data, what, framed=True)
+    return stamp_ns, frame_id, child, state[:4]
 
 
 def ego_messages(slot: EgoSlot, frame_id: str, stamp_ns: int) -> Iterator[tuple[str, bytes]]:

@@ -17,14 +17,13 @@ from typing import Any
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.markers import ADD, DELETE, LINE_LIST, Marker
 from msg_conventions.trajectory import FARTHEST
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types.lanes import Lane, LaneNetwork
 
-MARKER_TYPE = "visualization_msgs/msg/Marker"
 TOPIC = "road/lanes"
-LINE_LIST, ADD, DELETE = 5, 0, 2
 TAIL = 1  # bytes by which the message ends behind a multiple of 4
 
 
@@ -33,16 +32,9 @@ def encode_lanes(network: LaneNetwork | None, frame_id: str, stamp_ns: int) -> b
     lanes = () if network is None else network.lanes
     pairs = [border[np.repeat(np.arange(len(border)), 2)[1:-1]] for lane in lanes for border in (lane.left, lane.right)]
     points = np.concatenate(pairs) if pairs else np.zeros((0, 2))
-    writer = CdrWriter().header(stamp_ns, frame_id).string("lanes").pack("i", 0, LINE_LIST, ADD if lanes else DELETE)
-    writer.pack("d", 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0).pack("d", 0.1, 0.0, 0.0)  # pose; width of the lines in metres
-    writer.pack("f", 1.0, 1.0, 1.0, 0.7).stamp(0).pack("B", 0).pack("I", len(points))
-    if len(points):
-        writer.align(8).raw(np.column_stack((points, np.zeros(len(points)))).tobytes())
-    writer.pack("I", 0)  # colours
-    writer.string("").header(0, "").string("").pack("I", 0)  # texture: resource, image header, format, bytes
-    writer.pack("I", 0)  # uv coordinates
-    writer.string("" if network is None else json.dumps(_document(network), ensure_ascii=False))
-    return writer.string("").string("").pack("I", 0).pack("B", 0).finish()  # mesh: resource, file, bytes
+    text = "" if network is None else json.dumps(_document(network), ensure_ascii=False)
+    marker = Marker("lanes", LINE_LIST, ADD if lanes else DELETE, colour=(1.0, 1.0, 1.0, 0.7), points=points, text=text)
+    return marker.write(CdrWriter(), frame_id, stamp_ns).finish()
 
 
 def _document(network: LaneNetwork) -> dict[str, Any]:

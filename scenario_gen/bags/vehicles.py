@@ -21,31 +21,16 @@ from typing import Any
 
 import numpy as np
 
-from msg_conventions import ego, topics, trajectory
+from msg_conventions import odometry, topics, tracks, trajectory
 from msg_conventions.streams import speed_of
-from msg_conventions.tracks import decode_tracks
 from msg_conventions.yaw import yaw
 from scenario_gen.bags.storage.autoware import TRACKED
 from scenario_gen.bags.storage.definitions import type_store
 from scenario_gen.base.errors import guarded
 from scenario_gen.numerics import exact
+from scenario_gen.types.encounter import Encounter
 
-__all__ = [
-    "FIX",
-    "KINDS",
-    "ODOMETRY",
-    "TRACKED",
-    "TRACKS",
-    "TWIST",
-    "VEHICLES",
-    "Sample",
-    "TrackedObject",
-    "decode_sample",
-    "decode_tracked",
-    "decode_tracks",
-]
-
-FIX, TWIST, ODOMETRY, TRACKS = topics.FIX_TYPE, topics.TWIST_TYPE, ego.STATE_TYPE, trajectory.TYPE
+FIX, TWIST, ODOMETRY, TRACKS = topics.FIX_TYPE, topics.TWIST_TYPE, odometry.TYPE, trajectory.TYPE
 KINDS = ("unknown", "car", "truck", "bus", "trailer", "motorcycle", "bicycle", "pedestrian")  # by label
 VEHICLES = ("car", "truck", "bus", "trailer")
 UNAVAILABLE, SIGN_UNKNOWN = 0, 1  # of orientation_availability
@@ -95,6 +80,15 @@ def decode_sample(data: bytes, kind: str, what: str) -> Sample:
         return Sample(stamp, speed=speed_of(message.twist.linear.x, message.twist.linear.y))
     pose, linear = message.pose.pose, message.twist.twist.linear  # the speed is in the body frame
     return Sample(stamp, (pose.position.x, pose.position.y), _heading(pose), exact.hypot(linear.x, linear.y))
+
+
+def decode_tracks(data: bytes, what: str) -> Encounter:
+    """Return the encounter in a message of type TRACKS.
+
+    Raises:
+        InputError: naming `what`, it is damaged, or no encounter.
+    """
+    return tracks.decode_tracks(data, what)
 
 
 def decode_tracked(data: bytes, what: str) -> tuple[int, str, list[TrackedObject]]:

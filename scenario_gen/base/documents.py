@@ -97,11 +97,11 @@ def _yaml_said(error: Exception) -> str:
     return f"not YAML ({place}{problem})"
 
 
-def read_text(path: Path, most: int, what: str) -> str:
-    """Return the text of a regular file of at most `most` bytes.
+def read_bytes(path: Path, most: int, what: str, remedy: str = "") -> bytes:
+    """Return the content of a regular file of at most `most` bytes; `remedy` ends the message where it is larger.
 
     Raises:
-        InputError: it cannot be read, is no regular file, too large, or not UTF-8.
+        InputError: it cannot be read, is no regular file, or is too large.
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):  # before it is opened: a pipe would wait for its writer
@@ -111,9 +111,18 @@ def read_text(path: Path, most: int, what: str) -> str:
     except (OSError, ValueError) as error:  # ValueError: a name with a null byte
         raise InputError(f"{what}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
     if len(data) > most:
-        raise InputError(f"{what}: {path.stat().st_size} bytes; at most {most} are read")
+        raise InputError(f"{what}: {path.stat().st_size} bytes; at most {most} are read{remedy}")
+    return data
+
+
+def read_text(path: Path, most: int, what: str) -> str:
+    """Return the text of a regular file of at most `most` bytes.
+
+    Raises:
+        InputError: as `read_bytes`, or it is not UTF-8.
+    """
     try:
-        return data.decode("utf-8-sig")
+        return read_bytes(path, most, what).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{what}: not UTF-8 text (byte {error.start})") from error
 

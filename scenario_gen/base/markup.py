@@ -6,11 +6,10 @@
 from dataclasses import dataclass, field
 import math
 from pathlib import Path
-import stat
 from typing import Any
 from xml.parsers import expat
 
-from scenario_gen.base.documents import shown
+from scenario_gen.base.documents import read_bytes, shown
 from scenario_gen.base.errors import InputError
 
 MOST_BYTES = 128 * 1024 * 1024  # of a map; a town of 100 roads takes 0.5 MB in OpenDRIVE, a district in Lanelet2 20 MB
@@ -112,22 +111,10 @@ def read_xml(path: Path, what: str, skip: frozenset[str] = frozenset()) -> Eleme
     Raises:
         InputError: it cannot be read, is too large or deep, declares a document type, or is no XML; names line and column.
     """
-    return parse_xml(_bytes(path, what), what, skip)
-
-
-def _bytes(path: Path, what: str) -> bytes:
-    try:
-        if not stat.S_ISREG(path.stat().st_mode):  # before it is opened: a pipe would wait for its writer
-            raise InputError(f"{what}: not a regular file")
-        with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{what}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
-    if len(data) > MOST_BYTES:
-        raise InputError(f"{what}: {path.stat().st_size} bytes; at most {MOST_BYTES} are read: cut the map")
+    data = read_bytes(path, MOST_BYTES, what, ": cut the map")
     if not data.strip():
         raise InputError(f"{what} is empty")
-    return data
+    return parse_xml(data, what, skip)
 
 
 def parse_xml(data: bytes, what: str, skip: frozenset[str] = frozenset()) -> Element:

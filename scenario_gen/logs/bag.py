@@ -11,19 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from scenario_gen.bags.storage.autoware import TRACKED
 from scenario_gen.bags.storage.bag import open_bag
 from scenario_gen.bags.storage.config import BagConfig
-from scenario_gen.bags.vehicles import (
-    decode_sample,
-    decode_tracked,
-    decode_tracks,
-    FIX,
-    ODOMETRY,
-    TRACKED,
-    TRACKS,
-    TWIST,
-    VEHICLES,
-)
+from scenario_gen.bags.vehicles import decode_sample, decode_tracked, decode_tracks, FIX, ODOMETRY, TRACKS, TWIST, VEHICLES
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, left_out_note, RawLog, Rows, Segment
