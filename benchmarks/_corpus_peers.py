@@ -17,13 +17,12 @@ import warnings
 import numpy as np
 
 from benchmarks._segmentation_peers import installed, jax_moseq
+from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.nearest import attempt
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.segmentation.features import driving_features
 from scenario_gen.roads import build_road
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import ScenarioSet
@@ -52,7 +51,7 @@ def costs(encounter: Encounter, name: str, count: int, seed: int) -> dict[str, f
     config = PipelineConfig()
     begun = process_time()
     road = build_road(name, encounter, config.road)
-    made = attempt(encounter, segment(encounter, config.segmentation, seed), road, config, Request(), count=count, seed=seed)
+    made = Attempt(encounter, segment(encounter, config.segmentation, seed), road, config, count=count, seed=seed).run()
     found = {"ours": process_time() - begun}
     own = config.segmentation
     features = driving_features(encounter, own.speed_window, own.turn_window, own.speed_noise, own.turn_noise)[0]

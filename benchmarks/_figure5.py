@@ -13,10 +13,10 @@ from time import process_time
 from benchmarks._size import sized
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.logs import read_log
+from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import evaluate_scenarios, replay
 from scenario_gen.method.evaluation.references import linear_changepoints, uniform_changepoints, without_changepoints
-from scenario_gen.method.nearest import attempt
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.output.report.page import render, ReportInput
@@ -24,7 +24,6 @@ from scenario_gen.roads import build_road
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation
 from scenario_gen.types.generation import GenerationResult, ORACLE, UNIFORM, WITH, WITHOUT
-from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road
 from scenario_gen.types.segmentation import Segmentation
 
@@ -85,7 +84,7 @@ def _measure(
     """One case with every seed of planning and sampling; none where the segmenter's arm is refused."""
     try:
         road = build_road(name, encounter, config.road)
-        made = {seed: attempt(encounter, segmentation, road, config, Request(), count=COUNT, seed=seed) for seed in SEEDS}
+        made = {seed: Attempt(encounter, segmentation, road, config, count=COUNT, seed=seed).run() for seed in SEEDS}
     except (InputError, RefusedError) as error:
         say(f"{encounter.name} on {Path(name).stem}: {error}")
         return []
@@ -99,7 +98,7 @@ def _measure(
         arms = {WITH: arm}
         for name_of, reference in references.items():
             try:
-                arms[name_of] = attempt(encounter, reference, road, config, Request(), count=COUNT, seed=seed, waits=())
+                arms[name_of] = Attempt(encounter, reference, road, config, count=COUNT, seed=seed, waits=()).run()
             except RefusedError as error:
                 say(f"{encounter.name} on {road.name}, seed {seed}, {name_of}: {error}")
         found.append(_evaluated(encounter, arms, road, own_road=own_road, seed=seed))

@@ -18,7 +18,7 @@ from scenario_gen.method.evaluation.distributions import compare, QUANTITIES, va
 from scenario_gen.method.evaluation.motion import at_count, at_period
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
-from scenario_gen.method.sampling import sample_scenarios, SamplingConfig
+from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
@@ -56,10 +56,8 @@ class Prepared:
         """Sample `count` scenarios; unchecked, every candidate counts as valid."""
         checker = Checker(self.road, self.fit.asked, self.conflicts, self.waits)
         check = checker.check if checked else lambda scenarios: [Verdict() for _ in scenarios]
-        return sample_scenarios(
-            self.encounter, self.segmentation, self.road, self.routes, self.fit.asked, check, config,
-            count=count, seed=seed, waits=self.waits,
-        )  # fmt: skip
+        plan = Plan(self.encounter, self.segmentation, self.road, self.routes, self.fit.asked, self.waits)
+        return draw_scenarios(plan, check, config, count=count, seed=seed)
 
 
 def cases() -> Iterator[Prepared | str]:

@@ -16,12 +16,14 @@ STARTED = process_time()
 PARTS = {  # by the module that calls them
     "scenario_gen.cli.batch": {"read_log": "read", "write_results": "figures"},
     "scenario_gen.pipeline": {
-        "build_road": "road",
+        "road_and_template": "road",
         "segment": "segment",
-        "plan": "fit and plan",
-        "sample_checked": "sample",
+        "fit_template": "fit and plan",
+        "plan_routes": "fit and plan",
+        "sample_scenarios": "sample",
         "with_references": "references",
-        "with_evaluation": "evaluate",
+        "evaluate": "evaluate",
+        "coverage_of": "evaluate",
     },
     "scenario_gen.output.results": {"add_results": "bag", "write_report": "page"},
 }

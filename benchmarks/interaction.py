@@ -30,9 +30,9 @@ from benchmarks.row import Row
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
+from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.evaluation.interaction import following, ghosts, pair_windows, yielding
 from scenario_gen.method.evaluation.measures import measure
-from scenario_gen.method.nearest import attempt
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.pipeline import PipelineConfig
@@ -41,7 +41,6 @@ from scenario_gen.template.answers import Motion
 from scenario_gen.template.reactions import reactions_of
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.reaction import FOLLOW
-from scenario_gen.types.request import Request
 
 COUNT = sized(30, quick=4)
 LOGS = sized(None, quick=1)
@@ -123,7 +122,7 @@ def _measured(name: str, encounter: Encounter, road_name: str, count: int, varie
     try:
         road, segmentation = build_road(road_name, encounter, config.road), segment(encounter, config.segmentation, SEED)
         begun = process_time()
-        made = attempt(encounter, segmentation, road, config, Request(), count=count, seed=SEED)
+        made = Attempt(encounter, segmentation, road, config, count=count, seed=SEED).run()
         seconds = process_time() - begun
     except ScenarioGenError as error:
         case.figures["refused"] = str(error)

@@ -11,7 +11,7 @@ from benchmarks import _sampling_peers
 from benchmarks._sampling_cases import arrival_spread, cases, displacement, displacement_at_instants, divergences, Prepared
 from benchmarks._size import sized
 from benchmarks.row import Row
-from scenario_gen.method.sampling import sample_scenarios
+from scenario_gen.method.sampling import draw_scenarios, Plan
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.template.interaction import find_conflicts
@@ -70,7 +70,7 @@ def _seconds(vehicles: int, duration: float, count: int) -> float:
     asked = BoundaryStates(states[0], states[1])
     checker = Checker(road, asked, find_conflicts(names, time, position, heading), ())
     started = process_time()
-    found = sample_scenarios(encounter, segmentation, road, routes, asked, checker.check, count=count, waits=())
+    found = draw_scenarios(Plan(encounter, segmentation, road, routes, asked, ()), checker.check, count=count)
     spent = process_time() - started
     if len(found.scenarios) < count:
         raise RuntimeError(f"only {len(found.scenarios)} of {count} scenarios: {found.refused}")

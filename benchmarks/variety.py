@@ -31,7 +31,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.method.evaluation.measures import features, measure, MEASURES
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
-from scenario_gen.method.sampling import freed_states, sample_scenarios, SamplingConfig
+from scenario_gen.method.sampling import draw_scenarios, freed_states, Plan, SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
@@ -83,10 +83,8 @@ class Case:
         asked = freed_states(self.states, encounter, config, request)
         begun = process_time()
         check = Checker.of_template(encounter, road, asked, self.waits, None, request.order).check
-        made = sample_scenarios(
-            encounter, segmentation, road, routes, asked, check, config,
-            count=count, waits=self.waits, request=request, measures=MEASURES, **more,
-        )  # fmt: skip
+        plan = Plan(encounter, segmentation, road, routes, asked, self.waits)
+        made = draw_scenarios(plan, check, config, count=count, request=request, measures=MEASURES, **more)
         return made, process_time() - begun
 
 

@@ -19,11 +19,8 @@ import numpy as np
 from msg_conventions.cdr import CdrWriter
 from msg_conventions.odometry import encode_odometry
 from msg_conventions.poses import pose_rows
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.body import height, is_truck, rear_axle, shifted
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.qos import Quality
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.numerics import Floats
+from scenario_gen.types import height, is_truck, Quality, rear_axle, Scenario, shifted, Vehicle
 
 OBJECTS, TRACKS = "/perception/object_recognition/objects", "/perception/object_recognition/tracking/objects"
 EGO, BASE_LINK = "/localization/kinematic_state", "base_link"

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import Floats
 
 HEADER = b"\x00\x01\x00\x00"  # encapsulation: CDR, little-endian, no options
 NANOSECONDS = 1_000_000_000

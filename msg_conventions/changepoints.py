@@ -23,8 +23,7 @@ from msg_conventions.diagnostics import Level, Status
 from msg_conventions.tracks import encode_samples, FRAME
 from msg_conventions.trajectory import Trajectory
 from scenario_gen.base.errors import InputError
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
+from scenario_gen.types import Encounter, LiveChangepoints, Segmentation
 
 POSTERIOR_TYPE = "sensor_msgs/msg/PointCloud2"
 UINT16, FLOAT32, FLOAT64 = 4, 7, 8  # sensor_msgs/PointField datatypes

@@ -30,7 +30,7 @@ from msg_conventions.poses import poses_of
 from msg_conventions.roads import encode_grid, OCCUPIED
 from msg_conventions.trajectory import decode
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics import Bools, Floats
 
 TWIST_TYPE, CLOCK_TYPE = "geometry_msgs/msg/Twist", "rosgraph_msgs/msg/Clock"
 

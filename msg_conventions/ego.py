@@ -19,9 +19,8 @@ import numpy as np
 
 from msg_conventions.odometry import decode_odometry, encode_odometry
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.names import token
-from scenario_gen.types.scenario import EgoSlot
+from scenario_gen.numerics import Floats
+from scenario_gen.types import EgoSlot, token
 
 WITNESS = "ego/witness"
 

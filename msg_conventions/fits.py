@@ -19,11 +19,8 @@ from msg_conventions import trajectory
 from msg_conventions.diagnostics import Level, Status
 from msg_conventions.trajectory import Trajectory
 from scenario_gen.base.errors import guarded, InputError
-from scenario_gen.numerics.arrays import Floats, Ints
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.fit import Fit, FittedVehicle, Loss
-from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import BoundaryStates
+from scenario_gen.numerics import Floats, Ints
+from scenario_gen.types import BoundaryStates, Encounter, Fit, FittedVehicle, Loss, Route
 
 
 def anchor_stamps(encounter: Encounter, changepoints: Ints) -> list[int]:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.poses import pose_rows, poses_of
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import Floats
 
 TYPE = "tf2_msgs/msg/TFMessage"
 

@@ -20,8 +20,8 @@ from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.markers import ADD, DELETE, LINE_LIST, Marker
 from msg_conventions.trajectory import FARTHEST
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.lanes import Lane, LaneNetwork
+from scenario_gen.numerics import Floats
+from scenario_gen.types import Lane, LaneNetwork
 
 TOPIC = "road/lanes"
 TAIL = 1  # bytes by which the message ends behind a multiple of 4

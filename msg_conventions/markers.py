@@ -9,7 +9,7 @@ import numpy as np
 
 from msg_conventions.cdr import CdrWriter
 from msg_conventions.poses import pose_rows
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import Floats
 
 TYPE = "visualization_msgs/msg/Marker"
 ARRAY_TYPE = "visualization_msgs/msg/MarkerArray"

@@ -11,7 +11,7 @@ import numpy as np
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.poses import pose_rows, poses_of
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import Floats
 
 TYPE = "nav_msgs/msg/Odometry"
 _COVARIANCE = 36

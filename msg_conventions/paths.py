@@ -19,9 +19,8 @@ from msg_conventions.cdr import CdrReader, CdrWriter, HEADER, NANOSECONDS
 from msg_conventions.poses import poses_of
 from msg_conventions.yaw import half_angle
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
-from scenario_gen.types.route import Route
+from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.types import Route
 
 TYPE = "nav_msgs/msg/Path"
 

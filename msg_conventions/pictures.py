@@ -12,10 +12,8 @@ import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.markers import CUBE, DELETE_ALL, LINE_STRIP, Marker
-from scenario_gen.numerics.arrays import Bools, Floats
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.names import tokens
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.numerics import Bools, Floats
+from scenario_gen.types import Scenario, tokens, Vehicle
 
 FOOTPRINT_TYPE = "geometry_msgs/msg/PolygonStamped"
 COLOURS = ((0.12, 0.47, 0.71), (0.84, 0.15, 0.16), (0.17, 0.63, 0.17), (1.0, 0.5, 0.05), (0.58, 0.4, 0.74), (0.55, 0.34, 0.29))

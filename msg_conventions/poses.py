@@ -8,7 +8,7 @@ import numpy as np
 from msg_conventions.trajectory import FARTHEST
 from msg_conventions.yaw import check_quaternions, half_angle, yaw
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import Floats
 
 
 def pose_rows(poses: Floats) -> Floats:

@@ -18,8 +18,8 @@ from msg_conventions.poses import pose_rows, poses_of
 from msg_conventions.trajectory import FARTHEST
 from msg_conventions.yaw import check_quaternions, yaw
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Floats, Ints
-from scenario_gen.types.road import Road
+from scenario_gen.numerics import Floats, Ints
+from scenario_gen.types import Road
 
 MAP_TYPE = "nav_msgs/msg/OccupancyGrid"
 POSES_TYPE = "geometry_msgs/msg/PoseArray"

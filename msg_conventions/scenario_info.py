@@ -23,10 +23,8 @@ from msg_conventions.hashes import MAP_HASH, TEMPLATE_HASH
 from msg_conventions.scenarios import digest, encode_scenario, messages_of
 from scenario_gen.base.documents import parse_json
 from scenario_gen.base.errors import guarded, InputError
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.request import ORDERS
-from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, FACTS, Scenario, ScenarioSet
+from scenario_gen.numerics import Floats
+from scenario_gen.types import BoundaryStates, Cause, EgoSlot, FACTS, ORDERS, Scenario, ScenarioSet, Vehicle
 
 INFO = "scenarios/info"
 REFUSED, ADAPTATION, TARGET = "refused.", "adaptation.", "target."

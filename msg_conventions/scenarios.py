@@ -24,8 +24,8 @@ from msg_conventions import trajectory
 from msg_conventions.cdr import HEADER, NANOSECONDS
 from msg_conventions.trajectory import Trajectory
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Ints
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.numerics import Ints
+from scenario_gen.types import Scenario
 
 
 def encode_scenario(scenario: Scenario, stamp_ns: int) -> bytes:

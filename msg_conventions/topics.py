@@ -20,7 +20,7 @@ from msg_conventions import (
     roads,
     trajectory,
 )
-from scenario_gen.types.qos import Quality
+from scenario_gen.types import Quality
 
 FIX_TYPE = "sensor_msgs/msg/NavSatFix"
 TWIST_TYPE = "geometry_msgs/msg/TwistStamped"

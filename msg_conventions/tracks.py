@@ -14,9 +14,8 @@ import numpy as np
 from msg_conventions import trajectory
 from msg_conventions.trajectory import Trajectory
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Bools, Ints, runs
-from scenario_gen.types.encounter import Encounter, Vehicle
-from scenario_gen.types.presence import ALWAYS
+from scenario_gen.numerics import Bools, Ints, runs
+from scenario_gen.types import ALWAYS, Encounter, Vehicle
 
 FRAME = "local_enu"
 SHORTEST_STEP_NS, LONGEST_STEP_NS = 1_000_000, 10_000_000_000

@@ -20,9 +20,8 @@ import numpy as np
 from msg_conventions.cdr import CdrReader, CdrWriter, HEADER, NANOSECONDS
 from msg_conventions.yaw import check_quaternions, quaternion, yaw
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Bools, Floats, Ints
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.names import tokens
+from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.types import tokens, Vehicle
 
 TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
 FARTHEST = 1e8  # m from the frame's origin: more than any geodetic grid has

@@ -6,8 +6,7 @@
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 
 TWO_PI = 2.0 * np.pi
 SHORTEST, LARGEST = 0.5, 2.0  # length, and part, of a quaternion, which should have length 1

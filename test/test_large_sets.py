@@ -22,9 +22,10 @@ from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
+from scenario_gen.method import attempt
 from scenario_gen.method.evaluation import EvaluationConfig, MEASURED
 from scenario_gen.method.evaluation.evaluate import measured
-from scenario_gen.method.sampling import regenerate, sample, sampler
+from scenario_gen.method.sampling import Plan, regenerate, sample, sampler
 from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, index_of, LEVEL_SIZE, LEVELS, place_of
 from scenario_gen.method.segmentation import segment
 from scenario_gen.output.report.page import render, ReportInput
@@ -91,8 +92,8 @@ def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
     assert all(a.position.tobytes() == b.position.tobytes() for a, b in zip(plain.scenarios, beyond.scenarios, strict=True))
     last = beyond.scenarios[-1]
     placed, waits = answer(chain, Request(), count=1), waits_to_keep(chain.encounter, chain.segmentation)
-    told = (chain.encounter, chain.segmentation, chain.road, placed.routes, placed.fit.asked)
-    assert same(regenerate(*told, chain.sampling, seed=chain.seed, index=last.index, waits=waits), last)
+    plan = Plan(chain.encounter, chain.segmentation, chain.road, placed.routes, placed.fit.asked, waits)
+    assert same(regenerate(plan, chain.sampling, seed=chain.seed, index=last.index), last)
 
 
 @given(st.integers(MEASURED + 1, 10**12))
@@ -130,7 +131,7 @@ def test_memory_does_not_grow_with_the_number_of_scenarios(chain, monkeypatch, t
 def test_that_only_a_part_was_measured_is_said(chain, monkeypatch):
     """In the terminal, the page and the figures; the references are made no larger than they are measured."""
     evaluating = sys.modules[measured.__module__]  # the package has a function of that name
-    for module in (evaluating, pipeline):
+    for module in (evaluating, attempt):
         monkeypatch.setattr(module, "MEASURED", 10)
     monkeypatch.setattr(evaluating, "RUNS", 2)
     config = pipeline.PipelineConfig(evaluation=EvaluationConfig(resamples=20))

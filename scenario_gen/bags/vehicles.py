@@ -28,7 +28,7 @@ from scenario_gen.bags.storage.autoware import TRACKED
 from scenario_gen.bags.storage.definitions import type_store
 from scenario_gen.base.errors import guarded
 from scenario_gen.numerics import exact
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.types import Encounter
 
 FIX, TWIST, ODOMETRY, TRACKS = topics.FIX_TYPE, topics.TWIST_TYPE, odometry.TYPE, trajectory.TYPE
 KINDS = ("unknown", "car", "truck", "bus", "trailer", "motorcycle", "bicycle", "pedestrian")  # by label

@@ -12,9 +12,7 @@ from scenario_gen.base.folders import replaced_folder
 from scenario_gen.logs import read_log
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.request import Request
+from scenario_gen.types import Encounter, GenerationResult, Request
 
 Advance = Callable[[str, int, int], None]
 """Told how far a case is: its name, scenarios so far, scenarios wanted."""

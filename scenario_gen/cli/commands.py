@@ -17,7 +17,7 @@ from scenario_gen.cli.corpus import commands as corpus_commands
 if TYPE_CHECKING:
     from scenario_gen.closed_loop.command import OverDds
     from scenario_gen.pipeline import PipelineConfig
-    from scenario_gen.types.generation import GenerationResult
+    from scenario_gen.types import GenerationResult
 
 app = typer.Typer(
     help="Turn recorded vehicle encounters into new, valid ones on other roads.",
@@ -64,7 +64,7 @@ def obstructed(config: "PipelineConfig", obstacles: list[str] | None) -> "Pipeli
         InputError: one is not of the form; the message names it.
     """
     from scenario_gen.base.parameters import updated
-    from scenario_gen.roads.obstacles import read_obstacles
+    from scenario_gen.roads import read_obstacles
 
     for text in obstacles or []:
         read_obstacles(text, "--obstacle")
@@ -133,7 +133,7 @@ def generate(
     """Generate new encounters from a log: bag, report and figures in one folder."""
     from scenario_gen.base.terminal import progress_bars
     from scenario_gen.cli.batch import generate_folder
-    from scenario_gen.types.request import Request
+    from scenario_gen.types import Request
 
     cases, refusals = generate_folder(
         out,
@@ -199,7 +199,7 @@ def reproduce(
     out: Annotated[Path, typer.Option(help="folder of reproduce.html and reproduce.json")] = Path("out/reproduced"),
 ) -> None:
     """Draw figures 2 to 5 of the paper with its own settings, each beside its claim and what is measured for it."""
-    from scenario_gen.logs.synthetic import bundled, CASES
+    from scenario_gen.logs import bundled, CASES
     from scenario_gen.output.reproduce import reproduce as reproduce_figures
 
     logs = [log] if log else [[bundled(case)] for case in CASES]

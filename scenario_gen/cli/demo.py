@@ -11,10 +11,10 @@ from scenario_gen.bags.recordings.read import read_recording, SCENARIOS
 from scenario_gen.bags.recordings.write import scenario_bytes
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.cli.batch import Advance, generate_folder
-from scenario_gen.logs.synthetic import bundled
+from scenario_gen.logs import bundled
 from scenario_gen.output.results import namespaces
 from scenario_gen.pipeline import PipelineConfig
-from scenario_gen.types.generation import GenerationResult
+from scenario_gen.types import GenerationResult
 
 ROADS = {"a": "t_intersection", "b": "t_intersection", "c": "straight"}
 """The cases of the bundled log, and the road of each."""

@@ -16,13 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, frozen
+from scenario_gen.numerics import Bools, exact, Floats, frozen
 from scenario_gen.numerics.kernels import F, F1, F2, F3, kernel, OUT3
-from scenario_gen.template.answers import conflict_of, lag_behind
-from scenario_gen.types.names import tokens
-from scenario_gen.types.reaction import yielders_of
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.template import conflict_of, lag_behind
+from scenario_gen.types import Scenario, tokens, yielders_of
 
 CELL = 0.1  # seconds of a certified clock that are taken together
 ROOM = 0.05  # metres by which the box of a cell is larger than its ends ask for: what bends between them, and a little distance

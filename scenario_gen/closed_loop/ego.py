@@ -14,8 +14,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.numerics.kernels import F, F1, kernel, OUT1
 
 

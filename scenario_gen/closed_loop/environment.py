@@ -25,8 +25,7 @@ from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import read_trials, Trial
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.numerics.curve import Curve
 
 OTHERS = 8  # nearest others that are seen

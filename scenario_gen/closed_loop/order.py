@@ -8,7 +8,7 @@ Why nobody meets and nobody waits in a circle: docs/closed_loop.md.
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.kernels import kernel
 
 PARTS = 4  # of a step, in each of which the order is proven

@@ -16,8 +16,7 @@ import numpy as np
 
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at
 from scenario_gen.closed_loop.order import keep_order, limit
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics import Bools, exact, Floats
 from scenario_gen.numerics.kernels import kernel
 
 FORESEEN = 5.0  # seconds that a vehicle looks ahead

@@ -18,12 +18,9 @@ from scenario_gen.closed_loop.advance import advance, at_goal, overlaps
 from scenario_gen.closed_loop.certified import CELL, Certified, certified
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, TEMPLATE
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats
-from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.road import Road
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.roads import footprint_fits
+from scenario_gen.types import Road, Scenario, Vehicle
 
 
 @dataclass(frozen=True, eq=False)

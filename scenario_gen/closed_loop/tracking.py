@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.closed_loop.ego import Command, EgoState
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 
 SLOWEST = 0.5  # m/s below which a yaw rate is taken as that of this speed: a car does not turn on the spot
 CATCH_UP = 0.5  # 1/s, speed per metre that the ego is behind

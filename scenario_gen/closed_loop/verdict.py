@@ -12,16 +12,14 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
-from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
-from scenario_gen.method.evaluation.motion import Motion
+from scenario_gen.method.evaluation import footprint_distance, Motion, time_to_collision
 from scenario_gen.method.validity import collision as apart
 from scenario_gen.method.validity import containment as inside
-from scenario_gen.method.validity.dynamics import control_points
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats
-from scenario_gen.roads.clearance import clearance_in_cells, footprint_fits
-from scenario_gen.template.interaction import find_conflicts
-from scenario_gen.types.road import Road
+from scenario_gen.method.validity import control_points
+from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.roads import clearance_in_cells, footprint_fits
+from scenario_gen.template import find_conflicts
+from scenario_gen.types import Road
 
 PARTS = 200  # of a step, to which the beginning of a contact is told
 RESOLUTION = 1e-6  # seconds; what cannot be told apart over such an interval counts as a contact

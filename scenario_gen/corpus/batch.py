@@ -32,16 +32,13 @@ from scenario_gen.base.folders.scratch import sweep_tree
 from scenario_gen.base.interrupts import ending
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.tasks import arriving, check_out, spread, Told
+from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation.criticality import criticality
-from scenario_gen.method.evaluation.motion import at_period
+from scenario_gen.method.evaluation import at_period, criticality
 from scenario_gen.method.fitting import LostConflictError
-from scenario_gen.method.nearest import attempt
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road, road_and_template
-from scenario_gen.template.size import refuse_too_large
-from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.request import Request
+from scenario_gen.types import GenerationResult
 
 BATCH = "batch.json"
 TEMPLATES = 10  # of one task
@@ -234,10 +231,9 @@ def _case(row: Mapping[str, Any], table: Path, namespace: str, task: PartTask) -
     }  # fmt: skip
     try:
         encounter = encounter_of(row, table)
-        refuse_too_large(encounter)
         road, encounter = road_and_template(task.road, encounter, task.config.road)
         segmentation = segment(encounter, task.config.segmentation, seed)
-        made = attempt(encounter, segmentation, road, task.config, Request(), count=task.count, seed=seed)
+        made = Attempt(encounter, segmentation, road, task.config, count=task.count, seed=seed).run()
     except (RefusedError, InputError) as error:
         said = LOST_CONFLICT if isinstance(error, LostConflictError) else str(error).partition(":")[0]
         cause = said if isinstance(error, RefusedError) else "input"

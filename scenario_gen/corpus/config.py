@@ -6,7 +6,7 @@
 from dataclasses import dataclass
 
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs import LogConfig
 
 
 @dataclass(frozen=True)

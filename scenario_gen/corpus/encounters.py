@@ -22,12 +22,10 @@ from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import Found, label
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.logs import read_log
-from scenario_gen.logs.raw import Observations, RawLog, Segment
-from scenario_gen.logs.read import encounters_of
+from scenario_gen.logs import encounters_of, Observations, RawLog, read_log, Segment
 from scenario_gen.logs.tables import EPOCH_NS
-from scenario_gen.template.reactions import reactions_of
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.template import reactions_of
+from scenario_gen.types import Encounter
 
 ROW = {  # what is read of a row, and of which kinds it is
     **dict.fromkeys(("name", "kind"), str),

@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timedelta, UTC
 import heapq
 
-from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.groups import SHARED
+from scenario_gen.logs import LogConfig, SHARED
 
 START = datetime(2004, 1, 1, tzinfo=UTC)
 

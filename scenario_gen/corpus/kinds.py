@@ -18,9 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.logs.groups import LAG
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, wrap_angle
+from scenario_gen.logs import LAG
+from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUTB1
 
 KINDS = ("following", "merging", "turning", "crossing", "opposing", "other")

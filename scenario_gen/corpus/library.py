@@ -28,13 +28,10 @@ from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.kinds import Motion, space_time_gap
 from scenario_gen.corpus.page import sketch, write_page
 from scenario_gen.corpus.tasks import arriving, spread, Told
-from scenario_gen.method.segmentation.estimator import USUAL_R_HAT
-from scenario_gen.method.segmentation.library import assign, build_library, PrimitiveLibrary
-from scenario_gen.method.segmentation.segmenter import DEFAULT, SegmentationConfig
-from scenario_gen.numerics.arrays import Ints
-from scenario_gen.template.reactions import reactions_of
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.reaction import FOLLOW, YIELD
+from scenario_gen.method.segmentation import assign, build_library, DEFAULT, PrimitiveLibrary, SegmentationConfig, USUAL_R_HAT
+from scenario_gen.numerics import Ints
+from scenario_gen.template import reactions_of
+from scenario_gen.types import Encounter, FOLLOW, YIELD
 
 LIBRARY = Kind("primitive library")
 NAME, SEGMENTS, PAGE, SUMMARY = "library.json", "segments", "library.html", "summary.json"

@@ -21,9 +21,8 @@ from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.kinds import kind_of, Motion, space_time_gap, unwrapped
 from scenario_gen.corpus.messages import database, HOUR, quoted
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.logs.groups import APART, LAG, shortest, ticks, windows
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, Ints, runs
+from scenario_gen.logs import APART, LAG, shortest, ticks, windows
+from scenario_gen.numerics import Bools, exact, Floats, Ints, runs
 from scenario_gen.numerics.kernels import F, F1, I, I1, kernel, OUT2, OUTI1
 
 BIN = 500_000  # µs

@@ -44,9 +44,8 @@ from scenario_gen.corpus.meetings import HourTask, overlap, search_hours
 from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
 from scenario_gen.corpus.page import sketch, write_page
 from scenario_gen.corpus.tasks import arriving, check_out, spread, Told
-from scenario_gen.logs.adapters.commonroad import is_commonroad
-from scenario_gen.logs.read import is_bag, is_spmd, is_table
-from scenario_gen.template.reactions import reactions_of
+from scenario_gen.logs import is_bag, is_commonroad, is_spmd, is_table
+from scenario_gen.template import reactions_of
 
 ARCHIVE, PAGE = "archive.json", "encounters.html"
 ACCOUNT = {  # of a range of text: what was left out, by file; rows by hour

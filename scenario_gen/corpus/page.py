@@ -12,7 +12,7 @@ import numpy as np
 
 from scenario_gen.base.folders import write_text
 from scenario_gen.output.report.html import render_page
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.types import Encounter
 
 WIDTH, HEIGHT, BORDER = 240.0, 160.0, 12.0  # px
 COLOURS = ("#1f6feb", "#d1242f", "#1a7f37", "#9a6700", "#8250df", "#bf3989")

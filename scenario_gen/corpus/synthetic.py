@@ -20,8 +20,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError, needs
 from scenario_gen.base.folders import Kind, replaced_folder, write_text
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 
 TRUTH = "synthetic.json"
 SYNTHETIC = Kind("synthetic archive")

@@ -18,7 +18,7 @@ from scenario_gen.bags.vehicles import decode_sample, decode_tracked, decode_tra
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, left_out_note, RawLog, Rows, Segment
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.types import Encounter
 
 USED = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED)
 

@@ -13,8 +13,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.geodesy import local_frame
 from scenario_gen.logs.raw import Observations, RawLog
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, Ints
+from scenario_gen.numerics import Bools, exact, Floats, Ints
 
 LATEST_NS = 2**62  # years 1823 to 2116: so the difference of any two stamps fits in 64 bits
 SLOWEST = 5.0  # s between fixes: a slower source says nothing of how a vehicle drives, or its unit of time is another one

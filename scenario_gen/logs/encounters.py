@@ -13,8 +13,7 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, runs
+from scenario_gen.numerics import Bools, exact, Floats, runs
 
 TURNED = np.radians(120.0)  # who drives off from a stop this far from where it came from has reversed, or turned on the spot
 MOST_TICKS = 100_000  # of a piece: smoothing takes 3 kB for each

@@ -11,9 +11,8 @@ PROJ itself calls the C library's functions, whose last bit depends on the CPU.
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.numerics import exact, Floats
+from scenario_gen.types import Encounter
 
 SEMI_MAJOR, FLATTENING = 6378137.0, 1.0 / 298.257223563  # WGS84
 ECCENTRICITY2 = FLATTENING * (2.0 - FLATTENING)

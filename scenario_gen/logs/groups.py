@@ -21,8 +21,7 @@ import numpy as np
 
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, runs
+from scenario_gen.numerics import exact, Floats, runs
 
 MOST = 0.6  # with `whole`, a vehicle that is there for less of the time is left out; for more, it shortens the time
 EDGE = 1.0  # s by which a group is rather shortened than joined late or left early

@@ -14,8 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints, wrap_angle
+from scenario_gen.numerics import exact, Floats, Ints, wrap_angle
 
 KNOT = 1.0  # m between knots
 MARGIN = 5.0  # m of path beyond both ends, for fixes that lie there

@@ -10,10 +10,8 @@ import math
 import numpy as np
 import shapely
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.presence import together
+from scenario_gen.numerics import exact, Floats
+from scenario_gen.types import Encounter, together
 
 
 @dataclass(frozen=True)

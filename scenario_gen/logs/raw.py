@@ -11,8 +11,8 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.numerics.arrays import Floats, Ints
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.numerics import Floats, Ints
+from scenario_gen.types import Encounter
 
 LONGEST_HEADER = 65_536  # characters of a table's first line
 

@@ -24,8 +24,7 @@ from scenario_gen.logs.groups import distances, find_groups, Group
 from scenario_gen.logs.quality import Dropped, EncounterQuality, find_overlaps, Quality, VehicleQuality
 from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
-from scenario_gen.types.encounter import Encounter, Vehicle
-from scenario_gen.types.presence import cut
+from scenario_gen.types import cut, Encounter, Vehicle
 
 TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
 SPMD_FIELDS = 19  # of a line; `tables.COLUMNS` names them

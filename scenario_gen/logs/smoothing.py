@@ -21,8 +21,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.path import fit_path, Headings, headings_of, MOVES, Path, straight_path
 from scenario_gen.logs.raw import Observations
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, Ints, runs, wrap_angle
+from scenario_gen.numerics import Bools, exact, Floats, Ints, runs, wrap_angle
 from scenario_gen.numerics.exact.sparse import Columns
 
 STANDS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place

@@ -18,8 +18,8 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import longest_bridge
 from scenario_gen.logs.raw import natural, Observations, RawLog, Rows, Segment
 from scenario_gen.logs.smoothing import speed_of_fixes
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.numerics import Floats
+from scenario_gen.types import Vehicle
 
 WINDOW_NS = 3_000_000_000  # of the past that is cleaned again for every sample: enough to tell a jump from a new place
 FAR_NS = 10_000_000_000  # a stamp this far from the newest one belongs to another time, or is wrong

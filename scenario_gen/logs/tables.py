@@ -15,7 +15,7 @@ from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.logs.columns import Column, find_columns
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, LONGEST_HEADER, Observations, RawLog, Segment
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 
 PARQUET = (".parquet", ".pq")
 LONGEST = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be

@@ -6,32 +6,24 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, wraps
+from inspect import signature
+from typing import ParamSpec
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError, ScenarioGenError
-from scenario_gen.method.checked import sample_checked
-from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.fitting import fit_template, LostConflictError
-from scenario_gen.method.routing import plan_routes
-from scenario_gen.method.sampling import Cancelled, OnValid, Progress
-from scenario_gen.method.sampling.directed import TargetError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, wrap_angle
+from scenario_gen.method.sampling import Cancelled, TargetError
+from scenario_gen.method.segmentation import segment
+from scenario_gen.numerics import exact, Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.roads import build_road, BUILT_IN
-from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room
-from scenario_gen.roads.ways import draw_route
-from scenario_gen.template.interaction import Wait
-from scenario_gen.template.separation import footprint_gap
-from scenario_gen.types.encounter import Encounter, Vehicle
-from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.names import vehicle_index
-from scenario_gen.types.request import ENDS, Request, State
-from scenario_gen.types.road import Road
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.roads import build_road, BUILT_IN, draw_route, footprint_fits, nearest_pose_with_room, road_and_template
+from scenario_gen.template import footprint_gap
+from scenario_gen.types import ENDS, GenerationResult, Request, Road, State, Vehicle, vehicle_index
 
+P = ParamSpec("P")
 BISECTIONS = 7
 _NAMED = 2  # roads that keep an encounter
 ENOUGH = 10  # valid scenarios by which a request counts as possible, if not fewer are wanted
@@ -88,140 +80,104 @@ class ImpossibleError(RefusedError):
         self.suggestions = suggestions
 
 
+def suggest_nearest(generate: Callable[P, GenerationResult]) -> Callable[P, GenerationResult]:
+    """Wrap `pipeline.generate`: what it refuses is answered with the nearest requests that are possible."""
+
+    @wraps(generate)
+    def answered(*args: P.args, **kwargs: P.kwargs) -> GenerationResult:
+        try:
+            return generate(*args, **kwargs)
+        except RefusedError as error:
+            call = signature(generate).bind(*args, **kwargs)
+            call.apply_defaults()
+            config, request, count, seed = (call.arguments[name] for name in ("config", "request", "count", "seed"))
+            if not request.moves and not isinstance(error, LostConflictError):
+                raise
+            road, encounter = road_and_template(call.arguments["road"], call.arguments["encounter"], config.road)
+            segmentation = segment(encounter, config.segmentation, seed)
+            with nearest_if_impossible(Attempt(encounter, segmentation, road, config, request, count, seed)):
+                raise
+
+    return answered
+
+
 @contextmanager
-def nearest_if_impossible(
-    encounter: Encounter,
-    segmentation: Segmentation,
-    road: Road,
-    config: PipelineConfig,
-    request: Request,
-    *,
-    count: int,
-    seed: int,
-    cancelled: Cancelled = lambda: False,
-) -> Iterator[None]:
+def nearest_if_impossible(requested: Attempt, cancelled: Cancelled = lambda: False) -> Iterator[None]:
     """Answer a refusal in the body with the nearest requests that are possible; none if it was cancelled.
 
     Raises:
         LostConflictError: a conflict of the template would be lost; it names roads that keep it.
-        ImpossibleError: the asked states cannot be met; it says why, and what nearby can be.
-        RefusedError: as the body, where no states were asked for.
+        ImpossibleError: the requested states cannot be met; it says why, and what nearby can be.
+        RefusedError: as the body, where no states were requested.
     """
     try:
         yield
     except TargetError:  # the states are not what is impossible
         raise
     except RefusedError as error:
-        if not request.moves:
+        if not requested.request.moves:
             if not isinstance(error, LostConflictError):
                 raise
-            kept = " or ".join(f"road {name}" for name in roads_that_keep(encounter, segmentation, config))
+            kept = " or ".join(f"road {name}" for name in roads_that_keep(requested))
             raise LostConflictError(f"{error}. Nearest possible: {kept}") from error
-        search = _Search(encounter, segmentation, road, config, request, seed, min(count, ENOUGH), cancelled)
-        found = tuple(search.run())
-        raise ImpossibleError(str(error), () if search.cancelled() else found) from error
+        found = tuple(_Search(replace(requested, count=min(requested.count, ENOUGH)), cancelled).run())
+        raise ImpossibleError(str(error), () if cancelled() else found) from error
 
 
-def roads_that_keep(encounter: Encounter, segmentation: Segmentation, config: PipelineConfig) -> list[str]:
+def roads_that_keep(requested: Attempt) -> list[str]:
     """Names of the built-in roads that the template fits with all its conflicts, two at most; else `corridor`, its own road."""
+    encounter, config = requested.encounter, requested.config
     found: list[str] = []
     for name in BUILT_IN:
         with suppress(RefusedError):
-            fit_template(encounter, segmentation, build_road(name, encounter, config.road), replace(config.fitting, allow=""))
+            road = build_road(name, encounter, config.road)
+            fit_template(encounter, requested.segmentation, road, replace(config.fitting, allow=""))
             found.append(name)
         if len(found) == _NAMED:
             break
     return found or ["corridor"]
 
 
-def plan(
-    encounter: Encounter, segmentation: Segmentation, road: Road, config: PipelineConfig, request: Request, seed: int
-) -> GenerationResult:
-    """Fit and plan: a template on its road, with no scenarios yet.
-
-    Raises:
-        InputError, RefusedError: as the stages.
-    """
-    fit = fit_template(encounter, segmentation, road, config.fitting, request=request, max_speed=config.sampling.max_speed)
-    return GenerationResult(encounter, segmentation, road, fit, plan_routes(road, fit, config.planning, seed), seed=seed)
-
-
-def attempt(
-    encounter: Encounter,
-    segmentation: Segmentation,
-    road: Road,
-    config: PipelineConfig,
-    request: Request,
-    *,
-    count: int,
-    seed: int,
-    waits: tuple[Wait, ...] | None = None,
-    progress: Progress = lambda *_: None,
-    cancelled: Cancelled = lambda: False,
-    found: OnValid = lambda *_: None,
-) -> GenerationResult:
-    """Fit, plan and sample with given changepoints, without evaluation; `waits` that are kept are the template's unless given.
-
-    Raises:
-        InputError, RefusedError: as the stages.
-    """
-    return sample_checked(
-        plan(encounter, segmentation, road, config, request, seed), config.sampling, config.limits, request,
-        count=count, waits=waits, progress=progress, cancelled=cancelled, found=found,
-    )  # fmt: skip
-
-
 class _Search:
     """Everything that the suggestions for one request need."""
 
-    def __init__(
-        self,
-        encounter: Encounter,
-        segmentation: Segmentation,
-        road: Road,
-        config: PipelineConfig,
-        asked: Request,
-        seed: int,
-        wanted: int,
-        cancelled: Cancelled,
-    ) -> None:
-        self.encounter, self.segmentation, self.road, self.config = encounter, segmentation, road, config
-        self.asked, self.seed, self.wanted, self.cancelled = asked, seed, wanted, cancelled
+    def __init__(self, requested: Attempt, cancelled: Cancelled) -> None:
+        self.requested, self.cancelled = requested, cancelled
+        self.asked, self.encounter, self.road, self.config = (
+            requested.request, requested.encounter, requested.road, requested.config,
+        )  # fmt: skip
         self._plans: dict[tuple[str, str], GenerationResult | None] = {}
 
     @cached_property
     def base(self) -> dict[str, Floats]:
         """Start and end states of the fitting without any asked, (N, 4) by end; nothing where that is not possible either."""
         try:
-            unasked = fit_template(self.encounter, self.segmentation, self.road, self.config.fitting)
-            plan_routes(self.road, unasked, self.config.planning, self.seed)
+            _, fit = replace(self.requested, request=Request()).plan().placed()
         except ScenarioGenError:
             return {}
-        return {"starts": unasked.asked.start, "goals": unasked.asked.end}
+        return {"starts": fit.asked.start, "goals": fit.asked.end}
 
     def possible(self, request: Request, stretch: float | None = None) -> bool:
         """Whether scenarios of the request can be had within its budget."""
         if self.cancelled():
             return False
-        config = self.config
+        config, planned = self.config, self._planned(request)
         if stretch is not None:
             config = replace(config, sampling=replace(config.sampling, max_stretch=stretch))
-        planned = self._planned(request)
         if planned is None:
             return False
         try:
-            made = sample_checked(planned, config.sampling, config.limits, request, count=self.wanted)
+            result = replace(self.requested, request=request, config=config).sample(planned)
         except ScenarioGenError:
             return False
-        return len(made.generated.scenarios) == self.wanted
+        return len(result.generated.scenarios) == self.requested.count
 
     def _planned(self, request: Request) -> GenerationResult | None:
         """The template with these states on its road; None if they have no place or no way. Its clock has no part in that."""
         key = request.starts, request.goals
         if key not in self._plans:
             try:
-                given = self.encounter, self.segmentation, self.road, self.config
-                self._plans[key] = plan(*given, request, self.seed)
+                self._plans[key] = replace(self.requested, request=request).plan()
             except ScenarioGenError:
                 self._plans[key] = None
         return self._plans[key]

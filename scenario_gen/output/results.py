@@ -20,9 +20,7 @@ from scenario_gen.base.parameters import flatten
 from scenario_gen.method.evaluation import read_evaluations
 from scenario_gen.output.report.page import ReportInput, write_report
 from scenario_gen.pipeline import PipelineConfig
-from scenario_gen.types.evaluation import as_markdown
-from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.request import Request
+from scenario_gen.types import as_markdown, GenerationResult, Request
 
 BAG, REPORT, FIGURES, TABLE = "bag", "report.html", "evaluation.json", "evaluation.md"
 

@@ -3,9 +3,35 @@
 
 """Occupancy grids, their entries and exits, and the readers of map formats."""
 
+from scenario_gen.roads.arms import Arm, arms_of, reverse, ring_of, unused_arms
+from scenario_gen.roads.axis import bent_axis
 from scenario_gen.roads.build import build_road, road_and_template
-from scenario_gen.roads.builtin import BUILT_IN
+from scenario_gen.roads.builtin import BUILT_IN, draw, layout_for
+from scenario_gen.roads.clearance import (
+    clearance_field,
+    clearance_in_cells,
+    CONTACT,
+    footprint_fits,
+    free_length,
+    nearest_pose_with_room,
+    segment_free,
+    segments_free,
+    to_cells,
+    to_metres,
+)
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.types.road import Road
+from scenario_gen.roads.connectivity import common_component, component_cells
+from scenario_gen.roads.obstacles import read_obstacles
+from scenario_gen.roads.vector.ground import along_lanes, drives_against, own_ground
+from scenario_gen.roads.vector.match import Course
+from scenario_gen.roads.vector.place import laid, placements
+from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn, flare_begins, line_between, relative
+from scenario_gen.types import Road
 
-__all__ = ["BUILT_IN", "Road", "RoadConfig", "build_road", "road_and_template"]
+__all__ = [
+    "BUILT_IN", "CONTACT", "Arm", "Course", "Road", "RoadConfig", "along_lanes", "arms_of", "bent_axis", "build_road",
+    "clearance_field", "clearance_in_cells", "common_component", "component_cells", "draw", "draw_ring_route", "draw_route",
+    "draw_u_turn", "drives_against", "flare_begins", "footprint_fits", "free_length", "laid", "layout_for", "line_between",
+    "nearest_pose_with_room", "own_ground", "placements", "read_obstacles", "relative", "reverse", "ring_of",
+    "road_and_template", "segment_free", "segments_free", "to_cells", "to_metres", "unused_arms",
+]  # fmt: skip

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen, wrap_angle
+from scenario_gen.numerics import exact, Floats, frozen, wrap_angle
 from scenario_gen.roads.ways import relative
-from scenario_gen.types.road import Road
+from scenario_gen.types import Road
 
 _PARALLEL = np.radians(3.0)
 _LEVEL = 0.5  # metres along the arm by which the ends of its lanes may differ

@@ -7,8 +7,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.shaped import bends, main_axis
-from scenario_gen.template.frenet import main_line, to_frenet
-from scenario_gen.template.tracks import Track
+from scenario_gen.template import main_line, to_frenet, Track
 
 
 def bent_axis(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> Curve | None:

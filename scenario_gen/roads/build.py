@@ -26,13 +26,8 @@ from scenario_gen.roads.shaped import (
     PLAIN_LINE,
 )
 from scenario_gen.roads.vector.read import is_vector_map, READERS, vector_road
-from scenario_gen.template.frenet import main_line, to_frenet
-from scenario_gen.template.separation import own_paths
-from scenario_gen.template.side import mirrored, traffic_side
-from scenario_gen.template.tracks import clean_tracks, Track
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.lanes import MIRRORED
-from scenario_gen.types.road import Road
+from scenario_gen.template import clean_tracks, main_line, mirrored, own_paths, refuse_too_large, to_frenet, Track, traffic_side
+from scenario_gen.types import Encounter, MIRRORED, Road
 
 
 def build_road(name_or_path: str, encounter: Encounter | None = None, config: RoadConfig = RoadConfig()) -> Road:
@@ -53,19 +48,25 @@ def build_road(name_or_path: str, encounter: Encounter | None = None, config: Ro
     return with_obstacles(_bare_road(name_or_path, encounter, config), read_obstacles(config.obstacles))
 
 
-def road_and_template(name_or_path: str, encounter: Encounter, config: RoadConfig = RoadConfig()) -> tuple[Road, Encounter]:
+def road_and_template(
+    name_or_path: Road | str, encounter: Encounter, config: RoadConfig = RoadConfig()
+) -> tuple[Road, Encounter]:
     """Return the road, and the template as it drives there: mirrored on a map whose traffic keeps to the other side.
 
     A template in which nobody meets an oncoming vehicle counts as of right-hand traffic.
 
     Args:
-        name_or_path: as `build_road` takes it.
+        name_or_path: as `build_road` takes it; a road is returned as it is.
         encounter: the template.
         config: how a road is drawn.
 
     Raises:
-        InputError, RefusedError: as `build_road`.
+        InputError: as `build_road`.
+        RefusedError: likewise, or the encounter is too large.
     """
+    refuse_too_large(encounter)
+    if isinstance(name_or_path, Road):
+        return name_or_path, encounter
     road: Road | None = None
     refusal: RefusedError | None = None
     try:

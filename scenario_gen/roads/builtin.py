@@ -9,13 +9,10 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, wrap_angle
+from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
-from scenario_gen.template.frenet import FrenetTracks, to_frenet
-from scenario_gen.template.path_crossing import path_crossing
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.road import Road
+from scenario_gen.template import FrenetTracks, path_crossing, to_frenet, Track
+from scenario_gen.types import Road
 
 _VERGE = 2.0  # metres of kerb drawn beside a road
 _PAPER_LANE = 100.0  # cells

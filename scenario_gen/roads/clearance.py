@@ -7,10 +7,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics import Bools, exact, Floats
 from scenario_gen.numerics.kernels import B2, F, F2, kernel, OUT2, OUTB1
-from scenario_gen.types.road import Road
+from scenario_gen.types import Road
 
 CONTACT = 1e-9  # [cells] what lies nearer than this touches
 

@@ -14,11 +14,10 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen_ints, Ints
+from scenario_gen.numerics import exact, Floats, frozen_ints, Ints
 from scenario_gen.roads.clearance import clearance_in_cells, segment_free, segments_free, to_metres
 from scenario_gen.roads.labels import labelled
-from scenario_gen.types.road import Road
+from scenario_gen.types import Road
 
 _labels: "WeakKeyDictionary[Road, dict[float, Ints]]" = WeakKeyDictionary()
 _cells: "WeakKeyDictionary[Road, dict[tuple[float, int], tuple[Ints, Ints]]]" = WeakKeyDictionary()

@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Bools, Ints
+from scenario_gen.numerics import Bools, Ints
 
 
 def labelled(free: Bools) -> Ints:

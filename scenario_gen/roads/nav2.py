@@ -13,10 +13,10 @@ from PIL import Image
 
 from scenario_gen.base.documents import read_yaml, shown
 from scenario_gen.base.errors import guarded, InputError
-from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.openings import find_openings
-from scenario_gen.types.road import COARSEST, FARTHEST, FINEST, Road
+from scenario_gen.types import COARSEST, FARTHEST, FINEST, Road
 
 _MODES = ("trinary", "scale", "raw")
 _FORMATS = ("PPM", "PNG", "BMP", "JPEG")  # by Pillow's names; PPM is PGM, PBM and PPM

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import exact
-from scenario_gen.types.road import Road
+from scenario_gen.types import Road
 
 _FORM = "x y yaw length width"
 _LARGEST = 1000.0  # [m]

@@ -6,7 +6,7 @@
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Bools, Floats, runs
+from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.roads.config import RoadConfig
 
 _MIN_WIDTH = 2.5  # metres: narrower gaps are no way in for a car

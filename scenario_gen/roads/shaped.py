@@ -14,17 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, wrap_angle
+from scenario_gen.numerics import exact, Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.arms import RING_ROOM
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.sketch import convex_hull, Sketch
 from scenario_gen.roads.ways import draw_ring_route, draw_route, extended
-from scenario_gen.template.frenet import FrenetTracks, main_line, MainLine
-from scenario_gen.template.manoeuvre import sharpness_of, turn_of
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.road import Road
+from scenario_gen.template import FrenetTracks, main_line, MainLine, sharpness_of, Track, turn_of
+from scenario_gen.types import Road
 
 ARM_COUNT = {"straight": 2, "curve": 2, "t_intersection": 3, "four_way": 4, "roundabout": 4}
 _RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane

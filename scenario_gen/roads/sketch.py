@@ -8,12 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from PIL import Image, ImageDraw
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics import Bools, exact, Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.labels import labelled
-from scenario_gen.types.road import Road
+from scenario_gen.types import Road
 
 _BORDER = 2.0  # metres of wall around the grid
 _SLIVER = 60.0  # m²: smaller holes are none

@@ -12,8 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen, wrap_angle
+from scenario_gen.numerics import exact, Floats, frozen, wrap_angle
 from scenario_gen.numerics.curve import Curve
 
 Fits = Callable[[Floats], bool]

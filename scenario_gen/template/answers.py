@@ -7,10 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.template.interaction import Conflict, pair_conflict, WAIT_SPEED
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 
 SLOWEST = 2.0  # m/s, below which a time gap says nothing
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
+from scenario_gen.numerics import Bools, exact, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.template.manoeuvre import turn_of
 from scenario_gen.template.tracks import presence_of, smoothing_spline, Track

@@ -17,12 +17,9 @@ from itertools import combinations
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints, runs
+from scenario_gen.numerics import exact, Floats, Ints, runs
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1
-from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
-from scenario_gen.types.presence import ALWAYS
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.types import ALWAYS, Encounter, once_per_encounter, Segmentation, Vehicle
 
 WAIT_SPEED = 0.5  # m/s
 WAIT_DURATION = 1.0  # s

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import wrap_angle
+from scenario_gen.numerics import wrap_angle
 from scenario_gen.template.tracks import Track
 
 MOST_CHANGE: Final = np.radians(25.0)  # a manoeuvre is kept if its turn differs by no more, and it has the same name

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.numerics.curve import crossings
 from scenario_gen.template.tracks import Track
 

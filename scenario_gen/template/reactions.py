@@ -13,12 +13,10 @@ import math
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, wrap_angle
+from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
 from scenario_gen.template.answers import SLOWEST, time_gaps
 from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits
-from scenario_gen.types.encounter import Encounter, once_per_encounter
-from scenario_gen.types.reaction import FOLLOW, Reaction, ReactionGraph, YIELD
+from scenario_gen.types import Encounter, FOLLOW, once_per_encounter, Reaction, ReactionGraph, YIELD
 
 FAR = 60.0  # m, within which one follows
 LONG_ENOUGH = 3.0  # s, for which it drives behind the other

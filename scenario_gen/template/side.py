@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import wrap_angle
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.numerics import exact, wrap_angle
+from scenario_gen.types import Encounter
 
 _OPPOSITE = np.radians(150.0)  # between headings, at least
 _ABREAST = 6.0  # m ahead or behind

@@ -9,7 +9,7 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import exact
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.types import Encounter
 
 MOST_VEHICLES = 64  # as many as a log is cut into at most
 MOST_VEHICLE_SECONDS = 4000.0  # two vehicles for 1,000 s take some two minutes and 1 GB; effort grows faster than the duration

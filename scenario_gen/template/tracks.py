@@ -17,11 +17,9 @@ import math
 import numpy as np
 
 from scenario_gen.base.cancelling import stop_if_cancelled
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
+from scenario_gen.numerics import Bools, exact, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.types.encounter import Encounter, once_per_encounter, Vehicle
-from scenario_gen.types.presence import ALWAYS
+from scenario_gen.types import ALWAYS, Encounter, once_per_encounter, Vehicle
 
 _WAVELENGTHS = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)  # metres at which the filter halves an oscillation
 _MAX_CURVATURE = 0.2  # 1/m, a car's tightest turn but for a little

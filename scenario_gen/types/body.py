@@ -3,8 +3,7 @@
 
 """What a vehicle's footprint says of its body: where its rear axle is, what kind it is, how high; for formats that ask."""
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.types.encounter import Vehicle
 
 REAR_AXLE = 0.3  # of the length, from the footprint's centre back: 1.44 m of a car of 4.8 m

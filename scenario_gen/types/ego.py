@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types.scenario import Scenario
 
 _ROWS = ("position", "heading", "speed", "acceleration")
@@ -29,7 +29,7 @@ def with_witness(scenario: Scenario, index: int) -> Scenario:
     return replace(others, time=others.time[:last], **arrays, witness=witness)
 
 
-def together(scenario: Scenario) -> Scenario:
+def join_ego(scenario: Scenario) -> Scenario:
     """Return a scenario and its witness as one of all vehicles, the witness last; the same where there is no witness."""
     witness = scenario.witness
     if witness is None:

@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Bools, canonical_heading, Floats, frozen, Ints
+from scenario_gen.numerics import Bools, canonical_heading, Floats, frozen, Ints
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
 
 Derived = TypeVar("Derived")

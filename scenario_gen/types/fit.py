@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Bools, canonical_poses, Floats, frozen, Ints
+from scenario_gen.numerics import Bools, canonical_poses, Floats, frozen, Ints
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import BoundaryStates
 

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.numerics import Floats, frozen
 
 MIRRORED = "the template is mirrored"  # begins the note of a map whose traffic keeps to the other side than the template's
 _ONCOMING = -0.9  # cosine between directions of traffic

@@ -10,7 +10,7 @@ last value there, which says nothing of where it is. So whoever looks at a motio
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Bools, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 
 ALWAYS: Ints = np.zeros((0, 2), dtype=np.int64)  # the default of a field `present`: everybody is there throughout
 ALWAYS.setflags(write=False)

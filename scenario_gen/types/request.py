@@ -11,7 +11,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.names import vehicle_index
 from scenario_gen.types.target import read_targets, Target

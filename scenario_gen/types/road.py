@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Bools, canonical_poses, Floats, frozen, Ints
+from scenario_gen.numerics import Bools, canonical_poses, Floats, frozen, Ints
 from scenario_gen.types.lanes import LaneNetwork
 
 FINEST, COARSEST = 0.001, 10.0  # metres of a cell: nothing is seen of a vehicle in larger ones

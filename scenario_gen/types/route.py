@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from scenario_gen.numerics.arrays import canonical_poses, Floats, frozen, frozen_ints, Ints
+from scenario_gen.numerics import canonical_poses, Floats, frozen, frozen_ints, Ints
 
 FAR_OFF = 1.5
 """Metres between a route and its fitted path from which on it is said."""

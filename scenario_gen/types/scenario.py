@@ -10,7 +10,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Bools, canonical_heading, canonical_poses, Floats, frozen, Ints
+from scenario_gen.numerics import Bools, canonical_heading, canonical_poses, Floats, frozen, Ints
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
 from scenario_gen.types.reaction import Reaction, ReactionGraph

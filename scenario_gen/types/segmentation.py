@@ -6,7 +6,7 @@
 from dataclasses import dataclass
 import math
 
-from scenario_gen.numerics.arrays import Floats, frozen, frozen_ints, Ints
+from scenario_gen.numerics import Floats, frozen, frozen_ints, Ints
 from scenario_gen.types.encounter import Vehicle
 
 LONG_WITHOUT = 15.0  # s without a changepoint that are worth a word

@@ -161,10 +161,10 @@ def test_a_road_that_is_none_is_an_error_at_once(corpus, tmp_path):
 
 
 def test_lost_encounters_are_counted_under_one_cause(corpus, tmp_path, monkeypatch):
-    def lost(encounter, segmentation, road, *_, **__):
-        raise LostConflictError(f"road {road.name} has no place that keeps the encounter: vehicles 1 and 2 do not meet")
+    def lost(attempt):
+        raise LostConflictError(f"road {attempt.road.name} has no place that keeps the encounter: vehicles 1 and 2 do not meet")
 
-    monkeypatch.setattr(batches, "attempt", lost)
+    monkeypatch.setattr(batches.Attempt, "run", lost)
     made = run_batch(corpus[0], ROADS, tmp_path / "out", count=1, templates=2, workers=1)
     assert made.failures == {LOST_CONFLICT: 4} and not made.failed
     cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))

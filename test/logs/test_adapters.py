@@ -116,7 +116,7 @@ def tracked(folder):
     from rosbags.rosbag2 import StoragePlugin, Writer
 
     from scenario_gen.bags.storage.autoware import TRACKED
-from scenario_gen.bags.storage.definitions import type_store
+    from scenario_gen.bags.storage.definitions import type_store
     from scenario_gen.bags.vehicles import KINDS
 
     types = type_store().types

@@ -5,11 +5,12 @@
 
 from dataclasses import dataclass, field
 
+from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import FittingConfig
-from scenario_gen.method.nearest import attempt, nearest_if_impossible
+from scenario_gen.method.nearest import nearest_if_impossible
 from scenario_gen.method.routing import PlanningConfig
-from scenario_gen.method.sampling import SamplingConfig
+from scenario_gen.method.sampling import Callbacks, SamplingConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.road import Road
@@ -34,7 +35,6 @@ class Given:
 
 def answer(given, request, *, count, cancelled=lambda: False):
     """Return what comes of a request; the nearest possible one is looked for where it cannot be had."""
-    asked = (given.encounter, given.segmentation, given.road, given.config, request)
-    request.ego_of(given.encounter)
-    with nearest_if_impossible(*asked, count=count, seed=given.seed, cancelled=cancelled):
-        return attempt(*asked, count=count, seed=given.seed, cancelled=cancelled)
+    asked = Attempt(given.encounter, given.segmentation, given.road, given.config, request, count, given.seed)
+    with nearest_if_impossible(asked, cancelled):
+        return asked.run(Callbacks(cancelled=cancelled))

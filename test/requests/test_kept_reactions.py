@@ -10,14 +10,14 @@ import pytest
 from reaction_scenes import answering, crossing, lane_encounter, platoon, wander
 
 from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.evaluation.interaction import following, yielding
-from scenario_gen.method.nearest import attempt
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
-from scenario_gen.types.ego import together
+from scenario_gen.types.ego import join_ego
 from scenario_gen.types.reaction import FOLLOW
 from scenario_gen.types.request import Request
 
@@ -34,14 +34,14 @@ def late(encounter, who, sample):
 
 def made(encounter, request=Request(), count=30):
     road, segmentation = build_road("corridor", encounter, CONFIG.road), segment(encounter, CONFIG.segmentation, 1)
-    return attempt(encounter, segmentation, road, CONFIG, request, count=count, seed=1)
+    return Attempt(encounter, segmentation, road, CONFIG, request, count=count, seed=1).run()
 
 
 def wholes(result):
     """The scenarios with their witnesses, vehicles in the template's order."""
     ids = [vehicle.id for vehicle in result.encounter.vehicles]
     found = []
-    for scenario in map(together, result.generated.scenarios):
+    for scenario in map(join_ego, result.generated.scenarios):
         rows = [[vehicle.id for vehicle in scenario.vehicles].index(known) for known in ids]
         arrays = {name: getattr(scenario, name)[rows] for name in ("position", "heading", "speed", "acceleration", "present")}
         found.append(replace(scenario, vehicles=tuple(scenario.vehicles[row] for row in rows), **arrays))

@@ -11,7 +11,7 @@ import pytest
 
 from scenario_gen.logs import read_log
 from scenario_gen.method.sampling import SamplingConfig
-from scenario_gen.method.sampling.sample import LEVEL_SIZE
+from scenario_gen.method.sampling.sampler import LEVEL_SIZE
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
 from scenario_gen.roads import build_road

@@ -13,13 +13,13 @@ from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation.measures import features, figures_of, measure, MEASURES, most_critical
-from scenario_gen.method.sampling import sample_scenarios, SamplingConfig
+from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
 from scenario_gen.method.sampling.directed import TargetError
 from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate
-from scenario_gen.types.ego import together
+from scenario_gen.types.ego import join_ego
 from scenario_gen.types.request import Request
 from scenario_gen.types.target import read_targets
 
@@ -77,10 +77,8 @@ def test_a_range_that_cannot_be_had_is_refused_with_what_can(chain):
 def test_without_measures_a_target_is_refused(chain):
     with pytest.raises(InputError, match="measures"):
         made = answer(chain, Request(), count=1)
-        sample_scenarios(
-            made.encounter, made.segmentation, made.road, made.routes, made.fit.asked, lambda _: [],
-            count=1, waits=(), request=Request(target="pet=0..1"),
-        )  # fmt: skip
+        plan = Plan(made.encounter, made.segmentation, made.road, made.routes, made.fit.asked, ())
+        draw_scenarios(plan, lambda _: [], count=1, request=Request(target="pet=0..1"))
 
 
 @pytest.mark.parametrize(
@@ -98,7 +96,7 @@ def test_each_comes_again_bit_for_bit_and_is_valid(chain, request_, tmp_path):
     (found,) = validate_bag(bag)
     assert found.scenarios == 3 and not found.invalid
     if request_.target:
-        assert all(LOW <= measure(together(one), "pet") <= HIGH for one in made.generated.scenarios)
+        assert all(LOW <= measure(join_ego(one), "pet") <= HIGH for one in made.generated.scenarios)
 
 
 def test_another_order_is_named_and_only_then_allowed(chain, tmp_path):

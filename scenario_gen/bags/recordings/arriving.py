@@ -10,7 +10,7 @@ from msg_conventions.scenario_info import decode_info, INFO, ScenarioEntry
 from msg_conventions.scenarios import digest
 from scenario_gen.bags.recordings.of_scenarios import decode_with_witness
 from scenario_gen.bags.recordings.requests import Match, RequestTracker
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.types import Scenario
 
 SCENARIOS = "scenarios"
 TOPICS = (SCENARIOS, INFO, WITNESS)

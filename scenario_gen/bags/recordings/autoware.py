@@ -10,7 +10,7 @@ from msg_conventions.autoware import AutowareEncoder, EGO, OBJECTS, QUALITY, TRA
 from scenario_gen.bags.storage.autoware import PREDICTED, TRACKED
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import BagWriter
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.types import Scenario
 
 TYPES = {OBJECTS: PREDICTED, TRACKS: TRACKED, EGO: odometry.TYPE}
 

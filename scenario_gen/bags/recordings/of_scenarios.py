@@ -10,7 +10,7 @@ from msg_conventions.scenario_info import MESSAGES, ScenarioEntry
 from msg_conventions.scenarios import decode_scenario, digest
 from scenario_gen.bags.storage.bag import BagMessage
 from scenario_gen.base.errors import InputError
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.types import Scenario
 
 
 def decode_with_witness(

@@ -31,12 +31,7 @@ from scenario_gen.bags.recordings.template import anchor_index, decode_routes, l
 from scenario_gen.bags.storage.bag import BagMessage, read_messages, within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.fit import Fit
-from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import Scenario, ScenarioSet
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.types import Encounter, Fit, Road, Route, Scenario, ScenarioSet, Segmentation
 
 __all__ = [
     "INFO",

@@ -17,12 +17,8 @@ from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Ints
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.fit import Fit
-from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.names import tokens
-from scenario_gen.types.route import Route
+from scenario_gen.numerics import Ints
+from scenario_gen.types import Encounter, Fit, GenerationResult, Route, tokens
 
 
 def missing_topics(messages: Mapping[str, bytes]) -> list[str]:

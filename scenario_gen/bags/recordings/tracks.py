@@ -6,7 +6,7 @@
 from dataclasses import replace
 
 from msg_conventions.tracks import decode_tracks, encode_tracks
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.types import Encounter
 
 
 def tracks_bytes(encounter: Encounter) -> bytes:

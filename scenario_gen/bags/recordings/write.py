@@ -23,10 +23,7 @@ from msg_conventions.tracks import encode_tracks
 from scenario_gen.bags.recordings.read import SCENARIOS
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.names import tokens
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.types import Encounter, GenerationResult, Scenario, tokens
 
 SCENARIO_STEP_NS = 100_000_000  # scenarios are logged this far apart, so that a player shows one after the other
 

@@ -23,7 +23,7 @@ from scenario_gen.bags.storage.sqlite import open_sqlite, SqliteFile
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.base.folders import scratch
-from scenario_gen.types.qos import Quality
+from scenario_gen.types import Quality
 
 COPIED = 1 << 20  # bytes at a time
 

@@ -12,7 +12,7 @@ import yaml
 from scenario_gen.bags.storage.files import LOST
 from scenario_gen.base.documents import parse_yaml
 from scenario_gen.base.errors import InputError
-from scenario_gen.types.qos import Quality
+from scenario_gen.types import Quality
 
 VERSION = 9
 TIMES = ("deadline", "lifespan", "liveliness_lease_duration")

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
-from scenario_gen.types.evaluation import Interval
+from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.types import Interval
 
 Statistic = Callable[[Floats], Floats]
 

@@ -12,8 +12,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation.geometry import footprint_distance
 from scenario_gen.method.evaluation.motion import Motion
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 
 SMOOTHING = 0.5
 """Seconds over which acceleration is averaged before it is differentiated to jerk."""

@@ -5,8 +5,7 @@
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics import Bools, exact, Floats
 
 
 def displacements(position: Floats, there: Bools | None = None) -> Floats:

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Floats, frozen, frozen_ints, Ints, wrap_angle
+from scenario_gen.numerics import Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.kernels import F, F2, F3, I, kernel, OUT1, OUT2, OUTI2
 
 Distance = Literal["euclidean", "manhattan", "angle"]

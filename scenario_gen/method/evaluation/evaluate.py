@@ -20,12 +20,21 @@ from scenario_gen.method.evaluation.distributions import compare, QUANTITIES, va
 from scenario_gen.method.evaluation.dtw import Distance
 from scenario_gen.method.evaluation.metrics import LIMIT_CAUSES, METRICS
 from scenario_gen.method.evaluation.motion import at_common, at_count, at_period, COMMON, Motion, of_vehicles, stacked
-from scenario_gen.numerics.arrays import Bools, Floats, Ints
-from scenario_gen.template.manoeuvre import keeps
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.evaluation import CheckCounts, Evaluation, Interval, Row, TEMPLATE
-from scenario_gen.types.generation import GenerationResult, ORACLE
-from scenario_gen.types.scenario import Cause, Scenario, ScenarioSet
+from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.template import keeps
+from scenario_gen.types import (
+    Cause,
+    CheckCounts,
+    Encounter,
+    Evaluation,
+    GenerationResult,
+    Interval,
+    ORACLE,
+    Row,
+    Scenario,
+    ScenarioSet,
+    TEMPLATE,
+)
 
 MEASURED = 1000
 """Scenarios of a set that are measured; of a larger one this many, in RUNS evenly spaced runs of consecutive ones."""

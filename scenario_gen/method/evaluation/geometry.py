@@ -11,9 +11,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from scenario_gen.method.evaluation.motion import Motion
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.numerics import exact, Floats
+from scenario_gen.types import Vehicle
 
 STILL = 1e-6  # m/s; what closes more slowly does not close: rounding alone makes equal velocities differ
 

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, runs
-from scenario_gen.template.answers import conflict_of, lag_behind, Motion, time_gaps
-from scenario_gen.types.reaction import Reaction
+from scenario_gen.numerics import exact, Floats, runs
+from scenario_gen.template import conflict_of, lag_behind, Motion, time_gaps
+from scenario_gen.types import Reaction
 
 EARLY = 0.5  # s, by which a yielder leaves before the other has cleared
 _BRAKES, _LOSES = 0.6, 1.5  # m/s², m/s

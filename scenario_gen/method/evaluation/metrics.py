@@ -4,8 +4,7 @@
 """The catalogue of metrics: what each figure is called, its unit, and what it means."""
 
 from scenario_gen.method.evaluation.distributions import QUANTITIES
-from scenario_gen.types.evaluation import Metric
-from scenario_gen.types.scenario import Cause
+from scenario_gen.types import Cause, Metric
 
 LIMIT_CAUSES = (Cause.SPEED, Cause.LONGITUDINAL_ACCELERATION, Cause.LATERAL_ACCELERATION, Cause.CURVATURE)
 """Causes that count as a violated limit."""

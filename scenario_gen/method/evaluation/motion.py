@@ -9,10 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics.arrays import Bools, Floats, frozen, frozen_ints, Ints
-from scenario_gen.types.encounter import Encounter, Vehicle
-from scenario_gen.types.presence import ALWAYS, always, mask, together
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints
+from scenario_gen.types import ALWAYS, always, Encounter, mask, Scenario, together, Vehicle
 
 COMMON = 1.0
 """Seconds that two vehicles must be there together to be compared."""

@@ -5,12 +5,8 @@
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.fit import Fit, FittedVehicle
-from scenario_gen.types.presence import cut
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.numerics import exact, Floats
+from scenario_gen.types import cut, Encounter, Fit, FittedVehicle, Scenario
 
 MIN_CHORD = 0.5
 """Metres: below it a chord gives no direction (eq 8) and no scale (eq 9)."""

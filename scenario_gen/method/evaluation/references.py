@@ -11,9 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Floats, Ints
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.numerics import Floats, Ints
+from scenario_gen.types import Encounter, Segmentation
 
 
 def with_changepoints_at(segmentation: Segmentation, changepoints: Ints, what: str) -> Segmentation:

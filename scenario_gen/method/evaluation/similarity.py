@@ -14,8 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from scenario_gen.method.evaluation.dtw import blocks, Distance, feature_extents, feature_rows
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,8 @@
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.fit import fit_template
 from scenario_gen.method.fitting.kept import LostConflictError
-from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types import Fit, FittedVehicle
 
-__all__ = ["Fit", "FittedVehicle", "FittingConfig", "LostConflictError", "fit_template"]
+__all__ = [
+    "Fit", "FittedVehicle", "FittingConfig", "LostConflictError", "fit_template",
+]  # fmt: skip

@@ -8,12 +8,10 @@ from itertools import combinations
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.template.separation import footprint_gap
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.fit import Fit
-from scenario_gen.types.road import Road
+from scenario_gen.numerics import Floats
+from scenario_gen.roads import footprint_fits
+from scenario_gen.template import footprint_gap
+from scenario_gen.types import Encounter, Fit, Road
 
 STAND = 0.05  # m/s, a speed below this is met by standing
 NAMES = {"starts": "start", "goals": "goal"}

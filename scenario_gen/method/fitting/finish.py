@@ -11,15 +11,10 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.kept import find_losses
 from scenario_gen.method.fitting.placement import Placement
-from scenario_gen.numerics.arrays import Bools, Floats, frozen_ints, Ints
-from scenario_gen.roads.clearance import nearest_pose_with_room
-from scenario_gen.template.manoeuvre import turn_of
-from scenario_gen.template.tracks import clean_tracks, Track
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.fit import Fit, FittedVehicle
-from scenario_gen.types.road import Road
-from scenario_gen.types.scenario import BoundaryStates
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.numerics import Bools, Floats, frozen_ints, Ints
+from scenario_gen.roads import nearest_pose_with_room
+from scenario_gen.template import clean_tracks, Track, turn_of
+from scenario_gen.types import BoundaryStates, Encounter, Fit, FittedVehicle, Road, Segmentation
 
 _STAND_LENGTH = 0.5  # metres
 _PATH_STEP = 0.5  # metres between two poses of a fitted path

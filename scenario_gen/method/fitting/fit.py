@@ -20,14 +20,10 @@ from scenario_gen.method.fitting.lanes import place_along_lanes
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.fitting.search import place_by_search
 from scenario_gen.method.fitting.vector import place_on_lanes
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.roads.arms import arms_of
-from scenario_gen.template.tracks import clean_tracks, Track
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.fit import Fit
-from scenario_gen.types.request import Request
-from scenario_gen.types.road import Road
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.numerics import Floats
+from scenario_gen.roads import arms_of
+from scenario_gen.template import clean_tracks, Track
+from scenario_gen.types import Encounter, Fit, Request, Road, Segmentation
 
 _AT_HOME = 0.98  # share of footprints with room at which any road is taken for the template's own
 _NEAR_HOME = 0.5  # the same for a map without lanes to go by: recorded cars leave recorded maps here and there
@@ -61,6 +57,7 @@ def fit_template(
         RefusedError: it does not fit, or a state that is asked for cannot be had; the message says why, with figures.
         InputError: `starts` and `goals` disagree with the encounter, or a vehicle that is named does not exist.
     """
+    request.ego_of(encounter)
     if request.moves:
         return _fit_asked(encounter, segmentation, road, config, request, max_speed)
     if starts is not None or goals is not None:

@@ -11,15 +11,11 @@ from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.finish import STAND_SPEED
 from scenario_gen.method.fitting.placement import check_scale, max_repair, Placement, share_with_room
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.roads.ways import draw_route
-from scenario_gen.template.separation import own_paths
-from scenario_gen.template.tracks import clean_tracks, Track
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.road import Road
+from scenario_gen.roads import draw_route, footprint_fits
+from scenario_gen.template import clean_tracks, own_paths, Track
+from scenario_gen.types import Encounter, Road
 
 
 def place_in_own_frame(encounter: Encounter, road: Road, config: FittingConfig) -> tuple[Placement, float]:

@@ -19,17 +19,12 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.kept import count_lost, find_unused, refuse_lost_turns
 from scenario_gen.method.fitting.placement import check_scale, Equation, equations, find_relations, Placement, Relation, separated
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen, Ints, wrap_angle
+from scenario_gen.numerics import exact, Floats, frozen, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.kernels import F2, F3, kernel, OUTI2
-from scenario_gen.roads.arms import ring_of
-from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn, relative
-from scenario_gen.template.manoeuvre import in_words, manoeuvre_of, MOST_CHANGE, sharpness_of, turn_of
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.road import Road
+from scenario_gen.roads import draw_ring_route, draw_route, draw_u_turn, footprint_fits, relative, ring_of
+from scenario_gen.template import in_words, manoeuvre_of, MOST_CHANGE, sharpness_of, Track, turn_of
+from scenario_gen.types import Road, Vehicle
 
 _SEEDS = 3  # vehicles by whose ways the template is laid on the road
 _LAID = 80  # motions that are refined

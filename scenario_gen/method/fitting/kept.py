@@ -11,15 +11,10 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.placement import Placement
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, Ints, wrap_angle
-from scenario_gen.roads.arms import arms_of, unused_arms
-from scenario_gen.template.interaction import Conflict, find_conflicts
-from scenario_gen.template.manoeuvre import in_words, keeps, turn_of, turns_to_keep
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.fit import Loss
-from scenario_gen.types.road import Road
+from scenario_gen.numerics import Bools, exact, Floats, Ints, wrap_angle
+from scenario_gen.roads import arms_of, unused_arms
+from scenario_gen.template import Conflict, find_conflicts, in_words, keeps, Track, turn_of, turns_to_keep
+from scenario_gen.types import Encounter, Loss, Road
 
 CONFLICT, FOLLOWING = "conflict", "following"  # kinds of losses
 _LONG = 1.0  # s side by side that count

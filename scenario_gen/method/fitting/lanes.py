@@ -15,16 +15,11 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.kept import find_unused, refuse_lost_turns
 from scenario_gen.method.fitting.placement import check_scale, Placement, separated, share_with_room
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen, wrap_angle
+from scenario_gen.numerics import exact, Floats, frozen, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.roads.arms import arms_of, reverse
-from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.roads.ways import line_between, relative
-from scenario_gen.template.frenet import FrenetTracks, main_line, MainLine, to_frenet
-from scenario_gen.template.manoeuvre import manoeuvre_of, turn_of
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.road import Road
+from scenario_gen.roads import arms_of, footprint_fits, line_between, relative, reverse
+from scenario_gen.template import FrenetTracks, main_line, MainLine, manoeuvre_of, to_frenet, Track, turn_of
+from scenario_gen.types import Road
 
 _COLLINEAR = 0.3  # metres
 _PARALLEL = np.radians(2.0)

@@ -11,15 +11,11 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, wrap_angle
+from scenario_gen.numerics import exact, Floats, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
-from scenario_gen.roads.clearance import footprint_fits, nearest_pose_with_room
-from scenario_gen.template.path_crossing import path_crossing
-from scenario_gen.template.separation import separate, smallest_gaps
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.fit import Loss
-from scenario_gen.types.road import Road
+from scenario_gen.roads import footprint_fits, nearest_pose_with_room
+from scenario_gen.template import path_crossing, separate, smallest_gaps, Track
+from scenario_gen.types import Loss, Road
 
 _LEAST_CLEARANCE = 0.1  # metres between fitted footprints, where the template's own are as near
 _RELUCTANTLY = 0.1  # how readily a vehicle leaves the middle of its lane, where setting it forward or back does not do

@@ -17,12 +17,11 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.placement import max_repair, Placement, separated, share_with_room
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.roads.clearance import clearance_field
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.road import Road
+from scenario_gen.roads import clearance_field
+from scenario_gen.template import Track
+from scenario_gen.types import Road
 
 _CELL = 1.0  # metres of the coarse search
 _TURNS = 72

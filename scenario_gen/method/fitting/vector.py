@@ -11,12 +11,10 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.kept import keeps_conflicts
 from scenario_gen.method.fitting.placement import max_repair, Placement, separated
-from scenario_gen.numerics.arrays import frozen
-from scenario_gen.roads.vector.match import Course
-from scenario_gen.roads.vector.place import laid, placements
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.lanes import LaneNetwork
-from scenario_gen.types.road import Road
+from scenario_gen.numerics import frozen
+from scenario_gen.roads import Course, laid, placements
+from scenario_gen.template import Track
+from scenario_gen.types import LaneNetwork, Road
 
 _SCALES = (1.0, 0.9, 1.1, 0.8, 1.2)
 _TRIED, _MORE = 12, 40  # placements that are looked at cell by cell; of those that lose a conflict, more

@@ -4,7 +4,11 @@
 """Planning: RRT*-Connect between fitted anchors, and routes that can be driven."""
 
 from scenario_gen.method.routing.config import PlanningConfig
-from scenario_gen.method.routing.plan import deviations, plan_routes
-from scenario_gen.types.route import Route
+from scenario_gen.method.routing.plan import deviations, make_planner, plan_routes
+from scenario_gen.method.routing.search.planner import plan_with_retry, Query
+from scenario_gen.method.routing.search.rrt_star_connect import PAPER
+from scenario_gen.types import Route
 
-__all__ = ["PlanningConfig", "Route", "deviations", "plan_routes"]
+__all__ = [
+    "PAPER", "PlanningConfig", "Query", "Route", "deviations", "make_planner", "plan_routes", "plan_with_retry",
+]  # fmt: skip

@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import F, F1, F2, I, kernel, OUT1, OUT2
 
 PINNED = 1e15

@@ -10,10 +10,8 @@ import numpy as np
 
 from scenario_gen.method.routing.search.dubins import shortest_into, TURNS
 from scenario_gen.method.routing.search.sweep import sweep_is_free
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, wrap_angle
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.road import Road
+from scenario_gen.numerics import exact, Floats, wrap_angle
+from scenario_gen.types import Road, Vehicle
 
 SPACING = 0.2  # [m]
 STRETCHES = (1.0, 1.3, 0.8, 1.6)  # of a Hermite curve's tangents

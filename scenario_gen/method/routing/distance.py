@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import F2, kernel, OUT1
 
 

@@ -27,14 +27,9 @@ from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtSt
 from scenario_gen.method.routing.search.rrt_star_connect import RrtStarConnect
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.smooth import Curve, Guess, monotone_matching, smooth, Targets
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, wrap_angle
-from scenario_gen.roads.clearance import clearance_field, footprint_fits, nearest_pose_with_room
-from scenario_gen.roads.vector.ground import own_ground
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.fit import Fit, FittedVehicle
-from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
+from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
+from scenario_gen.roads import clearance_field, footprint_fits, nearest_pose_with_room, own_ground
+from scenario_gen.types import Fit, FittedVehicle, Road, Route, Vehicle
 
 STANDS = 0.05  # [m] a vehicle whose start and end are nearer than this has no path
 CLOSE = 0.3  # [m] anchors nearer to each other than this are one waypoint

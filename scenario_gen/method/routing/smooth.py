@@ -17,11 +17,9 @@ from scenario_gen.method.routing.band import relax
 from scenario_gen.method.routing.config import PlanningConfig
 from scenario_gen.method.routing.search.planner import path_length
 from scenario_gen.method.routing.search.sweep import sweep_is_free
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints, wrap_angle
-from scenario_gen.roads.clearance import clearance_field
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.road import Road
+from scenario_gen.numerics import exact, Floats, Ints, wrap_angle
+from scenario_gen.roads import clearance_field
+from scenario_gen.types import Road, Vehicle
 
 ROUNDS, STEPS = 40, 8  # the band is resampled between rounds
 BEND = exact.power(4.0, 4)  # [m^4] with hold = 1 a kink spreads over about 4 m

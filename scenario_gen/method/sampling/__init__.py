@@ -3,11 +3,18 @@
 
 """Speed profile and Gaussian process -> candidate scenarios (paper III-C)."""
 
+from scenario_gen.method.sampling.checked import checker_of, plan_of, sample_scenarios
 from scenario_gen.method.sampling.config import SamplingConfig
+from scenario_gen.method.sampling.directed import TargetError
 from scenario_gen.method.sampling.freedom import freed_states
+from scenario_gen.method.sampling.gp import Features, Observations, Posterior, Regression
+from scenario_gen.method.sampling.plan import Callbacks, Cancelled, Plan, Progress
 from scenario_gen.method.sampling.prepare import kept_reactions
-from scenario_gen.method.sampling.sample import Cancelled, OnValid, Progress, regenerate, sample_scenarios
+from scenario_gen.method.sampling.sample import draw_scenarios, regenerate
+from scenario_gen.method.sampling.speed_profile.knots import speed_knots, SpeedKnots
 
 __all__ = [
-    "Cancelled", "OnValid", "Progress", "SamplingConfig", "freed_states", "kept_reactions", "regenerate", "sample_scenarios",
+    "Callbacks", "Cancelled", "Features", "Observations", "Plan", "Posterior", "Progress", "Regression", "SamplingConfig",
+    "SpeedKnots", "TargetError", "checker_of", "draw_scenarios", "freed_states", "kept_reactions", "plan_of", "regenerate",
+    "sample_scenarios", "speed_knots",
 ]  # fmt: skip

@@ -9,19 +9,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.sampling.directed import Aim, CHUNK, FAIR, GOOD, Measures, PATIENCE, PLAIN, Seen, STAGE, STAGES
+from scenario_gen.method.sampling.directed import Aim, CHUNK, FAIR, GOOD, PATIENCE, PLAIN, Seen, STAGE, STAGES
+from scenario_gen.method.sampling.plan import Cancelled
 from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.template.interaction import closest_crossing, Conflict, find_conflicts, pair_conflict
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.names import token
-from scenario_gen.types.reaction import Reaction
-from scenario_gen.types.request import Request
-from scenario_gen.types.scenario import Cause, Scenario, Verdict
-from scenario_gen.types.target import Target
+from scenario_gen.numerics import Floats
+from scenario_gen.template import closest_crossing, Conflict, find_conflicts, pair_conflict
+from scenario_gen.types import Cause, Encounter, Measures, Reaction, Request, Scenario, Target, token, Verdict
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
-Cancelled = Callable[[], bool]
 
 ANY = 1 << 30  # conflicts: with one clock for all a road alone says which there are
 MOST_BEYOND = 3.0  # s

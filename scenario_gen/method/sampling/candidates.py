@@ -18,10 +18,8 @@ from scenario_gen.method.sampling.freedom import Freedom, onward, seconds_onward
 from scenario_gen.method.sampling.path import BasePath, states
 from scenario_gen.method.sampling.speed_profile.model import SpeedModel
 from scenario_gen.method.sampling.time_warp import Clock, DT, template_times
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, Ints, wrap_angle
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.numerics import Bools, exact, Floats, Ints, wrap_angle
+from scenario_gen.types import Scenario, Vehicle
 
 _APART = 0.05  # m, from which on two poses tell a curvature
 

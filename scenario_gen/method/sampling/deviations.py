@@ -10,11 +10,9 @@ import numpy as np
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.gp import Features, Observations, Regression
 from scenario_gen.method.sampling.path import BasePath
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.roads.vector.ground import along_lanes
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.road import Road
+from scenario_gen.numerics import exact, Floats
+from scenario_gen.roads import along_lanes
+from scenario_gen.types import Road, Vehicle
 
 LENGTH_SHARE = 0.25  # of the route, at most: what varies more slowly between given ends hardly varies
 SHORTEST_LENGTH = 15.0  # m; drivers do not wander within less, so on a short route there is little to draw

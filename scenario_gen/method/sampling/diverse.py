@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 
 POOL_SHARE = 10  # valid candidates that are drawn per scenario wanted
 FAR = 100.0  # bins to which what is infinite is taken

@@ -17,11 +17,8 @@ import numpy as np
 
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.time_warp import Clock, LONGEST_SHARE, SHORTEST_SHARE
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats
-from scenario_gen.types.encounter import Encounter, Vehicle
-from scenario_gen.types.request import Request
-from scenario_gen.types.scenario import BoundaryStates
+from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.types import BoundaryStates, Encounter, Request, Vehicle
 
 CATALOGUE = ((3.60, 1.62), (4.05, 1.75), (4.25, 1.79), (4.46, 1.83), (4.63, 1.83), (4.69, 1.85), (4.77, 1.88), (4.96, 1.93))
 """Length and width [m] of cars, each as likely: our choice of typical ones, from a city car to a large saloon."""

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 
 
 def squared_exponential(a: Floats, b: Floats, sigma: float, length: float) -> Floats:

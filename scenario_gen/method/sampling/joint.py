@@ -17,9 +17,8 @@ import numpy as np
 
 from scenario_gen.method.sampling.candidates import Scale, VehicleModel
 from scenario_gen.method.sampling.time_warp import Clock
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.reaction import FOLLOW, Reaction, ReactionGraph
+from scenario_gen.numerics import exact, Floats
+from scenario_gen.types import FOLLOW, Reaction, ReactionGraph
 
 _STEP, _MOST = 0.8, 60  # s between the equations of a follower; number of them
 _BLUR = 3.0  # s to either side, over which a leader's motion is averaged in the part that its follower does not answer at once

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from typing import overload
 
-from scenario_gen.numerics.arrays import Ints
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.numerics import Ints
+from scenario_gen.types import Scenario
 
 
 class LazyScenarios(Sequence[Scenario]):

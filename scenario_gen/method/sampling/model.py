@@ -10,8 +10,8 @@ import numpy as np
 from scenario_gen.method.sampling.candidates import Batch, Scale, VehicleModel
 from scenario_gen.method.sampling.joint import Mixing
 from scenario_gen.method.sampling.time_warp import TimeWarp
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.reaction import ReactionGraph
+from scenario_gen.numerics import Floats
+from scenario_gen.types import ReactionGraph
 
 
 class CandidateModel:

@@ -13,9 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from scenario_gen.method.sampling.time_warp import Clock
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.numerics import exact, Floats
+from scenario_gen.types import Encounter
 
 GRID = 0.1  # s
 REACH = 1.5  # s, ahead of a bend and behind it, over which the clock is slowed

@@ -13,10 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen, Ints
+from scenario_gen.numerics import exact, Floats, frozen, Ints
 from scenario_gen.numerics.kernels import F, F1, F2, F3, I1, kernel, OUT2, OUT3
-from scenario_gen.types.route import Route
+from scenario_gen.types import Route
 
 NODE_SPACING = 1.0  # m; a cubic through nodes this far apart is within 0.1 mm of an arc of radius 5 m
 MIN_NODES = 5

@@ -23,6 +23,7 @@ from scenario_gen.method.sampling.freedom import FADES, Freedom, freedom_of, MOS
 from scenario_gen.method.sampling.model import CandidateModel
 from scenario_gen.method.sampling.pace import clock_of, slowed_clock, template_grid
 from scenario_gen.method.sampling.path import BasePath, MIN_NODES, NODE_SPACING
+from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.speed_profile.knots import speed_knots, SpeedKnots, STAND
 from scenario_gen.method.sampling.speed_profile.mean import Bounds, mean_speed, Motion, rounded_lines, Target
 from scenario_gen.method.sampling.speed_profile.model import speed_model
@@ -35,18 +36,9 @@ from scenario_gen.method.sampling.speed_profile.stops import (
     standing_within,
 )
 from scenario_gen.method.sampling.time_warp import Clock, TimeWarp
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats
-from scenario_gen.template.interaction import Wait, WAIT_SPEED
-from scenario_gen.template.reactions import reactions_of
-from scenario_gen.template.separation import least_gaps
-from scenario_gen.template.tracks import clean_tracks, Track
-from scenario_gen.types.encounter import Encounter, Vehicle
-from scenario_gen.types.reaction import FOLLOW, ReactionGraph
-from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import BoundaryStates
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.template import clean_tracks, least_gaps, reactions_of, Track, Wait, WAIT_SPEED
+from scenario_gen.types import BoundaryStates, Encounter, FOLLOW, ReactionGraph, Road, Route, Vehicle
 
 _STRETCHES = 9
 _MOST_SCALE = 4.0  # a template speed is scaled at most so much; beyond it, lengths alone decide
@@ -188,25 +180,17 @@ def _bends(path: BasePath) -> Floats:
     return np.asarray(exact.moving_max(exact.moving_mean(np.abs(path.curvature), 3), reach))
 
 
-def prepare(
-    encounter: Encounter,
-    segmentation: Segmentation,
-    road: Road,
-    routes: Sequence[Route],
-    asked: BoundaryStates,
-    waits: Sequence[Wait],
-    config: SamplingConfig,
-    order: str = "keep",
-) -> Prepared:
+def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared:
     """Build the model: on the template's clock, slowed ahead of bends, and stretched only where no speed exists otherwise.
 
     Raises:
         InputError: routes, segmentation and encounter disagree in their numbers.
     """
-    times = encounter.time[np.concatenate([[0], segmentation.changepoints, [encounter.speed.shape[1] - 1]]).astype(np.int64)]
+    encounter, road, routes, asked = plan.encounter, plan.road, plan.routes, plan.asked
+    times = encounter.time[np.concatenate([[0], plan.segmentation.changepoints, [encounter.speed.shape[1] - 1]]).astype(np.int64)]
     if len(routes) != len(encounter.vehicles) or any(len(route.anchor) != len(times) for route in routes):
         raise InputError(f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each")
-    waits = [standing_part(encounter, wait) for wait in waits]
+    waits = [standing_part(encounter, wait) for wait in plan.waits]
     drives = [_drive(n, encounter, times, routes[n], asked, waits, config) for n in range(len(encounter.vehicles))]
     clock, sentences = _slowed(drives, template_grid(encounter), config)
     left = (1.0 + config.max_stretch) * float(times[-1]) / float(clock.time[-1])
@@ -238,19 +222,18 @@ def prepare(
             for n, (v, drive) in enumerate(zip(vehicles, drives, strict=True))
         ]
     reactions = kept_reactions(encounter, config, order)
-    return Prepared(CandidateModel(tuple(vehicles), warp, reactions), tuple(sentences))
+    return Prepared(CandidateModel(tuple(vehicles), warp, reactions if reactions.edges else None), tuple(sentences))
 
 
-def kept_reactions(encounter: Encounter, config: SamplingConfig, order: str = "keep") -> ReactionGraph | None:
-    """Return the reactions of the template that scenarios keep; None where there are none, or none is to be kept.
+def kept_reactions(encounter: Encounter, config: SamplingConfig, order: str = "keep") -> ReactionGraph:
+    """Return the reactions of the template that scenarios keep, without edges where none is to be kept.
 
-    Where an `order` other than the template's is asked for, nobody is made to wait for anybody.
+    Where an `order` other than the template's is requested, nobody is made to wait for anybody.
     """
-    if config.reactions != "keep":
-        return None
     graph = reactions_of(encounter)
-    edges = tuple(edge for edge in graph.edges if order == "keep" or edge.kind == FOLLOW)
-    return replace(graph, edges=edges) if edges else None
+    if config.reactions != "keep":
+        return replace(graph, edges=())
+    return replace(graph, edges=tuple(edge for edge in graph.edges if order == "keep" or edge.kind == FOLLOW))
 
 
 def _freedom(
@@ -333,7 +316,7 @@ def _drive(
             config.bend_acceleration or max(_BEND_SHARE * sideways, _LEAST_BEND), _CURVE_MARGIN * config.max_lateral_acceleration
         ),
         _sideways(track, encounter.speed[n])[here],
-        Steering.of(time, track.poses[here, 2], encounter.speed[n, here], path.length),
+        Steering.of(time, np.unwrap(encounter.heading[n, here]), encounter.speed[n, here], path.length),
         rests,
     )
 

@@ -13,41 +13,23 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.method.sampling.adapt import adapted, aim_of, Cancelled, Check, Judge, label_of
+from scenario_gen.method.sampling.adapt import adapted, aim_of, Check, Judge, label_of
 from scenario_gen.method.sampling.candidates import Batch
 from scenario_gen.method.sampling.config import SamplingConfig
-from scenario_gen.method.sampling.directed import Aim, estimated, Measures, reachable, STAGE, TargetError
+from scenario_gen.method.sampling.directed import Aim, estimated, reachable, STAGE, TargetError
 from scenario_gen.method.sampling.diverse import POOL_SHARE, spread_out
 from scenario_gen.method.sampling.lazy import LazyScenarios
+from scenario_gen.method.sampling.plan import Callbacks, Plan
 from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.sampling.sampler import (
     BLOCK,
     DIRECTED,
     ENOUGH,
-    index_of,
-    LEVEL_SIZE,
-    LEVEL_SLOTS,
     LEVELS,
     place_of,
     Sampler,
 )
-from scenario_gen.template.interaction import Wait
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.reaction import NOT_KEPT
-from scenario_gen.types.request import Request
-from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario, ScenarioSet
-from scenario_gen.types.segmentation import Segmentation
-from scenario_gen.types.target import Reached
-
-__all__ = [
-    "BLOCK", "KEPT", "LEVELS", "LEVEL_SIZE", "LEVEL_SLOTS", "PILOT", "Cancelled", "OnValid", "Progress", "Sampler", "index_of",
-    "place_of", "regenerate", "sample_scenarios",
-]  # fmt: skip
-
-Progress = Callable[[int, int, int], None]  # of scenarios so far, scenarios wanted, candidates so far
-OnValid = Callable[[Scenario, BoundaryStates, EgoSlot | None], None]  # a valid one, the states asked, what the ego is asked
+from scenario_gen.types import Cause, EgoSlot, Measures, NOT_KEPT, Reached, Request, Scenario, ScenarioSet
 
 KEPT = 1000  # scenarios up to which a set stays in memory
 LEAST_COUNT = 20  # where clocks are free: scenarios for which candidates are drawn at least, so that levels can be tried
@@ -56,22 +38,15 @@ DIRECTED_BUDGET = 10  # times the budget of a request without a target
 HOPELESS = 20 * BLOCK  # candidates of a proposal after which it is given up if none of them is valid and in the range
 
 
-def sample_scenarios(
-    encounter: Encounter,
-    segmentation: Segmentation,
-    road: Road,
-    routes: Sequence[Route],
-    asked: BoundaryStates,
+def draw_scenarios(
+    plan: Plan,
     check: Check,
     config: SamplingConfig = SamplingConfig(),
     *,
     count: int,
     seed: int = 0,
-    waits: tuple[Wait, ...],
     request: Request = Request(),
-    progress: Progress = lambda *_: None,
-    cancelled: Cancelled = lambda: False,
-    found: OnValid = lambda *_: None,
+    callbacks: Callbacks = Callbacks(),
     measures: Measures | None = None,
 ) -> ScenarioSet:
     """Draw candidates until `count` are valid or the budget is spent.
@@ -79,22 +54,15 @@ def sample_scenarios(
     Source: paper III-C.
 
     Args:
-        encounter: the template.
-        segmentation: its changepoints.
-        road: the target road, for the room it leaves.
-        routes: one per vehicle, with an anchor at start, changepoints and end.
-        asked: start and end states; their speeds are met exactly.
+        plan: the template on its road.
         check: the validity checker of all vehicles, the ego too; its verdicts decide.
         config: the standard deviations and limits.
         count: valid scenarios wanted.
         seed: of all randomness; with a scenario's index it gives that scenario again.
-        waits: when a vehicle stands, on the template's clock.
-        request: which vehicle is left out of every scenario, its own motion given as witness; whether states were asked for;
+        request: which vehicle is left out of every scenario, its own motion given as witness; whether states were requested;
             which range, choice and order.
-        progress: called with (valid so far, count, candidates so far).
-        cancelled: asked before each candidate; if True, the set so far is returned.
-        found: called with each valid scenario as it is drawn, in the set's order; of a chosen set, when it is chosen.
-        measures: what measures a scenario for a target or a choice, see `Measures`; `check` knows the order asked.
+        callbacks: called on progress and with valid scenarios.
+        measures: what measures a scenario for a target or a choice, see `Measures`; `check` knows the requested order.
 
     Returns:
         At most `count` scenarios; fewer if the budget did not suffice, which the account (`refused`) explains. Of more than KEPT
@@ -102,62 +70,57 @@ def sample_scenarios(
 
     Raises:
         InputError: routes, segmentation and encounter disagree, or the ego is none of the vehicles.
-        RefusedError: states or a target were asked for, and not one candidate that meets them is valid.
+        RefusedError: states or a target were requested, and not one candidate that meets them is valid.
     """
-    ego = request.ego_of(encounter)
-    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config, request.order)
-    slot = None if ego is None else EgoSlot(encounter.vehicles[ego], asked.start[ego], asked.end[ego])
+    encounter, ego = plan.encounter, request.ego_of(plan.encounter)
+    prepared = prepare(plan, config, request.order)
+    slot = None if ego is None else EgoSlot(encounter.vehicles[ego], plan.asked.start[ego], plan.asked.end[ego])
     if prepared.model is None:
-        made = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot)
+        drawn = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot)
     else:
         aim = aim_of(encounter, request, measures)
-        sampler = Sampler(prepared.model, seed, road.frame_id, ego, label=label_of(encounter, request, aim))
+        sampler = Sampler(prepared.model, seed, plan.road.frame_id, ego, label=label_of(encounter, request, aim))
         judge = Judge.of(sampler, check, _enough(config, request))
         graph = prepared.model.reactions
         kept = tuple(edge for edge in (graph.edges if graph is not None else ()) if (edge.who, edge.whom) not in judge.lost)
         sampler = replace(sampler, label=label_of(encounter, request, aim, kept))
-        loop = _Loop(sampler, judge, count, progress, cancelled, lambda scenario: found(scenario, asked, slot))
+        loop = _Loop(sampler, judge, count, callbacks, lambda scenario: callbacks.found(scenario, plan.asked, slot))
         loop.aim, loop.measures = aim, measures
         loop.run_request(config.attempts, diverse=request.choose == "diverse")
-        lost = [f"{NOT_KEPT}: {said}" for said in judge.lost.values()]
-        sentences = (*prepared.adaptations, *lost, *loop.adaptations)
-        made = ScenarioSet(
-            count, loop.scenarios(), loop.candidates, loop.refused, sentences, slot, loop.reached, loop.chosen_from, kept,
+        lost = [f"{NOT_KEPT}: {message}" for message in judge.lost.values()]
+        notes = (*prepared.adaptations, *lost, *loop.adaptations)
+        drawn = ScenarioSet(
+            count, loop.scenarios(), loop.candidates, loop.refused, notes, slot, loop.reached, loop.chosen_from, kept,
         )  # fmt: skip
-    if request.moves and not made.scenarios and not cancelled():
-        causes = ", ".join(f"{number} × {cause.value}" for cause, number in made.refused.most_common())
-        more = f"; {'; '.join(made.adaptations)}" if made.adaptations else ""
-        raise RefusedError(f"none of {made.candidates} candidate(s) with the asked states is valid ({causes}{more})")
-    return made
+    if request.moves and not drawn.scenarios and not callbacks.cancelled():
+        causes = ", ".join(f"{number} × {cause.value}" for cause, number in drawn.refused.most_common())
+        more = f"; {'; '.join(drawn.adaptations)}" if drawn.adaptations else ""
+        raise RefusedError(f"none of {drawn.candidates} candidate(s) with the asked states is valid ({causes}{more})")
+    return drawn
 
 
 def regenerate(
-    encounter: Encounter,
-    segmentation: Segmentation,
-    road: Road,
-    routes: Sequence[Route],
-    asked: BoundaryStates,
+    plan: Plan,
     config: SamplingConfig = SamplingConfig(),
     *,
     seed: int,
     index: int,
-    waits: tuple[Wait, ...],
     request: Request = Request(),
     check: Check | None = None,
     measures: Measures | None = None,
 ) -> Scenario | None:
-    """The scenario with this seed and index again, bit for bit, without the others; arguments as in `sample_scenarios`.
+    """The scenario with this seed and index again, bit for bit, without the others; arguments as in `draw_scenarios`.
 
     One of a proposal needs `check` and `measures`, by which that is found again.
 
     Raises:
         InputError: no candidate has this index, or nothing is said of the target.
     """
-    prepared = prepare(encounter, segmentation, road, routes, asked, waits, config, request.order)
+    prepared = prepare(plan, config, request.order)
     if prepared.model is None:
         return None
-    ego, aim = request.ego_of(encounter), aim_of(encounter, request, measures)
-    sampler = Sampler(prepared.model, seed, road.frame_id, ego, label=label_of(encounter, request, aim))
+    ego, aim = request.ego_of(plan.encounter), aim_of(plan.encounter, request, measures)
+    sampler = Sampler(prepared.model, seed, plan.road.frame_id, ego, label=label_of(plan.encounter, request, aim))
     if place_of(index)[0] == DIRECTED:
         if aim is None or check is None:
             raise InputError(f"index {index} is of a proposal, but no target was asked for")
@@ -177,8 +140,7 @@ class _Loop:
     sampler: Sampler
     judge: Judge
     count: int
-    progress: Progress
-    cancelled: Cancelled
+    callbacks: Callbacks
     found: Callable[[Scenario], None]
     kept: list[Scenario] = field(default_factory=list)  # the first KEPT
     index: Any = field(default_factory=lambda: array("q"))  # of all that are valid
@@ -219,7 +181,7 @@ class _Loop:
         self.sampler = replace(self.sampler, weighted=False)
         for k in sorted(chosen):
             scenario = self.sampler.scenario(pool[k])
-            if scenario is not None and not self.cancelled():
+            if scenario is not None and not self.callbacks.cancelled():
                 self._keep(pool[k], scenario)
 
     def _whole(self, index: Sequence[int]) -> Iterator[Scenario]:
@@ -243,10 +205,10 @@ class _Loop:
         """
         aim = self.aim
         assert aim is not None
-        made = adapted(self.sampler, self.judge, aim, self.cancelled)
+        made = adapted(self.sampler, self.judge, aim, self.callbacks.cancelled)
         self.sampler = made.sampler
         weights: list[float] = []
-        if made.seen.hits() and not self.cancelled():
+        if made.seen.hits() and not self.callbacks.cancelled():
             level = self.sampler.base if made.sampler.proposal is None else DIRECTED
             blocks = self._blocks(level)
             if made.sampler.proposal is None:
@@ -265,7 +227,7 @@ class _Loop:
             self.adaptations.append(self.reached.sentence())
             if self.sampler.base:
                 self._describe(self.sampler.base, 2)
-        if len(self.index) < self.count and not self.cancelled():
+        if len(self.index) < self.count and not self.callbacks.cancelled():
             said = f"target {'; '.join(map(str, aim.targets))}: "
             drawn = f"{made.candidates} candidates of {1 + made.stages} stage(s) and {self.candidates} more"
             said += f"{len(self.index)} found in {drawn}; reachable: {reachable(aim, made.seen)}"
@@ -276,7 +238,7 @@ class _Loop:
     def _take_pilot(self, pilot: Sequence[tuple[int, Scenario | None, Cause | None]]) -> None:
         """Take the candidates of a level that were drawn and checked already."""
         for number, scenario, cause in pilot:
-            if len(self.index) == self.count or self.cancelled():
+            if len(self.index) == self.count or self.callbacks.cancelled():
                 break
             self.candidates += 1
             if scenario is None or cause is not None or not self._in_range(scenario):
@@ -305,7 +267,7 @@ class _Loop:
         return LazyScenarios(self.sampler.redraw, np.array(self.index, dtype=np.int64), BLOCK)
 
     def _done(self, budget: int) -> bool:
-        return len(self.index) >= self.count or self.candidates >= budget or self.cancelled()
+        return len(self.index) >= self.count or self.candidates >= budget or self.callbacks.cancelled()
 
     def _blocks(self, level: int) -> Iterator[tuple[Batch, list[int]]]:
         for number in itertools.count():
@@ -314,13 +276,13 @@ class _Loop:
     def _spend(self, blocks: Iterator[tuple[Batch, list[int]]], most: int) -> tuple[int, int]:
         """Check up to `most` candidates, whole blocks at a time; how many were seen, and how many of them were valid."""
         seen = good = 0
-        while seen < most and len(self.index) < self.count and not self.cancelled():
+        while seen < most and len(self.index) < self.count and not self.callbacks.cancelled():
             batch, index = next(blocks)
             drawn = batch.scenarios(self.sampler.seed, index, self.sampler.frame_id)
             aimed = [scenario is not None and self._in_range(scenario) for scenario in drawn]
             causes = iter(self.judge([s for s, ok in zip(drawn, aimed, strict=True) if ok and s is not None]))
             for number, scenario, ok in zip(index, drawn, aimed, strict=True):
-                if seen == most or len(self.index) == self.count or self.cancelled():
+                if seen == most or len(self.index) == self.count or self.callbacks.cancelled():
                     break
                 seen += 1
                 cause = next(causes) if ok else Cause.SPEED_PROFILE if scenario is None else Cause.OUT_OF_RANGE
@@ -329,7 +291,7 @@ class _Loop:
                     self._keep(number, self.sampler.published(scenario) if self.publish else scenario)
                 else:
                     self.refused[cause or Cause.SPEED_PROFILE] += 1
-            self.progress(len(self.index), self.count, self.candidates + seen)
+            self.callbacks.progress(len(self.index), self.count, self.candidates + seen)
         self.candidates += seen
         return seen, good
 
@@ -347,5 +309,5 @@ class _Loop:
                 f"few candidates were valid: standard deviations multiplied by {s.lateral:g} across the route, "
                 f"{s.longitudinal:g} along it, {s.time:g} in time{own}"
             )
-        if self.cancelled():
+        if self.callbacks.cancelled():
             self.adaptations.append("cancelled")

@@ -12,10 +12,8 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.sampling.candidates import Batch, Scale
 from scenario_gen.method.sampling.directed import Proposal
 from scenario_gen.method.sampling.model import CandidateModel
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.ego import with_witness
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.numerics import exact, Floats
+from scenario_gen.types import Scenario, with_witness
 
 Label = Callable[[Scenario], dict[str, str]]
 

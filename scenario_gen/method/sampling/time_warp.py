@@ -14,8 +14,7 @@ import numpy as np
 
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.gp import Features, Observations, Regression
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.numerics.kernels import F1, F2, I1, kernel, OUT2
 
 DT = 0.1  # s, the grid of published scenarios

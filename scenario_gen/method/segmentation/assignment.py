@@ -7,7 +7,7 @@ Shortest augmenting paths (Crouse 2016), in the order of scipy's `linear_sum_ass
 scipy's package takes a fifth of a second to import.
 """
 
-from scenario_gen.numerics.arrays import Ints
+from scenario_gen.numerics import Ints
 
 NEVER = 2**62  # more than any sum of the numbers that are compared
 

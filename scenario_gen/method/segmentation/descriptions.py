@@ -7,9 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
-from scenario_gen.types.encounter import Tracks
+from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.types import Tracks
 
 STANDING = 0.5
 STEADY = 0.25

@@ -11,8 +11,7 @@ from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.problem import Problem
 from scenario_gen.method.segmentation.hdp_hmm.smoother import expected_statistics
 from scenario_gen.method.segmentation.posterior import Posterior
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, Ints
+from scenario_gen.numerics import Bools, exact, Floats, Ints
 
 ROUNDS, SETTLED = 50, 1e-7
 RIDGE = 1e-12  # of a variance, on covariances that channels which follow from others make singular

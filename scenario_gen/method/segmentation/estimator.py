@@ -18,7 +18,7 @@ from scenario_gen.method.segmentation.hdp_hmm.chain import TRACE
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.smoother import log_densities, smooth
 from scenario_gen.method.segmentation.series import segment_visible, usual_distances, without_outliers
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 
 Data = Any  # an array (T, D) or what becomes one, or a list of them
 

@@ -18,9 +18,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from scenario_gen.method.segmentation.hdp_hmm.problem import moving_mean
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.encounter import Tracks
+from scenario_gen.numerics import exact, Floats
+from scenario_gen.types import Tracks
 
 STAND_SPEED = 0.5
 STAND_BLUR = 0.2

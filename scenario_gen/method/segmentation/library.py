@@ -19,10 +19,8 @@ from scenario_gen.method.segmentation.features import driving_features
 from scenario_gen.method.segmentation.posterior import in_order
 from scenario_gen.method.segmentation.segmenter import cut, DEFAULT, on_trends, relabel, SegmentationConfig
 from scenario_gen.method.segmentation.series import segment_series
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen, frozen_ints, Ints
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.numerics import exact, Floats, frozen, frozen_ints, Ints
+from scenario_gen.types import Encounter, Segmentation
 
 FORMAT = "scenario_gen primitive library 1"
 _ROW = {"type": "array", "minItems": 1, "items": {**NUMBER, "minimum": -1e9, "maximum": 1e9}}  # of accelerations, speeds, seconds

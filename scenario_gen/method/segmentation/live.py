@@ -11,10 +11,10 @@ import numpy as np
 
 from scenario_gen.method.segmentation.online import Changepoint, OnlineConfig, OnlineSegmenter
 from scenario_gen.method.segmentation.trends import course
-from scenario_gen.types.segmentation import LiveChangepoints
+from scenario_gen.types import LiveChangepoints
 
 if TYPE_CHECKING:  # logs bring pandas and shapely, which a segmentation does not need
-    from scenario_gen.logs.streams import Sample
+    from scenario_gen.logs import Sample
 
 
 class LiveSegmenter:

@@ -20,8 +20,7 @@ from scenario_gen.method.segmentation.features import POSITION_FLOOR, SPEED_FLOO
 from scenario_gen.method.segmentation.library import PrimitiveLibrary
 from scenario_gen.method.segmentation.segment_classes import FinishedSegment, SegmentClasses
 from scenario_gen.method.segmentation.trends import Trends
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 
 UNJUDGED = 2  # samples at the end that may be outliers: nothing after them says
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scenario_gen.method.segmentation.assignment import best_partners
-from scenario_gen.numerics.arrays import Bools, Floats, frozen, frozen_ints, Ints
+from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints
 
 MOST_SAMPLES = 400  # labels of more sweeps than these are thinned evenly; traces are not
 

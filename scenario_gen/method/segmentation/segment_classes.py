@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.method.segmentation.library import PrimitiveLibrary
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen, frozen_ints, Ints
+from scenario_gen.numerics import exact, Floats, frozen, frozen_ints, Ints
 
 NEW = 1.0  # segments that the chance of a class never seen is worth
 WITHIN = (0.25, 0.25, 0.2)  # spread in a class: longitudinal, lateral acceleration [m/s²], moving 0..1

@@ -16,9 +16,8 @@ from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.posterior import in_order, Posterior
 from scenario_gen.method.segmentation.series import segment_series
 from scenario_gen.method.segmentation.trends import course, Trends
-from scenario_gen.numerics.arrays import Floats, Ints
-from scenario_gen.types.encounter import Tracks, Vehicle
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.numerics import Floats, Ints
+from scenario_gen.types import Segmentation, Tracks, Vehicle
 
 DRIVING_SAMPLER = SamplerConfig(weight=0.5, chains=3, sweeps=60)
 

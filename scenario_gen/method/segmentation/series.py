@@ -14,8 +14,7 @@ from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.problem import new_top, Place, Problem
 from scenario_gen.method.segmentation.hdp_hmm.start import FAR_QUANTILE, find_start, MOST_STATES, other_start, Start
 from scenario_gen.method.segmentation.posterior import pool, Posterior, r_hat
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 
 ROOM = 5  # states beyond those that the start found
 FIRST_LOOK = 40

@@ -17,10 +17,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from scenario_gen.method.segmentation.hdp_hmm.problem import moving_mean
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.numerics.kernels import F2, I, I1, kernel, OUT1
-from scenario_gen.types.presence import ALWAYS, canonical_presence
+from scenario_gen.types import ALWAYS, canonical_presence
 
 SPEED_NOISE = 0.1
 COURSE_NOISE = 0.3

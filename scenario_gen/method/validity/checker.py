@@ -15,17 +15,22 @@ from scenario_gen.method.validity import dynamics
 from scenario_gen.method.validity.dynamics import control_points, is_motion
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.method.validity.presence import driven_on
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, runs
-from scenario_gen.roads.clearance import clearance_in_cells
-from scenario_gen.roads.vector.ground import drives_against
-from scenario_gen.template.answers import conflict_of, lag_behind, time_gaps
-from scenario_gen.template.interaction import Conflict, find_conflicts, orders_asked, Wait
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.presence import at_ends, together
-from scenario_gen.types.reaction import FOLLOW, Reaction
-from scenario_gen.types.road import Road
-from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, Verdict, Violation
+from scenario_gen.numerics import Bools, exact, Floats, runs
+from scenario_gen.roads import clearance_in_cells, drives_against
+from scenario_gen.template import Conflict, conflict_of, find_conflicts, lag_behind, orders_asked, time_gaps, Wait
+from scenario_gen.types import (
+    at_ends,
+    BoundaryStates,
+    Cause,
+    Encounter,
+    FOLLOW,
+    Reaction,
+    Road,
+    Scenario,
+    together,
+    Verdict,
+    Violation,
+)
 
 
 class Checker:

@@ -12,8 +12,7 @@ axis). Where no such line is found the stretch is halved, until it is proven, an
 import numpy as np
 
 from scenario_gen.method.validity.dynamics import stretch
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.numerics.kernels import F, F1, F2, F4, kernel, OUT2
 
 BLOCK = 16  # intervals that share one bounding box

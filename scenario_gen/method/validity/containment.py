@@ -12,8 +12,7 @@ Where neither suffices the stretch is halved, until it is proven, the footprint 
 import numpy as np
 
 from scenario_gen.method.validity.dynamics import stretch
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, Ints
+from scenario_gen.numerics import Bools, exact, Floats, Ints
 from scenario_gen.numerics.kernels import F, F1, F2, F4, I2, kernel, OUT2
 
 CONTACT = 1e-9  # cells, an overlap this small only touches

@@ -7,10 +7,9 @@ from enum import IntEnum
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.numerics.kernels import F1, F2, F3, kernel, OUT3, OUT4
-from scenario_gen.types.scenario import Cause
+from scenario_gen.types import Cause
 
 LARGEST = 1e8  # m, s, m/s, …: a coordinate is rounded by some 10 nm here, and more beyond
 

@@ -6,8 +6,8 @@
 from dataclasses import dataclass, replace
 
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.template.separation import least_gap
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.template import least_gap
+from scenario_gen.types import Encounter
 
 _SHARE_OF_GAP, _MOST_CLEARANCE = 0.5, 0.5  # of the template's least gap; m
 

@@ -5,9 +5,8 @@
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.types import Scenario
 
 SAME = 0.5e-9  # s, instants are whole nanoseconds
 

@@ -15,10 +15,7 @@ from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import Lane, LaneMap, lanes_of
 from scenario_gen.output.exchange.road_lanes import lane_map_of
-from scenario_gen.types.ego import split_off
-from scenario_gen.types.names import tokens
-from scenario_gen.types.road import Road
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.types import Road, Scenario, split_off, tokens
 
 TOPICS = ("tracks", "map", "road/lanes", "fit/info", "ego/track", SCENARIOS, INFO)
 

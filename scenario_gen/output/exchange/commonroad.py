@@ -15,15 +15,13 @@ import re
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import Lane, stations
 from scenario_gen.output.exchange.motion import at_even_steps, even_step
 from scenario_gen.output.exchange.xml import add, comment, Element, serialized
-from scenario_gen.types.body import is_truck
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.types import is_truck, Scenario
 
 OBSTACLES, PROBLEM, INTERSECTION = 100_000, 200_000, 300_000  # ids from here on; lanelets count from 1
 GOAL_TURN = 0.3  # rad by which an ego may be turned at its goal

@@ -9,13 +9,10 @@ from dataclasses import replace
 import numpy as np
 from shapely import contains_xy, covers, make_valid, Polygon, polygons, prepare, union_all
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.output.exchange.lanes import Lane, LaneMap, lanes_of, network_lanes, Strip
-from scenario_gen.types.lanes import LaneNetwork
-from scenario_gen.types.road import Road
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.types import LaneNetwork, Road, Scenario
 
 STEP = 1.0  # metres between points of a lane
 APART = 0.5  # metres between points of a path that it is laid through

@@ -14,15 +14,12 @@ from itertools import product
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, wrap_angle
+from scenario_gen.numerics import exact, Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.output.exchange.derived_lanes import outline, widest_near
 from scenario_gen.output.exchange.lanes import Joint, LaneMap, Strip
-from scenario_gen.roads.arms import Arm, arms_of, reverse, ring_of
-from scenario_gen.roads.ways import draw_ring_route, draw_route, flare_begins
-from scenario_gen.types.road import Road
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.roads import Arm, arms_of, draw_ring_route, draw_route, flare_begins, reverse, ring_of
+from scenario_gen.types import Road, Scenario
 
 STEP = 1.0  # metres between points of a line
 HALF_DIAGONAL = 0.7072  # of a cell, in sides

@@ -16,8 +16,7 @@ from typing import Literal
 import numpy as np
 
 from scenario_gen.base.errors import InputError, of_system, reading
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.output.exchange.openscenario import SPEEDS
 from scenario_gen.output.exchange.xml import number, Place, read_xml
 

@@ -9,9 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen
-from scenario_gen.types.lanes import LaneNetwork
+from scenario_gen.numerics import exact, Floats, frozen
+from scenario_gen.types import LaneNetwork
 
 DECIMALS = 6
 """Of the metres of a lane's edges: rounded, lanes that follow or lie beside each other have the very same points there."""

@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.types import Scenario
 
 EVEN = 1e-9  # seconds by which steps may differ and still be one
 

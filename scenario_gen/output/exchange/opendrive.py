@@ -14,8 +14,7 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, wrap_angle
+from scenario_gen.numerics import exact, Floats, wrap_angle
 from scenario_gen.output.exchange.lanes import joined, Joint, LaneMap, Strip
 from scenario_gen.output.exchange.xml import add, comment, Element, serialized
 

@@ -15,10 +15,7 @@ from datetime import datetime, UTC
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.xml import add, Element, number, serialized
-from scenario_gen.types.body import height, is_truck, rear_axle, shifted, WHEELBASE
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.names import token
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.types import height, is_truck, rear_axle, Scenario, shifted, token, Vehicle, WHEELBASE
 
 EGO = "Ego"
 SPEEDS = "speed_mps"  # name of the property that holds a vehicle's speed at each vertex, for `scenario-gen import`

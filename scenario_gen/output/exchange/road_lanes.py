@@ -14,14 +14,9 @@ from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.output.exchange.derived_lanes import derived_lanes, with_all_vehicles, with_network
 from scenario_gen.output.exchange.drawn_lanes import drawn_lanes
 from scenario_gen.output.exchange.lanes import LaneMap
-from scenario_gen.roads import RoadConfig
-from scenario_gen.roads.axis import bent_axis
-from scenario_gen.roads.build import build_road
-from scenario_gen.roads.builtin import BUILT_IN
-from scenario_gen.template.tracks import clean_tracks
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.road import Road
-from scenario_gen.types.scenario import Scenario
+from scenario_gen.roads import bent_axis, build_road, BUILT_IN, RoadConfig
+from scenario_gen.template import clean_tracks
+from scenario_gen.types import Encounter, Road, Scenario
 
 
 def lane_map_of(

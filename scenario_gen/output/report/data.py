@@ -10,16 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.method.evaluation.dtw import mean_feature
-from scenario_gen.method.evaluation.motion import at_common, at_count
-from scenario_gen.numerics.arrays import Bools, Floats
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.fit import Fit
-from scenario_gen.types.generation import GenerationResult, UNIFORM, WITHOUT
-from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
-from scenario_gen.types.scenario import Scenario
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.method.evaluation import at_common, at_count, mean_feature
+from scenario_gen.numerics import Bools, Floats
+from scenario_gen.types import Encounter, Fit, GenerationResult, Road, Route, Scenario, Segmentation, UNIFORM, WITHOUT
 
 FRAME_PERIOD = 0.2
 """Seconds between the frames that are stored; the page interpolates between them."""

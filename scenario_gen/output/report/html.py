@@ -19,7 +19,7 @@ import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from scenario_gen.types.evaluation import formatted
+from scenario_gen.types import formatted
 
 
 def render_page(template: str, scripts: Sequence[str], data: Any, *, plotly: bool = True, **values: Any) -> str:

@@ -11,11 +11,20 @@ from typing import Any
 from scenario_gen.base.folders import write_text
 from scenario_gen.output.report.data import case_data
 from scenario_gen.output.report.html import render_page
-from scenario_gen.types.evaluation import formatted, Interval
-from scenario_gen.types.generation import ERRORS, GenerationResult, NARROW, ORACLE, UNIFORM, WITHOUT
-from scenario_gen.types.reaction import NOT_KEPT
-from scenario_gen.types.route import Route, routes_in_words
-from scenario_gen.types.scenario import ScenarioSet
+from scenario_gen.types import (
+    ERRORS,
+    formatted,
+    GenerationResult,
+    Interval,
+    NARROW,
+    NOT_KEPT,
+    ORACLE,
+    Route,
+    routes_in_words,
+    ScenarioSet,
+    UNIFORM,
+    WITHOUT,
+)
 
 SIGNIFICANT = 0.03
 """Below this, E without changepoints leaves nothing to gain and the case is not counted."""

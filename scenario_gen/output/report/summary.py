@@ -11,11 +11,20 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from scenario_gen.base.errors import printable
-from scenario_gen.types.evaluation import formatted, Interval
-from scenario_gen.types.generation import ERRORS, GenerationResult, NARROW, ORACLE, UNIFORM, WITH, WITHOUT
-from scenario_gen.types.reaction import NOT_KEPT
-from scenario_gen.types.route import routes_in_words
-from scenario_gen.types.scenario import Cause
+from scenario_gen.types import (
+    Cause,
+    ERRORS,
+    formatted,
+    GenerationResult,
+    Interval,
+    NARROW,
+    NOT_KEPT,
+    ORACLE,
+    routes_in_words,
+    UNIFORM,
+    WITH,
+    WITHOUT,
+)
 
 SHORT = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "narrow", ORACLE: "replayed"}
 

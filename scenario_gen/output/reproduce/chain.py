@@ -15,23 +15,13 @@ import numpy as np
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.evaluation import without_changepoints
 from scenario_gen.method.fitting import fit_template, FittingConfig
-from scenario_gen.method.routing import plan_routes, PlanningConfig
-from scenario_gen.method.routing.search.rrt_star_connect import PAPER
-from scenario_gen.method.sampling.config import SamplingConfig
-from scenario_gen.method.sampling.gp import Features, Observations, Posterior, Regression
-from scenario_gen.method.sampling.speed_profile.knots import speed_knots
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, wrap_angle
+from scenario_gen.method.routing import PAPER, plan_routes, PlanningConfig
+from scenario_gen.method.sampling import Features, Observations, Posterior, Regression, SamplingConfig, speed_knots
+from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
 from scenario_gen.output.reproduce.speed_profile import knots_on, SpeedBounds, SpeedProfile, SpeedProfileQP
-from scenario_gen.roads import build_road, RoadConfig
-from scenario_gen.roads.builtin import draw, layout_for
-from scenario_gen.template.interaction import find_waits, Wait
-from scenario_gen.template.tracks import clean_tracks
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.fit import Fit
-from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.roads import build_road, draw, layout_for, RoadConfig
+from scenario_gen.template import clean_tracks, find_waits, Wait
+from scenario_gen.types import Encounter, Fit, Road, Route, Segmentation
 
 SIGMA, LENGTH, NOISE, DEGREE = 10.0, 100.0, 10.0, 3
 """The paper's σ_f and l of eq 14 and σ_ω, the standard deviation at an interior anchor, in cells; degree of the mean."""

@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 
 from scenario_gen.output.reproduce.figures import figure_2, figure_3, figure_4, figure_5
 from scenario_gen.output.reproduce.measure import PaperCase
-from scenario_gen.types.generation import UNIFORM, WITH, WITHOUT
+from scenario_gen.types import UNIFORM, WITH, WITHOUT
 
 WAITS, OFF_ROAD = 0.5, 0.005
 """Mean speed [m/s] below which a vehicle waits, as in docs/method.md; share of instants off the road that is too much."""

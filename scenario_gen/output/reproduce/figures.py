@@ -13,11 +13,10 @@ from PIL import Image
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from scenario_gen.method.evaluation.dtw import mean_feature
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.method.evaluation import mean_feature
+from scenario_gen.numerics import Floats
 from scenario_gen.output.reproduce.measure import PaperCase, Regressions
-from scenario_gen.types.generation import WITH, WITHOUT
-from scenario_gen.types.road import Road
+from scenario_gen.types import Road, WITH, WITHOUT
 
 VEHICLES = ("#2563eb", "#e2590c", "#0d9488", "#9333ea", "#c2185b", "#65780b")
 PRIMITIVES = ("#4e79a7", "#f28e2b", "#59a14f", "#e15759", "#b07aa1", "#edc948", "#76b7b2", "#ff9da7", "#9c755f", "#79706e")

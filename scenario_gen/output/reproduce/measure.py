@@ -9,21 +9,21 @@ from itertools import pairwise
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.method.evaluation import linear_changepoints, uniform_changepoints, without_changepoints
-from scenario_gen.method.evaluation.bootstrap import Bootstrap
-from scenario_gen.method.evaluation.similarity import mean_correlation, mean_error, pair_similarities
-from scenario_gen.method.sampling.gp import Features, Observations, Regression
+from scenario_gen.method.evaluation import (
+    Bootstrap,
+    linear_changepoints,
+    mean_correlation,
+    mean_error,
+    pair_similarities,
+    uniform_changepoints,
+    without_changepoints,
+)
+from scenario_gen.method.sampling import Features, Observations, Regression
 from scenario_gen.method.segmentation import segment, SegmentationConfig
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.output.reproduce.chain import LENGTH, NOISE, place, rotation, sample, Sampled, SIGMA
-from scenario_gen.template.interaction import find_waits
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.evaluation import Interval
-from scenario_gen.types.generation import UNIFORM, WITH, WITHOUT
-from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.template import find_waits
+from scenario_gen.types import Encounter, Interval, Road, Route, Segmentation, UNIFORM, WITH, WITHOUT
 
 PRIORS = {"zero mean": -1, "training data mean": 0, "cubic polynomial": 3}
 """The priors of figure 2, as degrees of the mean."""

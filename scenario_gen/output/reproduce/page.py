@@ -12,7 +12,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.folders import Kind, replaced_folder, write_text
 from scenario_gen.base.parameters import flatten
 from scenario_gen.logs import read_log
-from scenario_gen.method.sampling.config import SamplingConfig
+from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.output.report.html import render_page
 from scenario_gen.output.reproduce.chain import ROADS
 from scenario_gen.output.reproduce.claims import Claim, claims_of

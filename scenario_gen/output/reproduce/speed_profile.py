@@ -23,10 +23,8 @@ import daqp
 import numpy as np
 import numpy.typing as npt
 
-from scenario_gen.method.sampling.config import SamplingConfig
-from scenario_gen.method.sampling.speed_profile.knots import SpeedKnots
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, frozen, Ints
+from scenario_gen.method.sampling import SamplingConfig, SpeedKnots
+from scenario_gen.numerics import Bools, exact, Floats, frozen, Ints
 from scenario_gen.numerics.kernels import F1, F2, I1, kernel, OUT2, OUT3
 
 Marks = npt.NDArray[np.intc]

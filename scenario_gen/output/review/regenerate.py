@@ -17,19 +17,14 @@ from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.folders import Kind, sha256_of
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.method.evaluation.measures import MEASURES
+from scenario_gen.method.evaluation import MEASURES
 from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.routing import plan_routes, PlanningConfig
-from scenario_gen.method.sampling import freed_states, kept_reactions, regenerate, SamplingConfig
+from scenario_gen.method.sampling import checker_of, plan_of, regenerate, SamplingConfig
 from scenario_gen.method.segmentation import segment, SegmentationConfig
-from scenario_gen.method.validity import Checker, Limits
-from scenario_gen.template.interaction import waits_to_keep
-from scenario_gen.template.side import mirrored
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.request import Request
-from scenario_gen.types.scenario import Scenario
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.method.validity import Limits
+from scenario_gen.template import mirrored
+from scenario_gen.types import Encounter, GenerationResult, Request, Scenario, Segmentation
 
 TEMPLATE = ("tracks", "changepoints", "map", "fit")
 
@@ -95,18 +90,12 @@ def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
         planning = read_parameters(PlanningConfig(), values, "planning.", what)
         fit = fit_template(encounter, segmentation, road, fitting, request=asked, max_speed=sampling.max_speed)
         routes = plan_routes(road, fit, planning, seed)
-    waits = waits_to_keep(encounter, segmentation)
-    states = freed_states(fit.asked, encounter, sampling, asked)
+    plan = plan_of(GenerationResult(encounter, segmentation, road, fit, routes, seed=seed), sampling, asked)
     check = None
     if asked.target or asked.order == "swap":  # a proposal is found again with them
         limits = read_parameters(Limits(), values, "limits.", what)
-        graph = kept_reactions(encounter, sampling, asked.order)
-        edges = graph.edges if graph is not None else ()
-        check = Checker.of_template(encounter, road, states, waits, limits, asked.order, edges).check
-    scenario = regenerate(
-        encounter, segmentation, road, routes, states, sampling, seed=seed, index=index, waits=waits, request=asked,
-        check=check, measures=MEASURES,
-    )  # fmt: skip
+        check = checker_of(plan, sampling, limits, asked).check
+    scenario = regenerate(plan, sampling, seed=seed, index=index, request=asked, check=check, measures=MEASURES)
     data, sha256 = (b"", "") if scenario is None else scenario_bytes(scenario, encounter)
     witness = None if scenario is None else scenario.witness
     own = "" if witness is None else scenario_bytes(witness, encounter)[1]

@@ -13,9 +13,9 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, finite, read_xml
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.network import Draft, network_of, refuse_too_many_lanes
-from scenario_gen.types.lanes import LaneNetwork
+from scenario_gen.types import LaneNetwork
 
 _SKIPPED = frozenset(
     ("obstacle", "staticObstacle", "dynamicObstacle", "environmentObstacle", "phantomObstacle", "planningProblem", "scenarioTags")

@@ -9,13 +9,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, wrap_angle
+from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
 from scenario_gen.roads.clearance import clearance_field, footprint_fits
 from scenario_gen.roads.vector.raster import covered
-from scenario_gen.types.encounter import Vehicle
-from scenario_gen.types.lanes import Lane
-from scenario_gen.types.road import Road
+from scenario_gen.types import Lane, Road, Vehicle
 
 _BINS = 16  # of directions
 _ALLOWED = np.pi / 2.0 + np.pi / _BINS  # a pose turned from a lane by more drives against it; half a bin is not told apart

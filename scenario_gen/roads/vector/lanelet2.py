@@ -17,11 +17,10 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, finite, read_xml
-from scenario_gen.logs.geodesy import local_frame
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.logs import local_frame
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.roads.vector.network import Draft, network_of, refuse_too_long, refuse_too_many_lanes
-from scenario_gen.types.lanes import LaneNetwork
+from scenario_gen.types import LaneNetwork
 
 _FOR_CARS = ("road", "highway", "play_street", "exit")  # subtypes that cars may use, if no participant is named
 _KMH = 1.0 / 3.6

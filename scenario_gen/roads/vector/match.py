@@ -15,13 +15,11 @@ import math
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, wrap_angle
+from scenario_gen.numerics import exact, Floats, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.roads.vector.search import Spot
-from scenario_gen.template.path_crossing import path_crossing, PathCrossing
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.lanes import LaneNetwork
+from scenario_gen.template import path_crossing, PathCrossing, Track
+from scenario_gen.types import LaneNetwork
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
 _HEADING = math.radians(60.0)  # and is turned from it by this at most

@@ -11,9 +11,8 @@ import numpy as np
 import shapely
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, Ints, runs
-from scenario_gen.types.lanes import Lane, LaneNetwork
+from scenario_gen.numerics import Bools, exact, Floats, Ints, runs
+from scenario_gen.types import Lane, LaneNetwork
 
 _SECTION = 1.0  # metres between cross-sections at most
 _SHORTEST = 0.05  # metres of a border

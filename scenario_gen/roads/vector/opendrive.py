@@ -16,11 +16,10 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, read_xml
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.roads.vector.network import Draft, MOST_LINKS, MOST_SECTIONS, network_of, refuse_too_long, refuse_too_many_lanes
 from scenario_gen.roads.vector.plan_view import Cubics, cubics, reference_line, ReferenceLine
-from scenario_gen.types.lanes import LaneNetwork
+from scenario_gen.types import LaneNetwork
 
 _FOR_CARS = frozenset(
     ("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "bidirectional", "mwyEntry", "mwyExit", "HOV")

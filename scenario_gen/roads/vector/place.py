@@ -13,13 +13,12 @@ import numpy as np
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.search import at_home, find_spots
 from scenario_gen.roads.vector.street import along_streets
-from scenario_gen.template.separation import separate
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.lanes import LaneNetwork
+from scenario_gen.template import separate, Track
+from scenario_gen.types import LaneNetwork
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
 _SPOTS = 15  # placements as one piece, and

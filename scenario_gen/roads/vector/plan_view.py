@@ -13,8 +13,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 
 _STEP = 1.0  # metres of a spiral that one rule of Gauss integrates
 _GAUSS = (  # five points on [0, 1], exact for degree 9

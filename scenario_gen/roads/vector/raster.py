@@ -5,11 +5,10 @@
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Bools, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.vector.network import lane_ends
-from scenario_gen.types.lanes import LaneNetwork
-from scenario_gen.types.road import Road
+from scenario_gen.types import LaneNetwork, Road
 
 _VERGE = 2.0  # metres of kerb drawn around a whole map
 

@@ -11,7 +11,7 @@ import numpy as np
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError, of_system, reading
 from scenario_gen.base.markup import finite
-from scenario_gen.numerics.arrays import Floats, frozen
+from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.vector.commonroad import read_commonroad
 from scenario_gen.roads.vector.lanelet2 import read_lanelet2
@@ -19,9 +19,8 @@ from scenario_gen.roads.vector.network import extent, part_of
 from scenario_gen.roads.vector.opendrive import read_opendrive
 from scenario_gen.roads.vector.place import best_part
 from scenario_gen.roads.vector.raster import road_of
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.lanes import LaneNetwork
-from scenario_gen.types.road import Road
+from scenario_gen.template import Track
+from scenario_gen.types import LaneNetwork, Road
 
 READERS = {".osm": read_lanelet2, ".xodr": read_opendrive, ".xml": read_commonroad}
 PARTS = ("lanelet", "junction", "box")

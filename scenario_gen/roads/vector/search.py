@@ -16,11 +16,9 @@ import numpy as np
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints, wrap_angle
-from scenario_gen.template.path_crossing import path_crossing
-from scenario_gen.template.tracks import Track
-from scenario_gen.types.lanes import LaneNetwork
+from scenario_gen.numerics import exact, Floats, Ints, wrap_angle
+from scenario_gen.template import path_crossing, Track
+from scenario_gen.types import LaneNetwork
 
 _CELL = 1.0  # metres
 _MOST_CELLS = 30_000_000  # of a map: a larger one is looked at in larger cells

@@ -15,12 +15,10 @@ import numpy as np
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, wrap_angle
+from scenario_gen.numerics import exact, Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.vector.match import bending, Chains, changed_curve, Course, Match, pressed_aside, speeding, turned_more
-from scenario_gen.template.frenet import FrenetTracks, to_frenet
-from scenario_gen.template.tracks import Track
+from scenario_gen.template import FrenetTracks, to_frenet, Track
 
 _ROOM = 1.0  # metres between a footprint and the end of the road
 _FORTH = 25.0  # metres of road before and after what is driven, where it has them

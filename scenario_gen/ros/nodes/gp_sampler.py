@@ -20,7 +20,7 @@ from scenario_gen.ros.plumbing.inputs import Inputs
 from scenario_gen.ros.plumbing.sampling_answer import Answer, answer_request, Config
 from scenario_gen.ros.plumbing.sampling_requests import OpenRequest, OpenRequests
 from scenario_gen.ros.plumbing.topics import unacknowledged
-from scenario_gen.types.names import tokens
+from scenario_gen.types import tokens
 
 ENDS = ("road/entries", "road/exits")  # of use only where start or end states are asked for
 

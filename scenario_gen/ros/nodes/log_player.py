@@ -22,11 +22,9 @@ from msg_conventions.tracks import encode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.geodesy import latitude_longitude
+from scenario_gen.logs import latitude_longitude, LogConfig, read_log
 from scenario_gen.ros.plumbing.base import StageNode
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.names import tokens
+from scenario_gen.types import Encounter, tokens
 
 HEAD_START = 1.0  # seconds in which listeners find the streams, which are not latched
 

@@ -32,15 +32,11 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.fitting import fit_template, FittingConfig
-from scenario_gen.method.routing import plan_routes, PlanningConfig
-from scenario_gen.method.routing.plan import make_planner
-from scenario_gen.method.routing.search.planner import plan_with_retry, Query
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.method.routing import make_planner, plan_routes, plan_with_retry, PlanningConfig, Query
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.ros.plumbing.base import REQUESTS, StageNode
 from scenario_gen.ros.plumbing.inputs import Inputs
-from scenario_gen.types.names import tokens
-from scenario_gen.types.road import Road
+from scenario_gen.types import Road, tokens
 
 EXPLAINED = 20  # newest plans whose lack is explained
 ROAD = ("map", "road/entries", "road/exits")

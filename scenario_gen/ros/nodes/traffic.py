@@ -43,8 +43,7 @@ from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
 from scenario_gen.ros.plumbing.topics import create_publisher, create_subscription, publish
 from scenario_gen.ros.plumbing.traffic_config import Config
 from scenario_gen.ros.plumbing.traffic_messages import encode_verdict, surroundings
-from scenario_gen.types.names import tokens
-from scenario_gen.types.road import Road
+from scenario_gen.types import Road, tokens
 
 OUTPUTS = ("/clock", "/tf", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
 LOOK_AROUND = 10  # steps between two looks at who commands the ego

@@ -18,7 +18,7 @@ from scenario_gen.ros.plumbing.inputs import refuse_damaged
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
 from scenario_gen.ros.plumbing.topics import create_subscription, Outputs
 from scenario_gen.ros.plumbing.worker import Job, Worker
-from scenario_gen.types.qos import Quality
+from scenario_gen.types import Quality
 
 REQUESTS = QoSProfile(depth=1000)  # ROS's own 10 would drop the oldest of many requests that come at once
 Result = TypeVar("Result")

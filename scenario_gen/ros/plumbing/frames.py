@@ -25,7 +25,7 @@ from scenario_gen.bags.storage.bag import bag_topics, read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 from scenario_gen.ros.plumbing.topics import create_publisher, create_subscription, publish
-from scenario_gen.types.names import tokens
+from scenario_gen.types import tokens
 
 MAP = "map"
 OWN = 100  # transforms of ours that may be underway

@@ -16,8 +16,8 @@ from msg_conventions.paths import decode_path
 from msg_conventions.roads import decode_map, decode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.errors import InputError
-from scenario_gen.template.size import MOST_SAMPLES, refuse_too_large
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.template import MOST_SAMPLES, refuse_too_large
+from scenario_gen.types import Encounter
 
 MOST_BYTES = 200 * MOST_SAMPLES  # of tracks: a sample of a vehicle takes 176 at most, and an instant 36
 

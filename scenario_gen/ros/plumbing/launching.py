@@ -117,7 +117,7 @@ def read_arguments(texts: Mapping[str, str]) -> Launch:
     _check_places(launch)
     for end in ("starts", "goals"):
         if launch.value(end):
-            from scenario_gen.types.request import read_states  # loads the stages, which takes seconds
+            from scenario_gen.types import read_states  # loads the stages, which takes seconds
 
             read_states(str(launch.value(end)), end)
     return launch

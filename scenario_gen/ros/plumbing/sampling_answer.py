@@ -15,16 +15,12 @@ from msg_conventions.topics import vehicle_topic
 from scenario_gen.bags.recordings.provenance import parameter_texts, versions
 from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.base.parameters import parameter
-from scenario_gen.method.checked import sample_checked
+from scenario_gen.method.evaluation import MEASURES
 from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import PlanningConfig
-from scenario_gen.method.sampling import SamplingConfig
+from scenario_gen.method.sampling import Callbacks, sample_scenarios, SamplingConfig
 from scenario_gen.method.validity import Limits
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.names import tokens
-from scenario_gen.types.request import Request
-from scenario_gen.types.scenario import BoundaryStates, EgoSlot, Scenario, ScenarioSet
+from scenario_gen.types import BoundaryStates, EgoSlot, Encounter, GenerationResult, Request, Scenario, ScenarioSet, tokens
 
 Answer = tuple[GenerationResult, RequestSummary]  # what a request came to; its scenarios are published by then
 Send = Callable[[str, bytes], None]  # of topic and CDR bytes
@@ -130,20 +126,20 @@ def answer_request(
 
     hashes = template_hashes(messages)
     out = _Messages(encounter, road.frame_id, request, node, hashes, send)
+    callbacks = Callbacks(advance, cancelled, out.scenario)
     if config.moves:
-        from scenario_gen.method.config import PipelineConfig  # these load all stages, and few requests need them
-        from scenario_gen.method.nearest import attempt, nearest_if_impossible
+        from scenario_gen.method.attempt import Attempt  # these load all stages, and few requests need them
+        from scenario_gen.method.config import PipelineConfig
+        from scenario_gen.method.nearest import nearest_if_impossible
 
         stages = PipelineConfig(fitting=config.fitting, planning=config.planning, sampling=config.sampling, limits=config.limits)
-        given = (encounter, segmentation, road, stages, config)
-        with nearest_if_impossible(*given, count=config.count, seed=config.seed, cancelled=cancelled):
-            made = attempt(
-                *given, count=config.count, seed=config.seed, progress=advance, cancelled=cancelled, found=out.scenario
-            )
+        attempt = Attempt(encounter, segmentation, road, stages, config, config.count, config.seed)
+        with nearest_if_impossible(attempt, cancelled):
+            made = attempt.run(callbacks)
     else:
-        made = sample_checked(
+        made = sample_scenarios(
             replace(template, seed=config.seed), config.sampling, config.limits, config,
-            count=config.count, progress=advance, cancelled=cancelled, found=out.scenario,
+            count=config.count, callbacks=callbacks, measures=MEASURES,
         )  # fmt: skip
     result = made.generated
     provenance = parameter_texts(config) | versions() | hashes

@@ -18,7 +18,7 @@ from msg_conventions.topics import vehicle_topic
 from scenario_gen.closed_loop.local_map import local_map
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import Outcome
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import Floats
 from scenario_gen.ros.plumbing.ego_commands import stamp_of
 
 GRID_EVERY = 0.2  # seconds of the drive between two local maps

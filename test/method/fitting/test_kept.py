@@ -10,6 +10,7 @@ import pytest
 from reaction_scenes import crossing, lane_encounter
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import fit, fit_template, FittingConfig, LostConflictError
 from scenario_gen.method.fitting.kept import keeps_conflicts
@@ -76,10 +77,10 @@ def test_a_lost_leader_is_said_and_not_refused(place):
 
 
 def test_the_refusal_names_roads_that_keep_it():
-    config = PipelineConfig()
+    attempt = Attempt(CROSSING, SEGMENTATION, OPEN, PipelineConfig())
     with (
         pytest.raises(LostConflictError, match=r"lost\. Nearest possible: road (t_intersection|four_way)"),
-        nearest_if_impossible(CROSSING, SEGMENTATION, OPEN, config, Request(), count=1, seed=0),
+        nearest_if_impossible(attempt),
     ):
         raise LostConflictError("lost")
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from sampling_scenes import scene
 
-from scenario_gen.method.sampling import freed_states, sample_scenarios, SamplingConfig
+from scenario_gen.method.sampling import draw_scenarios, freed_states, Plan, SamplingConfig
 from scenario_gen.method.sampling.candidates import Scale
 from scenario_gen.method.sampling.freedom import CATALOGUE, cut, FADES, freedom_of, onward, OwnClock, seconds_onward
 from scenario_gen.method.sampling.pace import clock_of
@@ -33,7 +33,7 @@ def batch(count=300, request=Request(), **parameters):
     encounter, segmentation, road, routes, asked, waits = scene()
     config = replace(SamplingConfig(), **parameters)
     states = freed_states(asked, encounter, config, request)
-    model = prepare(encounter, segmentation, road, routes, states, waits, config).model
+    model = prepare(Plan(encounter, segmentation, road, routes, states, waits), config).model
     return model, model.draw(normal(count, model.size), Scale())
 
 
@@ -98,7 +98,7 @@ def test_what_is_asked_holds_and_what_is_freed_keeps_its_bounds():
     assert (states.freed[0, 0] == 0.0).all()
     assert (states.freed[0, 1] > 0.0).all()
     check = Checker(None, states, None, None).check
-    made = sample_scenarios(encounter, segmentation, road, routes, states, check, config, count=40, waits=waits, request=request)
+    made = draw_scenarios(Plan(encounter, segmentation, road, routes, states, waits), check, config, count=40, request=request)
     assert len(made.scenarios) == 40
     for scenario in made.scenarios:
         assert np.hypot(*(scenario.position[0, 0] - asked.start[0, :2])) < 0.1
@@ -117,7 +117,7 @@ def test_a_start_off_its_bounds_is_refused():
     config = SamplingConfig()
     states = freed_states(asked, encounter, config, Request())
     given = (encounter, segmentation, road, routes, states)
-    made = sample_scenarios(*given, Checker(None, states, None, None).check, config, count=20, waits=waits)
+    made = draw_scenarios(Plan(*given, waits), Checker(None, states, None, None).check, config, count=20)
     assert len(made.scenarios) == 20
     tight = replace(states, freed=0.0 * states.freed)
     verdicts = Checker(None, tight, None, None).check(made.scenarios)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from reaction_scenes import answering, crossing, lane_encounter, wander
 
+from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.evaluation.interaction import following, yielding
-from scenario_gen.method.nearest import attempt
-from scenario_gen.method.sampling import kept_reactions, regenerate, SamplingConfig
+from scenario_gen.method.sampling import kept_reactions, Plan, plan_of, regenerate, SamplingConfig
 from scenario_gen.method.sampling.candidates import Scale
 from scenario_gen.method.sampling.joint import advance, lateness, Mixing
 from scenario_gen.method.sampling.prepare import prepare
@@ -35,15 +35,15 @@ def case(request):
     road, segmentation = build_road("corridor", encounter, CONFIG.road), segment(encounter, CONFIG.segmentation, 1)
 
     def made(config=CONFIG, count=40):
-        return attempt(encounter, segmentation, road, config, Request(), count=count, seed=1)
+        return Attempt(encounter, segmentation, road, config, count=count, seed=1).run()
 
     return encounter, made, made(), made(FREE)
 
 
 def model_of(encounter, result):
     waits = waits_to_keep(encounter, result.segmentation)
-    given = (encounter, result.segmentation, result.road, result.routes, result.fit.asked, waits, CONFIG.sampling)
-    return prepare(*given).model
+    plan = Plan(encounter, result.segmentation, result.road, result.routes, result.fit.asked, waits)
+    return prepare(plan, CONFIG.sampling).model
 
 
 def test_roots_keep_their_numbers_and_the_others_are_gaussian_with_the_stated_residual(case):
@@ -105,18 +105,16 @@ def test_what_is_published_answers_as_the_template_does(case):
 
 
 def test_a_scenario_comes_again_by_its_index(case):
-    encounter, _, made, _ = case
+    _, _, made, _ = case
     for scenario in made.generated.scenarios[3:6]:
-        again = regenerate(
-            encounter, made.segmentation, made.road, made.routes, made.fit.asked, CONFIG.sampling, seed=1, index=scenario.index,
-            waits=waits_to_keep(encounter, made.segmentation),
-        )  # fmt: skip
+        plan = plan_of(made, CONFIG.sampling, Request())
+        again = regenerate(plan, CONFIG.sampling, seed=1, index=scenario.index)
         assert np.array_equal(again.position, scenario.position) and np.array_equal(again.speed, scenario.speed)
 
 
 def test_nobody_is_made_to_wait_where_another_order_is_asked_for():
-    assert kept_reactions(CROSSING, CONFIG.sampling) is not None
-    assert kept_reactions(CROSSING, CONFIG.sampling, "free") is None
-    assert kept_reactions(CROSSING, CONFIG.sampling, "swap") is None
-    assert kept_reactions(LANE, CONFIG.sampling, "free") is not None
-    assert kept_reactions(LANE, SamplingConfig(reactions="none")) is None
+    assert kept_reactions(CROSSING, CONFIG.sampling).edges
+    assert kept_reactions(CROSSING, CONFIG.sampling, "free").edges == ()
+    assert kept_reactions(CROSSING, CONFIG.sampling, "swap").edges == ()
+    assert kept_reactions(LANE, CONFIG.sampling, "free").edges
+    assert kept_reactions(LANE, SamplingConfig(reactions="none")).edges == ()

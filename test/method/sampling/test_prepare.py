@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import uniform_changepoints
-from scenario_gen.method.nearest import plan
 from scenario_gen.method.routing.distance import distances_to_line
 from scenario_gen.method.sampling.candidates import Scale
+from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
 from scenario_gen.template.interaction import find_waits
 from scenario_gen.types.encounter import Encounter, Vehicle
-from scenario_gen.types.request import Request
 
 DT = 0.1
 CONFIG = PipelineConfig()
@@ -60,8 +60,8 @@ def rolls_out():
 def undisturbed(encounter, segmentation):
     """The drive without deviations on the own road, and what was adapted."""
     road = build_road("corridor", encounter, CONFIG.road)
-    planned = plan(encounter, segmentation, road, CONFIG, Request(), 0)
-    done = prepare(encounter, segmentation, road, planned.routes, planned.fit.asked, find_waits(encounter), NARROW)
+    planned = Attempt(encounter, segmentation, road, CONFIG).plan()
+    done = prepare(Plan(encounter, segmentation, road, planned.routes, planned.fit.asked, find_waits(encounter)), NARROW)
     return done.model.draw(np.zeros((1, done.model.size)), Scale()).scenarios(0, [0], "map")[0], done.adaptations, planned
 
 

@@ -11,7 +11,7 @@ import pytest
 from scenario_gen.logs import read_log
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
-from scenario_gen.method.sampling import regenerate, sample_scenarios, SamplingConfig
+from scenario_gen.method.sampling import draw_scenarios, Plan, regenerate, SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
@@ -38,8 +38,8 @@ def test_recorded_encounter(data, case, ablation):
     routes = plan_routes(road, fit)
     conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading)
     checker, config = Checker(road, fit.asked, conflicts, waits), SamplingConfig(variety="narrow")
-    given = (encounter, segmentation, road, routes, fit.asked)
-    found = sample_scenarios(*given, checker.check, config, count=30, seed=2, waits=waits)
+    plan = Plan(encounter, segmentation, road, routes, fit.asked, waits)
+    found = draw_scenarios(plan, checker.check, config, count=30, seed=2)
     assert len(found.scenarios) == 30
     assert found.acceptance > 0.7
     assert found.candidates == 30 + found.refused.total()
@@ -52,6 +52,6 @@ def test_recorded_encounter(data, case, ablation):
             stood = (encounter.speed[wait.vehicle, inside] <= STAND_SPEED).sum() * encounter.dt
             assert (s.speed[wait.vehicle] == 0.0).sum() * 0.1 > 0.7 * stood
             assert (s.speed[wait.vehicle] < WAIT_SPEED).sum() * 0.1 > 0.7 * (wait.end - wait.start)
-    again = regenerate(*given, config, seed=2, index=found.scenarios[-1].index, waits=waits)
+    again = regenerate(plan, config, seed=2, index=found.scenarios[-1].index)
     assert again.position.tobytes() == found.scenarios[-1].position.tobytes()
     assert again.speed.tobytes() == found.scenarios[-1].speed.tobytes()

@@ -25,15 +25,14 @@ from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
+from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
-from scenario_gen.method.nearest import attempt
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.report.page import render, ReportInput, write_report
 from scenario_gen.output.review.evaluation import bag_results
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
-from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import Cause, ScenarioSet
 
 QUICK = EvaluationConfig(resamples=50)
@@ -44,7 +43,7 @@ def real_run():
     (encounter,) = read_log([bundled("c")]).encounters
     config = PipelineConfig()
     road = build_road("straight", encounter, config.road)
-    return attempt(encounter, segment(encounter, config.segmentation, 7), road, config, Request(), count=3, seed=7)
+    return Attempt(encounter, segment(encounter, config.segmentation, 7), road, config, count=3, seed=7).run()
 
 
 def test_the_figures_survive_the_bag(tmp_path):

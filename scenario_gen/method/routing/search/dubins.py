@@ -10,8 +10,7 @@ Source: Dubins 1957; the closed forms are those of Shkel & Lumelsky 2001.
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.numerics.kernels import F, kernel, OUT1
 
 LSL, RSR, LSR, RSL, RLR, LRL = 0, 1, 2, 3, 4, 5

@@ -10,11 +10,9 @@ from typing import Protocol
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, frozen
-from scenario_gen.roads.clearance import segments_free
-from scenario_gen.roads.connectivity import common_component
-from scenario_gen.types.road import Road
+from scenario_gen.numerics import exact, Floats, frozen
+from scenario_gen.roads import common_component, segments_free
+from scenario_gen.types import Road
 
 
 class BlockedError(RefusedError):

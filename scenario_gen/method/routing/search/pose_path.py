@@ -23,7 +23,7 @@ from scenario_gen.method.routing.search.pose_tree import (  # fmt: skip
 from scenario_gen.method.routing.search.sweep import follow, scratch_rows
 from scenario_gen.method.routing.search.tree_nodes import BOUND, CONNECTION, LINK2, Links, NODES_A, PARENT, PARTNER, X, Y
 from scenario_gen.method.routing.search.tree_samples import Random, RandomState, uniform
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F, F2, I, I1, I2, kernel, OUT1, OUT2
 
 

@@ -41,8 +41,7 @@ from scenario_gen.method.routing.search.tree_nodes import (  # fmt: skip
     ZETA,
 )
 from scenario_gen.method.routing.search.tree_samples import Random, RandomState, uniform
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.numerics.kernels import F2, I, I1, I2, kernel, OUT1, OUT2, OUTI1
 
 YAW, WORD, PART_A, PART_B, PART_C = 4, 5, 6, 7, 8

@@ -14,11 +14,9 @@ from scenario_gen.method.routing.search import tree_nodes as trees
 from scenario_gen.method.routing.search.planner import Budget, BudgetSpentError, check_query, path_length, Plan, Query
 from scenario_gen.method.routing.search.shortcut import pull_string
 from scenario_gen.method.routing.search.tree_kernels import grow
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.roads.clearance import clearance_in_cells, to_cells, to_metres
-from scenario_gen.roads.connectivity import component_cells
-from scenario_gen.types.road import Road
+from scenario_gen.numerics import exact, Floats
+from scenario_gen.roads import clearance_in_cells, component_cells, to_cells, to_metres
+from scenario_gen.types import Road
 
 OCCUPANCY = 32  # nodes per bucket at which its side is halved
 ROOM = 4  # times the nodes there are: what a new pool holds

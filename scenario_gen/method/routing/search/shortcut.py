@@ -8,10 +8,9 @@ vertex out; slide it along one of its edges as far as its other neighbour can se
 between its neighbours. Where none helps the string is string_pulled.
 """
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.numerics.kernels import F, F2, I, kernel, OUT2
-from scenario_gen.roads.clearance import segment_free
+from scenario_gen.roads import segment_free
 
 BISECTIONS = 14  # of an edge, per pass; later passes refine
 

@@ -12,11 +12,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from scenario_gen.method.routing.search.dubins import shortest, TURNS
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.numerics.kernels import F, F2, I2, kernel, OUT2
-from scenario_gen.roads.clearance import clearance_in_cells, CONTACT, to_cells
-from scenario_gen.types.road import Road
+from scenario_gen.roads import clearance_in_cells, CONTACT, to_cells
+from scenario_gen.types import Road
 
 SWEEP = 0.2  # [m] between two poses that are compared with the grid
 FEELERS = 6  # most discs that cover a footprint

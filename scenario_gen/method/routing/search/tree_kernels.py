@@ -40,10 +40,9 @@ from scenario_gen.method.routing.search.tree_nodes import (  # fmt: skip
     ZETA,
 )
 from scenario_gen.method.routing.search.tree_samples import detour, next_sample, Random, RandomState
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.numerics.kernels import F2, I, I1, kernel, OUT1, OUT2, OUTI1, OUTI2
-from scenario_gen.roads.clearance import free_length, segment_free
+from scenario_gen.roads import free_length, segment_free
 
 TRAPPED, ADVANCED, REACHED = 0, 1, 2
 

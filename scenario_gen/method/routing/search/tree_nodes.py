@@ -16,7 +16,7 @@ from numba import types
 import numpy as np
 from numpy.typing import NDArray
 
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F2, I, I2, kernel, OUT1, OUT2, OUTI1, OUTI2
 
 CHUNK = 32

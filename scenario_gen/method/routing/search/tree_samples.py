@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenario_gen.method.routing.search.tree_nodes import BOUND, CORNERS, DRAWN, NODES_A, NODES_B, SIDE, USED
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
 AHEAD = 8  # so many nodes per sample drawn ahead: the trees' density hardly changes within a batch

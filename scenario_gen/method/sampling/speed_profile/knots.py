@@ -14,8 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, frozen, Ints, runs
+from scenario_gen.numerics import Bools, exact, Floats, frozen, Ints, runs
 
 STAND = 0.05  # m/s; an asked speed below this is met by standing
 SHORTEST = 0.2  # s, between two knots in the template

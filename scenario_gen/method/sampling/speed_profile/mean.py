@@ -18,8 +18,7 @@ import numpy as np
 
 from scenario_gen.method.sampling.speed_profile.knots import SpeedKnots
 from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats
+from scenario_gen.numerics import Bools, exact, Floats
 from scenario_gen.numerics.exact.sparse import Columns
 
 SMOOTHING = 0.5  # s, ℓ: kinks of the lines are rounded over about this time

@@ -19,8 +19,7 @@ import numpy as np
 
 from scenario_gen.method.sampling.speed_profile.mean import Bounds, fixed_coefficients, Motion
 from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, runs
+from scenario_gen.numerics import Bools, exact, Floats, runs
 
 SHARE = 0.85  # of the template's own deviation from the mean is drawn
 PASSES = 2  # of that window: a strength that changes at once is a jerk of high frequency

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from scenario_gen.method.sampling.time_warp import SHORTEST_SHARE
-from scenario_gen.numerics.arrays import Bools, Floats, runs
-from scenario_gen.template.interaction import STAND_SPEED, Wait
-from scenario_gen.types.encounter import Encounter
+from scenario_gen.numerics import Bools, Floats, runs
+from scenario_gen.template import STAND_SPEED, Wait
+from scenario_gen.types import Encounter
 
 SHORTEST_WAIT = 1.25  # s; shorter waits are lengthened to it, so that they are still waits on the published grid
 _LEAST_WAIT = 1.15  # s, to which a fast clock may shorten one

@@ -21,7 +21,7 @@ from scenario_gen.method.segmentation.hdp_hmm.prior import sample_prior, set_pri
 from scenario_gen.method.segmentation.hdp_hmm.random import pick, State, uniform
 from scenario_gen.method.segmentation.hdp_hmm.split_merge import split_or_merge
 from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitions, log_transitions, sample_transitions
-from scenario_gen.numerics.arrays import Bools, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import B2, F1, F2, I, I1, kernel, OUT1, OUT2, OUT3, OUTI1, OUTI2
 
 TRACE = ("log_joint", "occupied", "gamma", "alpha_kappa", "rho")

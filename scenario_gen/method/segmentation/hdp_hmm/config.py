@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import Floats
 
 GAUSSIAN_DOF = 1000.0
 

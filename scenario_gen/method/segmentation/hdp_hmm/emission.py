@@ -14,8 +14,7 @@ import math
 import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.random import gamma_draw, normal, State
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
 BLOCK = 64

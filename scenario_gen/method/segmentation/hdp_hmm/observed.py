@@ -15,8 +15,7 @@ import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.emission import cholesky, square
 from scenario_gen.method.segmentation.hdp_hmm.random import log_gamma_draw, normal, State
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, Ints
+from scenario_gen.numerics import Bools, exact, Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.emission import cholesky, log_marginal, posterior_factor
 from scenario_gen.method.segmentation.hdp_hmm.random import pick, State, uniform
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
 

@@ -15,7 +15,7 @@ from scenario_gen.method.segmentation.hdp_hmm.chain import run_chain, TRACE
 from scenario_gen.method.segmentation.hdp_hmm.config import GAUSSIAN_DOF, SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.emission import accumulate, joint_prior, mean_emission, posterior_factor, square
 from scenario_gen.method.segmentation.hdp_hmm.merge import merge_states
-from scenario_gen.numerics.arrays import Bools, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import F1, F2, I, I1, kernel, OUT1, OUT2
 
 

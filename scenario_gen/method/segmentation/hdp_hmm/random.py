@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.numerics.kernels import kernel
 
 State = np.ndarray[Any, np.dtype[np.uint64]]

@@ -9,8 +9,7 @@ import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.emission import add_sample
 from scenario_gen.method.segmentation.hdp_hmm.observed import log_radial, without_hidden
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Bools, Floats, Ints
+from scenario_gen.numerics import Bools, exact, Floats, Ints
 from scenario_gen.numerics.kernels import B2, F, F1, F2, F3, I1, kernel, OUT1, OUT2
 
 LEAST_LOG = -600.0

@@ -21,8 +21,7 @@ from scenario_gen.method.segmentation.hdp_hmm.emission import (
 )
 from scenario_gen.method.segmentation.hdp_hmm.random import log_beta_draw, State, uniform
 from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitions, log_transitions
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
 ROUNDS = 2

@@ -10,8 +10,7 @@ import numpy as np
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.problem import compact, moving_mean, new_top, Place, Prior, Problem
 from scenario_gen.method.segmentation.hdp_hmm.random import pick, State, uniform
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.numerics.kernels import F2, I, kernel, OUT2, OUTI1
 
 

@@ -13,8 +13,7 @@ from scenario_gen.method.segmentation.hdp_hmm.random import (
     tables_draw,
     uniform,
 )
-from scenario_gen.numerics import exact
-from scenario_gen.numerics.arrays import Floats, Ints
+from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
 # Hyperpriors in the order of `hyper`; what follows them there is the weight of a sample, the noise's degrees of freedom (0:

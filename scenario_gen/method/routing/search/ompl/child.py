@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.method.routing.search.ompl.solve import solve
-from scenario_gen.roads.clearance import segment_free
+from scenario_gen.roads import segment_free
 
 segment_free(np.full((2, 2), 0.5), 0.5, 0.5, 0.5, 0.5, 0.0)  # load the kernel here, not in every child
 

@@ -19,9 +19,9 @@ import numpy as np
 from scenario_gen.base.errors import needs
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.routing.search.planner import Budget, BudgetSpentError, check_query, path_length, Plan, Query
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.roads.clearance import clearance_in_cells, to_cells, to_metres
-from scenario_gen.types.road import Road
+from scenario_gen.numerics import Floats
+from scenario_gen.roads import clearance_in_cells, to_cells, to_metres
+from scenario_gen.types import Road
 
 GLANCE = 0.05  # [s] between two looks at the child and at the caller's wish to cancel
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from ompl import base, geometric, util
 
-from scenario_gen.numerics.arrays import Floats
-from scenario_gen.roads.clearance import segment_free
+from scenario_gen.numerics import Floats
+from scenario_gen.roads import segment_free
 
 PLANNERS = {
     "ompl_rrt_connect": "RRTConnect",

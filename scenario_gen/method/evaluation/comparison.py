@@ -10,8 +10,7 @@ from pathlib import Path
 
 from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import InputError, reading
-from scenario_gen.types.evaluation import as_markdown, Evaluation, formatted, Interval, Metric, SCHEMA
-from scenario_gen.types.generation import WITH
+from scenario_gen.types import as_markdown, Evaluation, formatted, Interval, Metric, SCHEMA, WITH
 
 FILE_SCHEMA = {  # evaluation.json of a run, or one evaluation alone
     "type": "object",
