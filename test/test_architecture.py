@@ -78,6 +78,7 @@ LATE_OURS = {
     "cli/": "a command loads what it needs",
     "corpus/tasks.py": "in a worker, whose processes load nothing else first",
     "logs/adapters/tracks.py": "needs pyarrow",
+    "logs/read.py": "adapters need extras",
     "logs/tables.py": "needs pyarrow",
     "method/routing/plan.py": "needs ompl",
     "method/routing/search/ompl/planners.py": "needs ompl",
