@@ -12,6 +12,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.geodesy import local_frame
+from scenario_gen.logs.quality import Dropped
 from scenario_gen.logs.raw import Observations, RawLog
 from scenario_gen.numerics import Bools, exact, Floats, Ints
 
@@ -39,6 +40,10 @@ class Drops:
             self.count[reason] = self.count.get(reason, 0) + len(rows)
             self.first[reason] = min(self.first.get(reason, int(rows[0])), int(rows.min()))
 
+    def of(self, log: RawLog) -> tuple[Dropped, ...]:
+        """Return the reasons with their counts and the places in the log."""
+        return tuple(Dropped(reason, count, log.where(self.first[reason])) for reason, count in self.count.items())
+
 
 def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Drops, tuple[float, float] | None]:
     """Drop what cannot be true and bring every vehicle into the local frame.
@@ -64,8 +69,8 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Dro
     check_clock(sound, log, config)
     tracks = [without_jumps(vehicle, drops, config) for vehicle in sound]
     if config.strict and drops.count:
-        reason = next(iter(drops.count))
-        raise InputError(f"{log.where(drops.first[reason])}: {reason} ({drops.count[reason]} such rows), and strict is set")
+        worst = drops.of(log)[0]
+        raise InputError(f"{worst.first}: {worst.reason} ({worst.count} such rows), and strict is set")
     return tuple(track for track in tracks if len(track.fix_ns) >= 2), drops, origin
 
 
@@ -123,7 +128,7 @@ def time_window(sound: list[Observations], log: RawLog, drops: Drops, config: Lo
     """
     stamps = [vehicle.fix_ns for vehicle in sound if len(vehicle.fix_ns)]
     if not stamps:
-        causes = "; ".join(f"{reason}: {n}, first at {log.where(drops.first[reason])}" for reason, n in drops.count.items())
+        causes = "; ".join(map(str, drops.of(log)))
         raise InputError(
             f"{log.segments[0].label} holds no usable position among {log.rows} rows"
             + (f" ({causes})" if causes else "")

@@ -22,6 +22,9 @@ class Dropped:
     count: int
     first: str
 
+    def __str__(self) -> str:
+        return f"{self.count} × {self.reason}, first at {self.first}"
+
 
 @dataclass(frozen=True)
 class VehicleQuality:
@@ -109,7 +112,7 @@ class Quality:
     def lines(self) -> tuple[str, ...]:
         """Return the summary for people, one fact per line."""
         out = [f"{self.name}: {self.rows} rows of {len(self.vehicles)} vehicles, {len(self.encounters)} encounter(s)"]
-        out += [f"  {drop.count} × {drop.reason}, first at {drop.first}" for drop in self.dropped]
+        out += [f"  {drop}" for drop in self.dropped]
         out += [vehicle_line(vehicle) for vehicle in self.vehicles]
         for encounter in self.encounters:
             out.append(f"  encounter {encounter.name}: {encounter.seconds:.1f} s of {', '.join(encounter.vehicles)}")

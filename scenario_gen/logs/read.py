@@ -21,7 +21,7 @@ from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.encounters import Piece, pieces_of
 from scenario_gen.logs.groups import distances, find_groups, Group
-from scenario_gen.logs.quality import Dropped, EncounterQuality, find_overlaps, Quality, VehicleQuality
+from scenario_gen.logs.quality import EncounterQuality, find_overlaps, Quality, VehicleQuality
 from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
 from scenario_gen.types import cut, Encounter, Vehicle
@@ -98,7 +98,7 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     summary = Quality(
         name=log.name,
         rows=log.rows,
-        dropped=tuple(Dropped(reason, count, log.where(drops.first[reason])) for reason, count in drops.count.items()),
+        dropped=drops.of(log),
         vehicles=tuple(vehicles),
         encounters=tuple(encounter_quality(encounter) for encounter in encounters),
         notes=(*log.notes, *dict.fromkeys(notes)),
@@ -215,7 +215,7 @@ def make_encounter(
 
 def too_few(log: RawLog, names: list[str], drops: Drops) -> str:
     """Say why there are fewer than two vehicles."""
-    causes = "; ".join(f"{count} × {reason}, first at {log.where(drops.first[reason])}" for reason, count in drops.count.items())
+    causes = "; ".join(map(str, drops.of(log)))
     have = f"only vehicle {names[0]}" if names else "no vehicle"
     return (
         f"{log.segments[0].label}: {have} has usable positions; an encounter needs at least two vehicles on one clock "

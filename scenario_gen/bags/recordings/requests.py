@@ -55,7 +55,7 @@ class TrackedRequest:
         return max(0, (self.summary.published if self.summary else len(self.entries)) - self.came)
 
     def keep(self, entry: ScenarioEntry, data: bytes, seed: int, most: int) -> None:
-        """Keep a scenario; of more than `most`, drop one by lot: the same are kept for the same seed, in whatever order they come."""
+        """Keep a scenario; of more than `most`, drop one by lot, which depends on the seed and not on the order of arrival."""
         lot = digest(f"{seed} {entry.sha256}".encode())
         heapq.heappush(self.kept, (lot, entry.index, entry, data))
         if len(self.kept) > most:

@@ -56,7 +56,7 @@ class RecordedScenarios:
 
     @cached_property
     def infos(self) -> Sequence[tuple[BagMessage, tuple[Info, ...]]]:
-        """The messages of `scenarios/info`, each with its entries and summaries; damaged ones are left out (see `check_infos`)."""
+        """The messages of `scenarios/info`, each with what it holds; damaged ones are left out (see `check_infos`)."""
         return self._decoded_infos[0]
 
     @cached_property

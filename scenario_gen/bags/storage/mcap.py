@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A whole MCAP file, read strictly: what is damaged is an error."""
+"""Whole MCAP files, read strictly: damage is an error."""
 
 from collections import Counter
 from collections.abc import Collection, Iterator
@@ -31,10 +31,11 @@ from scenario_gen.bags.storage.records import (
     read_schema,
     Record,
     records,
+    StoredTopic,
     TAIL_BYTES,
 )
 
-CHUNK_HEAD_BYTES = 64  # enough for the head of a chunk, whatever its compression is called
+CHUNK_HEAD_BYTES = 64  # enough for the head of a chunk with any name of its compression
 Logged = tuple[int, int, bytes]  # stamp [ns], channel, message
 
 
@@ -69,7 +70,7 @@ Block = ChunkBlock | LooseBlock
 
 @dataclass
 class McapFile:
-    """What an MCAP file holds: schemas and channels by id, blocks of messages, and their number by channel where it says so."""
+    """The content of an MCAP file: schemas and channels by id, blocks of messages, and their number by channel if it is known."""
 
     file: BinaryIO
     allowance: Allowance
@@ -79,7 +80,7 @@ class McapFile:
     counts: dict[int, int] | None = None
 
     def take(self, record: Record) -> None:
-        """Take note of a record at the top level of the file.
+        """Add a record at the top level of the file.
 
         Raises:
             DamagedError: its content is damaged.
@@ -108,12 +109,26 @@ class McapFile:
             self.counts = Statistics.read(Fields(content(self.file, record, most), record.start)).channel_message_counts
 
     def learn(self, contents: Contents) -> None:
-        """Take the schemas and channels of a chunk."""
+        """Add the schemas and channels of a chunk."""
         self.schemas |= {schema.id: schema for schema in contents.schemas}
         self.channels |= {channel.id: channel for channel in contents.channels}
 
+    def list_topics(self) -> list[StoredTopic]:
+        """Return the channels, with their types and numbers of messages.
+
+        Raises:
+            DamagedError: a chunk is damaged.
+        """
+        self.complete()
+        found = []
+        for channel in self.channels.values():
+            kind = self.schemas[channel.schema_id].name if channel.schema_id in self.schemas else ""
+            qos, count = channel.metadata.get("offered_qos_profiles", ""), (self.counts or {}).get(channel.id, 0)
+            found.append(StoredTopic(channel.id, channel.topic, kind, qos, channel.message_encoding, count))
+        return found
+
     def complete(self) -> None:
-        """Read the chunks for channels and numbers of messages, where the file does not sum them up.
+        """Read the chunks for channels and numbers of messages, if the file has no summary of them.
 
         Raises:
             DamagedError: a chunk is damaged.
@@ -179,7 +194,7 @@ class McapFile:
 
 
 def open_mcap(file: BinaryIO, size: int, allowance: Allowance) -> McapFile:
-    """Return what an MCAP file of `size` bytes holds.
+    """Return the content of an MCAP file of `size` bytes.
 
     Raises:
         DamagedError: it is damaged, was not closed, or is no recording of ROS 2.

@@ -32,11 +32,11 @@ CHUNK = struct.Struct("<QQQI")
 FOOTER_BYTES = 20
 TAIL_BYTES = HEAD.size + FOOTER_BYTES + len(MAGIC)
 LATEST = 2**63  # rosbag2's stamps are signed
-_WINDOW = 128 * 1024**2  # zstd's own limit where no other is asked for
+_WINDOW = 128 * 1024**2  # zstd's own default
 
 
 class DamagedError(ScenarioGenError):
-    """What lies at byte `offset` of a file is no whole record; it is caught inside this package."""
+    """There is no whole record at byte `offset` of a file; caught inside this package."""
 
     def __init__(self, offset: int, problem: str) -> None:
         super().__init__(f"byte {offset}: {problem}")
@@ -55,6 +55,18 @@ class Record:
     def end(self) -> int:
         """Where the next record begins."""
         return self.start + self.length
+
+
+@dataclass(frozen=True)
+class StoredTopic:
+    """A topic in a file of any storage: its number there, name, type ("" if missing), QoS profiles, encoding, message count."""
+
+    id: int
+    name: str
+    type: str
+    qos: str
+    encoding: str
+    count: int
 
 
 class Fields(ReadDataStream):  # type: ignore[misc]  # mcap has no types
@@ -134,7 +146,7 @@ def content(file: BinaryIO, record: Record, most: int) -> bytes:
 
 @dataclass(frozen=True)
 class ChunkHead:
-    """What a Chunk record says of itself: stamps [ns], size and checksum of the records in it, and where they lie in the file."""
+    """The head of a Chunk record: stamps [ns], size and checksum of its records, and where they lie in the file."""
 
     start_ns: int
     end_ns: int
@@ -169,7 +181,7 @@ class Messages:
     lengths: Any = field(default_factory=lambda: array("Q"))
 
     def add(self, head: bytes, start: int, length: int, offset: int) -> None:
-        """Take note of a message record that begins with `head`, at `start`; `offset` is its place in the file, for messages.
+        """Add a message record that begins with `head`, at `start`; `offset` is its place in the file, for errors.
 
         Raises:
             DamagedError: it is none.
@@ -192,7 +204,7 @@ class Contents(Messages):
     data: bytes = b""
     schemas: list[Schema] = field(default_factory=list)
     channels: list[Channel] = field(default_factory=list)
-    damage: str = ""  # what ended the reading before the end of the chunk
+    damage: str = ""  # why the reading ended before the end of the chunk
 
 
 def decompress(data: bytes, head: ChunkHead, allowance: Allowance) -> bytes:

@@ -31,7 +31,7 @@ MOST_LINES = 20  # of what was lost, on a terminal
 
 @dataclass(frozen=True)
 class Reindexed:
-    """What came of it.
+    """The result of `reindex`.
 
     Attributes:
         messages: how many were saved.
@@ -46,7 +46,7 @@ class Reindexed:
     unclosed: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
-        """Say what was lost, where, and what can be done about it; nothing where nothing was."""
+        """Return what was lost, where, and what can be done about it, line by line; no line if nothing was."""
         lines = [f"{name} was not closed: what its recorder still held is not in it" for name in self.unclosed]
         for name, gap in self.gaps:
             known = f", {gap.messages} messages by its index" if gap.messages else ""
@@ -118,7 +118,7 @@ def _types(found: list[tuple[Path, Salvage]], folder: Path) -> dict[str, str]:
 
 
 def _types_in_metadata(path: Path) -> dict[str, str]:
-    """Return topic and type as far as metadata.yaml tells them; it may be damaged, too."""
+    """Return topics and types as far as metadata.yaml, which may be damaged too, names them."""
     found: dict[str, str] = {}
     try:
         listed: Any = read_yaml(path)["rosbag2_bagfile_information"]["topics_with_message_count"]
@@ -132,7 +132,7 @@ def _types_in_metadata(path: Path) -> dict[str, str]:
 
 
 def _write(bag: BagWriter, found: list[tuple[Path, Salvage]], types: dict[str, str]) -> tuple[int, Counter[str]]:
-    """Write what was found; return how many messages, and how many could not be written, by the reason."""
+    """Write the messages that were found; return how many, and how many could not be written, by the reason."""
     topics = [_announce(bag, part.whole, types) for _, part in found]
     saved, undescribed = 0, Counter[str]()
     streams = [_logged(k, path, part.whole) for k, (path, part) in enumerate(found)]
@@ -150,7 +150,7 @@ def _logged(number: int, path: Path, whole: McapFile) -> Iterator[tuple[int, Log
     try:
         for message in whole.in_order(None, strict=False):
             yield number, message
-    except DamagedError as error:  # it was whole a moment ago
+    except DamagedError as error:  # the salvage has found it whole
         raise InputError(f"{path}: changed while it was read ({error})") from error
 
 
