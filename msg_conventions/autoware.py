@@ -5,9 +5,9 @@
 
 PredictedObjects on `/perception/object_recognition/objects`, TrackedObjects on `/perception/object_recognition/tracking/objects`:
 frame: the road's; each object is posed at its shape's centre, z = half its height; twist and acceleration in its own frame;
-its id is the first 16 bytes of the SHA-256 of the vehicle's id. The one predicted path is what the vehicle will do, each
+its id is the first 16 bytes of the SHA-256 of the vehicle's id. The only predicted path holds the poses that will follow, every
 `STEP_NS` up to `HORIZON_NS` ahead or the end. Odometry of the ego on `/localization/kinematic_state`: frame: the road's, child
-frame `base_link`, the middle of the rear axle on the ground. Covariances are 0: what is said is true. QoS: reliable, volatile,
+frame `base_link`, the middle of the rear axle on the ground. Covariances are 0: the values are exact. QoS: reliable, volatile,
 depth 1.
 """
 
@@ -41,7 +41,7 @@ class AutowareEncoder:
     """Encodes a scenario's instants, one after the other."""
 
     def __init__(self, scenario: Scenario) -> None:
-        """Take the scenario; its poses and yaw rates are made ready once."""
+        """Take the scenario and compute its poses and yaw rates once."""
         self.scenario = scenario
         self.yaw_rate = np.zeros_like(scenario.heading)
         self.time_ns = np.rint(scenario.time * 1e9).astype(np.int64)
@@ -50,13 +50,13 @@ class AutowareEncoder:
             there = slice(first, last + 1)
             self.yaw_rate[n, there] = np.gradient(scenario.heading[n, there], scenario.time[there])
 
-    def there(self, k: int) -> list[int]:
+    def present_at(self, k: int) -> list[int]:
         """Return the vehicles that are present at instant `k`."""
         return [n for n, (first, last) in enumerate(self.scenario.present.tolist()) if first <= k <= last]
 
     def predicted_objects(self, k: int, stamp_ns: int) -> bytes:
         """Return instant `k` as PredictedObjects."""
-        here = self.there(k)
+        here = self.present_at(k)
         writer = CdrWriter().header(stamp_ns, self.scenario.frame_id).pack("I", len(here))
         for n in here:
             self._object(writer, n, k)
@@ -66,7 +66,7 @@ class AutowareEncoder:
 
     def tracked_objects(self, k: int, stamp_ns: int) -> bytes:
         """Return instant `k` as TrackedObjects."""
-        here = self.there(k)
+        here = self.present_at(k)
         writer = CdrWriter().header(stamp_ns, self.scenario.frame_id).pack("I", len(here))
         for n in here:
             self._object(writer, n, k)
@@ -131,7 +131,7 @@ def _kinematics(writer: CdrWriter, vehicle: Vehicle, pose: Floats, speed: float,
 
 
 def _path(writer: CdrWriter, poses: Floats) -> None:
-    """Append the one predicted path, of poses (K, 7)."""
+    """Append a single predicted path, of poses (K, 7)."""
     writer.pack("I", 1).pack("I", len(poses)).align(8).raw(poses.tobytes()).stamp(STEP_NS).pack("f", 1.0)
 
 

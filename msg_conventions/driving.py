@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A drive in closed loop ⇄ messages: what the node `traffic` says of all vehicles, and what is asked of the ego.
+"""A run in closed loop ⇄ messages: the states that the node `traffic` publishes, and the commands to the ego.
 
-Out, at every step; stamp: the drive's time (that of /clock), frame: the road's:
+Out, at every step; stamp: the run's time (that of /clock), frame: the road's:
 
 - `vehicle_<id>/odom` (nav_msgs/Odometry): child frame `vehicle_<id>`, the centre of the footprint, x ahead; twist in that frame,
   linear.x the speed [m/s], angular.z the yaw rate [rad/s]. All vehicles, the ego too. QoS: reliable, volatile, depth 100.
 - `traffic/markers` (visualization_msgs/MarkerArray): a box for each, which replaces the one before; the ego's is black.
-- `traffic/local_map` (nav_msgs/OccupancyGrid): what is drivable around the ego, with the other vehicles in it. Depth 1.
+- `traffic/local_map` (nav_msgs/OccupancyGrid): the drivable cells around the ego, with the other vehicles as obstacles. Depth 1.
 - /clock (rosgraph_msgs/Clock), /tf (frames.py), `verdicts` (diagnostic_msgs/DiagnosticArray), `ego/goal`, `ego/route`.
 
 In, for the ego; a stamp of 0 is "now":
@@ -16,7 +16,7 @@ In, for the ego; a stamp of 0 is "now":
 - `ego/cmd_vel` (geometry_msgs/Twist), `ego/cmd_vel_stamped` (TwistStamped): linear.x [m/s] to be reached as fast as the body can,
   angular.z [rad/s].
 - `ego/trajectory` (trajectory_msgs/MultiDOFJointTrajectory, conventions: trajectory.py), `ego/path` (nav_msgs/Path, the stamp of
-  each pose is its time): where the ego is to be when; the body tracks it.
+  each pose is its time): the poses that the ego's body tracks.
 - `ego/odom` (nav_msgs/Odometry): where the ego is, by another simulator.
 """
 
@@ -37,7 +37,7 @@ TWIST_TYPE, CLOCK_TYPE = "geometry_msgs/msg/Twist", "rosgraph_msgs/msg/Clock"
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """Where the ego is to be when: (T,) nanoseconds on the drive's clock, (T, 3) x, y [m], yaw [rad] in `frame_id`."""
+    """Poses for the ego to track: (T,) nanoseconds on the run's clock, (T, 3) x, y [m], yaw [rad] in `frame_id`."""
 
     time_ns: Floats
     poses: Floats
@@ -96,5 +96,5 @@ def decode_timed_path(data: bytes, what: str = "ego/path") -> Way:
 
 
 def encode_local_map(blocked: Bools, resolution: float, origin: Floats, frame_id: str, stamp_ns: int) -> bytes:
-    """Return a grid (H, W) of what is not free, with its cell size and lower-left corner (2,) [m], as an OccupancyGrid."""
+    """Return cells (H, W) that are not free, with their size and the lower-left corner (2,) [m], as an OccupancyGrid."""
     return encode_grid(np.where(blocked, OCCUPIED, 0), resolution, origin, frame_id, stamp_ns)

@@ -7,8 +7,8 @@ Start and goal belong to the request whose `scenarios/info` names the vehicle as
 last such request. Frame: the road's. Stamp: the template's, also for the goal (when it is reached stands in the witness).
 Odometry: `child_frame_id` is `vehicle_<id>`, `pose.pose` the centre of the footprint, z = 0, yaw as a quaternion,
 `twist.twist.linear.x` the speed along the heading, m/s. Covariances and all else are 0. QoS: reliable, transient_local, depth 1.
-`ego/witness` is one message per scenario, before the scenario: a trajectory of the ego on the scenario's clock, with which the
-scenario was proven valid. `ego_witness` of its `scenarios/info` is the SHA-256 of the message. QoS as that of `scenarios`.
+`ego/witness` is one message per scenario, before the scenario: a trajectory of the ego on the scenario's clock, which proves the
+scenario valid. `ego_witness` of its `scenarios/info` is the SHA-256 of the message. QoS as that of `scenarios`.
 Bags of versions before 0.6 have `ego/track` instead: one for the whole request, the vehicle's template, which may hit others.
 """
 
@@ -54,7 +54,7 @@ def ego_messages(slot: EgoSlot, frame_id: str, stamp_ns: int) -> Iterator[tuple[
 
 
 def ego_values(slot: EgoSlot | None) -> dict[str, str]:
-    """Return what `scenarios/info` says of the ego: its id, start and goal; nothing if there is none."""
+    """Return the values of `scenarios/info` about the ego: its id, start and goal; none if there is no ego."""
     if slot is None:
         return {}
     start, goal = (json.dumps([float(value) for value in state]) for state in (slot.start, slot.goal))

@@ -5,8 +5,7 @@
 
 Frame: the road's. `header.stamp`: the template's. A pose's stamp is the planned time: the template's stamp at every anchor
 (start, changepoints, end), between anchors in proportion to arc length. Equal consecutive poses are a dwell.
-QoS: reliable, transient_local, depth 1.
-Arc length does not travel; it is the sum of the chords.
+QoS: reliable, transient_local, depth 1. Arc length is not in the message; it is the sum of the chords.
 """
 
 from collections.abc import Sequence

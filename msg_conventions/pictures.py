@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What RViz and Foxglove draw: footprints (geometry_msgs/PolygonStamped) and markers (visualization_msgs/MarkerArray).
+"""Pictures for RViz and Foxglove: footprints (geometry_msgs/PolygonStamped) and markers (visualization_msgs/MarkerArray).
 
-Only for looking at; nothing is read back but the footprint. Frame: that of the vehicles drawn. QoS: reliable, transient_local.
+Only footprints are read back. Frame: that of the vehicles drawn. QoS: reliable, transient_local.
 """
 
 from collections.abc import Sequence

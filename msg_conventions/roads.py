@@ -3,11 +3,11 @@
 
 """Road ⇄ `map` (nav_msgs/OccupancyGrid) and `road/entries`, `road/exits` (geometry_msgs/PoseArray).
 
-Map: 0 free, 100 occupied, 99 occupied by something that stands on the road (an obstacle), -1
-unknown; a cell is drivable if it is known and below 65 (nav2's occupied threshold).
+Map: 0 free, 100 occupied, 99 occupied by an obstacle on the road, -1 unknown; a cell is drivable if it is
+known and below 65 (nav2's occupied threshold).
 `info.origin` is the lower-left corner of cell (0, 0), not rotated; row 0 is the lowest y. Entries head into the road, exits out
 of it. Stamp: that of the template the road was made for, or 0 for one that suits any. QoS: reliable, transient_local, depth 1.
-The road's name does not travel: nothing is computed from it.
+The road's name is not in the messages: nothing is computed from it.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Every topic of the suite: its type and its quality of service, in one table (docs/interfaces.md says the same in words)."""
+"""Every topic of the suite: its type and its quality of service, in one table (in words: docs/interfaces.md)."""
 
 import re
 
@@ -28,7 +28,7 @@ TWIST_TYPE = "geometry_msgs/msg/TwistStamped"
 
 LATCHED = Quality()
 MANY = Quality(depth=1000)
-MANY_HEARD = Quality(depth=1000, keep_all=True)  # by who must not lose any: paced publishers then wait for it
+MANY_HEARD = Quality(depth=1000, keep_all=True)  # for subscribers that must not lose any: paced publishers then wait for them
 STREAM = Quality(depth=1000, transient_local=False)
 LIVE = Quality(depth=100, transient_local=False)
 
@@ -70,8 +70,8 @@ TOPICS: dict[str, tuple[str, Quality]] = {
     "scenarios/info": (diagnostics.TYPE, MANY),
     "markers": (markers.ARRAY_TYPE, LATCHED),
     "report": (diagnostics.TYPE, LATCHED),
-    "diagnostics": (diagnostics.TYPE, Quality(depth=100)),  # of a bag written in process: one message, which is latched
-    "/diagnostics": (diagnostics.TYPE, Quality(depth=100, transient_local=False)),  # all is said again every second
+    "diagnostics": (diagnostics.TYPE, Quality(depth=100)),  # in a bag written without nodes: one message, which is latched
+    "/diagnostics": (diagnostics.TYPE, Quality(depth=100, transient_local=False)),  # all is repeated every second
     "tf": (frames.TYPE, Quality(depth=100, transient_local=False)),
     "tf_static": (frames.TYPE, LATCHED),
 }

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""XML that others wrote, read with bounds: size, elements, depth; no document types, and so no entities of a file's own."""
+"""XML of others, read with bounds: size, elements, depth; no document types, and so no entities defined in a file."""
 
 from dataclasses import dataclass, field
 import math
@@ -106,7 +106,7 @@ def read_xml(path: Path, what: str, skip: frozenset[str] = frozenset()) -> Eleme
     Args:
         path: the file.
         what: names it in messages.
-        skip: names of elements that are passed over with all they hold.
+        skip: names of elements that are passed over with their content.
 
     Raises:
         InputError: it cannot be read, is too large or deep, declares a document type, or is no XML; names line and column.
@@ -165,8 +165,8 @@ def parse_xml(data: bytes, what: str, skip: frozenset[str] = frozenset()) -> Ele
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
-        said = expat.errors.messages.get(error.code, str(error))
-        raise InputError(f"{what}, line {error.lineno}, column {error.offset + 1}: not XML ({said})") from error
-    except (ValueError, LookupError) as error:  # an encoding that Python has not
+        problem = expat.errors.messages.get(error.code, str(error))
+        raise InputError(f"{what}, line {error.lineno}, column {error.offset + 1}: not XML ({problem})") from error
+    except (ValueError, LookupError) as error:  # an encoding that Python lacks
         raise InputError(f"{what}: not XML that can be read ({error})") from error
     return root.children[0]

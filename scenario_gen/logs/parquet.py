@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Parquet through Arrow, column by column: only what is needed is read, and every kind of column is taken or refused by name.
+"""Parquet through Arrow: only needed columns are read, and every kind of column is accepted or refused by name.
 
-What pandas leaves in a file about its own types is not needed and not believed.
+The metadata of pandas in a file is ignored.
 """
 
 from collections import Counter
@@ -29,7 +29,7 @@ def read_columns(path: Path, before: int, config: LogConfig) -> tuple[pd.DataFra
     """Read the columns that are needed; `before` rows were read from other files.
 
     Returns:
-        A table of numbers and texts, and the columns with the factors to our units; those of times as Arrow says.
+        A table of numbers and texts, and the columns with the factors to our units; those of times by the type in Arrow.
 
     Raises:
         InputError: the file is damaged or too large, or a column is of no kind that its quantity can have.
@@ -76,7 +76,7 @@ def read_table(path: Path, names: list[str], before: int, config: LogConfig) -> 
 
 
 def read_batches(path: Path, schema: pa.Schema, names: list[str], before: int, config: LogConfig) -> list[Any]:
-    """Read some columns batch by batch; texts as dictionaries, so that one that repeats takes its room once.
+    """Read some columns batch by batch; texts as dictionaries, so that repeated ones are stored once.
 
     Raises:
         InputError: the file is damaged or too large.

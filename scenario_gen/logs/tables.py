@@ -20,7 +20,7 @@ from scenario_gen.numerics import Floats, Ints
 PARQUET = (".parquet", ".pq")
 LONGEST = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
 LONGEST_NUMBER = 300  # characters
-LARGEST = 100.0  # m: what is longer is no vehicle
+LARGEST = 100.0  # m: no vehicle is longer
 EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime of SPMD counts microseconds from there
 COLUMNS = (  # of a basic safety message in the files of the Safety Pilot Model Deployment
     *("RxDevice", "FileId", "TxDevice", "Gentime", "TxRandom", "MsgCount", "DSecond", "Latitude", "Longitude", "Elevation"),
@@ -102,7 +102,7 @@ def read_text(path: Path, before: int, config: LogConfig, **options: Any) -> pd.
 
 
 def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> pd.DataFrame:
-    """Return the needed columns in our units; what is not a number becomes NaN. Stamps become integer nanoseconds.
+    """Return the needed columns in our units; texts that are no numbers become NaN. Stamps become integer nanoseconds.
 
     Raises:
         InputError: a column is of no kind that the quantity can have.
@@ -127,14 +127,14 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
 
 
 def reals(values: "pd.Series[Any]") -> "pd.Series[float]":
-    """Numbers, or texts that are numbers, as float64; NaN where they are none."""
+    """Return numbers, or texts that are numbers, as float64; NaN where they are none."""
     if not pd.api.types.is_numeric_dtype(values):
         values = values.where(values.astype(str).str.len() < LONGEST_NUMBER)  # pandas fails on a number beyond float64
     return pd.to_numeric(values, errors="coerce").astype(float)
 
 
 def vehicle_name(value: Any) -> str:
-    """A vehicle's name as text: 17, 17.0 and "17" are the same vehicle."""
+    """Return a vehicle's name as text: 17, 17.0 and "17" are the same vehicle."""
     if pd.isna(value):
         return ""
     if isinstance(value, float) and value.is_integer():
@@ -143,7 +143,7 @@ def vehicle_name(value: Any) -> str:
 
 
 def nanoseconds(values: "pd.Series[Any]", factor: float) -> tuple["pd.Series[int]", "pd.Series[bool]"]:
-    """Stamps as integer nanoseconds, `LONGEST` where they are beyond it, and which of them are numbers (or dates) at all.
+    """Return stamps as integer nanoseconds, `LONGEST` where they are beyond it, and which of them are numbers (or dates) at all.
 
     Args:
         values: numbers, or texts that are numbers or dates.
@@ -183,7 +183,7 @@ def from_frame(frame: pd.DataFrame, paths: Sequence[Path], segments: tuple[Segme
 
 
 def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> Observations:
-    """One vehicle's rows as observations; a row is both a fix and a speed."""
+    """Return one vehicle's rows as observations; a row is both a fix and a speed."""
 
     def column(quantity: str) -> Floats:
         return group[quantity].to_numpy(float) if quantity in group else np.full(len(group), np.nan)

@@ -82,7 +82,11 @@ class Fields(ReadDataStream):  # type: ignore[misc]  # mcap has no types
         self._size, self._offset = len(data), offset
 
     def read(self, length: int) -> bytes:
-        """Return the next bytes."""
+        """Return the next bytes.
+
+        Raises:
+            DamagedError: so many are not left.
+        """
         left = self._size - self.count
         if length > left:
             raise DamagedError(self._offset + self.count, f"{length} bytes are announced where {left} are left")
@@ -94,7 +98,11 @@ class Fields(ReadDataStream):  # type: ignore[misc]  # mcap has no types
         return self.decoded(self.read(self.read4()))
 
     def decoded(self, data: bytes) -> str:
-        """Return the text of bytes that were just read."""
+        """Return the text of bytes that were just read.
+
+        Raises:
+            DamagedError: it is not UTF-8.
+        """
         try:
             return data.decode()
         except UnicodeDecodeError:

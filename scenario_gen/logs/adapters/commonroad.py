@@ -34,7 +34,7 @@ _SKIPPED = frozenset(("lanelet", "trafficSign", "trafficLight", "intersection", 
 
 
 def is_commonroad(path: Path) -> bool:
-    """Return whether a file's name and beginning say CommonRoad."""
+    """Return whether a file is CommonRoad by its name and beginning."""
     if path.suffix.lower() != ".xml":
         return False
     with path.open("rb") as file:
@@ -88,7 +88,7 @@ def _observations(obstacle: Element, states: list[Element], step: float, row: in
 
 
 def _state(state: Element) -> tuple[float, float, float, float, float]:
-    """Steps, x, y, heading, speed; NaN for heading and speed where they are not said."""
+    """Return steps, x, y, heading, speed; NaN for heading and speed where they are missing."""
     point = state.first("position", "point") or state.first("position", "rectangle", "center")
     if point is None:
         raise InputError(f"{state.place} has no position that is a point")
