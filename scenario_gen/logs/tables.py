@@ -26,6 +26,13 @@ COLUMNS = (  # of a basic safety message in the files of the Safety Pilot Model 
     *("RxDevice", "FileId", "TxDevice", "Gentime", "TxRandom", "MsgCount", "DSecond", "Latitude", "Longitude", "Elevation"),
     *("Speed", "Heading", "Ax", "Ay", "Az", "Yawrate", "PathCount", "RadiusOfCurve", "Confidence"),
 )
+QUANTITIES = {
+    "vehicle": Column("TxDevice"),
+    "lat": Column("Latitude"),
+    "lon": Column("Longitude"),
+    "speed": Column("Speed"),
+    "heading": Column("Heading", math.pi / 180.0, clockwise=True),
+}
 
 
 def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> RawLog:
@@ -211,20 +218,9 @@ def read_messages(path: Path, before: int, config: LogConfig) -> pd.DataFrame:
             f"{path} has {raw.shape[1]} columns on line 1; basic safety messages have {len(COLUMNS)}: {', '.join(COLUMNS)}"
         )
     raw.columns = pd.Index(COLUMNS)
-
-    def numbers(name: str) -> "pd.Series[float]":
-        return reals(raw[name])
-
-    stamps = numbers("Gentime")  # microseconds stay exact in float64 until the year 2289
-    known = stamps.notna() & (stamps.abs() < 8e15)
-    return pd.DataFrame(
-        {
-            "time": stamps.where(known, 0.0).round().astype(np.int64) * 1000 + EPOCH_NS,
-            "time_ok": known,
-            "vehicle": numbers("TxDevice").map(vehicle_name),
-            "lat": numbers("Latitude"),
-            "lon": numbers("Longitude"),
-            "speed": numbers("Speed"),
-            "heading": math.pi / 2.0 - np.radians(numbers("Heading")),
-        }
-    )
+    raw["TxDevice"] = reals(raw["TxDevice"])
+    frame = to_numbers(raw, QUANTITIES, path)
+    stamps = reals(raw["Gentime"])  # microseconds stay exact in float64 until the year 2289
+    frame["time_ok"] = stamps.notna() & (stamps.abs() < 8e15)
+    frame["time"] = stamps.where(frame["time_ok"], 0.0).round().astype(np.int64) * 1000 + EPOCH_NS
+    return frame
