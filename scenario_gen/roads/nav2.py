@@ -62,7 +62,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _number(path: Path, content: dict[Any, Any], key: str, low: float, high: float, default: float | None = None) -> float:
-    value = content.get(key, default)
+    value: Any = content.get(key, default)
     if not _is_number(value):
         raise InputError(f"map {path}: key {key} is {shown(value)}; a number is needed")
     if not low <= value <= high:
