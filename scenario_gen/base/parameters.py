@@ -34,7 +34,7 @@ def parameter(
         low: least value, None for no bound.
         high: largest value, None for no bound.
         choices: the texts allowed, none for any.
-        was: its name in the version before this one, which is still taken, with a warning.
+        was: its name in the version before this one, which is still accepted, with a warning.
     """
     meta = {"meaning": meaning, "unit": unit, "low": low, "high": high, "choices": choices, "was": was}
     return field(default=default, metadata=meta)
@@ -42,7 +42,7 @@ def parameter(
 
 @dataclass(frozen=True)
 class Parameters:
-    """Base of every configuration: its values are checked when it is made.
+    """Base of every configuration: its values are checked when it is created.
 
     Raises:
         InputError: a value has the wrong type or is out of range.
@@ -141,7 +141,7 @@ def assigned(config: Config, assignment: str) -> Config:
 
 
 def loaded(config: Config, path: Path) -> Config:
-    """Return a copy of `config` with what a parameter file sets.
+    """Return a copy of `config` with the values of a parameter file.
 
     Raises:
         InputError: the file cannot be read, a name is unknown or a value does not suit; the message names file and parameter.
