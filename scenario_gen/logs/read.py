@@ -14,6 +14,7 @@ import numpy as np
 
 from scenario_gen.bags.storage.files import files_of
 from scenario_gen.base.errors import guarded, InputError, needs, reading
+from scenario_gen.base.registry import Registry
 from scenario_gen.logs.adapters import commonroad
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.cleaning import clean, Drops
@@ -27,7 +28,6 @@ from scenario_gen.types import cut, Encounter, Vehicle
 
 TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
 SPMD_FIELDS = 19  # of a line; `tables.COLUMNS` names them
-Reader = Callable[[Sequence[Path], LogConfig], RawLog]
 
 
 @dataclass(frozen=True)
@@ -267,51 +267,75 @@ def is_known(path: Path, name: str) -> bool:
     return recognised(path) == name
 
 
-PUBLIC = ("argoverse2", "interaction", "ind", "highd")
-ACCEPTS: dict[str, Callable[[Path], bool]] = {  # asked in this order: a headerless table is SPMD
-    "bag": is_bag,
-    "commonroad": is_commonroad,
-    "spmd": is_spmd,
-    **{name: partial(is_known, name=name) for name in PUBLIC},
-    "table": is_table,
-}
+def _read_bag(paths: Sequence[Path], config: LogConfig) -> RawLog:
+    needs("bags", "lz4", "mcap", "rosbags", "zstandard")
+    from scenario_gen.logs import bag
+
+    return bag.read(paths, config)
 
 
-def reader(name: str) -> Reader:
-    """Return the reader of a format; its libraries are loaded only now, for each takes up to a second."""
-    if name == "bag":
-        needs("bags", "lz4", "mcap", "rosbags", "zstandard")
-        from scenario_gen.logs import bag
+def _read_public(paths: Sequence[Path], config: LogConfig, name: str) -> RawLog:
+    from scenario_gen.logs.adapters import tracks
 
-        return bag.read
-    if name == "commonroad":
-        return commonroad.read
-    if name in PUBLIC:
-        from scenario_gen.logs.adapters import tracks
+    return tracks.read(paths, config, name=name)
 
-        return partial(tracks.read, name=name)
+
+def _read_table(paths: Sequence[Path], config: LogConfig, *, spmd: bool) -> RawLog:
     from scenario_gen.logs import tables
 
-    return partial(tables.read, spmd=name == "spmd")
+    return tables.read(paths, config, spmd=spmd)
+
+
+@dataclass(frozen=True)
+class LogFormat:
+    """A format of logs; what its reader imports is loaded when it reads, for each library takes up to a second.
+
+    Attributes:
+        accepts: whether a file (or a bag's folder) is of this format, by its name and first bytes; it never fails on others.
+        read: returns the log in files of which each was accepted, or for which `format` names this format. It raises
+            InputError, naming file and row, where they cannot be read, and keeps `size_limit`, `row_limit` and `vehicle_limit`.
+    """
+
+    accepts: Callable[[Path], bool]
+    read: Callable[[Sequence[Path], LogConfig], RawLog]
+
+
+FORMATS = Registry[LogFormat](
+    "scenario_gen.logs",
+    {  # tried in this order: a headerless table is SPMD
+        "bag": LogFormat(is_bag, _read_bag),
+        "commonroad": LogFormat(is_commonroad, commonroad.read),
+        "spmd": LogFormat(is_spmd, partial(_read_table, spmd=True)),
+        **{
+            name: LogFormat(partial(is_known, name=name), partial(_read_public, name=name))
+            for name in ("argoverse2", "interaction", "ind", "highd")
+        },
+        "table": LogFormat(is_table, partial(_read_table, spmd=False)),
+    },
+    LogFormat,
+)
+"""The formats of logs by name; `config.FORMATS` repeats the names of the built-in ones."""
 
 
 def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
-    """Read one log from files or a folder with the first reader that accepts all of them.
+    """Read one log from files or a folder in the first format that accepts all of them; those of plugins come last.
 
     Raises:
         InputError: nothing is there, no reader accepts it, or the one that does cannot read it.
     """
     with guarded(str(paths[0]), OSError):  # no permission, a name too long, a file that goes away
         files = [file for path in paths for file in present(path)]
-        formats = ACCEPTS if config.format == "auto" else {config.format: lambda _: True}
-        name = next((name for name, accepts in formats.items() if all(accepts(file) for file in files)), "")
-    if not name:
+        if config.format == "auto":
+            found = next((known for known in FORMATS.values() if all(known.accepts(file) for file in files)), None)
+        else:
+            found = FORMATS[config.format]
+    if found is None:
         raise InputError(
             f"{paths[0]} is none of the known logs: {', '.join(TABLES)} tables and SPMD files, "
             "CommonRoad scenarios, rosbag2 folders, .mcap, .db3; set the parameter format if its name misleads"
         )
     with reading(files[0]):
-        return reader(name)(files, config)
+        return found.read(files, config)
 
 
 def present(path: Path) -> list[Path]:

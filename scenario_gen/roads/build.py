@@ -5,12 +5,15 @@
 
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError, reading, RefusedError
+from scenario_gen.base.registry import Registry
 from scenario_gen.roads.builtin import BUILT_IN, draw, draw_corridor, draw_paper, junction_centre, layout_for
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.nav2 import read_map
@@ -26,7 +29,7 @@ from scenario_gen.roads.shaped import (
     PLAIN_LINE,
 )
 from scenario_gen.roads.vector.read import is_vector_map, READERS, vector_road
-from scenario_gen.template import clean_tracks, main_line, mirrored, own_paths, refuse_too_large, to_frenet, Track, traffic_side
+from scenario_gen.template import clean_tracks, main_line, mirrored, own_paths, refuse_too_large, to_frenet, traffic_side
 from scenario_gen.types import Encounter, MIRRORED, Road
 
 
@@ -34,9 +37,9 @@ def build_road(name_or_path: str, encounter: Encounter | None = None, config: Ro
     """Return the road `name_or_path`, with the obstacles of `config` drawn into it.
 
     Args:
-        name_or_path: `straight`, `curve`, `t_intersection`, `four_way`, `merge`, `roundabout`, `corridor`, or the path of a
-            nav2 map_server YAML,
-            or of a vector map (.osm, .xodr, .xml), of which `#box=x0,y0,x1,y1`, `#lanelet=ID` or `#junction=ID` chooses a part.
+        name_or_path: `straight`, `curve`, `t_intersection`, `four_way`, `merge`, `roundabout`, `corridor`, a road of an
+            installed package (see `ROADS`), or the path of a nav2 map_server YAML, or of a vector map (.osm, .xodr, .xml), of
+            which `#box=x0,y0,x1,y1`, `#lanelet=ID` or `#junction=ID` chooses a part.
         encounter: the template, to which built-in roads are sized (None: plain sizes), and for which the best place on a vector
             map is searched; `corridor` cannot do without.
         config: how it is drawn.
@@ -96,36 +99,33 @@ def _on_other_side(encounter: Encounter, road: Road) -> bool:
 
 
 def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfig) -> Road:
-    if name_or_path in BUILT_IN:
-        if config.paper:
-            if name_or_path not in ("straight", "t_intersection"):
-                raise InputError(f"road {name_or_path} has no paper version; choose straight or t_intersection")
-            return draw_paper(name_or_path, config)
-        return _built_in(name_or_path, None if encounter is None else clean_tracks(encounter), config)
-    if name_or_path == "corridor":
-        if encounter is None:
-            raise InputError("road corridor is drawn around a template; give a log too")
-        return draw_corridor(own_paths(encounter).tracks, config)
     if is_vector_map(name_or_path):
         return vector_road(name_or_path, None if encounter is None else clean_tracks(encounter), config)
     path = Path(name_or_path)
-    if path.suffix.lower() not in (".yaml", ".yml"):
-        names = ", ".join((*BUILT_IN, "corridor"))
+    if path.suffix.lower() in (".yaml", ".yml"):
+        with reading(path):
+            return read_map(path, config)
+    if name_or_path not in ROADS:
+        names = ", ".join(ROADS.names())
         kinds = f"a map_server YAML file or a vector map ({', '.join(READERS)})"
         part = "; one part behind one # can be named of a vector map alone" if "#" in name_or_path else ""
         raise InputError(f"road {shown(name_or_path, 200)!r} is neither one of {names} nor the path of {kinds}{part}")
-    with reading(path):
-        return read_map(path, config)
+    return ROADS[name_or_path](encounter, config)
 
 
-def _built_in(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -> Road:
-    """A built-in road in plain sizes, or shaped to a template."""
-    if tracks is None:
+def _built_in(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
+    """A built-in road as in the paper, in plain sizes, or shaped to a template."""
+    if config.paper:
+        if name not in ("straight", "t_intersection"):
+            raise InputError(f"road {name} has no paper version; choose straight or t_intersection")
+        return draw_paper(name, config)
+    if encounter is None:
         if name == "curve":
             return draw_along(name, PLAIN_LINE, max(config.lanes, 1), config)
         if name == "roundabout":
             return draw_roundabout(None, np.zeros(2), config)
         return draw_merge(None, None, config) if name == "merge" else draw(name, layout_for(name, None, config), config)
+    tracks = clean_tracks(encounter)
     config = fitting_width(tracks, config)
     if name == "roundabout":
         return draw_roundabout(tracks, junction_centre(tracks), config)
@@ -142,3 +142,30 @@ def _built_in(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -
     if bends(name, main_line(frenet, tracks)):
         return draw_bent(name, tracks, frenet.spread(), config)
     return draw(name, layout_for(name, tracks, config), config)
+
+
+def _corridor(encounter: Encounter | None, config: RoadConfig) -> Road:
+    if encounter is None:
+        raise InputError("road corridor is drawn around a template; give a log too")
+    return draw_corridor(own_paths(encounter).tracks, config)
+
+
+class DrawRoad(Protocol):
+    """What a road's name stands for: draws the road, for a template if there is one."""
+
+    def __call__(self, encounter: Encounter | None, config: RoadConfig, /) -> Road:
+        """Return the road, without obstacles, whose `name` is the one by which it was chosen.
+
+        Args:
+            encounter: the template, to which the road is sized; None: in plain sizes.
+            config: how roads are drawn; it should keep lane width, resolution and traffic side.
+
+        Raises:
+            InputError: it cannot be drawn without a template, or with these parameters.
+            RefusedError: it cannot be drawn for this template.
+        """
+        ...
+
+
+ROADS = Registry[DrawRoad]("scenario_gen.roads", {**{name: partial(_built_in, name) for name in BUILT_IN}, "corridor": _corridor})
+"""The roads by name."""

@@ -5,10 +5,11 @@
 
 from scenario_gen.method.evaluation.bootstrap import Bootstrap, wilson
 from scenario_gen.method.evaluation.compare import compare, comparison_table, Difference, read_evaluations
+from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.coverage import coverage_of
 from scenario_gen.method.evaluation.criticality import criticality
 from scenario_gen.method.evaluation.dtw import Alignment, dtw, dtw_distance, feature_matrix, mean_feature
-from scenario_gen.method.evaluation.evaluate import evaluate, evaluate_scenarios, EvaluationConfig, MEASURED
+from scenario_gen.method.evaluation.evaluate import evaluate, evaluate_scenarios, MEASURED
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.method.evaluation.measures import MEASURES
 from scenario_gen.method.evaluation.motion import at_common, at_count, at_period, Motion
