@@ -6,6 +6,7 @@
 import ast
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
+import importlib
 from pathlib import Path
 import re
 import subprocess
@@ -16,12 +17,77 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "scenario_gen"
 
-# The data flow, first to last: a room is a folder of scenario_gen, a stage a folder or a module of scenario_gen/method.
-ROOMS = ("base", "numerics", "types", "bags", "logs", "template", "roads", "method", "pipeline")
-ORDER = (*ROOMS, "output", "closed_loop", "corpus", "ros", "cli", "__main__")
-STAGES = ("segmentation", "fitting", "routing", "validity", "sampling", "evaluation", "config", "attempt", "nearest")
-RANK = {name: rank for rank, name in enumerate(ORDER)}
-STAGE_RANK = {name: rank for rank, name in enumerate(STAGES)}
+# The data flow, first to last: a room is a folder or a module of scenario_gen. What each imports, besides the foundation.
+FOUNDATION = {"base", "numerics", "types"}
+ROOMS = {
+    "base": set(),
+    "numerics": set(),
+    "types": set(),
+    "bags": set(),
+    "logs": {"bags"},
+    "template": set(),
+    "roads": {"logs", "template"},
+    "method": {"bags", "logs", "roads", "template"},
+    "pipeline": {"method", "roads"},
+    "output": {"bags", "logs", "method", "pipeline", "roads", "template"},
+    "closed_loop": {"bags", "method", "output", "roads", "template"},
+    "corpus": {"bags", "logs", "method", "output", "roads", "template"},
+    "ros": {"bags", "closed_loop", "logs", "method", "pipeline", "roads", "template"},
+    "cli": {"bags", "closed_loop", "corpus", "logs", "method", "output", "pipeline", "roads", "ros"},
+    "__main__": {"cli"},
+}
+# The same of the stages, folders or modules of scenario_gen/method: what one makes, `pipeline` hands to the next.
+STAGES = {
+    "segmentation": set(),
+    "fitting": set(),
+    "routing": set(),
+    "validity": set(),
+    "sampling": {"validity"},
+    "evaluation": set(),
+    "config": {"segmentation", "fitting", "routing", "validity", "sampling", "evaluation"},
+    "attempt": {"config", "fitting", "routing", "sampling", "evaluation"},
+    "nearest": {"attempt", "segmentation", "fitting", "sampling"},
+}
+# Rooms and stages that others enter by their packages alone; behind the door stand what an extra brings, and what is slow.
+DOORS = {"types", "template", "roads", "logs", *(f"method.{stage}" for stage in STAGES)}
+BESIDE_THE_DOOR = {
+    "logs.tables": "needs pandas",
+    "method.validity.collision": "kernels, named by what they prove",
+    "method.validity.containment": "kernels, named by what they prove",
+}
+# What may be imported inside a function: extras and what takes long to load, and modules of ours that load such.
+LATE = {
+    "arviz",
+    "dask",
+    "distributed",
+    "duckdb",
+    "jsonschema",
+    "multiprocessing",
+    "ompl",
+    "pandas",
+    "pyarrow",
+    "rclpy",
+    "rich",
+    "rosbags",
+    "sklearn",
+    "std_msgs",
+    "yaml",
+}
+LATE_OURS = {
+    "__main__.py": "a command loads what it needs",
+    "cli/": "a command loads what it needs",
+    "corpus/tasks.py": "in a worker, whose processes load nothing else first",
+    "logs/adapters/tracks.py": "needs pyarrow",
+    "logs/read.py": "adapters need extras",
+    "logs/tables.py": "needs pyarrow",
+    "method/routing/search/ompl/planners.py": "needs ompl",
+    "ros/plumbing/doctor.py": "the standard library alone must do for it",
+    "ros/plumbing/launching.py": "launch files must be read in no time",
+    "ros/plumbing/ros_parameters.py": "loads all stages, which a node does without",
+    "ros/plumbing/sampling_answer.py": "loads all stages, and few requests need them",
+    "ros/plumbing/start.py": "loads rclpy",
+    "ros/plumbing/topics.py": "loads rclpy",
+}
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])
 
 
@@ -52,28 +118,70 @@ def stage(path: Path) -> str:
     return path.relative_to(PACKAGE / "method").parts[0].removesuffix(".py")
 
 
-def test_every_room_and_stage_has_a_place_in_the_order():
-    assert {room(path) for path in PACKAGE.rglob("*.py")} - {"__init__"} == set(ORDER)
-    assert {stage(path) for path in (PACKAGE / "method").rglob("*.py")} - {"__init__"} == set(STAGES)
-
-
-def test_a_room_imports_only_what_stands_before_it():
+def test_every_room_imports_what_the_table_says_and_nothing_behind_it():
+    found: dict[str, set[str]] = {name: set() for name in ROOMS}
     for path in (path for path in PYTHON_FILES if PACKAGE in path.parents and room(path) != "__init__"):
-        for name in imported(path):
-            parts = name.split(".")
-            if parts[0] == "scenario_gen" and len(parts) > 1 and parts[1] in RANK:
-                assert RANK[parts[1]] <= RANK[room(path)], f"{path} imports {name}"
+        names = {name.split(".")[1] for name in imported(path) if name.startswith("scenario_gen.")}
+        found[room(path)] |= (names & set(ROOMS)) - {room(path)}
+    order = list(ROOMS)
+    assert all(order.index(other) < order.index(name) for name, others in found.items() for other in others)
+    assert {name: others - FOUNDATION for name, others in found.items()} == ROOMS
 
 
-def test_a_stage_of_the_method_imports_only_what_stands_before_it():
-    for path in (PACKAGE / "method").rglob("*.py"):
-        for name in imported(path):
-            parts = name.split(".")
-            if parts[:2] == ["scenario_gen", "method"] and len(parts) > 2:
-                assert STAGE_RANK[parts[2]] <= STAGE_RANK[stage(path)], f"{path} imports {name}"
+def test_every_stage_imports_what_the_table_says_and_nothing_behind_it():
+    found: dict[str, set[str]] = {name: set() for name in STAGES}
+    for path in (path for path in (PACKAGE / "method").rglob("*.py") if stage(path) != "__init__"):
+        parts = [name.split(".") for name in imported(path)]
+        found[stage(path)] |= {part[2] for part in parts if part[:2] == ["scenario_gen", "method"] and len(part) > 2}
+    order = list(STAGES)
+    assert all(order.index(other) <= order.index(name) for name, others in found.items() for other in others)
+    assert {name: others - {name} for name, others in found.items()} == STAGES
 
 
-FOUNDATION = ("base", "numerics", "types")  # of scenario_gen, for the conventions
+def door(name: str) -> str:
+    """Return the room or stage with a door that a module stands in, "" if there is none."""
+    parts = name.split(".")[1:] if name.startswith("scenario_gen.") else []
+    own = ".".join(parts[: 2 if parts[:1] == ["method"] else 1])
+    return own if own in DOORS else ""
+
+
+def test_rooms_and_stages_are_entered_by_their_doors():
+    modules = {module(path) for path in PYTHON_FILES}
+    used = set()
+    for path in (path for path in PYTHON_FILES if path != PACKAGE / "__init__.py"):
+        for name in modules_imported(path, modules):
+            entered = door(name)
+            package, _, last = name.rpartition(".")
+            is_public = package == f"scenario_gen.{entered}" and last in importlib.import_module(package).__all__
+            if entered and entered != door(module(path)) and name != f"scenario_gen.{entered}" and not is_public:
+                assert name.removeprefix("scenario_gen.") in BESIDE_THE_DOOR, f"{path} imports {name}"
+                used.add(name.removeprefix("scenario_gen."))
+    assert used == set(BESIDE_THE_DOOR)
+
+
+def imports_in_functions(path: Path) -> set[str]:
+    """Return the modules that are imported inside functions of a file."""
+    functions = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)]
+    found: set[str] = set()
+    for node in (node for function in functions for node in ast.walk(function)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found.add(node.module)
+    return found
+
+
+def test_functions_import_extras_and_what_is_slow_to_load_alone():
+    used = set()
+    for path in PYTHON_FILES:
+        name = path.relative_to(PACKAGE if PACKAGE in path.parents else ROOT).as_posix()
+        for imported_name in imports_in_functions(path):
+            if imported_name.split(".")[0] in LATE:
+                continue
+            own = [known for known in LATE_OURS if name.startswith(known)]
+            assert own and imported_name.startswith("scenario_gen"), f"{name} imports {imported_name} inside a function"
+            used.add(own[0])
+    assert used == set(LATE_OURS)
 
 
 def test_the_conventions_stand_on_the_types_and_below_bags_and_nodes():
@@ -81,7 +189,7 @@ def test_the_conventions_stand_on_the_types_and_below_bags_and_nodes():
     for path in PYTHON_FILES:
         names = [name.split(".") for name in imported(path)]
         if PACKAGE not in path.parents:
-            assert {parts[1] for parts in names if parts[0] == "scenario_gen" and len(parts) > 1} <= set(FOUNDATION), path
+            assert {parts[1] for parts in names if parts[0] == "scenario_gen" and len(parts) > 1} <= FOUNDATION, path
         elif room(path) not in ("bags", "ros"):
             assert "msg_conventions" not in {parts[0] for parts in names}, path
 

@@ -25,8 +25,7 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge, Runner
 from scenario_gen.method.evaluation import wilson
-from scenario_gen.types import Interval, Road, Scenario, token
-from scenario_gen.types.ego import together
+from scenario_gen.types import Interval, join_ego, Road, Scenario, token
 
 MakePlanner = Callable[[], Planner]
 
@@ -126,7 +125,7 @@ def trial_of(name: str, scenario: Scenario, entry: ScenarioEntry | None, road: R
     Raises:
         InputError: naming `where`, there is no such vehicle, the scenario was made for another, or the witness is missing.
     """
-    return Trial(name, together(scenario), _ego_of(scenario, entry.ego if entry else "", ego, where), road)
+    return Trial(name, join_ego(scenario), _ego_of(scenario, entry.ego if entry else "", ego, where), road)
 
 
 def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:

@@ -11,8 +11,7 @@ import numpy as np
 import shapely
 
 from scenario_gen.numerics import exact, Floats
-from scenario_gen.types import Encounter
-from scenario_gen.types.presence import together
+from scenario_gen.types import Encounter, together
 
 
 @dataclass(frozen=True)

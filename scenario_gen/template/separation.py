@@ -13,8 +13,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.template.tracks import clean_tracks, presence_of, Track
-from scenario_gen.types import Encounter, once_per_encounter, Vehicle
-from scenario_gen.types.presence import together
+from scenario_gen.types import Encounter, once_per_encounter, together, Vehicle
 
 _ROUNDS = 400
 _ALONG = 0.3  # how readily a vehicle is set forward or back on its path

@@ -5,14 +5,15 @@
 
 from scenario_gen.types.body import height, is_truck, rear_axle, shifted, WHEELBASE
 from scenario_gen.types.coverage import Coverage, Spread
-from scenario_gen.types.ego import split_off, with_witness
+from scenario_gen.types.ego import join_ego, split_off, with_witness
 from scenario_gen.types.encounter import Encounter, once_per_encounter, Tracks, Vehicle
 from scenario_gen.types.evaluation import as_markdown, CheckCounts, Evaluation, formatted, Interval, Metric, Row, SCHEMA, TEMPLATE
 from scenario_gen.types.fit import Fit, FittedVehicle, Loss
 from scenario_gen.types.generation import ERRORS, GenerationResult, NARROW, ORACLE, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.lanes import Lane, LaneNetwork, MIRRORED
+from scenario_gen.types.measures import Measure, Measures
 from scenario_gen.types.names import token, tokens, vehicle_index
-from scenario_gen.types.presence import ALWAYS, always, at_ends, canonical_presence, cut, mask
+from scenario_gen.types.presence import ALWAYS, always, at_ends, canonical_presence, cut, mask, together
 from scenario_gen.types.qos import Quality
 from scenario_gen.types.reaction import FOLLOW, NOT_KEPT, Reaction, ReactionGraph, YIELD, yielders_of
 from scenario_gen.types.request import ENDS, ORDERS, read_states, Request, State
@@ -26,9 +27,9 @@ __all__ = [
     "ALWAYS", "COARSEST", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "MIRRORED", "NARROW", "NOT_KEPT", "ORACLE",
     "ORDERS", "SCHEMA", "TEMPLATE", "UNIFORM", "UNITS", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates", "Cause",
     "CheckCounts", "Coverage", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle", "GenerationResult", "Interval",
-    "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Metric", "Pair", "Quality", "Reached", "Reaction", "ReactionGraph",
-    "Request", "Road", "Route", "Row", "Scenario", "ScenarioSet", "Segmentation", "Spread", "State", "Target", "Tracks",
-    "Vehicle", "Verdict", "Violation", "always", "as_markdown", "at_ends", "canonical_presence", "cut", "formatted", "height",
-    "is_truck", "mask", "once_per_encounter", "read_states", "rear_axle", "routes_in_words", "shifted", "split_off", "token",
-    "tokens", "vehicle_index", "with_witness", "yielders_of",
+    "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair", "Quality", "Reached",
+    "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "Scenario", "ScenarioSet", "Segmentation", "Spread",
+    "State", "Target", "Tracks", "Vehicle", "Verdict", "Violation", "always", "as_markdown", "at_ends", "canonical_presence",
+    "cut", "formatted", "height", "is_truck", "join_ego", "mask", "once_per_encounter", "read_states", "rear_axle",
+    "routes_in_words", "shifted", "split_off", "together", "token", "tokens", "vehicle_index", "with_witness", "yielders_of",
 ]  # fmt: skip

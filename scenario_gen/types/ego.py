@@ -29,7 +29,7 @@ def with_witness(scenario: Scenario, index: int) -> Scenario:
     return replace(others, time=others.time[:last], **arrays, witness=witness)
 
 
-def together(scenario: Scenario) -> Scenario:
+def join_ego(scenario: Scenario) -> Scenario:
     """Return a scenario and its witness as one of all vehicles, the witness last; the same where there is no witness."""
     witness = scenario.witness
     if witness is None:

@@ -22,7 +22,7 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.template.answers import conflict_of, lag_behind, time_gaps
-from scenario_gen.types.ego import together, with_witness
+from scenario_gen.types.ego import join_ego, with_witness
 
 CONFIG = PipelineConfig()
 FAR = Pose(1e4, 1e4, 0.0, 0.0)
@@ -60,7 +60,7 @@ def test_a_yielder_among_the_others_waits_for_one_that_the_ego_holds_up(led, sha
     """The ego is the one ahead: as a vehicle of the scenario, and in its slot with the witness beside it."""
     early = 0
     for scenario in led:
-        driven = together(with_witness(scenario, 2)) if slot else scenario
+        driven = join_ego(with_witness(scenario, 2)) if slot else scenario
         own = lag_behind(driven, conflict_of(driven, 1, 0))
         for facts, kept in ((driven.facts, True), ({}, False)):
             loop = ClosedLoop(replace(driven, facts=facts), "3")

@@ -28,7 +28,7 @@ OF_TARGETS = {
     "vector_map_xml": ("roads/vector/commonroad.py",),
     "parameters": ("base/parameters.py",),
     "library": ("method/segmentation/library.py",),
-    "evaluation_json": ("method/evaluation/compare.py", "types/evaluation.py"),
+    "evaluation_json": ("method/evaluation/comparison.py", "types/evaluation.py"),
     "batch": ("corpus/find.py",),
     "corpus": ("corpus/encounters.py",),
     "archive": ("corpus/messages.py",),

@@ -1,139 +1,222 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Counts of one or more trees of the project, as a Markdown table; `make counts` writes it into docs/architecture.md.
+"""Counts of the working tree as Markdown tables; `make counts` writes them into docs/architecture.md.
 
-    python counts.py [--write PAGE] [NAME=]COMMIT ...        the working tree comes last
+    python counts.py [--write PAGE]
 
-What is counted, of scenario_gen/ and msg_conventions/:
-
-* files: those that end with .py;
-* code lines: lines with a token that is no comment, outside of docstrings;
-* median: code lines of the file in the middle;
-* containers: dataclasses that carry a generation from stage to stage, that is, have three or more of PARTS among their fields,
-  or two of them one of which is such a container (a list of whole generations is none);
-* arrows: ordered pairs (A, B) of folders of scenario_gen of which A imports B, at any depth and for type checkers too;
-* both ways: those pairs whose inverse is an arrow too.
+* code lines: lines with a token that is no comment, outside docstrings, of scenario_gen/ and msg_conventions/;
+* rooms: folders of scenario_gen, msg_conventions, and modules of the root;
+* arrows: ordered pairs (A, B) of rooms of which A imports B, at any depth; up: B stands behind A in the order of
+  test_architecture.py; mutual: pairs whose inverse is an arrow too;
+* floors: rooms of the longest chain of imports;
+* parameters: of functions outside numba kernels, `self` and `cls` included.
 """
 
 import argparse
 import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache, cached_property
 import io
 from pathlib import Path
 import re
-import statistics
-import subprocess
-import tarfile
-import tempfile
 import tokenize
 
 ROOT = Path(__file__).resolve().parents[2]
+MARKS = ("<!-- counts -->\n", "<!-- end of counts -->\n")
 BLANK = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-PARTS = ("Encounter", "Segmentation", "Road", "Fit", "Route", "ScenarioSet")
-MARKS = ("<!-- counts -->\n", "<!-- end of counts -->\n")
+MOST_PARAMETERS, MOST_LINES = 8, 60
+BEFORE = {  # of commit 4ef626c
+    "code lines": "36,446",
+    "lines": "57,722",
+    "modules at the root; folders beside them": "23; 21",
+    "files of the nodes": "35",
+    "import arrows; up or mutual": "330; 8",
+    f"functions of more than {MOST_PARAMETERS} parameters": "12",
+    f"functions of more than {MOST_LINES} lines": "20",
+    "imports inside functions": "131",
+}
 
 
-def code_lines(text: str) -> int:
-    """Return the number of lines that hold code: no docstring, no comment, not blank."""
-    docstrings: set[int] = set()
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
-            docstrings |= set(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
-    lines: set[int] = set()
-    for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type not in BLANK:
-            lines |= set(range(token.start[0], token.end[0] + 1))
-    return len(lines - docstrings)
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A file: its room and its text."""
+
+    path: Path
+    room: str
+    text: str
+
+    @cached_property
+    def nodes(self) -> tuple[ast.AST, ...]:
+        """All nodes of its tree, the module first."""
+        return tuple(ast.walk(ast.parse(self.text)))
+
+    @property
+    def functions(self) -> Iterator[ast.FunctionDef]:
+        """All functions, at any depth."""
+        return (node for node in self.nodes if isinstance(node, ast.FunctionDef))
+
+    @cached_property
+    def code_lines(self) -> int:
+        """The number of lines that hold code: no docstring, no comment, not blank."""
+        docstrings: set[int] = set()
+        for node in self.nodes:
+            if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+                docstrings |= set(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
+        lines: set[int] = set()
+        for token in tokenize.generate_tokens(io.StringIO(self.text).readline):
+            if token.type not in BLANK:
+                lines |= set(range(token.start[0], token.end[0] + 1))
+        return len(lines - docstrings)
 
 
-def containers(texts: list[str]) -> list[str]:
-    """Return the names of the dataclasses that carry a generation."""
-    parts = {name: {name} for name in PARTS}
-    types: dict[str, set[str]] = {}
-    for node in (node for text in texts for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ClassDef)):
-        if any("dataclass" in ast.unparse(one) for one in node.decorator_list):
-            annotations = " ".join(ast.unparse(one.annotation) for one in node.body if isinstance(one, ast.AnnAssign))
-            types[node.name] = types.get(node.name, set()) | set(re.findall(r"\w+", annotations))
-    found: list[str] = []
-    while more := [name for name, held in types.items() if name not in parts and len(carried(held, parts)) >= 3]:
-        parts |= {name: carried(types[name], parts) for name in more}
-        found += more
-    return sorted(found)
+@cache
+def sources() -> tuple[Source, ...]:
+    """Return all files of the package and the conventions."""
+    found = []
+    for path in sorted([*ROOT.glob("scenario_gen/**/*.py"), *ROOT.glob("msg_conventions/**/*.py")]):
+        parts = path.relative_to(ROOT).parts
+        text = path.read_text(encoding="utf-8")
+        room = parts[0] if parts[0] != "scenario_gen" else parts[1].removesuffix(".py")
+        found.append(Source(path, room, text))
+    return tuple(found)
 
 
-def carried(types: set[str], parts: dict[str, set[str]]) -> set[str]:
-    """Return the parts of a generation that fields of these types bring."""
-    named = types & set(parts)
-    return {part for name in named for part in parts[name]} if len(named) > 1 else set()
-
-
-def arrows(tree: Path) -> set[tuple[str, str]]:
-    """Return which folders of scenario_gen import which, at any depth of their code."""
-    package = tree / "scenario_gen"
-    folders = {path.name for path in package.iterdir() if path.is_dir()}
+def arrows() -> set[tuple[str, str]]:
+    """Return which rooms import which."""
+    rooms = {source.room for source in sources()}
     found = set()
-    for path in package.rglob("*.py"):
-        own = path.relative_to(package).parts[0].removesuffix(".py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for source in sources():
+        for node in source.nodes:
+            names: list[str] = []
             if isinstance(node, ast.ImportFrom) and node.module:
                 names = [f"{node.module}.{alias.name}" for alias in node.names]
-            else:
-                names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-            parts = [name.split(".") for name in names]
-            found |= {(own, part[1]) for part in parts if part[0] == "scenario_gen" and len(part) > 1 and part[1] in folders}
-    return {(a, b) for a, b in found if a in folders and a != b}
+            elif isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            for parts in (name.split(".") for name in names):
+                room = parts[0] if parts[0] == "msg_conventions" else ".".join(parts[1:2])
+                if parts[0] in ("scenario_gen", "msg_conventions") and room in rooms and room != source.room:
+                    found.add((source.room, room))
+    return found
 
 
-def counts(tree: Path) -> dict[str, str]:
-    """Return the figures of a tree, by name."""
-    texts = [
-        path.read_text(encoding="utf-8") for part in ("scenario_gen", "msg_conventions") for path in (tree / part).rglob("*.py")
+def floors(pairs: set[tuple[str, str]]) -> int:
+    """Return the number of rooms in the longest chain of imports."""
+
+    @cache
+    def height(room: str) -> int:
+        return 1 + max((height(b) for a, b in pairs if a == room), default=0)
+
+    return max(height(room) for room, _ in pairs)
+
+
+def is_kernel(function: ast.FunctionDef) -> bool:
+    """Whether numba compiles it."""
+    return any("kernel" in ast.unparse(one) or "njit" in ast.unparse(one) for one in function.decorator_list)
+
+
+def parameters(function: ast.FunctionDef) -> int:
+    """Return the number of its parameters."""
+    given = function.args
+    return len(given.posonlyargs) + len(given.args) + len(given.kwonlyargs)
+
+
+def named(source: Source, function: ast.FunctionDef) -> str:
+    """Return a function's module and name."""
+    return f"`{source.path.relative_to(ROOT / 'scenario_gen').with_suffix('')}: {function.name}`"
+
+
+def crowded() -> list[str]:
+    """Return the functions outside kernels with too many parameters."""
+    return [
+        f"{named(source, one)} {parameters(one)}"
+        for source in sources()
+        for one in source.functions
+        if parameters(one) > MOST_PARAMETERS and not is_kernel(one)
     ]
-    lines = [code_lines(text) for text in texts]
-    carriers = containers(texts)
-    pairs = arrows(tree)
+
+
+def long() -> list[str]:
+    """Return the functions that are too long."""
+    return [
+        f"{named(source, one)} {length}"
+        for source in sources()
+        for one in source.functions
+        if (length := (one.end_lineno or 0) - one.lineno) > MOST_LINES
+    ]
+
+
+def late_imports() -> int:
+    """Return the number of imports inside functions."""
+    spans = {source: [(one.lineno, one.end_lineno or 0) for one in source.functions] for source in sources()}
+    return sum(
+        any(first < node.lineno <= last for first, last in spans[source])
+        for source in sources()
+        for node in source.nodes
+        if isinstance(node, ast.Import | ast.ImportFrom)
+    )
+
+
+def totals() -> dict[str, str]:
+    """Return the figures of the whole."""
+    root = [source for source in sources() if source.path.parent == ROOT / "scenario_gen"]
+    folders = [path for path in (ROOT / "scenario_gen").iterdir() if path.is_dir() and not path.name.startswith("_")]
+    nodes = [source for source in sources() if source.room == "ros"]
+    pairs = arrows()
     return {
-        "files": f"{len(texts):,}",
-        "code lines": f"{sum(lines):,}",
-        "median code lines of a file": f"{statistics.median(lines):g}",
-        "containers of a generation": f"{len(carriers)} ({', '.join(carriers)})",
-        "import arrows between folders": str(len(pairs)),
-        "arrows that go both ways": str(sum((b, a) in pairs for a, b in pairs)),
+        "code lines": f"{sum(source.code_lines for source in sources()):,}",
+        "lines": f"{sum(len(source.text.splitlines()) for source in sources()):,}",
+        "modules at the root; folders beside them": f"{len(root)}; {len(folders)}",
+        "files of the nodes": str(len(nodes)),
+        "floors": str(floors(pairs)),
+        "import arrows; up or mutual": f"{len(pairs)}; {sum((b, a) in pairs for a, b in pairs)}",
+        f"functions of more than {MOST_PARAMETERS} parameters": str(len(crowded())),
+        f"functions of more than {MOST_LINES} lines": str(len(long())),
+        "imports inside functions": str(late_imports()),
     }
 
 
-def of_commit(commit: str) -> dict[str, str]:
-    """Return the figures of a commit of this repository."""
-    archive = subprocess.run(
-        ["git", "archive", commit, "scenario_gen", "msg_conventions"], cwd=ROOT, check=True, capture_output=True
-    ).stdout
-    with tempfile.TemporaryDirectory() as folder, tarfile.open(fileobj=io.BytesIO(archive)) as packed:
-        packed.extractall(folder, filter="data")
-        return counts(Path(folder))
-
-
-def table(columns: dict[str, dict[str, str]]) -> str:
-    """Return the figures, one column for each tree."""
-    lines = [f"| | {' | '.join(columns)} |", "|---|" + "---|" * len(columns)]
-    lines += [f"| {name} | {' | '.join(column[name] for column in columns.values())} |" for name in next(iter(columns.values()))]
+def tables() -> str:
+    """Return all tables."""
+    lines = ["| | 4ef626c | now |", "|---|---|---|"]
+    lines += [f"| {name} | {BEFORE.get(name, '–')} | {value} |" for name, value in totals().items()]
+    lines += ["", f"More than {MOST_PARAMETERS} parameters: {', '.join(crowded()) or 'none'}.", ""]
+    lines += [f"More than {MOST_LINES} lines: {', '.join(long()) or 'none'}.", ""]
+    pairs = arrows()
+    lines += ["| room | files | code lines | imports |", "|---|---|---|---|"]
+    for room in sorted({source.room for source in sources()} - {"__init__"}):
+        own = [source for source in sources() if source.room == room]
+        behind = ", ".join(sorted(b for a, b in pairs if a == room))
+        lines.append(f"| `{room}` | {len(own)} | {sum(source.code_lines for source in own):,} | {behind} |")
+    pages = [*sorted((ROOT / "docs").glob("*.md")), ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+    words = {page.name: len(re.findall(r"\w+", without_tables(page.read_text(encoding="utf-8")))) for page in pages}
+    lines += ["", f"Words by page ({sum(words.values()):,}): {', '.join(f'{name} {n:,}' for name, n in words.items())}."]
     return "\n".join(lines) + "\n"
 
 
-def main() -> None:
-    """Print the table, or put it between its marks in a page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("commits", nargs="*", metavar="[NAME=]COMMIT")
-    parser.add_argument("--write", type=Path)
-    asked = parser.parse_args()
-    columns = {text.rpartition("=")[0] or text: of_commit(text.rpartition("=")[2]) for text in asked.commits}
-    said = table(columns | {"this version": counts(ROOT)})
-    if asked.write is None:
-        print(said, end="")
-        return
-    page = asked.write.read_text(encoding="utf-8")
+def without_tables(page: str) -> str:
+    """Return a page without these tables, whose words are not written by anybody."""
     before, _, rest = page.partition(MARKS[0])
-    asked.write.write_text(before + MARKS[0] + said + MARKS[1] + rest.partition(MARKS[1])[2], encoding="utf-8")
+    return before + rest.partition(MARKS[1])[2]
+
+
+def written(page: str) -> str:
+    """Return a page with the tables between their marks."""
+    before, _, rest = page.partition(MARKS[0])
+    return before + MARKS[0] + tables() + MARKS[1] + rest.partition(MARKS[1])[2]
+
+
+def main() -> None:
+    """Print the tables, or put them between their marks in a page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--write", type=Path)
+    page = parser.parse_args().write
+    if page is None:
+        print(tables(), end="")
+    else:
+        page.write_text(written(page.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
 from scenario_gen.template.interaction import find_conflicts, waits_to_keep
-from scenario_gen.types.ego import together, with_witness
+from scenario_gen.types.ego import join_ego, with_witness
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import BoundaryStates, Scenario
@@ -29,7 +29,7 @@ def test_of_two_vehicles_one_is_left(chain, plain, ego):
     whole = answer(chain, Request(), count=5).generated
     for one, all_of_it in zip(made.scenarios, whole.scenarios, strict=True):
         assert one.index == all_of_it.index, "the model of all vehicles is drawn and checked, then parted"
-        assert encode_scenario(together(one), 0) == encode_scenario(together(with_witness(all_of_it, index)), 0)
+        assert encode_scenario(join_ego(one), 0) == encode_scenario(join_ego(with_witness(all_of_it, index)), 0)
     assert [v.id for s in made.scenarios for v in s.vehicles] == ["2" if ego == "1" else "1"] * 5
     asked = plain.fit.asked
     for s in made.scenarios:
@@ -64,9 +64,9 @@ def test_parted_and_together_again():
     whole = Scenario(tuple(map(Vehicle, "abc")), time, position, *rest, present=np.array([[0, 30], [5, 49], [2, 40]]))
     parted = with_witness(whole, 1)
     assert len(parted.time) == 41 and [v.id for v in parted.vehicles] == ["a", "c"]
-    back = together(parted)
+    back = join_ego(parted)
     assert [v.id for v in back.vehicles] == ["a", "c", "b"]
-    assert encode_scenario(together(with_witness(back, 1)), 0) == encode_scenario(together(with_witness(whole, 2)), 0)
+    assert encode_scenario(join_ego(with_witness(back, 1)), 0) == encode_scenario(join_ego(with_witness(whole, 2)), 0)
     assert np.array_equal(back.time, whole.time) and np.array_equal(back.present[[0, 2, 1]], whole.present)
     assert np.array_equal(back.position[[0, 2, 1]], whole.position)
 
@@ -90,7 +90,7 @@ def test_the_others_stay_valid_among_themselves(data, ego):
     everybody = Checker.of_template(encounter, chain.road, outcome.fit.asked, kept_waits)
     order = [*kept, ego]
     place = np.argsort(order).tolist()
-    for scenario in map(together, outcome.generated.scenarios):
+    for scenario in map(join_ego, outcome.generated.scenarios):
         arrays = {name: getattr(scenario, name)[place] for name in ("position", "heading", "speed", "acceleration", "present")}
         whole = replace(scenario, vehicles=tuple(scenario.vehicles[k] for k in place), **arrays)
         assert everybody.check([whole])[0].valid, "the witness is certified together with the others"

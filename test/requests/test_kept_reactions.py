@@ -17,7 +17,7 @@ from scenario_gen.method.validity import Limits
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
-from scenario_gen.types.ego import together
+from scenario_gen.types.ego import join_ego
 from scenario_gen.types.reaction import FOLLOW
 from scenario_gen.types.request import Request
 
@@ -41,7 +41,7 @@ def wholes(result):
     """The scenarios with their witnesses, vehicles in the template's order."""
     ids = [vehicle.id for vehicle in result.encounter.vehicles]
     found = []
-    for scenario in map(together, result.generated.scenarios):
+    for scenario in map(join_ego, result.generated.scenarios):
         rows = [[vehicle.id for vehicle in scenario.vehicles].index(known) for known in ids]
         arrays = {name: getattr(scenario, name)[rows] for name in ("position", "heading", "speed", "acceleration", "present")}
         found.append(replace(scenario, vehicles=tuple(scenario.vehicles[row] for row in rows), **arrays))

@@ -19,7 +19,7 @@ from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate
-from scenario_gen.types.ego import together
+from scenario_gen.types.ego import join_ego
 from scenario_gen.types.request import Request
 from scenario_gen.types.target import read_targets
 
@@ -96,7 +96,7 @@ def test_each_comes_again_bit_for_bit_and_is_valid(chain, request_, tmp_path):
     (found,) = validate_bag(bag)
     assert found.scenarios == 3 and not found.invalid
     if request_.target:
-        assert all(LOW <= measure(together(one), "pet") <= HIGH for one in made.generated.scenarios)
+        assert all(LOW <= measure(join_ego(one), "pet") <= HIGH for one in made.generated.scenarios)
 
 
 def test_another_order_is_named_and_only_then_allowed(chain, tmp_path):

@@ -4,7 +4,7 @@
 """DTW features (paper V-B), realism and criticality."""
 
 from scenario_gen.method.evaluation.bootstrap import Bootstrap, wilson
-from scenario_gen.method.evaluation.compare import compare, comparison_table, Difference, read_evaluations
+from scenario_gen.method.evaluation.comparison import compare, comparison_table, Difference, read_evaluations
 from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.coverage import coverage_of
 from scenario_gen.method.evaluation.criticality import criticality

@@ -13,8 +13,7 @@ from scenario_gen.method.evaluation.evaluate import measured
 from scenario_gen.method.evaluation.measures import figures_of, most_critical, PairFigures
 from scenario_gen.numerics import Floats
 from scenario_gen.template import manoeuvre_of
-from scenario_gen.types import Coverage, Encounter, Scenario, Spread
-from scenario_gen.types.ego import together
+from scenario_gen.types import Coverage, Encounter, join_ego, Scenario, Spread
 
 EDGES = (0.0, 0.5, 1.0, 2.0, 4.0)  # s of PET
 BINS = ("below 0 s", "0 … 0.5 s", "0.5 … 1 s", "1 … 2 s", "2 … 4 s", "4 s and more", "no crossing")
@@ -36,7 +35,7 @@ def coverage_of(encounter: Encounter, scenarios: Sequence[Scenario]) -> Coverage
     or, if nobody crosses, the least gap; most typical the one nearest to the medians of the set, each figure in units of its
     spread; most different the one farthest from the template.
     """
-    whole = [together(one) for one in measured(scenarios)]
+    whole = [join_ego(one) for one in measured(scenarios)]
     each = [figures_of(one) for one in whole]
     rows = [_row(one, most_critical(figures)) for one, figures in zip(whole, each, strict=True)]
     template = _row(encounter, most_critical(figures_of(encounter)))

@@ -28,10 +28,9 @@ import numpy as np
 
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.method.evaluation.motion import at_period, Motion
-from scenario_gen.method.sampling import Measures
 from scenario_gen.numerics import exact
 from scenario_gen.template import Conflict, pair_conflict
-from scenario_gen.types import Encounter, Pair, Scenario
+from scenario_gen.types import Encounter, Measures, Pair, Scenario
 
 PERIOD = 0.1  # s
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints
-from scenario_gen.types import ALWAYS, always, Encounter, mask, Scenario, Vehicle
-from scenario_gen.types.presence import together
+from scenario_gen.types import ALWAYS, always, Encounter, mask, Scenario, together, Vehicle
 
 COMMON = 1.0
 """Seconds that two vehicles must be there together to be compared."""

@@ -5,7 +5,7 @@
 
 from scenario_gen.method.sampling.checked import checker_of, plan_of, sample_scenarios
 from scenario_gen.method.sampling.config import SamplingConfig
-from scenario_gen.method.sampling.directed import Measures, TargetError
+from scenario_gen.method.sampling.directed import TargetError
 from scenario_gen.method.sampling.freedom import freed_states
 from scenario_gen.method.sampling.gp import Features, Observations, Posterior, Regression
 from scenario_gen.method.sampling.plan import Callbacks, Cancelled, Plan, Progress
@@ -14,7 +14,7 @@ from scenario_gen.method.sampling.sample import draw_scenarios, regenerate
 from scenario_gen.method.sampling.speed_profile.knots import speed_knots, SpeedKnots
 
 __all__ = [
-    "Callbacks", "Cancelled", "Features", "Measures", "Observations", "Plan", "Posterior", "Progress", "Regression",
-    "SamplingConfig", "SpeedKnots", "TargetError", "checker_of", "draw_scenarios", "freed_states", "kept_reactions", "plan_of",
-    "regenerate", "sample_scenarios", "speed_knots",
+    "Callbacks", "Cancelled", "Features", "Observations", "Plan", "Posterior", "Progress", "Regression", "SamplingConfig",
+    "SpeedKnots", "TargetError", "checker_of", "draw_scenarios", "freed_states", "kept_reactions", "plan_of", "regenerate",
+    "sample_scenarios", "speed_knots",
 ]  # fmt: skip

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.sampling.directed import Aim, CHUNK, FAIR, GOOD, Measures, PATIENCE, PLAIN, Seen, STAGE, STAGES
+from scenario_gen.method.sampling.directed import Aim, CHUNK, FAIR, GOOD, PATIENCE, PLAIN, Seen, STAGE, STAGES
 from scenario_gen.method.sampling.plan import Cancelled
 from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
 from scenario_gen.numerics import Floats
 from scenario_gen.template import closest_crossing, Conflict, find_conflicts, pair_conflict
-from scenario_gen.types import Cause, Encounter, Reaction, Request, Scenario, Target, token, Verdict
+from scenario_gen.types import Cause, Encounter, Measures, Reaction, Request, Scenario, Target, token, Verdict
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
 

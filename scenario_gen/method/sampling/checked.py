@@ -6,14 +6,13 @@
 from dataclasses import replace
 
 from scenario_gen.method.sampling.config import SamplingConfig
-from scenario_gen.method.sampling.directed import Measures
 from scenario_gen.method.sampling.freedom import freed_states
 from scenario_gen.method.sampling.plan import Callbacks, Plan
 from scenario_gen.method.sampling.prepare import kept_reactions
 from scenario_gen.method.sampling.sample import draw_scenarios
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.template import reactions_of, Wait, waits_to_keep
-from scenario_gen.types import GenerationResult, MIRRORED, Request
+from scenario_gen.types import GenerationResult, Measures, MIRRORED, Request
 
 
 def sample_scenarios(

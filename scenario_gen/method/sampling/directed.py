@@ -13,7 +13,7 @@ One candidate in ten is drawn as without a target, which bounds every weight by 
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 import math
 
@@ -21,9 +21,7 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Bools, exact, Floats
-from scenario_gen.types import Cause, Encounter, Pair, Scenario, Target, UNITS
-
-Measure = Callable[[Scenario, str, Pair | None], float]  # a figure of a scenario; NaN if it has none
+from scenario_gen.types import Cause, Encounter, Measure, Pair, Scenario, Target, UNITS
 
 NATURAL_SHARE = 0.1  # of the proposal's candidates that are drawn as without a target
 PLAIN = 0.35  # share of natural candidates that are valid and in the range, from which on no proposal is needed
@@ -41,19 +39,6 @@ _PASSES = 3  # of the regression, each with the last one's squared coefficients 
 _INVALID = 1.0  # what is not valid, or not checked, counts as so much farther from the range
 _SPREAD = 1.25  # the proposal's standard deviations over the elite's
 _LEAST, _MOST = 0.3, 1.5  # the least and greatest of them
-
-
-@dataclass(frozen=True)
-class Measures:
-    """What measures a scenario of all vehicles.
-
-    Attributes:
-        figure: returns one figure by its name, of a pair or of the most critical one.
-        features: returns where a scenario lies in the space that a choice covers, in bins of width 1.
-    """
-
-    figure: Measure
-    features: Callable[[Scenario], tuple[float, ...]]
 
 
 class TargetError(RefusedError):

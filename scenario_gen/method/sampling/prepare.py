@@ -316,7 +316,7 @@ def _drive(
             config.bend_acceleration or max(_BEND_SHARE * sideways, _LEAST_BEND), _CURVE_MARGIN * config.max_lateral_acceleration
         ),
         _sideways(track, encounter.speed[n])[here],
-        Steering.of(time, track.poses[here, 2], encounter.speed[n, here], path.length),
+        Steering.of(time, np.unwrap(encounter.heading[n, here]), encounter.speed[n, here], path.length),
         rests,
     )
 

@@ -16,7 +16,7 @@ from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.sampling.adapt import adapted, aim_of, Check, Judge, label_of
 from scenario_gen.method.sampling.candidates import Batch
 from scenario_gen.method.sampling.config import SamplingConfig
-from scenario_gen.method.sampling.directed import Aim, estimated, Measures, reachable, STAGE, TargetError
+from scenario_gen.method.sampling.directed import Aim, estimated, reachable, STAGE, TargetError
 from scenario_gen.method.sampling.diverse import POOL_SHARE, spread_out
 from scenario_gen.method.sampling.lazy import LazyScenarios
 from scenario_gen.method.sampling.plan import Callbacks, Plan
@@ -29,7 +29,7 @@ from scenario_gen.method.sampling.sampler import (
     place_of,
     Sampler,
 )
-from scenario_gen.types import Cause, EgoSlot, NOT_KEPT, Reached, Request, Scenario, ScenarioSet
+from scenario_gen.types import Cause, EgoSlot, Measures, NOT_KEPT, Reached, Request, Scenario, ScenarioSet
 
 KEPT = 1000  # scenarios up to which a set stays in memory
 LEAST_COUNT = 20  # where clocks are free: scenarios for which candidates are drawn at least, so that levels can be tried

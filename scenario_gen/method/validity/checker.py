@@ -18,8 +18,19 @@ from scenario_gen.method.validity.presence import driven_on
 from scenario_gen.numerics import Bools, exact, Floats, runs
 from scenario_gen.roads import clearance_in_cells, drives_against
 from scenario_gen.template import Conflict, conflict_of, find_conflicts, lag_behind, orders_asked, time_gaps, Wait
-from scenario_gen.types import at_ends, BoundaryStates, Cause, Encounter, FOLLOW, Reaction, Road, Scenario, Verdict, Violation
-from scenario_gen.types.presence import together
+from scenario_gen.types import (
+    at_ends,
+    BoundaryStates,
+    Cause,
+    Encounter,
+    FOLLOW,
+    Reaction,
+    Road,
+    Scenario,
+    together,
+    Verdict,
+    Violation,
+)
 
 
 class Checker:

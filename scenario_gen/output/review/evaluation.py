@@ -17,8 +17,7 @@ from scenario_gen.method.evaluation import coverage_of, evaluate_scenarios, Eval
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.output.review.validation import kept_reactions, Reference
 from scenario_gen.template import find_conflicts, find_waits, orders_asked, reactions_of
-from scenario_gen.types import at_ends, CheckCounts, EgoSlot, GenerationResult, Scenario, ScenarioSet, Verdict, WITHOUT
-from scenario_gen.types.ego import together
+from scenario_gen.types import at_ends, CheckCounts, EgoSlot, GenerationResult, join_ego, Scenario, ScenarioSet, Verdict, WITHOUT
 
 
 def bag_results(
@@ -100,7 +99,7 @@ def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Lim
     for k, one in enumerate(scenarios):
         entry = namespace.entry(k)
         map_hash = entry.map_hash if entry else None
-        scenario = together(one)
+        scenario = join_ego(one)
         order = entry.order if entry else "keep"
         reactions = kept_reactions(encounter, names, entry)
         key = (map_hash or "", order, *reactions, *(vehicle.id for vehicle in scenario.vehicles))

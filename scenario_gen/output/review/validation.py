@@ -23,8 +23,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.numerics import Bools
 from scenario_gen.template import Conflict, find_conflicts, find_waits, orders_asked, reactions_of, Wait
-from scenario_gen.types import at_ends, BoundaryStates, Cause, Encounter, Reaction, Road, Scenario, tokens
-from scenario_gen.types.ego import together
+from scenario_gen.types import at_ends, BoundaryStates, Cause, Encounter, join_ego, Reaction, Road, Scenario, tokens
 
 UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
 NO_WITNESS = f"the ego: its witness is not on {WITNESS}"
@@ -143,7 +142,7 @@ def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
         states = None
         if entry is not None:
             states = entry.asked(namespace.where(INFO), witness=scenario.witness is not None)
-        scenario = together(scenario)
+        scenario = join_ego(scenario)
         is_lost = k in namespace.unknown and entry is None
         kept = "" if entry is None else entry.facts.get("reactions", "")
         place = (stamp, is_lost, entry and entry.template_hash, entry and entry.map_hash, entry and entry.order, kept)

@@ -13,7 +13,7 @@ from msg_conventions.scenario_info import encode_info, scenario_entry
 from msg_conventions.scenarios import encode_scenario, messages_of
 from scenario_gen.bags.recordings.arriving import ArrivingScenarios, INFO, SCENARIOS, WITNESS
 from scenario_gen.base.errors import InputError
-from scenario_gen.types.ego import together, with_witness
+from scenario_gen.types.ego import join_ego, with_witness
 from scenario_gen.types.scenario import BoundaryStates, EgoSlot, Scenario
 
 
@@ -46,8 +46,8 @@ def test_whatever_comes_first(order):
     assert sorted(entry.index for entry, _, _ in found) == [0, 1] and arriving.unmatched == 0
     for entry, stamp, got in found:
         assert stamp == 17 and entry.ego == got.witness.vehicles[0].id
-        wanted = together(MADE[entry.index])
-        assert encode_scenario(together(got), 17) == encode_scenario(wanted, 17)
+        wanted = join_ego(MADE[entry.index])
+        assert encode_scenario(join_ego(got), 17) == encode_scenario(wanted, 17)
     assert [one for k in order for one in arriving.take(*MESSAGES[k])] == [], "what comes twice counts once"
 
 

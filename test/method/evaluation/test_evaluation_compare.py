@@ -13,7 +13,7 @@ import pytest
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
-from scenario_gen.method.evaluation.compare import compare, comparison_table, read_evaluations
+from scenario_gen.method.evaluation.comparison import compare, comparison_table, read_evaluations
 from scenario_gen.types.segmentation import Segmentation
 
 

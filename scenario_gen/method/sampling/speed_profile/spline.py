@@ -15,7 +15,7 @@ import numpy as np
 
 from scenario_gen.numerics import Bools, exact, Floats, frozen, frozen_ints, Ints
 
-KNOT_SPACING = 0.4  # s; what a driver does with the pedals is slower
+KNOT_SPACING = 0.25  # s; farther apart, the steps of jerk between knots are told from what a driver does
 MOST_KNOTS = 600  # of long encounters the knots are farther apart
 DEGREE = 3
 _BEFORE = 1e-9  # s

@@ -1,0 +1,25 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What measures scenarios, for targets and choices: the evaluation provides it, the sampler calls it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from scenario_gen.types.scenario import Scenario
+from scenario_gen.types.target import Pair
+
+Measure = Callable[[Scenario, str, Pair | None], float]  # a figure of a scenario; NaN if it has none
+
+
+@dataclass(frozen=True)
+class Measures:
+    """What measures a scenario of all vehicles.
+
+    Attributes:
+        figure: returns one figure by its name, of a pair or of the most critical one.
+        features: returns where a scenario lies in the space that a choice covers, in bins of width 1.
+    """
+
+    figure: Measure
+    features: Callable[[Scenario], tuple[float, ...]]
