@@ -61,7 +61,7 @@ class Template:
 
     @cached_property
     def values(self) -> dict[str, Floats]:
-        """The encounter's values by quantity."""
+        """(n,) values of the encounter by quantity, in the units of `QUANTITIES` (m, s, rad)."""
         return values_of(self.periodic(self.encounter))
 
     @cached_property
