@@ -32,11 +32,11 @@ RUNS = 20
 Scenarios = Sequence[Scenario] | ScenarioSet
 
 
-def evaluate(made: GenerationResult, config: EvaluationConfig = EvaluationConfig()) -> Evaluation:
+def evaluate(result: GenerationResult, config: EvaluationConfig = EvaluationConfig()) -> Evaluation:
     """Measure what was generated, beside its references and the fitted template replayed (the oracle row).
 
     Args:
-        made: as `generate` returns it.
+        result: as `generate` returns it.
         config: how to measure.
 
     Returns:
@@ -45,12 +45,12 @@ def evaluate(made: GenerationResult, config: EvaluationConfig = EvaluationConfig
     Raises:
         InputError: a scenario has a vehicle that the encounter has not.
     """
-    sets: dict[str, Scenarios] = {made.row: made.generated, **made.references}
-    if made.oracle is not None:
-        sets[ORACLE] = (made.oracle,)
-    road = made.road.name if made.road else ""
-    points = len(made.segmentation.changepoints)
-    return evaluate_scenarios(made.encounter, sets, changepoints=points, road=road, config=config, seed=made.seed)
+    sets: dict[str, Scenarios] = {result.row: result.generated, **result.references}
+    if result.oracle is not None:
+        sets[ORACLE] = (result.oracle,)
+    road = result.road.name if result.road else ""
+    points = len(result.segmentation.changepoints)
+    return evaluate_scenarios(result.encounter, sets, changepoints=points, road=road, config=config, seed=result.seed)
 
 
 def evaluate_scenarios(
@@ -88,8 +88,9 @@ def evaluate_scenarios(
         InputError: a scenario has a vehicle that the encounter has not.
     """
     named = sets if isinstance(sets, Mapping) else {"scenarios": sets}
-    counts = {name: CheckCounts.of_set(one) for name, one in named.items() if isinstance(one, ScenarioSet)} | dict(checks or {})
-    rows = {name: one.scenarios if isinstance(one, ScenarioSet) else one for name, one in named.items()}
+    accounts = {name: CheckCounts.of_set(given) for name, given in named.items() if isinstance(given, ScenarioSet)}
+    counts = accounts | dict(checks or {})
+    rows = {name: given.scenarios if isinstance(given, ScenarioSet) else given for name, given in named.items()}
     sizes = {name: len(scenarios) for name, scenarios in rows.items()}
     rows = {name: measured(scenarios) for name, scenarios in rows.items()}
     steps = min(encounter.speed.shape[1], config.max_steps)

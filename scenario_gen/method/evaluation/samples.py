@@ -140,10 +140,10 @@ class VehiclePair:
 
     def similarity(self, k: int, distance: Distance, least: float = 0.0) -> PairSimilarity:
         """Compare one of the three, as `pair_similarity` does."""
-        one, many = self.template[k], self.samples[k]
-        if one.ndim == 2:
-            one, many = one[..., None], many[..., None]
-        target, series = np.moveaxis(one, -1, -2), np.moveaxis(many, -1, -2)
+        target, series = self.template[k], self.samples[k]
+        if target.ndim == 2:
+            target, series = target[..., None], series[..., None]
+        target, series = np.moveaxis(target, -1, -2), np.moveaxis(series, -1, -2)
         return pair_similarity((target[0], target[1]), (series[:, 0], series[:, 1]), distance, least)
 
 

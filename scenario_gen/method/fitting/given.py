@@ -30,15 +30,8 @@ def place_in_own_frame(encounter: Encounter, road: Road, config: FittingConfig) 
     separation = own_paths(encounter)
     shares = [float(share_with_room(road, track)) for track in separation.tracks]
     max_repair([t for t, share in zip(separation.tracks, shares, strict=True) if share < 1.0], road, config.max_move)
-    n = len(separation.tracks)
-    placement = Placement(
-        tracks=separation.tracks,
-        scale=frozen(np.ones(n)),
-        manoeuvre=tuple("wait" if track.still else "own path" for track in separation.tracks),
-        moved=separation.moved,
-        notes=(f"placed on road {road.name} in the template's own frame", *separation.notes),
-        at_home=True,
-    )
+    notes = (f"placed on road {road.name} in the template's own frame", *separation.notes)
+    placement = replace(Placement.of(separation.tracks, 1.0, notes, "own path"), moved=separation.moved, at_home=True)
     return placement, float(np.mean(shares))
 
 
@@ -154,7 +147,7 @@ def _place(track: Track, ends: Floats, joint: tuple[float, float], road: Road, c
     route = draw_route(start[:3], goal[:3], fits)
     if route is not None and abs(float(route.points[-1, 2] - route.points[0, 2]) - template_turn) < _TURN:
         scale = route.length / track.travelled
-        if config.scale_low <= scale <= config.scale_high:
+        if config.accepts(scale):
             placed = replace(track, curve=route.cut(0.0, route.length, 0.25), progress=frozen(scale * track.progress))
             return placed, scale, f"along a drawn route (s = {scale:.2f})"
     u = (track.poses[-1] - track.poses[0])[:2]

@@ -11,6 +11,7 @@ the template: headings and relative positions at sampled instants, turns, crossi
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -66,6 +67,18 @@ class _Way:
     turn: float
 
 
+class _Rigid(NamedTuple):
+    """A similarity of the plane: points (..., 2) [m] go to points · matrix' + shift, headings turn by yaw [rad]."""
+
+    matrix: Floats
+    shift: Floats
+    yaw: float
+
+    def of(self, points: Floats) -> Floats:
+        """Return where points (M, 2) [m] go."""
+        return exact.matmul(points, self.matrix.T) + self.shift
+
+
 @dataclass(frozen=True, eq=False)
 class _Choice:
     """Ways for the vehicles assigned so far, with the arc lengths A at which they start."""
@@ -94,9 +107,7 @@ def place_at_junction(tracks: tuple[Track, ...], road: Road, config: FittingConf
             )
     relations = find_relations(tracks)
     reasons = []
-    for scale in _SCALES:
-        if not config.scale_low <= scale <= config.scale_high:
-            continue
+    for scale in filter(config.accepts, _SCALES):
         best: tuple[int, Placement] | None = None
         for choice in _search(tracks, ways, relations, scale)[:_PLACED]:
             reason = _misfit_reason(choice, scale)
@@ -239,7 +250,8 @@ class _Laying:
         for i in seeds:
             for way in self.ways[i]:
                 start = solver.start_by_turn(i, way.curve)
-                motions.append(self._from(solver.align({i: way}, {i: start}, [i])))
+                rigid = solver.align({i: way}, {i: start}, [i])
+                motions.append(np.array([*rigid.of(self.middle[None])[0], rigid.yaw]))  # where the middle goes, and the rotation
         rated = sorted(((self._rated(motion)[0], k) for k, motion in enumerate(motions)), key=lambda r: (round(r[0], 6), r[1]))
         found: dict[tuple[int, ...], tuple[float, list[list[int]]]] = {}
         for _, k in rated[:_LAID]:
@@ -254,11 +266,6 @@ class _Laying:
                 found[chosen] = cost, others
         order = sorted(found, key=lambda chosen: (round(found[chosen][0], 6), chosen))
         return [(chosen, found[chosen][1]) for chosen in order[:_SOLVED]]
-
-    def _from(self, aligned: tuple[Floats, Floats, float]) -> Floats:
-        """(3,) where the template's middle goes, and the rotation."""
-        matrix, shift, yaw = aligned
-        return np.array([*(exact.matmul(self.middle[None], matrix.T)[0] + shift), yaw])
 
     def _rated(self, motion: Floats) -> tuple[float, list[tuple[Floats, Floats, Floats]]]:
         """The cost of a motion [m²]; for each vehicle the cost of its ways (W,), how far it is beside them and where (W, K)."""
@@ -349,15 +356,14 @@ class _Solver:
         if not start:  # nobody is tied down: who turns most is placed by its turn, the others beside it
             i = max(members, key=lambda i: (abs(self._turn(i)), self.driven[i, -1], -i))
             start[i] = self.start_by_turn(i, ways[i].curve)
-        rotation, shift, yaw = self.align(ways, start, members)
+        rigid = self.align(ways, start, members)
         untied = [i for i in members if i not in start]
         for i in untied:  # who has no equation is placed by its relative position
-            target = exact.matmul(self.poses[i][::3, :2], rotation.T) + shift
-            station, _ = ways[i].curve.project(target)
+            station, _ = ways[i].curve.project(rigid.of(self.poses[i][::3, :2]))
             start[i] = float(np.median(station - self.driven[i][::3]))
         if untied:
-            rotation, shift, yaw = self.align(ways, start, members)
-        return self._checked(ways, start, members, lost, rotation, shift, yaw)
+            rigid = self.align(ways, start, members)
+        return self._checked(ways, start, lost, rigid)
 
     def _equations(self, k: int, relation: Relation, one: _Way, two: _Way) -> tuple[Equation, ...] | None:
         key = (k, id(one), id(two))
@@ -381,7 +387,7 @@ class _Solver:
         best = starts[alike >= alike.max() - 1e-3]
         return float(best[np.argmin(np.abs(best - most / 2.0))])
 
-    def align(self, ways: dict[int, _Way], start: dict[int, float], members: list[int]) -> tuple[Floats, Floats, float]:
+    def align(self, ways: dict[int, _Way], start: dict[int, float], members: list[int]) -> _Rigid:
         """The rigid motion (Umeyama 1991, det R = +1, scale fixed) from the template to the vehicles placed so far."""
         known = [i for i in members if i in start]
         source = np.concatenate([self.poses[i] for i in known])
@@ -392,19 +398,12 @@ class _Solver:
         sine = float((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum()) + 10.0 * float(exact.sin(target[:, 2] - source[:, 2]).sum())
         cosine = float((u * v).sum()) + 10.0 * float(exact.cos(target[:, 2] - source[:, 2]).sum())
         yaw = float(exact.arctan2(sine, cosine))
-        rotation = _rotation(yaw)
-        return self.scale * rotation, cb - exact.matmul(rotation, ca), yaw
+        rotation = np.array([[exact.cos(yaw), -exact.sin(yaw)], [exact.sin(yaw), exact.cos(yaw)]])
+        return _Rigid(self.scale * rotation, cb - exact.matmul(rotation, ca), yaw)
 
-    def _checked(
-        self,
-        ways: dict[int, _Way],
-        start: dict[int, float],
-        members: list[int],
-        lost: int,
-        rotation: Floats,
-        shift: Floats,
-        yaw: float,
-    ) -> _Choice:
+    def _checked(self, ways: dict[int, _Way], start: dict[int, float], lost: int, rigid: _Rigid) -> _Choice:
+        """The cost of ways and starts: how unlike the template the vehicles are then, each seen from the others."""
+        members = sorted(ways)
         cost, beyond, turned = _LOST * lost, 0.0, 0.0
         came = [float(ways[i].curve.points[0, 2] - self.poses[i][0, 2]) for i in members]
         for k in range(1, len(members)):
@@ -413,8 +412,8 @@ class _Solver:
         for i in members:
             curve = ways[i].curve
             fitted = curve.at(start[i] + self.driven[i])
-            miss = exact.hypot(*(fitted[:, :2] - exact.matmul(self.poses[i][:, :2], rotation.T) - shift).T)
-            off = np.abs(wrap_angle(fitted[:, 2] - self.poses[i][:, 2] - yaw))
+            miss = exact.hypot(*(fitted[:, :2] - exact.matmul(self.poses[i][:, :2], rigid.matrix.T) - rigid.shift).T)
+            off = np.abs(wrap_angle(fitted[:, 2] - self.poses[i][:, 2] - rigid.yaw))
             own = float((fitted[-1, 2] - fitted[0, 2]) - (self.poses[i][-1, 2] - self.poses[i][0, 2]))
             whole = float(ways[i].turn - (self.poses[i][-1, 2] - self.poses[i][0, 2]))
             alike = np.mean(np.square(np.minimum(miss, _FAR))) + _HEADING * np.mean(1.0 - exact.cos(off))
@@ -426,10 +425,6 @@ class _Solver:
             beyond = max(beyond, short)
             cost += _OFF * short
         return _Choice(ways, start, cost, lost, beyond, turned, len(self.relations))
-
-
-def _rotation(yaw: float) -> Floats:
-    return np.array([[exact.cos(yaw), -exact.sin(yaw)], [exact.sin(yaw), exact.cos(yaw)]])
 
 
 def _least_squares(members: list[int], system: list[Equation]) -> dict[int, float]:
@@ -456,7 +451,7 @@ def _least_squares(members: list[int], system: list[Equation]) -> dict[int, floa
 def _placed(
     tracks: tuple[Track, ...], road: Road, choice: _Choice, scale: float, relations: tuple[Relation, ...], config: FittingConfig
 ) -> Placement:
-    placed, manoeuvres = [], []
+    placed = []
     notes = [f"scaled by {scale:g} to fit the road"] if scale != 1.0 else []
     for i, track in enumerate(tracks):
         way, begin = choice.ways[i], choice.start[i]
@@ -464,7 +459,6 @@ def _placed(
         curve = way.curve.cut(begin, max(end, begin + 1.0), 0.25)
         progress = scale * track.progress * (curve.length / max(end - begin, 1.0))
         placed.append(replace(track, curve=curve, progress=frozen(np.minimum(progress, curve.length))))
-        manoeuvres.append("wait" if track.still else manoeuvre_of(turn_of(placed[-1])))
         notes.append(
             f"vehicle {track.vehicle.id} takes entry {way.entry} and exit {way.leave} ({in_words(way.turn)}), "
             f"{begin:.1f} m to {end:.1f} m of {way.curve.length:.1f} m; {_said(track)} in the template"
@@ -474,7 +468,6 @@ def _placed(
         notes.append(f"vehicle {a} {r.kind.value} vehicle {b}, as in the template")
     notes.append(f"assignment chosen at a cost of {choice.cost:.1f} m²")
     refuse_lost_turns(tracks, tuple(placed), road.name)
-    n = len(tracks)
+    placement = Placement.of(tuple(placed), scale, notes, (manoeuvre_of(turn_of(track)) for track in placed))
     unused = find_unused(road, [way.curve.points[k] for way in choice.ways.values() for k in (0, -1)])
-    placement = Placement(tuple(placed), frozen(np.full(n, scale)), tuple(manoeuvres), frozen(np.zeros(n)), tuple(notes), unused)
-    return separated(placement, config, sideways=0.0, own=tracks)
+    return separated(replace(placement, unused=unused), config, sideways=0.0, own=tracks)

@@ -16,7 +16,7 @@ import numpy as np
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.method.fitting.placement import max_repair, Placement, separated, share_with_room
+from scenario_gen.method.fitting.placement import max_repair, Placement, SCALES, separated, share_with_room
 from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import clearance_field
@@ -25,7 +25,6 @@ from scenario_gen.types import Road
 
 _CELL = 1.0  # metres of the coarse search
 _TURNS = 72
-_SCALES = (1.0, 0.9, 1.1, 0.8, 1.2)
 _KEPT = 10  # coarse placements that are refined
 _SPACING = 1.5  # metres between the path's sampled discs
 _MOSTLY = 0.8  # share of footprints with room below which a placement is no good
@@ -53,9 +52,7 @@ def place_by_search(tracks: tuple[Track, ...], road: Road, config: FittingConfig
     need = max(t.vehicle.width for t in tracks) / 2.0 + config.margin
     best: tuple[float, Placement] | None = None
     reason = f"the template ({np.ptp(discs, axis=0).max():.0f} m) is larger than the map"
-    for scale in _SCALES:
-        if not config.scale_low <= scale <= config.scale_high:
-            continue
+    for scale in filter(config.accepts, SCALES):
         found = sorted(_coarse(discs, road, need, scale), key=_order)[:_KEPT]
         for motion in sorted((_refined(discs, road, need, motion) for motion in found), key=_order):
             stop_if_cancelled()
@@ -75,30 +72,20 @@ def place_by_search(tracks: tuple[Track, ...], road: Road, config: FittingConfig
     return best[1]
 
 
-def _order(motion: "_Motion") -> tuple[float, float, tuple[float, float]]:
+def _order(motion: _Motion) -> tuple[float, float, tuple[float, float]]:
     return motion.cost, motion.yaw, motion.at
 
 
 def _tried(
-    tracks: tuple[Track, ...], centre: Floats, motion: "_Motion", road: Road, config: FittingConfig
+    tracks: tuple[Track, ...], centre: Floats, motion: _Motion, road: Road, config: FittingConfig
 ) -> tuple[Placement, float, float]:
     """The placement of one similarity, the share of its footprints that have room, the farthest repair [m]."""
-    moved = _moved(tracks, centre, motion)
-    n = len(tracks)
-    placement = separated(
-        Placement(
-            tracks=moved,
-            scale=frozen(np.full(n, motion.scale)),
-            manoeuvre=tuple("wait" if t.still else "own path" for t in tracks),
-            moved=frozen(np.zeros(n)),
-            notes=(
-                f"placed on road {road.name} as one piece: turned by {np.degrees(motion.yaw) % 360.0:.0f}°, scale "
-                f"{motion.scale:g}, its centre at x {motion.at[0]:.1f}, y {motion.at[1]:.1f}",
-            ),
-        ),
-        config,
-        sideways=1.0,
+    note = (
+        f"placed on road {road.name} as one piece: turned by {np.degrees(motion.yaw) % 360.0:.0f}°, scale "
+        f"{motion.scale:g}, its centre at x {motion.at[0]:.1f}, y {motion.at[1]:.1f}"
     )
+    as_laid = Placement.of(_moved(tracks, centre, motion), motion.scale, [note], "own path")
+    placement = separated(as_laid, config, sideways=1.0)
     share = float(min(share_with_room(road, track) for track in placement.tracks))
     return placement, share, max_repair(placement.tracks, road, config.max_move)
 
