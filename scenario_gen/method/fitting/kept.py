@@ -87,14 +87,8 @@ def find_unused(road: Road, used: Iterable[Floats]) -> tuple[Loss, ...]:
     arms, unused = len(arms_of(road)), len(unused_arms(road, used))
     if not unused:
         return ()
-    verb = "is" if unused == 1 else "are"
-    return (
-        Loss(
-            "arm",
-            (),
-            f"{unused} of the {arms} arms of road {road.name} {verb} not used: nobody in the template comes or goes there",
-        ),
-    )
+    used_by_nobody = f"{'is' if unused == 1 else 'are'} not used: nobody in the template comes or goes there"
+    return (Loss("arm", (), f"{unused} of the {arms} arms of road {road.name} {used_by_nobody}"),)
 
 
 def find_losses(encounter: Encounter, tracks: tuple[Track, ...], placement: Placement) -> tuple[Loss, ...]:
@@ -162,14 +156,9 @@ def _lost_neighbours(encounter: Encounter, own: Floats, poses: Floats) -> list[L
             kept = float((_side(poses[i], poses[j], reach, _LANES_DIFFER)[there] == side).mean())
             if kept < _ENOUGH:
                 a, b = encounter.vehicles[i].id, encounter.vehicles[j].id
-                lost.append(
-                    Loss(
-                        "beside",
-                        (a, b),
-                        f"vehicle {b} is to the {word} of {a} for {seconds:.1f} s in the template, "
-                        f"for {kept * seconds:.1f} s of these on this road",
-                    )
-                )
+                here = f"for {kept * seconds:.1f} s of these on this road"
+                in_template = f"vehicle {b} is to the {word} of {a} for {seconds:.1f} s in the template"
+                lost.append(Loss("beside", (a, b), f"{in_template}, {here}"))
     return lost
 
 
