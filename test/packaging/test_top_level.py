@@ -9,6 +9,7 @@ import subprocess
 
 TOP = Path(__file__).resolve().parents[2]
 ALLOWED = {
+    ".pre-commit-config.yaml",
     *("package.xml", "setup.py", "setup.cfg", "pyproject.toml", "MANIFEST.in", "Makefile", ".gitignore", ".ci", "requirements*"),
     *("README.md", "CHANGELOG.rst", "CONTRIBUTING.md", "LICENSE", "config", "docs", "examples", "launch", "resource"),
     *("scenario_gen", "msg_conventions", "test", "benchmarks"),
