@@ -29,15 +29,16 @@ class LostConflictError(RefusedError):
 
 
 def refuse_lost_conflicts(lost: Iterable[Loss], road: str) -> None:
-    """Refuse a fit on which vehicles whose paths cross or merge in the template do not meet; who follows whom is only said.
+    """Refuse a fit on which vehicles whose paths cross or merge in the template do not meet; who follows whom is only reported.
 
     Raises:
         LostConflictError: one is; it names the vehicles, and how it can be had all the same.
     """
-    gone = [loss.said for loss in lost if loss.kind == CONFLICT]
-    if gone:
+    lost_here = [loss.said for loss in lost if loss.kind == CONFLICT]
+    if lost_here:
+        said = "; ".join(lost_here)
         raise LostConflictError(
-            f"road {road} has no place that keeps the encounter: {'; '.join(gone)}; fitting.allow=lost_conflict takes it as it is"
+            f"road {road} has no place that keeps the encounter: {said}; fitting.allow=lost_conflict takes it as it is"
         )
 
 
@@ -65,8 +66,8 @@ def _otherwise(turn: float) -> str:
 def count_lost(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> int:
     """How many of the template's conflicts a placement has not, or in another order, each counted twice, and new ones."""
     before, after = (_meetings(some) for some in (tracks, placed))
-    gone = [pair for pair, conflict in before.items() if pair not in after or after[pair].first != conflict.first]
-    return 2 * len(gone) + len(after.keys() - before.keys())
+    changed = [pair for pair, conflict in before.items() if pair not in after or after[pair].first != conflict.first]
+    return 2 * len(changed) + len(after.keys() - before.keys())
 
 
 @lru_cache(maxsize=2)  # of one template many places are looked at

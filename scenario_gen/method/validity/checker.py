@@ -186,14 +186,14 @@ class Checker:
         if self.asked is None:
             return
         limits = self._limits
-        freed = self.asked.freed.tolist()
+        relaxed = self.asked.freed.tolist()
         for name, k, asked in (("start", 0, self.asked.start), ("end", -1, self.asked.end)):  # too few numbers for arrays
             # a vehicle's row is held outside of its presence: its first or last value is that at its own first or last instant
             ends = zip(scenario.position[:, k].tolist(), scenario.speed[:, k].tolist(), asked.tolist(), strict=True)
             for i, ((x, y), speed, (x_asked, y_asked, _, speed_asked)) in enumerate(ends):
                 distance, difference = exact.hypot(x - x_asked, y - y_asked), abs(speed - speed_asked)
                 far, off = self._within_a_step(scenario, i, k)
-                free, faster = freed[i][k]
+                free, faster = relaxed[i][k]
                 far, off = far + free + limits.position_tolerance, off + faster + limits.speed_tolerance
                 if not (distance <= far + 1e-9 and difference <= off + 1e-9):  # NaN is not near
                     bounds = f" (free are {free:.3f} m and {faster:.3f} m/s)" if free or faster else ""
