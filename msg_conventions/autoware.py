@@ -5,9 +5,9 @@
 
 PredictedObjects on `/perception/object_recognition/objects`, TrackedObjects on `/perception/object_recognition/tracking/objects`:
 frame: the road's; each object is posed at its shape's centre, z = half its height; twist and acceleration in its own frame;
-its id is the first 16 bytes of the SHA-256 of the vehicle's id. The one predicted path is what the vehicle will do, each
+its id is the first 16 bytes of the SHA-256 of the vehicle's id. The only predicted path holds the poses that will follow, every
 `STEP_NS` up to `HORIZON_NS` ahead or the end. Odometry of the ego on `/localization/kinematic_state`: frame: the road's, child
-frame `base_link`, the middle of the rear axle on the ground. Covariances are 0: what is said is true. QoS: reliable, volatile,
+frame `base_link`, the middle of the rear axle on the ground. Covariances are 0: the values are exact. QoS: reliable, volatile,
 depth 1.
 """
 
@@ -17,7 +17,8 @@ import hashlib
 import numpy as np
 
 from msg_conventions.cdr import CdrWriter
-from msg_conventions.roads import pose_rows
+from msg_conventions.odometry import encode_odometry
+from msg_conventions.poses import pose_rows
 from scenario_gen.numerics import Floats
 from scenario_gen.types import height, is_truck, Quality, rear_axle, Scenario, shifted, Vehicle
 
@@ -40,7 +41,7 @@ class AutowareEncoder:
     """Encodes a scenario's instants, one after the other."""
 
     def __init__(self, scenario: Scenario) -> None:
-        """Take the scenario; its poses and yaw rates are made ready once."""
+        """Take the scenario and compute its poses and yaw rates once."""
         self.scenario = scenario
         self.yaw_rate = np.zeros_like(scenario.heading)
         self.time_ns = np.rint(scenario.time * 1e9).astype(np.int64)
@@ -49,13 +50,13 @@ class AutowareEncoder:
             there = slice(first, last + 1)
             self.yaw_rate[n, there] = np.gradient(scenario.heading[n, there], scenario.time[there])
 
-    def there(self, k: int) -> list[int]:
+    def present_at(self, k: int) -> list[int]:
         """Return the vehicles that are present at instant `k`."""
         return [n for n, (first, last) in enumerate(self.scenario.present.tolist()) if first <= k <= last]
 
     def predicted_objects(self, k: int, stamp_ns: int) -> bytes:
         """Return instant `k` as PredictedObjects."""
-        here = self.there(k)
+        here = self.present_at(k)
         writer = CdrWriter().header(stamp_ns, self.scenario.frame_id).pack("I", len(here))
         for n in here:
             self._object(writer, n, k)
@@ -65,7 +66,7 @@ class AutowareEncoder:
 
     def tracked_objects(self, k: int, stamp_ns: int) -> bytes:
         """Return instant `k` as TrackedObjects."""
-        here = self.there(k)
+        here = self.present_at(k)
         writer = CdrWriter().header(stamp_ns, self.scenario.frame_id).pack("I", len(here))
         for n in here:
             self._object(writer, n, k)
@@ -118,25 +119,19 @@ def encode_predicted_objects(
 def encode_kinematic_state(vehicle: Vehicle, state: Floats, frame_id: str, stamp_ns: int) -> bytes:
     """Return the ego as Odometry; `state` (6,) x, y [m], yaw [rad], speed [m/s], acceleration [m/s²], yaw rate [rad/s]."""
     axle = shifted(state[:2], state[2], -rear_axle(vehicle))
-    writer = CdrWriter().header(stamp_ns, frame_id).string(BASE_LINK)
-    writer.pack("d", *pose_rows(np.array([[*axle, state[2]]]))[0]).raw(_NO_COVARIANCE)
-    return _twist(writer, float(state[3]), float(state[5])).finish()
+    return encode_odometry(np.array([*axle, *state[2:4]]), float(state[5]), BASE_LINK, frame_id, stamp_ns)
 
 
 def _kinematics(writer: CdrWriter, vehicle: Vehicle, pose: Floats, speed: float, acceleration: float, rate: float) -> None:
     """Append id, existence, class, pose (7,), twist and acceleration."""
     writer.raw(uuid_of(vehicle)).pack("f", 1.0).pack("I", 1).pack("B", TRUCK if is_truck(vehicle) else CAR).pack("f", 1.0)
     writer.pack("d", *pose).raw(_NO_COVARIANCE)
-    _twist(writer, speed, rate)
+    writer.pack("d", speed, 0.0, 0.0, 0.0, 0.0, rate).raw(_NO_COVARIANCE)
     writer.pack("d", acceleration, *[0.0] * 5).raw(_NO_COVARIANCE)
 
 
-def _twist(writer: CdrWriter, speed: float, rate: float) -> CdrWriter:
-    return writer.pack("d", speed, 0.0, 0.0, 0.0, 0.0, rate).raw(_NO_COVARIANCE)
-
-
 def _path(writer: CdrWriter, poses: Floats) -> None:
-    """Append the one predicted path, of poses (K, 7)."""
+    """Append a single predicted path, of poses (K, 7)."""
     writer.pack("I", 1).pack("I", len(poses)).align(8).raw(poses.tobytes()).stamp(STEP_NS).pack("f", 1.0)
 
 

@@ -108,7 +108,7 @@ class CdrReader:
         return self._data[start : start + size]
 
     def one(self, code: str) -> Any:
-        """Read one number of struct `code`."""
+        """Read a number of struct `code`."""
         size = struct.calcsize("<" + code)
         return struct.unpack("<" + code, self._take(size, size))[0]
 

@@ -8,8 +8,8 @@ frame. It is all that the stages after the segmenter need, so another segmenter 
 `posterior` (sensor_msgs/PointCloud2, frame as tracks) has one row per vehicle and one column per sample: x, y, z [m, float32],
 vehicle, primitive [uint16], t [s since the stamp, float64], p [posterior probability of a changepoint, float64].
 Both bear the stamp of their tracks. QoS: reliable, transient_local, depth 1.
-`changepoints/live` has what one sample of the vehicles' streams confirmed, while they run; its stamp is that of the stretch's
-first sample, since when the same vehicles have been there. QoS: reliable, transient_local, depth 1000.
+`changepoints/live` has the changepoints that one sample of the vehicles' streams confirmed; its stamp is that of the first sample
+since which the same vehicles have been there. QoS: reliable, transient_local, depth 1000.
 """
 
 from collections.abc import Mapping
@@ -124,7 +124,7 @@ def decode_posterior(data: bytes, descriptions: tuple[str, ...] = (), what: str 
 
 
 def segmentation_status(segmentation: Segmentation, node: str, duration: float) -> Status:
-    """Return what the segmenter found in an encounter of `duration` s, in words; `node` is its full name."""
+    """Return the segmenter's report on an encounter of `duration` s; `node` is its full name."""
     values = {f"segment.{k}": text for k, text in enumerate(segmentation.descriptions)}
     message = f"{len(segmentation.changepoints)} changepoints, {segmentation.n_primitives} primitives"
     remark = segmentation.remark(duration)

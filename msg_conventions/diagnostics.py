@@ -4,8 +4,8 @@
 """Reports ⇄ diagnostic_msgs/DiagnosticArray: key-values with full node names, one status per subject.
 
 Used for `scenarios/info` (scenario_info.py), `road/info` and `fit/info` (hashes.py), `report` and `/diagnostics`.
-`header.stamp` is the template's, but on /diagnostics the time of the message: there what is said of a template bears its stamp
-as the value `template_stamp`.
+`header.stamp` is the template's, but on /diagnostics the time of the message: there a status about a template bears its stamp as
+the value `template_stamp`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -73,12 +73,12 @@ def written(stamp_ns: int) -> str:
 
 
 def of_template(status: Status, stamp_ns: int) -> Status:
-    """Return a status that says as the value `template_stamp` which template it is about."""
+    """Return a status with the stamp of the template that it is about, as the value `template_stamp`."""
     return replace(status, values={**status.values, TEMPLATE: written(stamp_ns)})
 
 
 def template_of(status: Status, stamp_ns: int) -> int:
-    """Return the stamp [ns] of the template that a status is about; `stamp_ns`, its message's, where it does not say."""
+    """Return the stamp [ns] of the template that a status is about; by default `stamp_ns`, its message's."""
     seconds, point, rest = status.values.get(TEMPLATE, "").partition(".")
-    said = point and len(rest) == 9 and (seconds + rest).isascii() and (seconds + rest).isdecimal() and len(seconds) < 20
-    return int(seconds + rest) if said else stamp_ns
+    is_stamp = point and len(rest) == 9 and (seconds + rest).isascii() and (seconds + rest).isdecimal() and len(seconds) < 20
+    return int(seconds + rest) if is_stamp else stamp_ns

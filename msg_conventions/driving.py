@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A drive in closed loop ⇄ messages: what the node `traffic` says of all vehicles, and what is asked of the ego.
+"""A run in closed loop ⇄ messages: the states that the node `traffic` publishes, and the commands to the ego.
 
-Out, at every step; stamp: the drive's time (that of /clock), frame: the road's:
+Out, at every step; stamp: the run's time (that of /clock), frame: the road's:
 
 - `vehicle_<id>/odom` (nav_msgs/Odometry): child frame `vehicle_<id>`, the centre of the footprint, x ahead; twist in that frame,
   linear.x the speed [m/s], angular.z the yaw rate [rad/s]. All vehicles, the ego too. QoS: reliable, volatile, depth 100.
 - `traffic/markers` (visualization_msgs/MarkerArray): a box for each, which replaces the one before; the ego's is black.
-- `traffic/local_map` (nav_msgs/OccupancyGrid): what is drivable around the ego, with the other vehicles in it. Depth 1.
+- `traffic/local_map` (nav_msgs/OccupancyGrid): the drivable cells around the ego, with the other vehicles as obstacles. Depth 1.
 - /clock (rosgraph_msgs/Clock), /tf (frames.py), `verdicts` (diagnostic_msgs/DiagnosticArray), `ego/goal`, `ego/route`.
 
 In, for the ego; a stamp of 0 is "now":
@@ -16,30 +16,28 @@ In, for the ego; a stamp of 0 is "now":
 - `ego/cmd_vel` (geometry_msgs/Twist), `ego/cmd_vel_stamped` (TwistStamped): linear.x [m/s] to be reached as fast as the body can,
   angular.z [rad/s].
 - `ego/trajectory` (trajectory_msgs/MultiDOFJointTrajectory, conventions: trajectory.py), `ego/path` (nav_msgs/Path, the stamp of
-  each pose is its time): where the ego is to be when; the body tracks it.
+  each pose is its time): the poses that the ego's body tracks.
 - `ego/odom` (nav_msgs/Odometry): where the ego is, by another simulator.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
-from msg_conventions.pictures import COLOURS, CUBE, DELETE_ALL
-from msg_conventions.roads import OCCUPIED, pose_rows, poses_of
+from msg_conventions.paths import read_poses
+from msg_conventions.poses import poses_of
+from msg_conventions.roads import encode_grid, OCCUPIED
 from msg_conventions.trajectory import decode
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats
-from scenario_gen.types import tokens, Vehicle
 
-TWIST_TYPE, ODOMETRY_TYPE, CLOCK_TYPE = "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry", "rosgraph_msgs/msg/Clock"
-_COVARIANCE = 36
+TWIST_TYPE, CLOCK_TYPE = "geometry_msgs/msg/Twist", "rosgraph_msgs/msg/Clock"
 
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """Where the ego is to be when: (T,) nanoseconds on the drive's clock, (T, 3) x, y [m], yaw [rad] in `frame_id`."""
+    """Poses for the ego to track: (T,) nanoseconds on the run's clock, (T, 3) x, y [m], yaw [rad] in `frame_id`."""
 
     time_ns: Floats
     poses: Floats
@@ -49,29 +47,6 @@ class Way:
 def encode_clock(stamp_ns: int) -> bytes:
     """Return a Clock as CDR bytes."""
     return CdrWriter().stamp(stamp_ns).finish()
-
-
-def encode_odometry(state: Floats, yaw_rate: float, child: str, frame_id: str, stamp_ns: int) -> bytes:
-    """Return a state (4,) of x [m], y [m], yaw [rad], speed [m/s] and the yaw rate [rad/s] as an Odometry's CDR bytes."""
-    writer = CdrWriter().header(stamp_ns, frame_id).string(child)
-    writer.pack("d", *pose_rows(state[None, :3])[0], *[0.0] * _COVARIANCE)
-    return writer.pack("d", float(state[3]), 0.0, 0.0, 0.0, 0.0, yaw_rate, *[0.0] * _COVARIANCE).finish()
-
-
-def decode_odometry(data: bytes, what: str = "ego/odom") -> tuple[int, str, Floats]:
-    """Return stamp [ns], frame and (5,) x [m], y [m], yaw [rad], speed [m/s], yaw rate [rad/s] of an Odometry.
-
-    Raises:
-        InputError: the message is damaged, or a value is not finite.
-    """
-    reader = CdrReader(data, what)
-    stamp_ns, frame_id = reader.header()
-    reader.string()
-    row = reader.floats(7 + _COVARIANCE)
-    twist = reader.floats(6 + _COVARIANCE)
-    if not np.isfinite(twist[:6]).all():
-        raise InputError(f"{what}: the twist holds a value that is not finite")
-    return stamp_ns, frame_id, np.append(poses_of(row[None, :7], what)[0], (twist[0], twist[5]))
 
 
 def encode_twist(speed: float, yaw_rate: float) -> bytes:
@@ -112,45 +87,14 @@ def decode_timed_path(data: bytes, what: str = "ego/path") -> Way:
     """
     reader = CdrReader(data, what)
     _, frame_id = reader.header()
-    stamps, rows = [], []
-    for _ in range(reader.count(68)):
-        stamp_ns, _ = reader.header()
-        stamps.append(stamp_ns)
-        rows.append(reader.floats(7))
-    if not rows:
+    stamps, _, rows = read_poses(reader)
+    if not len(rows):
         raise InputError(f"{what} is empty")
-    time = np.array(stamps, dtype=np.float64)
-    if (np.diff(time) <= 0.0).any():
+    if (np.diff(stamps) <= 0).any():
         raise InputError(f"{what}: the poses' stamps must ascend: they say when each pose is to be reached")
-    return Way(time, poses_of(np.array(rows), what), frame_id)
+    return Way(stamps.astype(np.float64), poses_of(rows, what), frame_id)
 
 
 def encode_local_map(blocked: Bools, resolution: float, origin: Floats, frame_id: str, stamp_ns: int) -> bytes:
-    """Return a grid (H, W) of what is not free, with its cell size and lower-left corner (2,) [m], as an OccupancyGrid."""
-    height, width = blocked.shape
-    writer = CdrWriter().header(stamp_ns, frame_id).stamp(stamp_ns).pack("f", resolution).pack("I", width, height)
-    writer.pack("d", *origin.tolist(), 0.0, 0.0, 0.0, 0.0, 1.0).pack("I", blocked.size)
-    return writer.raw(np.where(blocked, OCCUPIED, 0).astype(np.int8).tobytes()).finish()
-
-
-def encode_traffic_markers(
-    vehicles: Sequence[Vehicle], states: Floats, here: Bools, ego: int, frame_id: str, stamp_ns: int
-) -> bytes:
-    """Return a box for each vehicle that is there, states (N, 3+) x, y [m], yaw [rad], in place of all boxes before."""
-    names = tokens(vehicle.id for vehicle in vehicles)
-    shown = np.flatnonzero(here).tolist()
-    writer = CdrWriter().pack("I", 1 + len(shown))
-    blank = np.zeros((1, 3))
-
-    def add(name: str, action: int, scale: tuple[float, ...], colour: tuple[float, ...], pose: Floats) -> None:
-        writer.header(stamp_ns, frame_id).string(name).pack("i", 0, CUBE, action)
-        writer.pack("d", *pose_rows(pose)[0]).pack("d", *scale).pack("f", *colour).stamp(0).pack("B", 0)
-        writer.pack("I", 0).pack("I", 0)  # points, colours
-        writer.string("").header(0, "").string("").pack("I", 0).pack("I", 0)  # texture, uv coordinates
-        writer.string("").string("").string("").pack("I", 0).pack("B", 0)  # text, mesh
-
-    add("", DELETE_ALL, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0, 1.0), blank)
-    for k in shown:
-        colour = (0.06, 0.09, 0.16) if k == ego else COLOURS[k % len(COLOURS)]
-        add(f"box_{names[k]}", 0, (vehicles[k].length, vehicles[k].width, 1.5), (*colour, 0.9), states[k : k + 1])
-    return writer.finish()
+    """Return cells (H, W) that are not free, with their size and the lower-left corner (2,) [m], as an OccupancyGrid."""
+    return encode_grid(np.where(blocked, OCCUPIED, 0), resolution, origin, frame_id, stamp_ns)

@@ -7,8 +7,8 @@ Start and goal belong to the request whose `scenarios/info` names the vehicle as
 last such request. Frame: the road's. Stamp: the template's, also for the goal (when it is reached stands in the witness).
 Odometry: `child_frame_id` is `vehicle_<id>`, `pose.pose` the centre of the footprint, z = 0, yaw as a quaternion,
 `twist.twist.linear.x` the speed along the heading, m/s. Covariances and all else are 0. QoS: reliable, transient_local, depth 1.
-`ego/witness` is one message per scenario, before the scenario: a trajectory of the ego on the scenario's clock, with which the
-scenario was proven valid. `ego_witness` of its `scenarios/info` is the SHA-256 of the message. QoS as that of `scenarios`.
+`ego/witness` is one message per scenario, before the scenario: a trajectory of the ego on the scenario's clock, which proves the
+scenario valid. `ego_witness` of its `scenarios/info` is the SHA-256 of the message. QoS as that of `scenarios`.
 Bags of versions before 0.6 have `ego/track` instead: one for the whole request, the vehicle's template, which may hit others.
 """
 
@@ -17,15 +17,12 @@ import json
 
 import numpy as np
 
-from msg_conventions.cdr import CdrReader, CdrWriter
-from msg_conventions.roads import pose_rows, poses_of
+from msg_conventions.odometry import decode_odometry, encode_odometry
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
 from scenario_gen.types import EgoSlot, token
 
 WITNESS = "ego/witness"
-STATE_TYPE = "nav_msgs/msg/Odometry"
-_COVARIANCE = 36
 
 
 def encode_state(state: Floats, child_frame_id: str, frame_id: str, stamp_ns: int) -> bytes:
@@ -36,9 +33,7 @@ def encode_state(state: Floats, child_frame_id: str, frame_id: str, stamp_ns: in
     """
     if not np.isfinite(state).all():
         raise InputError("a state with a value that is not finite cannot be sent")
-    writer = CdrWriter().header(stamp_ns, frame_id).string(child_frame_id)
-    writer.pack("d", *pose_rows(state[None, :3])[0], *[0.0] * _COVARIANCE)
-    return writer.pack("d", float(state[3]), *[0.0] * (5 + _COVARIANCE)).finish()
+    return encode_odometry(state, 0.0, child_frame_id, frame_id, stamp_ns)
 
 
 def decode_state(data: bytes, what: str = "state") -> tuple[int, str, str, Floats]:
@@ -47,14 +42,8 @@ def decode_state(data: bytes, what: str = "state") -> tuple[int, str, str, Float
     Raises:
         InputError: the message is damaged, or a value is not finite.
     """
-    reader = CdrReader(data, what)
-    stamp_ns, frame_id = reader.framed_header()
-    child = reader.string()
-    row = reader.floats(7 + _COVARIANCE)
-    speed = float(reader.floats(6 + _COVARIANCE)[0])
-    if not np.isfinite(speed):
-        raise InputError(f"{what}: the speed is not finite")
-    return stamp_ns, frame_id, child, np.append(poses_of(row[None, :7], what)[0], speed)
+    stamp_ns, frame_id, child, state = decode_odometry(data, what, framed=True)
+    return stamp_ns, frame_id, child, state[:4]
 
 
 def ego_messages(slot: EgoSlot, frame_id: str, stamp_ns: int) -> Iterator[tuple[str, bytes]]:
@@ -65,7 +54,7 @@ def ego_messages(slot: EgoSlot, frame_id: str, stamp_ns: int) -> Iterator[tuple[
 
 
 def ego_values(slot: EgoSlot | None) -> dict[str, str]:
-    """Return what `scenarios/info` says of the ego: its id, start and goal; nothing if there is none."""
+    """Return the values of `scenarios/info` about the ego: its id, start and goal; none if there is no ego."""
     if slot is None:
         return {}
     start, goal = (json.dumps([float(value) for value in state]) for state in (slot.start, slot.goal))

@@ -4,8 +4,8 @@
 """Fit ⇄ `fit`: the changepoints on the road (conventions: trajectory.py).
 
 Points are the anchors (start, changepoints, end) in the road's frame, at the template's times; the first and last are the
-states asked of every scenario, speed included. Speeds in between are the template's, scaled, for whoever wants them.
-What the fitting decided travels on the diagnostics, a status for each vehicle. QoS: reliable, transient_local, depth 1.
+states requested of every scenario, speed included. Speeds in between are the template's, scaled; no stage reads them.
+The decisions of the fitting are in the diagnostics, a status for each vehicle. QoS: reliable, transient_local, depth 1.
 """
 
 from collections.abc import Mapping, Sequence
@@ -50,7 +50,7 @@ def encode_fit(encounter: Encounter, fit: Fit, frame_id: str) -> bytes:
 
 
 def decode_fit(data: bytes, what: str = "fit") -> tuple[int, str, BoundaryStates, Floats]:
-    """Return stamp [ns], frame, the asked states, and the anchors (N, K + 2, 3) x, y, yaw.
+    """Return stamp [ns], frame, the requested states, and the anchors (N, K + 2, 3) x, y, yaw.
 
     Raises:
         InputError: the message is damaged or has no start and end.
@@ -63,7 +63,7 @@ def decode_fit(data: bytes, what: str = "fit") -> tuple[int, str, BoundaryStates
 
 
 def fit_statuses(fit: Fit, node: str, more: Mapping[str, str] | None = None, routes: Sequence[Route] = ()) -> tuple[Status, ...]:
-    """Return what was decided: a status per vehicle, with figures of its route, one for the notes; each with what `more` says."""
+    """Return the decisions: a status per vehicle, with figures of its route, one for the notes; each with the values `more`."""
     planned = [route.figures() for route in routes] or [{}] * len(fit.fitted)
     remarks = [route.remarks(vehicle.id) for vehicle, route in zip(fit.vehicles, routes, strict=False)]
     per_vehicle = tuple(
@@ -83,16 +83,16 @@ def fit_statuses(fit: Fit, node: str, more: Mapping[str, str] | None = None, rou
         )
         for k, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True))
     )
-    sentences = (*fit.notes, *(said for each in remarks for said in each))
+    sentences = (*fit.notes, *(remark for each in remarks for remark in each))
     notes = {f"note.{k}": note for k, note in enumerate(sentences)}
     lost = {f"lost.{k}": json.dumps([loss.kind, list(loss.vehicles), loss.said]) for k, loss in enumerate(fit.lost)}
-    said = f"template fitted to the road, {len(lost)} things of it are lost" if lost else "template fitted to the road"
+    message = f"template fitted to the road, {len(lost)} things of it are lost" if lost else "template fitted to the road"
     level = Level.WARN if any(loss.kind != "arm" for loss in fit.lost) else Level.OK
-    return (*per_vehicle, Status(f"{node}: fit", level, said, notes | lost | dict(more or {})))
+    return (*per_vehicle, Status(f"{node}: fit", level, message, notes | lost | dict(more or {})))
 
 
 def decode_losses(values: Mapping[str, str]) -> tuple[Loss, ...]:
-    """Return what the planner's status `fit` says is lost; nothing in bags of versions that did not say so.
+    """Return the losses in the planner's status `fit`; none in bags of versions that did not write them.
 
     Raises:
         InputError: it is damaged.
@@ -107,10 +107,10 @@ def decode_losses(values: Mapping[str, str]) -> tuple[Loss, ...]:
 
 
 def with_figures(route: Route, statuses: Mapping[str, Mapping[str, str]], vehicle: str) -> Route:
-    """Return a decoded route with what the planner's status `fit of <vehicle>` says of how it was planned, where it says so.
+    """Return a decoded route with the figures of its planning in the planner's status `fit of <vehicle>`, if they are there.
 
     Raises:
-        InputError: that is damaged.
+        InputError: they are damaged.
     """
     values = statuses.get(f"fit of {vehicle}", {})
     if "legs_joined" not in values:
@@ -126,7 +126,7 @@ def with_figures(route: Route, statuses: Mapping[str, Mapping[str, str]], vehicl
 
 
 def decode_fitted(anchors: Floats, statuses: Mapping[str, Mapping[str, str]], vehicle: str) -> FittedVehicle:
-    """Return what the fitting decided of a vehicle.
+    """Return the decisions of the fitting for a vehicle.
 
     Args:
         anchors: (K + 2, 3) x, y, yaw, as `decode_fit` returns them.

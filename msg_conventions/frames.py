@@ -10,7 +10,7 @@ footprint's centre, x ahead. QoS: reliable; /tf volatile, /tf_static transient_l
 from collections.abc import Sequence
 
 from msg_conventions.cdr import CdrReader, CdrWriter
-from msg_conventions.roads import pose_rows, poses_of
+from msg_conventions.poses import pose_rows, poses_of
 from scenario_gen.numerics import Floats
 
 TYPE = "tf2_msgs/msg/TFMessage"

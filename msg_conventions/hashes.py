@@ -3,7 +3,7 @@
 
 """Hashes of messages ⇄ `road/info` and `fit/info` (diagnostic_msgs/DiagnosticArray): which messages belong together, by topic.
 
-Most types have no field to say it in, and a frame must stay what tf knows. Stamp: the template's.
+Most types have no field for it, and frames must stay those that tf knows. Stamp: the template's.
 QoS: reliable, transient_local, depth 1.
 """
 
@@ -26,12 +26,12 @@ def hash_of(topic: str, data: bytes) -> str:
     So the same geometry has the same hash, whatever template it was made for.
     """
     if topic == lanes.TOPIC:
-        data = data[: len(data) - (len(data) - lanes.TAIL) % 4]  # without what DDS fills it up with
+        data = data[: len(data) - (len(data) - lanes.TAIL) % 4]  # without the padding of DDS
     return hashlib.sha256(_timeless(data) if topic == "map" else data).hexdigest()[:DIGITS]
 
 
 def _timeless(grid: bytes) -> bytes:
-    """Return the bytes of a map without stamp, load time, and what follows its cells; of a damaged one, whatever is there.
+    """Return the bytes of a map without stamp, load time, and the bytes behind its cells; of a damaged one, some of its bytes.
 
     DDS fills small messages up to a multiple of 4 bytes. All others that are named by a hash end at one, but for `road/lanes`.
     """
@@ -51,7 +51,7 @@ def template_hashes(messages: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def encode_hashes(name: str, messages: Mapping[str, bytes], stamp_ns: int) -> bytes:
-    """Return as CDR bytes that these messages (by topic) belong together; `name` says what they are about."""
+    """Return as CDR bytes that these messages (by topic) belong together; `name` names their subject."""
     hashes = {topic: hash_of(topic, data) for topic, data in sorted(messages.items()) if topic not in INFOS}
     return encode_diagnostics([Status(name, Level.OK, "these belong together", hashes)], stamp_ns)
 
@@ -60,7 +60,7 @@ def decode_hashes(data: bytes, what: str) -> dict[str, str]:
     """Return the hashes by topic.
 
     Raises:
-        InputError: the message is damaged, or says no hashes.
+        InputError: the message is damaged, or holds no hashes.
     """
     _, statuses = decode_diagnostics(data, what)
     hashes = {topic: text for status in statuses for topic, text in status.values.items()}

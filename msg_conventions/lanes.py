@@ -5,7 +5,7 @@
 
 One LINE_LIST draws all borders, the left one of a lane before its right one, lane after lane, each as pairs of neighbouring
 points. `text` is a JSON object: `name`, `notes`, and of every lane its `id`, the number of `points` of a border, `successors` and
-`beside` (places in the list), `speed_limit` [m/s, null: not said] and `junction`. Action 2 (delete) says that the road has no
+`beside` (places in the list), `speed_limit` [m/s, null: unknown] and `junction`. Action 2 (delete) means that the road has no
 lanes. Stamp and frame: the map's. QoS: reliable, transient_local, depth 1.
 """
 
@@ -17,14 +17,13 @@ from typing import Any
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
+from msg_conventions.markers import ADD, DELETE, LINE_LIST, Marker
 from msg_conventions.trajectory import FARTHEST
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
 from scenario_gen.types import Lane, LaneNetwork
 
-MARKER_TYPE = "visualization_msgs/msg/Marker"
 TOPIC = "road/lanes"
-LINE_LIST, ADD, DELETE = 5, 0, 2
 TAIL = 1  # bytes by which the message ends behind a multiple of 4
 
 
@@ -33,16 +32,9 @@ def encode_lanes(network: LaneNetwork | None, frame_id: str, stamp_ns: int) -> b
     lanes = () if network is None else network.lanes
     pairs = [border[np.repeat(np.arange(len(border)), 2)[1:-1]] for lane in lanes for border in (lane.left, lane.right)]
     points = np.concatenate(pairs) if pairs else np.zeros((0, 2))
-    writer = CdrWriter().header(stamp_ns, frame_id).string("lanes").pack("i", 0, LINE_LIST, ADD if lanes else DELETE)
-    writer.pack("d", 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0).pack("d", 0.1, 0.0, 0.0)  # pose; width of the lines in metres
-    writer.pack("f", 1.0, 1.0, 1.0, 0.7).stamp(0).pack("B", 0).pack("I", len(points))
-    if len(points):
-        writer.align(8).raw(np.column_stack((points, np.zeros(len(points)))).tobytes())
-    writer.pack("I", 0)  # colours
-    writer.string("").header(0, "").string("").pack("I", 0)  # texture: resource, image header, format, bytes
-    writer.pack("I", 0)  # uv coordinates
-    writer.string("" if network is None else json.dumps(_document(network), ensure_ascii=False))
-    return writer.string("").string("").pack("I", 0).pack("B", 0).finish()  # mesh: resource, file, bytes
+    text = "" if network is None else json.dumps(_document(network), ensure_ascii=False)
+    marker = Marker("lanes", LINE_LIST, ADD if lanes else DELETE, colour=(1.0, 1.0, 1.0, 0.7), points=points, text=text)
+    return marker.write(CdrWriter(), frame_id, stamp_ns).finish()
 
 
 def _document(network: LaneNetwork) -> dict[str, Any]:
@@ -61,10 +53,10 @@ def _document(network: LaneNetwork) -> dict[str, Any]:
 
 
 def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | None]:
-    """Return the frame and the lanes, None if the message says that there are none.
+    """Return the frame and the lanes, None if the road has none.
 
     Raises:
-        InputError: the message is damaged, or says of its lanes what cannot be.
+        InputError: the message is damaged, or its lanes contradict their borders.
     """
     reader = CdrReader(data, what)
     _, frame_id = reader.framed_header()
@@ -98,18 +90,20 @@ def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | Non
         raise InputError(f"{what}: its text does not say what its lanes are: {type(error).__name__}: {error}") from None
 
 
-def _lanes(said: list[dict[str, Any]], points: Floats, what: str) -> Iterator[Lane]:
-    """Yield the lanes that are said, with borders out of pairs of points (P, 2) [m]."""
+def _lanes(documents: list[dict[str, Any]], points: Floats, what: str) -> Iterator[Lane]:
+    """Yield the lanes of their documents, with borders out of pairs of points (P, 2) [m]."""
     at = 0
-    for one in said:
-        pairs = 2 * (int(one["points"]) - 1)
+    for document in documents:
+        pairs = 2 * (int(document["points"]) - 1)
         if pairs < 2 or at + 2 * pairs > len(points):
-            raise InputError(f"{what}: lane {one['id']!r} has borders of {one['points']} points, and {len(points) - at} are left")
+            raise InputError(
+                f"{what}: lane {document['id']!r} has borders of {document['points']} points, and {len(points) - at} are left"
+            )
         borders = [points[start : start + pairs] for start in (at, at + pairs)]
         left, right = (np.concatenate((border[:1], border[1::2])) for border in borders)
-        limit = math.nan if one["speed_limit"] is None else float(one["speed_limit"])
-        after, beside = (tuple(int(k) for k in one[key]) for key in ("successors", "beside"))
-        yield Lane(str(one["id"]), left, right, after, beside, limit, str(one["junction"]))
+        limit = math.nan if document["speed_limit"] is None else float(document["speed_limit"])
+        after, beside = (tuple(int(k) for k in document[key]) for key in ("successors", "beside"))
+        yield Lane(str(document["id"]), left, right, after, beside, limit, str(document["junction"]))
         at += 2 * pairs
     if at != len(points):
         raise InputError(f"{what}: {len(points) - at} points belong to no lane")

@@ -5,8 +5,7 @@
 
 Frame: the road's. `header.stamp`: the template's. A pose's stamp is the planned time: the template's stamp at every anchor
 (start, changepoints, end), between anchors in proportion to arc length. Equal consecutive poses are a dwell.
-QoS: reliable, transient_local, depth 1.
-Arc length does not travel; it is the sum of the chords.
+QoS: reliable, transient_local, depth 1. Arc length is not in the message; it is the sum of the chords.
 """
 
 from collections.abc import Sequence
@@ -16,7 +15,7 @@ import struct
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter, HEADER, NANOSECONDS
-from msg_conventions.roads import poses_of
+from msg_conventions.poses import poses_of
 from msg_conventions.yaw import half_angle
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import exact, Floats, Ints
@@ -77,14 +76,23 @@ def decode_path(data: bytes, what: str = "path") -> tuple[int, str, Floats, Ints
     """
     reader = CdrReader(data, what)
     stamp_ns, frame_id = reader.framed_header()
-    count = reader.count(68)
-    rows, stamps = np.zeros((count, 7)), np.zeros(count, dtype=np.int64)
-    for k in range(count):
-        stamps[k], frame = reader.header()
-        rows[k] = reader.floats(7)
+    stamps, frames, rows = read_poses(reader)
+    for k, frame in enumerate(frames):
         if frame not in (frame_id, ""):
             raise InputError(f"{what}: pose {k} is in frame {frame!r}, the path in {frame_id!r}")
     return stamp_ns, frame_id, poses_of(rows, what), stamps
+
+
+def read_poses(reader: CdrReader) -> tuple[Ints, list[str], Floats]:
+    """Read geometry_msgs/PoseStamped[]: stamps (M,) [ns], frames and poses (M, 7) as on the wire."""
+    count = reader.count(68)
+    rows, stamps = np.zeros((count, 7)), np.zeros(count, dtype=np.int64)
+    frames = []
+    for k in range(count):
+        stamps[k], frame = reader.header()
+        frames.append(frame)
+        rows[k] = reader.floats(7)
+    return stamps, frames, rows
 
 
 def chord_length(points: Floats) -> Floats:

@@ -1,22 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What RViz and Foxglove draw: footprints (geometry_msgs/PolygonStamped) and markers (visualization_msgs/MarkerArray).
+"""Pictures for RViz and Foxglove: footprints (geometry_msgs/PolygonStamped) and markers (visualization_msgs/MarkerArray).
 
-Only for looking at; nothing is read back but the footprint. Frame: that of the vehicles drawn. QoS: reliable, transient_local.
+Only footprints are read back. Frame: that of the vehicles drawn. QoS: reliable, transient_local.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
-from msg_conventions.roads import pose_rows
-from scenario_gen.numerics import Floats
+from msg_conventions.markers import CUBE, DELETE_ALL, LINE_STRIP, Marker
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.types import Scenario, tokens, Vehicle
 
 FOOTPRINT_TYPE = "geometry_msgs/msg/PolygonStamped"
-MARKERS_TYPE = "visualization_msgs/msg/MarkerArray"
-CUBE, LINE_STRIP, DELETE_ALL = 1, 4, 3
 COLOURS = ((0.12, 0.47, 0.71), (0.84, 0.15, 0.16), (0.17, 0.63, 0.17), (1.0, 0.5, 0.05), (0.58, 0.4, 0.74), (0.55, 0.34, 0.29))
+EGO_COLOUR = (0.06, 0.09, 0.16)
 
 
 def encode_footprint(vehicle: Vehicle, stamp_ns: int, frame_id: str) -> bytes:
@@ -40,36 +41,30 @@ def decode_footprint(data: bytes, what: str = "footprint") -> Floats:
 
 def scenario_markers(scenario: Scenario, stamp_ns: int) -> bytes:
     """Return one scenario as a MarkerArray that replaces the one before: a line along each path, a box where it begins."""
-    names = tokens(vehicle.id for vehicle in scenario.vehicles)
-    writer = CdrWriter().pack("I", 1 + 2 * len(names))
-
-    def add(
-        namespace: str,
-        kind: int,
-        scale: tuple[float, ...] = (0.1, 0.0, 0.0),
-        colour: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0),
-        pose: tuple[float, ...] = (0.0, 0.0, 0.0),
-        *,
-        action: int = 0,
-        points: Floats | None = None,
-    ) -> None:
-        writer.header(stamp_ns, scenario.frame_id).string(namespace).pack("i", 0, kind, action)
-        writer.pack("d", *pose_rows(np.array([pose]))[0]).pack("d", *scale)
-        writer.pack("f", *colour).stamp(0).pack("B", 0)
-        writer.pack("I", 0 if points is None else len(points))
-        if points is not None:
-            writer.align(8).raw(np.column_stack([points, np.zeros(len(points))]).tobytes())
-        writer.pack("I", 0)  # colours
-        writer.string("").header(0, "").string("").pack("I", 0)  # texture: resource, image header, format, bytes
-        writer.pack("I", 0)  # uv coordinates
-        writer.string("").string("").string("").pack("I", 0)  # text; mesh resource; mesh file: name and bytes
-        writer.pack("B", 0)
-
-    add("", 0, action=DELETE_ALL)
-    for k, (name, vehicle) in enumerate(zip(names, scenario.vehicles, strict=True)):
+    markers = [Marker("", 0, DELETE_ALL)]
+    for k, (name, vehicle) in enumerate(zip(tokens(v.id for v in scenario.vehicles), scenario.vehicles, strict=True)):
         first, last = scenario.present[k].tolist()
         colour, path = COLOURS[k % len(COLOURS)], scenario.position[k, first : last + 1]
         start = (*path[0].tolist(), float(scenario.heading[k, 0]))
-        add(f"path_{name}", LINE_STRIP, (0.15, 0.0, 0.0), (*colour, 0.6), points=path)
-        add(f"box_{name}", CUBE, (vehicle.length, vehicle.width, 1.5), (*colour, 0.8), start)
+        markers.append(Marker(f"path_{name}", LINE_STRIP, scale=(0.15, 0.0, 0.0), colour=(*colour, 0.6), points=path))
+        markers.append(Marker(f"box_{name}", CUBE, pose=start, scale=(vehicle.length, vehicle.width, 1.5), colour=(*colour, 0.8)))
+    return encode_markers(markers, scenario.frame_id, stamp_ns)
+
+
+def vehicle_markers(vehicles: Sequence[Vehicle], states: Floats, here: Bools, ego: int, frame_id: str, stamp_ns: int) -> bytes:
+    """Return a box for each vehicle that is there, states (N, 3+) x, y [m], yaw [rad], in place of all boxes before."""
+    names = tokens(vehicle.id for vehicle in vehicles)
+    markers = [Marker("", CUBE, DELETE_ALL, scale=(1.0, 1.0, 1.0))]
+    for k in np.flatnonzero(here).tolist():
+        colour, size = EGO_COLOUR if k == ego else COLOURS[k % len(COLOURS)], (vehicles[k].length, vehicles[k].width, 1.5)
+        x, y, yaw = states[k, :3].tolist()
+        markers.append(Marker(f"box_{names[k]}", CUBE, pose=(x, y, yaw), scale=size, colour=(*colour, 0.9)))
+    return encode_markers(markers, frame_id, stamp_ns)
+
+
+def encode_markers(markers: Sequence[Marker], frame_id: str, stamp_ns: int) -> bytes:
+    """Return markers as CDR bytes of a MarkerArray."""
+    writer = CdrWriter().pack("I", len(markers))
+    for marker in markers:
+        marker.write(writer, frame_id, stamp_ns)
     return writer.finish()

@@ -3,21 +3,22 @@
 
 """Road ⇄ `map` (nav_msgs/OccupancyGrid) and `road/entries`, `road/exits` (geometry_msgs/PoseArray).
 
-Map: 0 free, 100 occupied, 99 occupied by something that stands on the road (an obstacle), -1
-unknown; a cell is drivable if it is known and below 65 (nav2's occupied threshold).
+Map: 0 free, 100 occupied, 99 occupied by an obstacle on the road, -1 unknown; a cell is drivable if it is
+known and below 65 (nav2's occupied threshold).
 `info.origin` is the lower-left corner of cell (0, 0), not rotated; row 0 is the lowest y. Entries head into the road, exits out
 of it. Stamp: that of the template the road was made for, or 0 for one that suits any. QoS: reliable, transient_local, depth 1.
-The road's name does not travel: nothing is computed from it.
+The road's name is not in the messages: nothing is computed from it.
 """
 
 import numpy as np
 
 from msg_conventions.cdr import CdrReader, CdrWriter
 from msg_conventions.lanes import decode_lanes
+from msg_conventions.poses import pose_rows, poses_of
 from msg_conventions.trajectory import FARTHEST
-from msg_conventions.yaw import check_quaternions, half_angle, yaw
+from msg_conventions.yaw import check_quaternions, yaw
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Road
 
 MAP_TYPE = "nav_msgs/msg/OccupancyGrid"
@@ -26,38 +27,20 @@ OCCUPIED, OBSTRUCTED = 100, 99
 OCCUPIED_FROM = 65
 
 
-def pose_rows(poses: Floats) -> Floats:
-    """Return (M, 7) position and quaternion, as geometry_msgs/Pose lays them out, of (M, 3) x, y, yaw."""
-    rows = np.zeros((len(poses), 7))
-    rows[:, :2] = poses[:, :2]
-    rows[:, 5], rows[:, 6] = half_angle(poses[:, 2])
-    return rows
-
-
-def poses_of(rows: Floats, what: str) -> Floats:
-    """Return (M, 3) x, y, yaw of (M, 7) poses.
-
-    Raises:
-        InputError: naming `what`, a value is not finite.
-    """
-    if not np.isfinite(rows).all():
-        raise InputError(f"{what}: a pose holds a value that is not finite")
-    if (np.abs(rows[:, :3]) > FARTHEST).any():
-        raise InputError(f"{what}: a position is {np.abs(rows[:, :3]).max():g}; at most {FARTHEST:g} is read")
-    check_quaternions(rows[:, 3:], what)
-    return np.column_stack([rows[:, :2], yaw(rows[:, 3:])])
-
-
 def encode_map(road: Road, stamp_ns: int) -> bytes:
     """Return the grid as CDR bytes."""
-    height, width = road.drivable.shape
-    origin = [*road.origin, 0.0, 0.0, 0.0, 0.0, 1.0]
-    writer = CdrWriter().header(stamp_ns, road.frame_id).stamp(stamp_ns).pack("f", road.resolution).pack("I", width, height)
-    writer.pack("d", *origin).pack("I", road.drivable.size)
-    cells = np.where(road.drivable, 0, OCCUPIED).astype(np.int8)
+    cells = np.where(road.drivable, 0, OCCUPIED)
     if road.obstructed is not None:
         cells[road.obstructed] = OBSTRUCTED
-    return writer.raw(cells.tobytes()).finish()
+    return encode_grid(cells, road.resolution, road.origin, road.frame_id, stamp_ns)
+
+
+def encode_grid(cells: Ints, resolution: float, origin: Floats, frame_id: str, stamp_ns: int) -> bytes:
+    """Return cells (H, W) of 0 to 100 or -1, with their size and the lower-left corner (2,) [m], as an OccupancyGrid."""
+    height, width = cells.shape
+    writer = CdrWriter().header(stamp_ns, frame_id).stamp(stamp_ns).pack("f", resolution).pack("I", width, height)
+    writer.pack("d", *origin, 0.0, 0.0, 0.0, 0.0, 1.0).pack("I", cells.size)
+    return writer.raw(cells.astype(np.int8).tobytes()).finish()
 
 
 def encode_poses(poses: Floats, frame_id: str, stamp_ns: int) -> bytes:

@@ -3,7 +3,7 @@
 
 """`scenarios/info` (diagnostic_msgs/DiagnosticArray): an entry for each scenario, then a summary of its request.
 
-Every key of both stands in this file alone; docs/interfaces.md lists them. Stamp: the template's. Entries are joined with their
+All keys of both are in this file; docs/interfaces.md lists them. Stamp: the template's. Entries are joined with their
 scenarios by the SHA-256 of the scenario's CDR bytes. QoS: reliable, transient_local, depth 1000.
 """
 
@@ -28,21 +28,26 @@ from scenario_gen.types import BoundaryStates, Cause, EgoSlot, FACTS, ORDERS, Sc
 
 INFO = "scenarios/info"
 REFUSED, ADAPTATION, TARGET = "refused.", "adaptation.", "target."
-REACTION, CUT = "reaction.", "reaction.cut."  # who reacts to whom in the template, JSON; what closes a circle
+REACTION, CUT = (
+    "reaction.",
+    "reaction.cut.",
+)  # who reacts to whom in the template, JSON; reactions that were cut because they closed a circle
 MESSAGES, PRESENT = "messages", "present"  # of a scenario in which not all are there throughout
-FREED = "freed"  # metres and m/s by which start and end of each vehicle may differ from the asked states
+FREED = "freed"  # metres and m/s by which start and end of each vehicle may differ from the requested states
 EGO_WITNESS = "ego_witness"  # of one with an ego slot
 Values = Mapping[str, str]
 
 
 @dataclass(frozen=True)
 class ScenarioEntry:
-    """What `scenarios/info` says of one scenario.
+    """The entry of one scenario.
 
     Attributes:
-        request: id of its request; index, seed: which sample of it.
+        request: id of its request.
+        index: its number in the request.
+        seed: of the request.
         sha256: of the scenario's CDR bytes.
-        status: all of it: `asked_start`, `asked_end`, `achieved_start`, `achieved_end`, `template`, `road`, `ego…`, hashes.
+        status: with all values: `asked_start`, `asked_end`, `achieved_start`, `achieved_end`, `template`, `road`, `ego…`, hashes.
     """
 
     request: str
@@ -53,7 +58,7 @@ class ScenarioEntry:
 
     @property
     def road(self) -> str:
-        """Name of the road; "" if it is not said, as by the nodes."""
+        """Name of the road; "" if it is not there, as in entries of the nodes."""
         return self.status.values.get("road", "")
 
     @cached_property
@@ -84,7 +89,7 @@ class ScenarioEntry:
 
     @property
     def order(self) -> str:
-        """Who was to go first: "keep" (also where it is not said), "free" or "swap".
+        """Who was to go first: "keep" (the default), "free" or "swap".
 
         Raises:
             InputError: it is none of these.
@@ -96,12 +101,12 @@ class ScenarioEntry:
 
     @property
     def facts(self) -> dict[str, str]:
-        """What it says besides of a scenario, see `Scenario.facts`."""
+        """Further values about the scenario, see `Scenario.facts`."""
         return {key: text for key, text in self.status.values.items() if key.startswith(FACTS)}
 
     @property
     def template_hash(self) -> str | None:
-        """Hash of the `tracks` that it was made from (hashes.py); None where it is not said (before version 0.2)."""
+        """Hash of the `tracks` that it was made from (hashes.py); None before version 0.2."""
         return self.status.values.get(TEMPLATE_HASH)
 
     @property
@@ -110,7 +115,7 @@ class ScenarioEntry:
         return self.status.values.get(MAP_HASH)
 
     def asked(self, what: str = INFO, *, witness: bool = False) -> BoundaryStates | None:
-        """Return the start and end states (N, 4) that were asked of it, None where they are not said.
+        """Return the requested start and end states (N, 4), None where they are not there.
 
         Args:
             what: names the topic in messages.
@@ -127,22 +132,22 @@ class ScenarioEntry:
         if witness:
             own = (_states(f"[{values[key]}]", where) for _, key in keys)
             start, end = (np.concatenate(rows) for rows in zip((start, end), own, strict=True))
-        return BoundaryStates(start, end, self._freed(len(start), where))
+        return BoundaryStates(start, end, self._relaxed(len(start), where))
 
-    def _freed(self, count: int, where: str) -> Floats:
-        """Return by how much the first of `count` vehicles' states may be left (count, 2, 2) [m, m/s]; 0 where it is not said."""
-        freed = np.zeros((count, 2, 2))
+    def _relaxed(self, count: int, where: str) -> Floats:
+        """Return by how much each of `count` vehicles may miss its states (count, 2, 2) [m, m/s]; 0 where it is not there."""
+        relaxed = np.zeros((count, 2, 2))
         with guarded(where):
             own = np.array(json.loads(self.status.values.get(FREED, "[]")), dtype=np.float64).reshape(-1, 2, 2)
         if len(own) > count or not np.isfinite(own).all() or (own < 0.0).any():
             raise InputError(f"{where}: {FREED} is not metres and m/s of at most {count} vehicles")
-        freed[: len(own)] = own
-        return freed
+        relaxed[: len(own)] = own
+        return relaxed
 
 
 @dataclass(frozen=True)
 class RequestSummary:
-    """What `scenarios/info` says of a request once it is closed.
+    """The summary of a closed request.
 
     Attributes:
         request: its id.
@@ -166,7 +171,7 @@ class RequestSummary:
 
     @property
     def provenance(self) -> dict[str, str]:
-        """What is needed to make it again, and its seed: what is neither its identity nor its outcome."""
+        """The values that regenerate it, and its seed: all that are neither its identity nor its outcome."""
         known = {"request", "requested", "published", "candidates", "chosen_from", MAP_HASH, TEMPLATE_HASH}
         return {
             key: value
@@ -208,14 +213,14 @@ class RequestSummary:
         return tuple(found)
 
     def sentence(self) -> str:
-        """Say what the request came to."""
+        """Return a sentence on the result of the request."""
         words = (self.values.get(key, "?") for key in ("request", "published", "requested", "candidates"))
-        said = "by its own summary request {} published {} of {} from {} candidates".format(*words)
+        text = "by its own summary request {} published {} of {} from {} candidates".format(*words)
         refused = [f"{key.removeprefix(REFUSED)} {n}" for key, n in self.values.items() if key.startswith(REFUSED) and n != "0"]
-        return f"{said}, refused: {', '.join(refused).replace('_', ' ')}" if refused else said
+        return f"{text}, refused: {', '.join(refused).replace('_', ' ')}" if refused else text
 
     def of_one_scenario(self) -> "RequestSummary":
-        """Return the summary as it stands in a bag of one of its scenarios."""
+        """Return the summary for a bag of one of its scenarios."""
         values = {**self.values, "published": "1", "requested": "1"}
         return replace(self, published=1, status=replace(self.status, values=values))
 
@@ -242,7 +247,7 @@ def decode_info(data: bytes, what: str = INFO) -> tuple[Info, ...]:
         elif "sha256" in values:
             index, seed = (_count(values, key, where) for key in ("index", "seed"))
             entry = ScenarioEntry(_text(values, "request", where), index, seed, values["sha256"], status)
-            _ = entry.messages  # they are damaged or not
+            _ = entry.messages  # raises if they are damaged
             found.append(entry)
     return tuple(found)
 
@@ -268,7 +273,7 @@ def scenario_entry(
         template: the template's vehicles, of which the scenario may have fewer.
         asked: their states.
         ego: the vehicle that was left out.
-        about: what else there is to say of all scenarios of the request (names of template and road, hashes).
+        about: further values for all scenarios of the request (names of template and road, hashes).
     """
     ids = [vehicle.id for vehicle in template]
     rows = [ids.index(vehicle.id) for vehicle in scenario.vehicles]
@@ -309,13 +314,13 @@ def request_summary(
     """Return the summary of a request.
 
     Args:
-        result: what it came to.
+        result: its scenarios and counts.
         request: its id.
         node: full name of the publishing node.
         seed: of the request.
-        provenance: what is needed to make it again.
+        provenance: the values that regenerate it.
         cancelled: whether it was ended early.
-        reactions: who reacts to whom in the template, `ReactionGraph.document` with what is kept.
+        reactions: who reacts to whom in the template, `ReactionGraph.document` with the kept ones marked.
     """
     edges = {REACTION: (reactions or {}).get("edges", ()), CUT: (reactions or {}).get("cut", ())}
     values = {
@@ -345,7 +350,7 @@ def _states_text(scenario: Scenario, at: int) -> str:
 
 
 def _states(text: str, what: str) -> Floats:
-    """Return the (N, 4) x, y, yaw, speed that such a list says."""
+    """Return the (N, 4) x, y, yaw, speed of such a list."""
     with guarded(f"{what}: no rows of numbers"):
         rows = np.array(json.loads(text), dtype=np.float64)
     if rows.ndim != 2 or rows.shape[1] != 4 or not np.isfinite(rows).all():

@@ -3,15 +3,15 @@
 
 """`scenarios` (conventions: trajectory.py): one message per scenario, several where vehicles arrive late or leave early.
 
-Frame: the road's. Stamp: the template's, so that the bytes depend on nothing but what was asked; a scenario's SHA-256 joins it
-with its `scenarios/info`, which also holds seed and index. QoS: reliable, transient_local, depth 1000.
+Frame: the road's. Stamp: the template's, so that the bytes depend on the request alone; a scenario's SHA-256 joins it with its
+`scenarios/info`, which also holds seed and index. QoS: reliable, transient_local, depth 1000.
 
-A vehicle is in a message from its first point to its last; nobody is ever shown where he is not. So vehicles that are there
+A vehicle is in a message from its first point to its last, and never while it is absent. So vehicles that are there
 from and to the same instants share a message (neighbours in the scenario's order: it is kept), and a scenario in which all are
 there throughout is one. `time_from_start` counts from the scenario's start in each, so a consumer that takes every message for
 itself sees each vehicle where and when it is. The messages of a scenario follow each other, then its entry of `scenarios/info`,
 whose `messages` are their SHA-256 and whose `sha256` is that of all their bytes in order. In this package a scenario's data is
-those bytes, of one message or of several; `messages_of` parts them.
+those bytes, of one message or of several; `messages_of` separates them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,7 +34,7 @@ def encode_scenario(scenario: Scenario, stamp_ns: int) -> bytes:
 
 
 def _parts(scenario: Scenario, stamp_ns: int) -> Iterator[Trajectory]:
-    """Yield what each message says: neighbouring vehicles that come and go together."""
+    """Yield the content of each message: neighbouring vehicles that come and go together."""
     time_ns = np.rint(scenario.time * NANOSECONDS).astype(np.int64)
     edges = [0, *(1 + np.flatnonzero((np.diff(scenario.present, axis=0) != 0).any(axis=1))).tolist(), len(scenario.vehicles)]
     for begin, end in pairwise(edges):

@@ -5,8 +5,8 @@
 
 Frame `local_enu`: metres east and north of the log's origin. QoS: reliable, transient_local, depth 1.
 A vehicle that arrives late or leaves early is far below the ground meanwhile (trajectory.py).
-Accelerations are the central differences of the speeds, for whoever wants them; they are not read back.
-The encounter's name and geodetic origin do not travel: nothing is computed from them.
+Accelerations are the central differences of the speeds; they are not read back.
+The encounter's name and geodetic origin are not in the message: nothing is computed from them.
 """
 
 import numpy as np

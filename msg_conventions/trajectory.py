@@ -25,7 +25,7 @@ from scenario_gen.types import tokens, Vehicle
 
 TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
 FARTHEST = 1e8  # m from the frame's origin: more than any geodetic grid has
-FASTEST = 1e4  # m/s: what drives is slower, and what follows from speeds can still be reckoned with
+FASTEST = 1e4  # m/s: no vehicle is faster, and sums of squares stay finite
 MANY = 10_000  # vehicles: beyond, a message is not laid out as one table
 LONGEST_NS = 7200 * NANOSECONDS  # of an encounter or a scenario
 SMALLEST, LARGEST = 0.01, 1000.0  # metres of a footprint
@@ -34,7 +34,7 @@ ABSENT = -1000.0  # m: z of a vehicle that is not there
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """What the message says: N vehicles at T instants.
+    """The content of the message: N vehicles at T instants.
 
     Attributes:
         stamp_ns: header stamp; frame_id: header frame.
@@ -56,7 +56,7 @@ class Trajectory:
 
 
 def joint_names(vehicles: Sequence[Vehicle]) -> tuple[str, ...]:
-    """Return `<token>:<length>x<width>` of each vehicle, metres: the message needs no second one beside it."""
+    """Return `<token>:<length>x<width>` of each vehicle, metres, so that no second message is needed for sizes."""
     names = tokens(vehicle.id for vehicle in vehicles)
     return tuple(f"{name}:{vehicle.length!r}x{vehicle.width!r}" for name, vehicle in zip(names, vehicles, strict=True))
 
@@ -123,7 +123,7 @@ def encode(trajectory: Trajectory) -> bytes:
 
 
 def decode(data: bytes, what: str) -> Trajectory:
-    """Return what the message says; velocities or accelerations that were left out are read as zero.
+    """Return the content of the message; velocities or accelerations that were left out are read as zero.
 
     Raises:
         InputError: naming `what`, where the message is damaged, lacks poses, or holds a value that is not finite or no vehicle's.
@@ -132,7 +132,7 @@ def decode(data: bytes, what: str) -> Trajectory:
 
 
 def decode_first(data: bytes, what: str) -> tuple[Trajectory, int]:
-    """Return what the first message says, and how many bytes it takes; others may follow.
+    """Return the content of the first message, and how many bytes it takes; others may follow.
 
     Raises:
         InputError: as `decode`.
@@ -143,7 +143,7 @@ def decode_first(data: bytes, what: str) -> tuple[Trajectory, int]:
     n, count = len(vehicles), reader.count(20)
     if not n:
         raise InputError(f"{what}: joint_names is empty; at least one vehicle is needed")
-    time_ns, pose, velocity, acceleration = _alike(reader, n, count) or _one_by_one(reader, what, n, count)
+    time_ns, pose, velocity, acceleration = _uniform(reader, n, count) or _one_by_one(reader, what, n, count)
     if not all(np.isfinite(value).all() for value in (pose, velocity, acceleration)):
         raise InputError(f"{what}: the message holds a value that is not finite")
     for name, values, most in (
@@ -172,8 +172,8 @@ def decode_first(data: bytes, what: str) -> tuple[Trajectory, int]:
 Points = tuple[Ints, Floats, Floats, Floats]  # times (T,) [ns], poses (T, N, 7), velocities and accelerations (T, N, 6)
 
 
-def _alike(reader: CdrReader, n: int, count: int) -> Points | None:
-    """The points all at once, where each has all that it can have; None, and nothing read, where they have not."""
+def _uniform(reader: CdrReader, n: int, count: int) -> Points | None:
+    """Return the points as one table if each has all its sequences; otherwise None, and nothing is read."""
     place = reader.place
     points = reader.aligned(_point_type(n), count) if n <= MANY else None
     if points is None:
@@ -187,7 +187,7 @@ def _alike(reader: CdrReader, n: int, count: int) -> Points | None:
 
 
 def _one_by_one(reader: CdrReader, what: str, n: int, count: int) -> Points:
-    """The points one after the other; velocities or accelerations that were left out are zero.
+    """Return the points, read one after the other; velocities or accelerations that were left out are zero.
 
     Raises:
         InputError: naming `what`, where the message is damaged or lacks poses.

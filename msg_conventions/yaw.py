@@ -17,7 +17,7 @@ def half_angle(heading: Floats) -> tuple[Floats, Floats]:
 
     A canonical angle is a multiple of a nanoradian plus turns and keeps off ±pi, so that taking back the turns is exact enough.
     """
-    if heading.size and max(heading.max(), -heading.min()) > np.pi:  # seldom
+    if heading.size and max(heading.max(), -heading.min()) > np.pi:  # rarely
         heading = heading - TWO_PI * np.rint(heading / TWO_PI)
     half = 0.5 * heading
     return exact.sin(half), exact.cos(half)

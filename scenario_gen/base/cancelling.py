@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Work that somebody may have given up meanwhile: it asks now and then, wherever it stands, and ends."""
+"""Cancellation of long work: the work checks a flag between its pieces, and ends."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,28 +9,28 @@ from contextvars import ContextVar
 
 from scenario_gen.base.errors import ScenarioGenError
 
-_asked: ContextVar[Callable[[], bool]] = ContextVar("cancelled", default=lambda: False)
+_is_cancelled: ContextVar[Callable[[], bool]] = ContextVar("cancelled", default=lambda: False)
 
 
 class CancelledError(ScenarioGenError):
-    """Nobody waits for the result any more."""
+    """The work was cancelled: nobody waits for its result."""
 
 
 @contextmanager
 def cancellable(cancelled: Callable[[], bool]) -> Iterator[None]:
-    """Let `stop_if_cancelled` ask `cancelled` while the work inside goes on, on this thread."""
-    before = _asked.set(cancelled)
+    """Let `stop_if_cancelled` call `cancelled` during the work inside, on this thread."""
+    before = _is_cancelled.set(cancelled)
     try:
         yield
     finally:
-        _asked.reset(before)
+        _is_cancelled.reset(before)
 
 
 def stop_if_cancelled() -> None:
-    """End the work here if it was cancelled; called between pieces of long work.
+    """End the work if it was cancelled; called between pieces of long work.
 
     Raises:
         CancelledError: it was.
     """
-    if _asked.get()():
+    if _is_cancelled.get()():
         raise CancelledError("cancelled")

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""YAML and JSON that others wrote, read with bounds: size, depth, no aliases, plain values only, a schema."""
+"""YAML and JSON of others, read with bounds: size, depth, no aliases, plain values only, a schema."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -15,8 +15,8 @@ from scenario_gen.base.errors import guarded, InputError
 MOST_YAML = 512 * 1024  # bytes; the parameters of all stages take 9 kB, the metadata of a bag of 1000 topics 500 kB
 MOST_JSON = 8 * 1024 * 1024  # bytes; the figures of one case take 9 kB
 DEEPEST = 32  # nested lists and mappings
-WHOLE = 2**63  # beyond this an integer is none that a parameter or a stamp can be
-LARGEST = 1e300  # of a number in JSON: no infinity, and room to reckon with it
+WHOLE = 2**63  # bound of the integers that parameters and stamps can be
+LARGEST = 1e300  # of a number in JSON: finite, also after some arithmetic
 PLAIN = frozenset(f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "str", "seq", "map"))
 NUMBER = {"type": "number", "minimum": -LARGEST, "maximum": LARGEST}
 COUNT = {"type": "integer", "minimum": 0, "maximum": WHOLE - 1}
@@ -24,7 +24,7 @@ COUNT = {"type": "integer", "minimum": 0, "maximum": WHOLE - 1}
 
 @cache
 def _loader() -> Any:
-    """Make the class that reads YAML; PyYAML is imported when the first document is read, for the segmentation does without."""
+    """Return the class that reads YAML; PyYAML is imported with the first document, for the segmentation does not need it."""
     import yaml
 
     class Loader(yaml.CSafeLoader):  # type: ignore[misc]
@@ -63,13 +63,13 @@ def parse_yaml(text: str, what: str) -> Any:
         _check_events(text, what)
         return yaml.load(text, Loader=_loader())
     except yaml.YAMLError as error:
-        raise InputError(f"{what}: {_yaml_said(error)}") from error
+        raise InputError(f"{what}: {_yaml_problem(error)}") from error
     except (ValueError, KeyError, IndexError, AttributeError) as error:  # PyYAML's own constructors, of `!!int ""` or `!!bool x`
         raise InputError(f"{what}: a value does not suit its tag ({type(error).__name__})") from error
 
 
 def _check_events(text: str, what: str) -> None:
-    """Look at a YAML text's structure before anything is made of it.
+    """Check a YAML text's structure before any value is built from it.
 
     Raises:
         InputError: it is too deep, or has an alias or a tag of another kind.
@@ -89,7 +89,7 @@ def _check_events(text: str, what: str) -> None:
             raise InputError(f"{place}: lists or mappings nested more than {DEEPEST} deep are not read")
 
 
-def _yaml_said(error: Exception) -> str:
+def _yaml_problem(error: Exception) -> str:
     """Return place and problem in one line."""
     mark = getattr(error, "problem_mark", None)
     place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
@@ -97,11 +97,11 @@ def _yaml_said(error: Exception) -> str:
     return f"not YAML ({place}{problem})"
 
 
-def read_text(path: Path, most: int, what: str) -> str:
-    """Return the text of a regular file of at most `most` bytes.
+def read_bytes(path: Path, most: int, what: str, remedy: str = "") -> bytes:
+    """Return the content of a regular file of at most `most` bytes; `remedy` ends the message where it is larger.
 
     Raises:
-        InputError: it cannot be read, is no regular file, too large, or not UTF-8.
+        InputError: it cannot be read, is no regular file, or is too large.
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):  # before it is opened: a pipe would wait for its writer
@@ -111,9 +111,18 @@ def read_text(path: Path, most: int, what: str) -> str:
     except (OSError, ValueError) as error:  # ValueError: a name with a null byte
         raise InputError(f"{what}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
     if len(data) > most:
-        raise InputError(f"{what}: {path.stat().st_size} bytes; at most {most} are read")
+        raise InputError(f"{what}: {path.stat().st_size} bytes; at most {most} are read{remedy}")
+    return data
+
+
+def read_text(path: Path, most: int, what: str) -> str:
+    """Return the text of a regular file of at most `most` bytes.
+
+    Raises:
+        InputError: as `read_bytes`, or it is not UTF-8.
+    """
     try:
-        return data.decode("utf-8-sig")
+        return read_bytes(path, most, what).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{what}: not UTF-8 text (byte {error.start})") from error
 
@@ -129,10 +138,10 @@ def read_yaml(path: Path, what: str = "") -> Any:
 
 
 def parse_json(text: str, what: str, schema: Mapping[str, Any]) -> Any:
-    """Return the value of a JSON text that keeps the schema; its numbers are finite if the schema takes `NUMBER` for them.
+    """Return the value of a JSON text that conforms to the schema; its numbers are finite if the schema uses `NUMBER`.
 
     Raises:
-        InputError: the text is no JSON, or does not keep the schema; the message names the path inside the document.
+        InputError: the text is no JSON, or does not conform; the message names the path inside the document.
     """
 
     def refuse(name: str) -> NoReturn:
@@ -159,12 +168,12 @@ def read_json(path: Path, schema: Mapping[str, Any], what: str = "") -> Any:
 
 
 def _check_schema(value: Any, what: str, schema: Mapping[str, Any]) -> None:
-    """Hold a value against a JSON schema.
+    """Check a value against a JSON schema.
 
     Raises:
-        InputError: it does not keep it; names the path, what was found there and what is needed.
+        InputError: it does not conform; names the path, what was found there and what is needed.
     """
-    import jsonschema  # a quarter of a second, that only who reads JSON need wait
+    import jsonschema  # takes a quarter of a second
 
     with guarded(what, RecursionError, remedy="lists or objects are nested too deep"):
         error = next(jsonschema.Draft202012Validator(schema).iter_errors(value), None)
@@ -176,7 +185,7 @@ def _check_schema(value: Any, what: str, schema: Mapping[str, Any]) -> None:
 
 
 def check_shape(value: Any, shape: tuple[int, ...], what: str) -> None:
-    """Hold lists in lists against the shape of an array.
+    """Check nested lists against the shape of an array.
 
     Raises:
         InputError: there are more or fewer items somewhere.

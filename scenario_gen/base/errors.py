@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The errors of the project, what is shown of them, and how those of libraries become ours."""
+"""The errors of the project, how they are shown, and how errors of libraries become ours."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,8 +20,8 @@ class ScenarioGenError(Exception):
 class InputError(ScenarioGenError):
     """A file, row, topic or parameter cannot be used as it is.
 
-    The message is made fit to be shown, for it may quote the file: characters that do not print are escaped, and of a message
-    that is too long the middle is left out, so that the place at its beginning and the remedy at its end stay.
+    The message may quote the file, so it is made presentable: characters that do not print are escaped, and the middle of a long
+    message is left out, so that the place at its beginning and the remedy at its end stay.
     """
 
     def __init__(self, message: str) -> None:
@@ -29,15 +29,15 @@ class InputError(ScenarioGenError):
 
 
 class UnforeseenError(InputError):
-    """A reader failed on a file in a way that nobody foresaw; the failure is its cause, and a fault to be mended."""
+    """A reader failed on a file in an unforeseen way; its cause is a fault of the reader."""
 
 
 class MissingExtraError(ScenarioGenError, ImportError):
-    """A library is not installed that only some uses need; the message names the extra that brings it."""
+    """A library that only some uses need is not installed; the message names the extra that installs it."""
 
 
 def needs(extra: str, *modules: str) -> None:
-    """Refuse to go on where a module of an extra is not installed.
+    """Check that the modules of an extra are installed.
 
     Args:
         extra: a key of `extras_require` in setup.py.
@@ -53,7 +53,7 @@ def needs(extra: str, *modules: str) -> None:
 
 def presentable(text: str) -> str:
     """Return a message with at most `LONGEST` characters, all of which print, or are line breaks."""
-    if len(text) > LONGEST:  # at first roughly, for a quoted field may hold megabytes
+    if len(text) > LONGEST:  # a first cut, for a quoted field may hold megabytes
         text = text[:LONGEST] + text[-LONGEST:]
     text = printable(text)
     half = LONGEST // 2
@@ -61,7 +61,7 @@ def presentable(text: str) -> str:
 
 
 class RefusedError(ScenarioGenError):
-    """The input is sound but what was asked cannot be done with it, e.g. a template that fits no road."""
+    """The input is sound but the request cannot be met with it, e.g. a template that fits no road."""
 
 
 def of_system(error: OSError, name: object = None, advice: str = "") -> InputError:
@@ -73,12 +73,12 @@ def of_system(error: OSError, name: object = None, advice: str = "") -> InputErr
 
 
 def printable(text: str) -> str:
-    """Return the text with what would steer a terminal (control characters, bidi marks) written as in Python source."""
+    """Return the text with characters that control a terminal (also bidi marks) written as in Python source."""
     return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
 
 
 def tell(error: ScenarioGenError | OSError) -> int:
-    """Say on standard error what is wrong; return the exit code."""
+    """Print the error on standard error; return the exit code."""
     own = of_system(error) if isinstance(error, OSError) else error
     print(f"error: {presentable(str(own))}", file=sys.stderr)
     return own.exit_code
@@ -86,16 +86,16 @@ def tell(error: ScenarioGenError | OSError) -> int:
 
 @contextmanager
 def guarded(where: str, *kinds: type[Exception], remedy: str = "") -> Iterator[None]:
-    """Turn what a library raises while it decodes into an InputError; the block holds nothing but calls into that library.
+    """Turn the exceptions of a library that decodes into an InputError; the block holds nothing but calls into that library.
 
     Args:
         where: the file and the place in it; begins the message.
-        kinds: what to turn; everything by default, for a decoder that meets damaged bytes may fail in any way, and with
-            none of our own code in the block no fault of ours can hide behind it.
+        kinds: of exceptions to turn; by default all: a decoder may fail in any way on damaged bytes, and as the block holds
+            no code of ours, no fault of ours is hidden.
         remedy: what to do; ends the message.
 
     Raises:
-        InputError: the library failed; names `where`, what the library said, and `remedy`.
+        InputError: the library failed; with `where`, the message of the library, and `remedy`.
     """
     turned = kinds or (Exception,)
     try:
@@ -108,9 +108,9 @@ def guarded(where: str, *kinds: type[Exception], remedy: str = "") -> Iterator[N
 
 @contextmanager
 def reading(path: object) -> Iterator[None]:
-    """Turn whatever a reader did not foresee in a damaged file into an InputError that names the file; once around each reader.
+    """Turn an unforeseen exception of a reader into an InputError that names the file; used once around each reader.
 
-    Unlike `guarded` there is code of ours in the block, so the error has a kind of its own, which the fuzzing takes as a finding.
+    Unlike in `guarded` there is code of ours in the block, so the error has a class of its own, a finding of the fuzzing.
 
     Raises:
         UnforeseenError: the reader failed with none of our errors, and none of the system's.
@@ -124,7 +124,7 @@ def reading(path: object) -> Iterator[None]:
 
 
 def said(error: Exception) -> str:
-    """Return what an error says in one line, with its kind where it says little or nothing."""
+    """Return the message of an error in one line, with its class where the message is a single word or empty."""
     if isinstance(error, MemoryError):
         return "asks for more memory than there is"
     text = " ".join(str((isinstance(error, OSError) and error.strerror) or error).split())

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Ctrl-C, SIGTERM and SIGHUP: heard by a thread (nodes), or kept out of what must not be cut in two (commands)."""
+"""Ctrl-C, SIGTERM and SIGHUP: received by a thread (nodes), or deferred by work that must not be interrupted (commands)."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -18,19 +18,19 @@ _held = 0
 _pending: int | None = None
 _endings: list[Callable[[], None]] = []
 _orderly: Callable[[], None] | None = None
-_hearing = 0  # the process that has a thread for it; a fork has none
+_hearing = 0  # id of the process that has the thread; a fork has none
 
 
 def end_with_parent() -> None:
-    """Let a worker process end when the one does that started it, however that ends; a Ctrl-C is for that one.
+    """Let a worker process end when its parent does, however that ends; a Ctrl-C is for the parent alone.
 
-    It is of this module, which loads next to nothing: so it holds before a worker loads what its tasks need.
+    This module imports little, so that a worker calls this before it loads the modules of its tasks.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is None:
         return
-    if sys.platform == "linux":  # at once, in compiled code too
+    if sys.platform == "linux":  # takes effect at once, also in compiled code
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
 
     def wait() -> None:
@@ -41,10 +41,10 @@ def end_with_parent() -> None:
 
 
 def hear() -> None:
-    """Have the signals heard by a thread of their own from now on: whatever else runs goes on undisturbed, compiled code too.
+    """Start a thread that receives the signals, so that all other work, also compiled code, is not interrupted.
 
-    A signal ends the process at once, or calls what `end_orderly` was given. To be called before there are other threads: those
-    would take the signals.
+    A signal ends the process at once, or calls the function given to `end_orderly`. To be called before other threads start:
+    they would receive the signals.
     """
     global _hearing  # noqa: PLW0603
     if _hearing == os.getpid():
@@ -52,13 +52,13 @@ def hear() -> None:
     _hearing = os.getpid()
     heard = {number for number in SIGNALS if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN}
     signal.pthread_sigmask(signal.SIG_BLOCK, heard)
-    for number in heard:  # one that is ignored (of a job in the background, say) would never come
-        signal.signal(number, lambda number, _: _take(number))  # and should a thread of before take it
+    for number in heard:  # an ignored signal (of a job in the background, say) would never come
+        signal.signal(number, lambda number, _: _take(number))  # for threads that started earlier
     threading.Thread(target=_hear, args=(heard,), daemon=True, name="signals").start()
 
 
 def end_orderly(end: Callable[[], None]) -> None:
-    """Have `end` called by a signal, on the thread of the signals, instead of ending the process."""
+    """Let a signal call `end`, on the thread of the signals, instead of ending the process."""
     global _orderly  # noqa: PLW0603
     _orderly = end
 
@@ -78,10 +78,10 @@ def _take(number: int) -> None:
 def leave(number: int, _frame: object) -> None:
     """Signal handler of commands: clean up and end the process, at once or when `uninterrupted` work is done.
 
-    Nothing is raised: an exception out of the blue is swallowed where Python calls back (when a module has been imported, say),
-    and compiled code that it meets may crash.
+    It raises nothing: Python swallows exceptions in callbacks (after the import of a module, say), and compiled code may crash on
+    them.
     """
-    global _pending  # noqa: PLW0603 - a signal has no other place to be noted
+    global _pending  # noqa: PLW0603 - a signal handler has no other state
     if _held:
         _pending = number
     else:
@@ -90,7 +90,7 @@ def leave(number: int, _frame: object) -> None:
 
 @contextmanager
 def ending(clean_up: Callable[[], None]) -> Iterator[None]:
-    """Let `leave` call `clean_up` while the work inside goes on."""
+    """Let `leave` call `clean_up` during the work inside."""
     _endings.append(clean_up)
     try:
         yield
@@ -100,7 +100,7 @@ def ending(clean_up: Callable[[], None]) -> Iterator[None]:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Let the work inside be finished before a signal takes effect; of nested ones the outermost."""
+    """Defer signals until the work inside is finished; of nested ones the outermost."""
     global _held  # noqa: PLW0603
     _held += 1
     try:
@@ -113,14 +113,14 @@ def uninterrupted() -> Iterator[None]:
 
 @contextmanager
 def starting() -> Iterator[None]:
-    """Let processes that are started inside hear no Ctrl-C, which a terminal sends to them, too: it is for this one, afterwards.
+    """Start processes inside with Ctrl-C blocked: a terminal sends it to them too, but this process handles it, afterwards.
 
-    They are deaf to it before their first line; what they load meanwhile would end in a traceback.
+    It is blocked before their first line, for an interrupted import would end in a traceback.
     """
     from multiprocessing import resource_tracker
 
     with uninterrupted():
-        resource_tracker.ensure_running()  # it unblocks Ctrl-C when it begins, and else begins with the first process
+        resource_tracker.ensure_running()  # it unblocks Ctrl-C when it starts, by default with the first process
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             yield
@@ -129,11 +129,11 @@ def starting() -> Iterator[None]:
 
 
 def _leave(number: int) -> None:
-    signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # a second Ctrl-C does not disturb this
+    signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # a second Ctrl-C does not interrupt this
     for clean_up in reversed(_endings):
         with suppress(Exception):
             clean_up()
     cursor = "\x1b[?25h" if os.isatty(2) else ""  # a progress bar hides it
     with suppress(OSError):
         os.write(2, f"{cursor}stopped by {signal.Signals(number).name}\n".encode())
-    os._exit(128 + number)  # as a shell says it
+    os._exit(128 + number)  # as a shell reports it

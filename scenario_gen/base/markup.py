@@ -1,16 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""XML that others wrote, read with bounds: size, elements, depth; no document types, and so no entities of a file's own."""
+"""XML of others, read with bounds: size, elements, depth; no document types, and so no entities defined in a file."""
 
 from dataclasses import dataclass, field
 import math
 from pathlib import Path
-import stat
 from typing import Any
 from xml.parsers import expat
 
-from scenario_gen.base.documents import shown
+from scenario_gen.base.documents import read_bytes, shown
 from scenario_gen.base.errors import InputError
 
 MOST_BYTES = 128 * 1024 * 1024  # of a map; a town of 100 roads takes 0.5 MB in OpenDRIVE, a district in Lanelet2 20 MB
@@ -107,27 +106,15 @@ def read_xml(path: Path, what: str, skip: frozenset[str] = frozenset()) -> Eleme
     Args:
         path: the file.
         what: names it in messages.
-        skip: names of elements that are passed over with all they hold.
+        skip: names of elements that are passed over with their content.
 
     Raises:
         InputError: it cannot be read, is too large or deep, declares a document type, or is no XML; names line and column.
     """
-    return parse_xml(_bytes(path, what), what, skip)
-
-
-def _bytes(path: Path, what: str) -> bytes:
-    try:
-        if not stat.S_ISREG(path.stat().st_mode):  # before it is opened: a pipe would wait for its writer
-            raise InputError(f"{what}: not a regular file")
-        with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{what}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
-    if len(data) > MOST_BYTES:
-        raise InputError(f"{what}: {path.stat().st_size} bytes; at most {MOST_BYTES} are read: cut the map")
+    data = read_bytes(path, MOST_BYTES, what, ": cut the map")
     if not data.strip():
         raise InputError(f"{what} is empty")
-    return data
+    return parse_xml(data, what, skip)
 
 
 def parse_xml(data: bytes, what: str, skip: frozenset[str] = frozenset()) -> Element:
@@ -178,8 +165,8 @@ def parse_xml(data: bytes, what: str, skip: frozenset[str] = frozenset()) -> Ele
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
-        said = expat.errors.messages.get(error.code, str(error))
-        raise InputError(f"{what}, line {error.lineno}, column {error.offset + 1}: not XML ({said})") from error
-    except (ValueError, LookupError) as error:  # an encoding that Python has not
+        problem = expat.errors.messages.get(error.code, str(error))
+        raise InputError(f"{what}, line {error.lineno}, column {error.offset + 1}: not XML ({problem})") from error
+    except (ValueError, LookupError) as error:  # an encoding that Python lacks
         raise InputError(f"{what}: not XML that can be read ({error})") from error
     return root.children[0]

@@ -37,7 +37,7 @@ def parameter(
         high: largest value, None for no bound.
         choices: the texts allowed, none for any.
         group: of entry points, whose names are allowed beside `choices` (see `base.registry`).
-        was: its name in the version before this one, which is still taken, with a warning.
+        was: its name in the version before this one, which is still accepted, with a warning.
     """
     meta = {"meaning": meaning, "unit": unit, "low": low, "high": high, "choices": choices, "group": group, "was": was}
     return field(default=default, metadata=meta)
@@ -45,7 +45,7 @@ def parameter(
 
 @dataclass(frozen=True)
 class Parameters:
-    """Base of every configuration: its values are checked when it is made.
+    """Base of every configuration: its values are checked when it is created.
 
     Raises:
         InputError: a value has the wrong type or is out of range.
@@ -146,7 +146,7 @@ def assigned(config: Config, assignment: str) -> Config:
 
 
 def loaded(config: Config, path: Path) -> Config:
-    """Return a copy of `config` with what a parameter file sets.
+    """Return a copy of `config` with the values of a parameter file.
 
     Raises:
         InputError: the file cannot be read, a name is unknown or a value does not suit; the message names file and parameter.

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The terminal: what files, vehicles and encounters are called is shown letter by letter, whatever the letters are."""
+"""The terminal: names of files, vehicles and encounters are shown literally, whatever characters they have."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,19 +15,19 @@ from scenario_gen.base.errors import printable
 
 
 class Terminal(Console):
-    """A console that takes no text for markup and lets no control character out of one; styles come with Text objects only."""
+    """A console that interprets no markup and prints no control characters of texts; styles come with Text objects only."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(markup=False, emoji=False, highlight=False, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Every plain text goes this way, in a table's cell, too."""
+        """Render a plain text; rich calls this for all of them, also in a table's cells."""
         return super().render_str(printable(text), **options)
 
 
 @contextmanager
 def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
-    """Show progress bars on standard error, silent where nobody watches; give what is told name, done and total of each."""
+    """Show progress bars on standard error if it is a terminal; yield the function that takes name, done and total of each."""
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     tasks: dict[str, TaskID] = {}
     with Progress(*columns, console=Terminal(stderr=True), transient=True) as bars:
@@ -42,6 +42,6 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
 
 @contextmanager
 def status_line() -> Iterator[Callable[[str], None]]:
-    """Show one changing line while others work, silent where nobody watches; give what is told its text."""
+    """Show a changing line if this is a terminal; yield the function that takes its text."""
     with Terminal().status("starting") as status:
         yield lambda text: status.update(Text(printable(text)))

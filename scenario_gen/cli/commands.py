@@ -404,10 +404,10 @@ def compare_sets(
 
 def remind(bag: Path) -> None:
     """Say what is missing of a bag that is read all the same."""
-    from scenario_gen.bags.storage.files import remark
+    from scenario_gen.bags.storage.files import remarks
 
-    if said := remark(bag):
-        say(said)
+    for remark in remarks(bag):
+        say(remark)
 
 
 def conclude(cases: "list[GenerationResult]", refusals: list[str], out: Path) -> None:

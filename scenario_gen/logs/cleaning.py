@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Cleaning: what cannot be true is dropped and counted; what is left is in order of time, in metres."""
+"""Cleaning: impossible values are dropped and counted; the rest is put in order of time and into metres."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -12,18 +12,19 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.geodesy import local_frame
+from scenario_gen.logs.quality import Dropped
 from scenario_gen.logs.raw import Observations, RawLog
 from scenario_gen.numerics import Bools, exact, Floats, Ints
 
 LATEST_NS = 2**62  # years 1823 to 2116: so the difference of any two stamps fits in 64 bits
-SLOWEST = 5.0  # s between fixes: a slower source says nothing of how a vehicle drives, or its unit of time is another one
+SLOWEST = 5.0  # s between fixes: a slower source does not show how a vehicle drives, or its unit of time is another one
 FARTHEST = 1e8  # m from the origin of any frame: a quarter of the way to the moon
 UNITS = {"milliseconds": ("ms", 1e-3), "microseconds": ("us", 1e-6), "nanoseconds": ("ns", 1e-9)}
 USUAL = (0.005, 2.0)  # s between fixes of usual sources
 FASTEST = 70.0  # m/s: no road vehicle's measured speed is above it (an SPMD unit sends 163.8 for "unknown")
 JUMP_SLACK = 3.0  # m that a fix may lie beyond what the speeds allow: GPS noise
 JUMP_SPEED = 10.0  # m/s by which a measured speed may be wrong before a fix counts as a jump
-RELOCATED = 5  # so many fixes in a row that agree with each other are a new place, not jumps
+RELOCATED = 5  # fixes in a row that agree with each other and are then a new place, not jumps
 
 
 @dataclass
@@ -39,16 +40,20 @@ class Drops:
             self.count[reason] = self.count.get(reason, 0) + len(rows)
             self.first[reason] = min(self.first.get(reason, int(rows[0])), int(rows.min()))
 
+    def of(self, log: RawLog) -> tuple[Dropped, ...]:
+        """Return the reasons with their counts and the places in the log."""
+        return tuple(Dropped(reason, count, log.where(self.first[reason])) for reason, count in self.count.items())
+
 
 def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Drops, tuple[float, float] | None]:
-    """Drop what cannot be true and bring every vehicle into the local frame.
+    """Drop impossible values and bring every vehicle into the local frame.
 
     Returns:
         The vehicles with at least two fixes, in metres, stamps strictly increasing, no NaN but in headings; the drops; the
         frame's origin (latitude, longitude) or None.
 
     Raises:
-        InputError: nothing usable is left, or `strict` and something had to be repaired.
+        InputError: nothing usable is left, or `strict` is set and a row had to be repaired.
     """
     drops = Drops()
     for reason, row in log.dropped:
@@ -64,13 +69,13 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Dro
     check_clock(sound, log, config)
     tracks = [without_jumps(vehicle, drops, config) for vehicle in sound]
     if config.strict and drops.count:
-        reason = next(iter(drops.count))
-        raise InputError(f"{log.where(drops.first[reason])}: {reason} ({drops.count[reason]} such rows), and strict is set")
+        worst = drops.of(log)[0]
+        raise InputError(f"{worst.first}: {worst.reason} ({worst.count} such rows), and strict is set")
     return tuple(track for track in tracks if len(track.fix_ns) >= 2), drops, origin
 
 
 def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) -> Observations:
-    """Leave out values that are no position or no speed."""
+    """Return the observations without impossible positions and speeds."""
     fix, speed = vehicle.fix, vehicle.speed
     checks: list[tuple[str, Any]] = [
         ("stamp is out of range", beyond(vehicle.fix_ns)),
@@ -93,12 +98,12 @@ def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) ->
 
 
 def beyond(stamps: Ints) -> Bools:
-    """Return which stamps (T,) [ns] are too far from 1970 to be subtracted from each other."""
+    """Return which stamps (T,) [ns] are so far from 1970 that differences of them may overflow."""
     return (stamps < -LATEST_NS) | (stamps > LATEST_NS)
 
 
 def judge(checks: list[tuple[str, Any]], rows: Ints, drops: Drops) -> Bools:
-    """Return which rows (T,) fail no check of (T,) flags; each that fails counts once, for the first reason."""
+    """Return which rows (T,) pass all checks, each a reason and (T,) flags; a row counts once, for its first reason."""
     keep = np.ones(len(rows), dtype=bool)
     for reason, bad in checks:
         drops.add(reason, rows[keep & bad])
@@ -123,7 +128,7 @@ def time_window(sound: list[Observations], log: RawLog, drops: Drops, config: Lo
     """
     stamps = [vehicle.fix_ns for vehicle in sound if len(vehicle.fix_ns)]
     if not stamps:
-        causes = "; ".join(f"{reason}: {n}, first at {log.where(drops.first[reason])}" for reason, n in drops.count.items())
+        causes = "; ".join(map(str, drops.of(log)))
         raise InputError(
             f"{log.segments[0].label} holds no usable position among {log.rows} rows"
             + (f" ({causes})" if causes else "")
@@ -159,7 +164,7 @@ def to_metres(
     if config.origin:
         origin = parse_origin(config.origin)
     else:
-        middle = np.round(np.percentile(everything, [5, 95], axis=0).mean(axis=0), 5)  # a few wrong fixes do not move it
+        middle = np.round(np.percentile(everything, [5, 95], axis=0).mean(axis=0), 5)  # robust against a few wrong fixes
         origin = (float(middle[0]), float(middle[1]))
     return origin, [replace(vehicle, fix=local_frame(vehicle.fix[:, 0], vehicle.fix[:, 1], origin)) for vehicle in vehicles]
 
@@ -183,16 +188,16 @@ def in_order(vehicle: Observations, log: RawLog, drops: Drops) -> Observations:
     """Sort by stamp and drop repeated stamps.
 
     Raises:
-        InputError: the clock is no clock: it runs backwards half of the time, or stands.
+        InputError: the stamps run backwards half of the time, or stand still.
     """
     fixes, speeds = np.diff(vehicle.fix_ns), np.diff(vehicle.speed_ns)
     back = np.flatnonzero(fixes < 0) + 1
     repeated = int((fixes == 0).sum())
     if len(fixes) >= 4 and (len(back) > len(fixes) / 2 or repeated > 0.9 * len(fixes)):
         row = vehicle.fix_row[back[0] if len(back) else 1]
-        what = f"runs backwards {len(back)} times" if len(back) else f"stands still {repeated} times"
+        fault = f"runs backwards {len(back)} times" if len(back) else f"stands still {repeated} times"
         raise InputError(
-            f"{log.where(int(row))}: the clock of vehicle {vehicle.id} {what} in {len(fixes)} rows; check the time column"
+            f"{log.where(int(row))}: the clock of vehicle {vehicle.id} {fault} in {len(fixes)} rows; check the time column"
         )
     drops.add("stamp out of order (sorted)", vehicle.fix_row[back])
     late = set(back.tolist())
@@ -215,8 +220,8 @@ def first_of_each(stamps: Ints) -> tuple[Ints, Ints]:
 def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig) -> None:
     """Refuse tracks whose common clock would have more than `tick_limit` ticks, or whose unit of time seems to be wrong.
 
-    The clock has a tick for every period between a vehicle's first and last stamp: one wrong stamp puts them years apart, and
-    the clock then asks for hundreds of gibibytes.
+    The clock has a tick for every period between a vehicle's first and last stamp: with one wrong stamp these may be years apart,
+    and the clock would need hundreds of gibibytes.
 
     Args:
         vehicles: stamps in order.
@@ -232,10 +237,10 @@ def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig
     typical = float(np.median(np.concatenate([np.diff(vehicle.fix_ns) for vehicle in vehicles]))) * 1e-9
     if typical > max(SLOWEST, config.longest_gap):
         likely = [(name, unit) for name, (unit, factor) in UNITS.items() if USUAL[0] <= typical * factor <= USUAL[1]]
-        said = f"this looks like {likely[0][0]} read as seconds; " if likely else ""
+        hint = f"this looks like {likely[0][0]} read as seconds; " if likely else ""
         raise InputError(
             f"{log.where(int(vehicles[0].fix_row[1]))}: positions are {typical:g} s apart (median), at most {SLOWEST:g} s make a "
-            f"track; {said}name the unit with the parameter columns, time=<column>:{likely[0][1] if likely else '<unit>'}"
+            f"track; {hint}name the unit with the parameter columns, time=<column>:{likely[0][1] if likely else '<unit>'}"
         )
     spans = [int(vehicle.fix_ns[-1]) - int(vehicle.fix_ns[0]) for vehicle in vehicles]
     ticks = round(sum(int(span) for span in spans) / (config.period * 1e9))
@@ -251,7 +256,7 @@ def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig
 
 
 def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig) -> Observations:
-    """Drop fixes that the vehicle cannot have reached at the speeds it measured; several in a row that agree are believed."""
+    """Drop fixes that the vehicle cannot have reached at its measured speeds, except several in a row that agree."""
     limit = reach(vehicle)
     step = exact.hypot(*np.diff(vehicle.fix, axis=0).T)
     seconds = np.diff(vehicle.fix_ns) * 1e-9
@@ -266,30 +271,30 @@ def without_jumps(vehicle: Observations, drops: Drops, config: LogConfig) -> Obs
 
 
 def reach(vehicle: Observations) -> Floats:
-    """(F,) m/s: the fastest that the vehicle may have been at each fix."""
+    """Return the highest speeds (F,) [m/s] that the vehicle may have had at its fixes."""
     if len(vehicle.speed_ns) < 2:
         return np.full(len(vehicle.fix_ns), FASTEST)
     return 1.5 * np.interp(vehicle.fix_ns, vehicle.speed_ns, vehicle.speed) + JUMP_SPEED
 
 
 def reachable(seconds: Floats, fix: Floats, limit: Floats) -> Bools:
-    """Return which fixes (F,) can be reached from the last one believed.
+    """Return which fixes (F,) can be reached from the last accepted one.
 
     Args:
         seconds: (F,) their stamps.
         fix: (F, 2) [m].
-        limit: (F,) the fastest that the vehicle may have been [m/s].
+        limit: (F,) the highest speeds that the vehicle may have had [m/s].
     """
     keep = np.ones(len(fix), dtype=bool)
-    last, doubted = 0, 0
+    last, n_doubted = 0, 0
     for i in range(1, len(fix)):
         if exact.hypot(*(fix[i] - fix[last])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[last]):
-            last, doubted = i, 0
+            last, n_doubted = i, 0
             continue
-        agrees = doubted and exact.hypot(*(fix[i] - fix[i - 1])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[i - 1])
-        doubted = doubted + 1 if agrees else 1
+        agrees = n_doubted and exact.hypot(*(fix[i] - fix[i - 1])) <= JUMP_SLACK + limit[i] * (seconds[i] - seconds[i - 1])
+        n_doubted = n_doubted + 1 if agrees else 1
         keep[i] = False
-        if doubted >= RELOCATED:
-            keep[i - doubted + 1 : i + 1] = True
-            last, doubted = i, 0
+        if n_doubted >= RELOCATED:
+            keep[i - n_doubted + 1 : i + 1] = True
+            last, n_doubted = i, 0
     return keep

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which column of a table holds which quantity, and in which unit: by option, or by name and suffix."""
+"""The columns of a table by quantity, with their units: by option, or by name and suffix."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -46,7 +46,7 @@ class Column:
     """A column of the table, the factor to our unit, and whether it is a heading clockwise from north."""
 
     name: str
-    factor: float
+    factor: float = 1.0
     clockwise: bool = False
 
 
@@ -68,8 +68,8 @@ def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Co
             continue
         name, _, unit = (name, "", "") if name.lower() in names else name.rpartition(":")
         if name.lower() not in names:
-            asked = part.partition("=")[2].strip()
-            raise InputError(f"{path} has no column {asked!r} (asked for as {quantity}); it has {', '.join(names.values())}")
+            requested = part.partition("=")[2].strip()
+            raise InputError(f"{path} has no column {requested!r} (asked for as {quantity}); it has {', '.join(names.values())}")
         if unit and unit not in UNITS[quantity]:
             raise InputError(f"parameter columns: {quantity} has no unit {unit!r}; choose one of {', '.join(UNITS[quantity])}")
         found[quantity] = as_column(quantity, names[name.lower()], unit)
@@ -87,27 +87,29 @@ def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Co
 
 
 def complete(found: dict[str, Column], without: set[str], path: Path, names: dict[str, str]) -> dict[str, Column]:
-    """Return what is read of the columns: latitude and longitude win over x and y.
+    """Return the columns that are read: latitude and longitude are preferred to x and y.
 
     Raises:
         InputError: a needed column is missing.
     """
-    lacks = None
+    missing = None
     if not ({"lat", "lon"} <= found.keys() or {"x", "y"} <= found.keys()):
-        lacks = ("position (lat and lon, or x and y)", "x=…,y=…")
+        missing = ("position (lat and lon, or x and y)", "x=…,y=…")
     elif "time" not in found:
-        lacks = ("time", "time=…")
+        missing = ("time", "time=…")
     elif "speed" not in found and "speed" not in without:
-        lacks = ("speed", "speed=… or speed=none to take it from the positions")
-    if lacks:
+        missing = ("speed", "speed=… or speed=none to take it from the positions")
+    if missing:
         there = ", ".join(names.values())
-        raise InputError(f"{path} has no column for {lacks[0]}; it has {there}. Name it with the parameter columns, {lacks[1]}")
+        raise InputError(
+            f"{path} has no column for {missing[0]}; it has {there}. Name it with the parameter columns, {missing[1]}"
+        )
     unused = ("x", "y") if {"lat", "lon"} <= found.keys() else ("lat", "lon")
     return {quantity: column for quantity, column in found.items() if quantity not in unused}
 
 
 def as_column(quantity: str, name: str, unit: str = "") -> Column:
-    """Return the column with the unit given, or else the one that its suffix says."""
+    """Return the column with the given unit, by default that of its suffix."""
     lower = name.strip().lower()
     unit = unit or max((unit for unit in UNITS[quantity] if lower.endswith("_" + unit)), key=len, default="")
     if quantity == "heading":

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""From clean tracks to smooth pieces: cut at long gaps, relocations and reversals."""
+"""From clean tracks to smooth pieces: tracks are cut at long gaps, relocations and reversals."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,10 +15,10 @@ from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import Smooth, smooth_piece, speed_of_fixes, standing
 from scenario_gen.numerics import Bools, exact, Floats, runs
 
-TURNED = np.radians(120.0)  # who drives off from a stop this far from where it came from has reversed, or turned on the spot
+TURNED = np.radians(120.0)  # a vehicle whose course changes by more in a stop has reversed, or turned on the spot
 MOST_TICKS = 100_000  # of a piece: smoothing takes 3 kB for each
-SHARPEST = 0.4  # 1/m: no car turns sharper, nor by noise on its path
-LEVER = 3.0  # m over which that direction is measured
+SHARPEST = 0.4  # 1/m: no car turns sharper, noise included
+LEVER = 3.0  # m over which the course before and after a stop is measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,18 +39,18 @@ class Piece:
         return self.smooth.first + len(self.smooth.speed)
 
     def position(self, first: int, last: int) -> Floats:
-        """Positions (T, 2) [m] from tick `first` to before tick `last`."""
+        """Return positions (T, 2) [m] from tick `first` to before tick `last`."""
         return self.smooth.position[first - self.first : last - self.first]
 
     def speed(self, first: int, last: int) -> Floats:
-        """Speeds (T,) [m/s], likewise."""
+        """Return speeds (T,) [m/s], likewise."""
         return self.smooth.speed[first - self.first : last - self.first]
 
 
 def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[list[Piece], VehicleQuality]:
     """Cut a track at gaps, relocations and reversals, and smooth each piece.
 
-    A gap may always be two and a half of the source's own periods long, so that a source of 1 Hz is not cut to bits.
+    Gaps of up to two and a half of the source's own periods are bridged, so that a source of 1 Hz is not cut at every fix.
     """
     seconds = np.diff(track.fix_ns) * 1e-9
     usual = float(np.median(seconds))
@@ -98,7 +98,7 @@ def pieces_of(track: Observations, origin_ns: int, config: LogConfig) -> tuple[l
 def steered(part: Observations, origin_ns: int, config: LogConfig) -> list[tuple[Observations, Smooth | None]]:
     """Smooth a part of a track, cut wherever its path then turns sharper than a car can.
 
-    Nobody turns on the spot: where a path does, the vehicle reversed in a stop too short to be seen in the fixes.
+    A car cannot turn on the spot: where its path does, it reversed in a stop too short for the fixes.
     """
     smooth = smooth_piece(part, origin_ns, config)
     if smooth is None:
@@ -113,7 +113,7 @@ def steered(part: Observations, origin_ns: int, config: LogConfig) -> list[tuple
 
 
 def laps(track: Observations, config: LogConfig) -> Bools:
-    """(F-1,) where a track of hours is cut, so that the memory which smoothing takes does not grow with it."""
+    """Return where (F-1,) a track of hours is cut, so that the memory of smoothing does not grow with it."""
     lap = (track.fix_ns - track.fix_ns[0]) // round(MOST_TICKS * config.period * 1e9)
     new: Bools = np.diff(lap) > 0
     return new
@@ -125,7 +125,7 @@ def longest_bridge(seconds: Floats, config: LogConfig) -> float:
 
 
 def reversals(track: Observations, config: LogConfig) -> Bools:
-    """(F-1,) where to cut because the vehicle drives back where it came from after a stop: a heading cannot follow that."""
+    """Return where (F-1,) to cut because the vehicle reverses after a stop: its heading would jump."""
     seconds = (track.fix_ns - track.fix_ns[0]).astype(np.float64) * 1e-9
     speed_t = (track.speed_ns - track.fix_ns[0]).astype(np.float64) * 1e-9
     speed = track.speed
@@ -143,7 +143,7 @@ def reversals(track: Observations, config: LogConfig) -> Bools:
 
 
 def departure(fix: Floats) -> Floats | None:
-    """Return the unit vector (2,) from the first fix (F, 2) [m] to the first one that is `LEVER` away, None if there is none."""
+    """Return the unit vector (2,) from the first fix (F, 2) [m] to the first one `LEVER` away, None if there is none."""
     offset = fix - fix[0]
     away = exact.hypot(offset[:, 0], offset[:, 1])
     far = np.flatnonzero(away > LEVER)

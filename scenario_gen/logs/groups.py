@@ -1,16 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who is together: groups of vehicles and the time that each is there.
+"""Groups of vehicles that meet, and the time that each is there.
 
 A *pair interval* is a time in which two vehicles are nearer than `proximity`, for at least `min_presence` seconds; those longer
 than `max_duration` are cut.
 A group grows from the strongest pair interval of `min_duration` or more, whose time is its own, and is joined by vehicles that
 are near a member for at least `min_presence` of its seconds, up to `max_vehicles`: each is there for the time in which it is
-recorded and near, so it may arrive late and leave early. Then the pairs inside the group are used up, and the next begins.
-In a log of few vehicles (as cut by a person) every pair interval counts, and a vehicle joins that meets any member. In a longer
-one only those count in which somebody moves and the two interact (places and times come close, `space_time_gap`: they
-cross, follow, merge or pass), and a vehicle joins that so meets at least half of the members that it is together with.
+recorded and near, so it may arrive late and leave early. Then the pairs inside the group are removed, and the next group grows.
+In a small log (of at most `max_vehicles`, as cut by a person) every pair interval counts, and a vehicle joins that meets any
+member. In a larger one only those count in which a vehicle moves and the two interact (places and times come close,
+`space_time_gap`: they cross, follow, merge or pass), and a vehicle joins that so meets at least half of the members that it is
+together with.
 """
 
 from collections.abc import Sequence
@@ -24,12 +25,12 @@ from scenario_gen.logs.encounters import Piece
 from scenario_gen.numerics import exact, Floats, runs
 
 MOST = 0.6  # with `whole`, a vehicle that is there for less of the time is left out; for more, it shortens the time
-EDGE = 1.0  # s by which a group is rather shortened than joined late or left early
-SHARED = 0.5  # of the members that a vehicle is together with, it interacts with at least so many, in a log of many vehicles
-INTERACTS = 6.0  # m: the space-time gap below which two vehicles have to do with each other
-LAG = 2.0  # m/s: what a second between two vehicles at the same place is worth in metres
+EDGE = 1.0  # s by which a group is shortened so that no vehicle joins late or leaves early
+SHARED = 0.5  # least share of the members together with a vehicle that it interacts with, in a large log
+INTERACTS = 6.0  # m: the space-time gap below which two vehicles interact
+LAG = 2.0  # m/s: converts the time between two vehicles at the same place to metres
 APART = 1.0  # s that a pair may be out of range within one pair interval
-REST = 2.0  # s of a long standstill that stay with the encounter before or after it
+REST = 2.0  # s of a long standstill that belong to the encounter before or after it
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class PairInterval:
 
 @dataclass(frozen=True)
 class Group:
-    """Pieces that make an encounter, from tick `first` to before tick `last`.
+    """Pieces that form an encounter, from tick `first` to before tick `last`.
 
     Attributes:
         spans: for each member from which to before which tick it is there.
@@ -74,12 +75,12 @@ class Growing:
 
 def find_groups(pieces: Sequence[Piece], config: LogConfig) -> tuple[tuple[Group, ...], tuple[str, ...]]:
     """Return the encounters in order of time, and notes on vehicles that were left out or shortened one."""
-    few = len({piece.track.id for piece in pieces}) <= config.max_vehicles
-    pairs = find_pair_intervals(pieces, config, few=few)
+    small = len({piece.track.id for piece in pieces}) <= config.max_vehicles
+    pairs = find_pair_intervals(pieces, config, small=small)
     groups, notes = [], []
     while seeds := [pair for pair in pairs if pair.last - pair.first > ticks(config.min_duration, config)]:
         seed = min(seeds, key=lambda m: (m.gap, m.first - m.last, m.first, m.i, m.j))
-        group, remarks = grow(seed, pairs, pieces, config, few=few)
+        group, remarks = grow(seed, pairs, pieces, config, small=small)
         whole, left = split(group, pieces, config)
         groups += whole
         notes += [*remarks, *left] if whole else []
@@ -88,8 +89,8 @@ def find_groups(pieces: Sequence[Piece], config: LogConfig) -> tuple[tuple[Group
     return tuple(groups), tuple(notes)
 
 
-def find_pair_intervals(pieces: Sequence[Piece], config: LogConfig, *, few: bool) -> list[PairInterval]:
-    """Return all pair intervals of two different vehicles; with `few` vehicles each has gap 0."""
+def find_pair_intervals(pieces: Sequence[Piece], config: LogConfig, *, small: bool) -> list[PairInterval]:
+    """Return all pair intervals of two different vehicles; in a `small` log each has gap 0."""
     found = []
     order = sorted(range(len(pieces)), key=lambda i: pieces[i].first)
     least = shortest(config)
@@ -102,14 +103,14 @@ def find_pair_intervals(pieces: Sequence[Piece], config: LogConfig, *, few: bool
             begin = max(pieces[i].first, pieces[j].first)
             for low, high in runs(distances(pieces[i], pieces[j]) < config.proximity, ticks(APART, config)):
                 for first, last in windows(begin + low, begin + high, config):
-                    gap = 0.0 if few else space_time_gap(pieces[i], pieces[j], first, last, config)
+                    gap = 0.0 if small else space_time_gap(pieces[i], pieces[j], first, last, config)
                     if last - first >= least and gap <= INTERACTS:
                         found.append(PairInterval(min(i, j), max(i, j), first, last, gap))
     return found
 
 
 def windows(first: int, last: int, config: LogConfig) -> list[tuple[int, int]]:
-    """Cut a long pair interval at whole multiples of `max_duration` on the common clock, so that all who meet are cut alike."""
+    """Cut a long pair interval at whole multiples of `max_duration` on the common clock, so that all pairs are cut alike."""
     longest, least = ticks(config.max_duration, config), ticks(config.min_duration, config) + 1
     if last - first <= longest:
         return [(first, last)]
@@ -118,31 +119,31 @@ def windows(first: int, last: int, config: LogConfig) -> list[tuple[int, int]]:
 
 
 def shortest(config: LogConfig) -> int:
-    """Return the fewest ticks for which a pair meets: of one that makes an encounter, or of one that joins it."""
+    """Return the fewest ticks of a pair interval: of one that forms an encounter, or of one that joins it."""
     return ticks(config.min_duration if config.whole else min(config.min_presence, config.min_duration), config) + 1
 
 
 def ticks(seconds: float, config: LogConfig) -> int:
-    """Seconds as a number of ticks."""
+    """Return seconds as a number of ticks."""
     return round(seconds / config.period)
 
 
 def distances(a: Piece, b: Piece) -> Floats:
-    """Distances (T,) [m] of two pieces at their common ticks; empty where they have none."""
+    """Return the distances (T,) [m] of two pieces at their common ticks; empty where they have none."""
     first = max(a.first, b.first)
     last = max(min(a.last, b.last), first)
     return exact.hypot(*(a.position(first, last) - b.position(first, last)).T)
 
 
 def driven(piece: Piece, first: int, last: int, config: LogConfig) -> float:
-    """Distance [m] that a piece drives from tick `first` to before tick `last`."""
+    """Return the distance [m] that a piece drives from tick `first` to before tick `last`."""
     return float(piece.speed(first, last).sum() * config.period)
 
 
 def space_time_gap(a: Piece, b: Piece, first: int, last: int, config: LogConfig) -> float:
-    """How close two vehicles come in place and time: min over t, t' of |a(t) - b(t')| + LAG |t - t'|, in metres.
+    """Return how close two vehicles come in place and time: min over t, t' of |a(t) - b(t')| + LAG |t - t'|, in metres.
 
-    Two of whom neither drives `travel` metres have nothing to do with each other: infinite.
+    Infinite if neither drives `travel` metres: they do not interact.
     """
     if max(driven(piece, first, last, config) for piece in (a, b)) < config.travel:
         return float("inf")
@@ -154,12 +155,12 @@ def space_time_gap(a: Piece, b: Piece, first: int, last: int, config: LogConfig)
 
 
 def grow(
-    seed: PairInterval, pairs: list[PairInterval], pieces: Sequence[Piece], config: LogConfig, *, few: bool
+    seed: PairInterval, pairs: list[PairInterval], pieces: Sequence[Piece], config: LogConfig, *, small: bool
 ) -> tuple[Group, list[str]]:
-    """Grow a group from the strongest pair interval, `seed`; the notes say who meets it and is not in it, and why."""
+    """Grow a group from the strongest pair interval, `seed`; notes name the vehicles that meet it but are left out, and why."""
     group = Growing(seed.first, seed.last, dict.fromkeys((seed.i, seed.j), (seed.first, seed.last)))
     refused: set[int] = set()
-    while candidates := joining(group, refused, pairs, pieces, few=few):
+    while candidates := joining(group, refused, pairs, pieces, small=small):
         spans = {other: common_span(other, group, pieces, config) for other in candidates}
         best = min(candidates, key=lambda other: (spans[other][0] - spans[other][1], min(candidates[other]), other))
         if len(group.spans) >= config.max_vehicles:
@@ -167,7 +168,7 @@ def grow(
             group.notes.append(f"left out of an encounter of {len(group.spans)} vehicles (max_vehicles): {', '.join(left)}")
             break
         refused.add(best)
-        if not few and not meets_enough(best, spans[best], len(candidates[best]), group):
+        if not small and not meets_enough(best, spans[best], len(candidates[best]), group):
             continue
         take(group, best, spans[best], pieces[best].track.id, config)
     settle(group, pieces, config)
@@ -175,16 +176,16 @@ def grow(
 
 
 def joining(
-    group: Growing, refused: set[int], pairs: list[PairInterval], pieces: Sequence[Piece], *, few: bool
+    group: Growing, refused: set[int], pairs: list[PairInterval], pieces: Sequence[Piece], *, small: bool
 ) -> dict[int, list[float]]:
-    """Return who meets a member while the group lasts, and the gaps to those that it meets [m]."""
-    here = {pieces[m].track.id for m in group.spans}
+    """Return the pieces that meet a member while the group lasts, with the gaps to those that they meet [m]."""
+    ids = {pieces[m].track.id for m in group.spans}
     found: dict[int, list[float]] = {}
     for pair in pairs:
-        if not few and (pair.first >= group.last or pair.last <= group.first):
+        if not small and (pair.first >= group.last or pair.last <= group.first):
             continue
         for inside, other in ((pair.i, pair.j), (pair.j, pair.i)):
-            if inside in group.spans and other not in refused and pieces[other].track.id not in here:
+            if inside in group.spans and other not in refused and pieces[other].track.id not in ids:
                 found.setdefault(other, []).append(pair.gap)
     return found
 
@@ -196,7 +197,7 @@ def meets_enough(other: int, span: tuple[int, int], met: int, group: Growing) ->
 
 
 def take(group: Growing, other: int, span: tuple[int, int], name: str, config: LogConfig) -> None:
-    """Let a vehicle join for `span`, or say why not."""
+    """Add a vehicle for `span`, or note why not."""
     begin, end = span
     lasts = group.last - group.first
     near = f"near for {seconds(begin, end, config)} of {seconds(group.first, group.last, config)} s"
@@ -220,7 +221,7 @@ def take(group: Growing, other: int, span: tuple[int, int], name: str, config: L
 
 
 def settle(group: Growing, pieces: Sequence[Piece], config: LogConfig) -> None:
-    """Shorten a group rather than have a vehicle come a moment late or go a moment early; say who still does."""
+    """Shorten a group by up to `EDGE` so that its vehicles come and go together; note those that do not."""
     edge = ticks(EDGE, config)
     first = max(begin for begin, _ in group.spans.values() if begin <= group.first + edge)
     last = min(end for _, end in group.spans.values() if end >= group.last - edge)
@@ -236,12 +237,12 @@ def settle(group: Growing, pieces: Sequence[Piece], config: LogConfig) -> None:
 
 
 def seconds(first: int, last: int, config: LogConfig) -> str:
-    """Length of an interval of ticks, for people."""
+    """Return the length of an interval of ticks in seconds, for notes."""
     return f"{max(last - first - 1, 0) * config.period:.1f}"
 
 
 def common_span(other: int, group: Growing, pieces: Sequence[Piece], config: LogConfig) -> tuple[int, int]:
-    """The longest stretch of a group's time in which piece `other` is near a member that is there."""
+    """Return the longest stretch of a group's time in which piece `other` is near a member that is there."""
     piece = pieces[other]
     flags = np.zeros(group.last - group.first, dtype=bool)
     for member, (first, last) in group.spans.items():
@@ -256,7 +257,7 @@ def common_span(other: int, group: Growing, pieces: Sequence[Piece], config: Log
 
 
 def split(group: Group, pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Group], list[str]]:
-    """Cut a group where all stand for long, and into equal parts where it lasts too long; keep the parts with motion.
+    """Cut a group at long standstills of all, and into equal parts where it lasts too long; keep the parts with motion.
 
     Returns:
         The parts, and notes on members that are there for too little of one.
@@ -288,7 +289,7 @@ def split(group: Group, pieces: Sequence[Piece], config: LogConfig) -> tuple[lis
 
 
 def part_of(group: Group, first: int, last: int, config: LogConfig) -> tuple[Group, list[tuple[int, tuple[int, int]]]]:
-    """Return a part of a group, with those who are there long enough, and who is there for less, with their ticks."""
+    """Return a part of a group with the members that are there long enough; the others are returned with their ticks."""
     spans = {m: (max(own[0], first), min(own[1], last)) for m, own in zip(group.members, group.spans, strict=True)}
     kept = {m: own for m, own in spans.items() if own == (first, last) or own[1] - own[0] > ticks(config.min_presence, config)}
     left = [(m, own) for m, own in spans.items() if m not in kept and own[1] > own[0]]
@@ -298,7 +299,7 @@ def part_of(group: Group, first: int, last: int, config: LogConfig) -> tuple[Gro
 
 
 def left_over(pairs: list[PairInterval], group: Group, config: LogConfig) -> list[PairInterval]:
-    """Return what remains of the pair intervals when those inside the group are used up."""
+    """Return the pair intervals without the parts inside the group."""
     least = shortest(config)
     remaining = []
     for pair in pairs:

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Parquet through Arrow, column by column: only what is needed is read, and every kind of column is taken or refused by name.
+"""Parquet through Arrow: only needed columns are read, and every kind of column is accepted or refused by name.
 
-What pandas leaves in a file about its own types is not needed and not believed.
+The metadata of pandas in a file is ignored.
 """
 
 from collections import Counter
@@ -29,24 +29,19 @@ def read_columns(path: Path, before: int, config: LogConfig) -> tuple[pd.DataFra
     """Read the columns that are needed; `before` rows were read from other files.
 
     Returns:
-        A table of numbers and texts, and the columns with the factors to our units; those of times as Arrow says.
+        A table of numbers and texts, and the columns with the factors to our units; those of times by the type in Arrow.
 
     Raises:
         InputError: the file is damaged or too large, or a column is of no kind that its quantity can have.
     """
     schema = read_schema(path)
     columns = find_columns(list(schema.names), path, config.columns)
-    batches = read_batches(path, schema, sorted({column.name for column in columns.values()}), before, config)
-    frame, found = {}, {}
     for quantity, column in columns.items():
-        with guarded(f"{path}, column {column.name!r} ({quantity}) cannot be read"):
-            values = pa.chunked_array([batch.column(column.name) for batch in batches])
-        factor = unit_of(values.type) if quantity == "time" else None
-        check_kind(values, quantity, column, path)
-        with guarded(f"{path}, column {column.name!r} ({quantity}) cannot be read"):
-            frame[column.name] = to_series(values)
-        found[quantity] = column if factor is None else replace(column, factor=factor)
-    return pd.DataFrame(frame), found
+        kind = schema.field(column.name).type
+        check_kind(kind, quantity, column, path)
+        if quantity == "time" and (factor := unit_of(kind)) is not None:
+            columns[quantity] = replace(column, factor=factor)
+    return read_table(path, sorted({column.name for column in columns.values()}), before, config), columns
 
 
 def read_schema(path: Path) -> pa.Schema:
@@ -81,7 +76,7 @@ def read_table(path: Path, names: list[str], before: int, config: LogConfig) -> 
 
 
 def read_batches(path: Path, schema: pa.Schema, names: list[str], before: int, config: LogConfig) -> list[Any]:
-    """Read some columns batch by batch; texts as dictionaries, so that one that repeats takes its room once.
+    """Read some columns batch by batch; texts as dictionaries, so that repeated ones are stored once.
 
     Raises:
         InputError: the file is damaged or too large.
@@ -123,13 +118,13 @@ def unit_of(kind: pa.DataType) -> float | None:
     return None
 
 
-def check_kind(values: pa.ChunkedArray, quantity: str, column: Column, path: Path) -> None:
+def check_kind(kind: pa.DataType, quantity: str, column: Column, path: Path) -> None:
     """Refuse a column that holds neither numbers nor texts, nor times where those are wanted.
 
     Raises:
         InputError: it does; names the column and its type.
     """
-    kind = values.type.value_type if pa.types.is_dictionary(values.type) else values.type
+    kind = kind.value_type if pa.types.is_dictionary(kind) else kind
     sound = is_text(kind) or any(
         is_kind(kind) for is_kind in (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.types.is_null)
     )

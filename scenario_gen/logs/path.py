@@ -3,9 +3,9 @@
 
 """The path a vehicle drove: a penalised spline by distance driven, through its fixes and along its recorded headings.
 
-What is asked of it is what a driver does, and a driver steers in time: so the penalty on the curvature's change grows with the
-speed there (lateral jerk), and less with what the wheels can do at any speed. The noise of fixes and headings, estimated per
-track, says how far the path may be from either.
+A driver steers in time, so the penalty on the change of curvature grows with the speed (lateral jerk), beside a smaller one for
+the limits of steering at any speed. The noise of fixes and headings, estimated per
+track, determines how far the path may be from either.
 """
 
 from dataclasses import dataclass
@@ -23,15 +23,15 @@ CURVATURE = 0.1  # 1/m: spectral density of the curvature, about 0.1 1/m over 10
 STEERING = 0.002  # 1/m³: spectral density of the curvature's change, about 0.02 1/m² over 5 m
 LATERAL = 12.0  # m²/s³: spectral density of the lateral acceleration, about 2 m/s² over 3 s
 LATERAL_JERK = 1.0  # m²/s⁵: spectral density of the lateral jerk, about 1 m/s³ over 1 s
-CREEP = 0.2  # m: fixes closer together than this share one weight, for GPS noise is no steering
+CREEP = 0.2  # m: fixes closer together than this share one weight, for their differences are GPS noise
 SAME_HEADING = 1.0  # m: headings closer together than this share one weight, for their error is one
-STANDING_HEADING = 0.02  # the least weight of a heading: a stand of five seconds says as much as a metre of driving
+STANDING_HEADING = 0.02  # the least weight of a heading: a stand of five seconds counts as much as a metre of driving
 HEADING_NOISE = float(np.radians(2.0))  # of a heading sensor at its best, slip included
 NEAR = 5  # samples on either side over which the scatter of headings is taken
-SCATTER = 9.0  # by how much the variance seen between neighbours stands for errors that they share
-MOVES = 1.0  # m/s: faster, a course is known to some degrees
+SCATTER = 9.0  # factor from the variance between neighbours to that of errors which they share
+MOVES = 1.0  # m/s: above it a course is known to a few degrees
 JUMP = float(np.radians(15.0))  # between two samples: no heading of a car
-CONTRADICTS = float(np.radians(20.0))  # headings that are further off the path are none: a default, or of somebody who reverses
+CONTRADICTS = float(np.radians(20.0))  # headings further off the path are ignored: defaults, or of a reversing vehicle
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ def fit_path(
         weight: (F,) in (0, 1].
         noise: standard deviation of the fixes [m].
         speed: (F,) [m/s].
-        headings: what the log says of them.
+        headings: recorded ones, if there are any.
     """
     low, high = place.min() - MARGIN, place.max() + MARGIN
     spans = max(int(np.ceil((high - low) / KNOT)), 4)
@@ -173,18 +173,18 @@ def tabulate(curve: exact.BSpline, low: float, high: float) -> Path:
 
 
 def headings_of(heading: Floats, course: Floats, speed: Floats) -> Headings | None:
-    """Weigh recorded headings by their own scatter; what is no heading counts for nothing.
+    """Weigh recorded headings by their own scatter; values that are no headings of a car get weight 0.
 
     A car's heading does not jump. So the headings are cut where they do, and a run counts if it agrees with the path where the
     vehicle moves: a course over ground, taken from two fixes, jumps about where a vehicle is slow, and a default is another run.
 
     Args:
-        heading: (F,) as recorded [rad], NaN where the log does not say.
+        heading: (F,) as recorded [rad], NaN where it is not recorded.
         course: (F,) of the path fitted so far [rad].
         speed: (F,) [m/s].
 
     Returns:
-        None if the log says nothing that can be used.
+        None if no recorded heading can be used.
     """
     known = np.flatnonzero(np.isfinite(heading))
     value = heading[known]

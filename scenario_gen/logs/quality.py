@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The data-quality summary of a log: what was read, dropped, bridged, reconciled, and what the record itself gets wrong."""
+"""The data-quality summary of a log: rows read and dropped, gaps bridged, speeds reconciled, overlaps in the record."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -21,6 +21,9 @@ class Dropped:
     reason: str
     count: int
     first: str
+
+    def __str__(self) -> str:
+        return f"{self.count} × {self.reason}, first at {self.first}"
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ class VehicleQuality:
         moved_most: the largest such distance [m].
         noise: standard deviation of the fixes [m], as estimated from the track (or as given); how smooth it is follows from it.
         turned: median difference of recorded and published headings while it moves [rad]; NaN if none is recorded.
-        headings: share of the recorded headings that had a say; the others contradict the way driven, or jump.
+        headings: share of the recorded headings that were used; the others contradict the path, or jump.
     """
 
     id: str
@@ -82,10 +85,10 @@ class EncounterQuality:
 
     Attributes:
         name: the encounter's.
-        vehicles: who is there.
+        vehicles: their names.
         seconds: how long it lasts.
         overlaps: recorded overlaps of footprints.
-        partly: who is there for a part of it: name, and from when to when [s].
+        partly: vehicles that are there for a part of it: name, from when, to when [s].
     """
 
     name: str
@@ -109,7 +112,7 @@ class Quality:
     def lines(self) -> tuple[str, ...]:
         """Return the summary for people, one fact per line."""
         out = [f"{self.name}: {self.rows} rows of {len(self.vehicles)} vehicles, {len(self.encounters)} encounter(s)"]
-        out += [f"  {drop.count} × {drop.reason}, first at {drop.first}" for drop in self.dropped]
+        out += [f"  {drop}" for drop in self.dropped]
         out += [vehicle_line(vehicle) for vehicle in self.vehicles]
         for encounter in self.encounters:
             out.append(f"  encounter {encounter.name}: {encounter.seconds:.1f} s of {', '.join(encounter.vehicles)}")
@@ -126,7 +129,7 @@ class Quality:
 
 
 def vehicle_line(vehicle: VehicleQuality) -> str:
-    """One vehicle in one line."""
+    """Return a vehicle's quality in one line."""
     gaps = f"{vehicle.bridged} gaps bridged (up to {vehicle.longest_bridged:.1f} s)" if vehicle.bridged else "no gaps bridged"
     if vehicle.cut:
         gaps += f", cut at {vehicle.cut} (up to {vehicle.longest_cut:.1f} s)"

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What every reader of logs delivers: observations per vehicle, with the place each of them came from, within bounds."""
+"""Raw logs, the result of every reader: observations per vehicle, with the places they came from, within bounds."""
 
 from bisect import bisect_right
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,19 +19,19 @@ LONGEST_HEADER = 65_536  # characters of a table's first line
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """What a log says about one vehicle, in the order of the log; values may still be NaN, stamps unordered.
+    """Observations of one vehicle, in the order of the log; values may still be NaN, stamps unordered.
 
     Attributes:
         id: the vehicle's name in the log.
         fix_ns: (F,) stamps of the positions, nanoseconds.
-        fix: (F, 2) latitude and longitude in degrees, or x and y in metres (`RawLog.geographic` tells).
+        fix: (F, 2) latitude and longitude in degrees, or x and y in metres (see `RawLog.geographic`).
         fix_row: (F,) rows of the log (`RawLog.where` names them).
-        heading: (F,) rad, counter-clockwise from east; NaN where the log does not say.
+        heading: (F,) rad, counter-clockwise from east; NaN where it is not recorded.
         speed_ns: (S,) stamps of the speeds, nanoseconds.
         speed: (S,) m/s.
         speed_row: (S,) rows of the log.
-        length: metres, NaN if the log does not say.
-        width: metres, NaN if the log does not say.
+        length: metres, NaN if it is not recorded.
+        width: metres, NaN if it is not recorded.
     """
 
     id: str
@@ -44,10 +45,29 @@ class Observations:
     length: float = np.nan
     width: float = np.nan
 
+    @classmethod
+    def of_rows(
+        cls, name: str, stamps: Ints, states: Floats, rows: Ints, size: tuple[float, float], *, measured: bool = True
+    ) -> "Observations":
+        """Return the observations of a log each of whose rows is a fix and, if it was `measured`, a speed.
+
+        Args:
+            name: the vehicle.
+            stamps: (F,) nanoseconds.
+            states: (F, 4) position (two columns), heading and speed, as above.
+            rows: (F,) rows of the log.
+            size: length and width, metres or NaN.
+            measured: whether the log has speeds.
+        """
+        n_speeds = len(rows) if measured else 0
+        return cls(
+            name, stamps, states[:, :2], rows, states[:, 2], stamps[:n_speeds], states[:n_speeds, 3], rows[:n_speeds], *size
+        )
+
 
 @dataclass
 class Rows:
-    """Messages of one vehicle as they come: (stamp [ns], row, values…); values as in `Observations`."""
+    """Messages of one vehicle in the order of arrival: (stamp [ns], row, values…); values as in `Observations`."""
 
     fixes: list[tuple[int, int, float, float, float]] = field(default_factory=list)
     speeds: list[tuple[int, int, float]] = field(default_factory=list)
@@ -87,9 +107,9 @@ class RawLog:
         vehicles: observations, one per vehicle, in the order of first appearance.
         rows: number of rows read.
         segments: where the rows come from, in order.
-        notes: what a person should know about how it was read.
-        dropped: rows that the reader itself had to leave out: (reason, row).
-        encounters: what a recorded `tracks` topic holds: encounters as they stand, and then no vehicles.
+        notes: for people, on how it was read.
+        dropped: rows that the reader itself left out: (reason, row).
+        encounters: those of a recorded `tracks` topic, used as they are; then there are no vehicles.
     """
 
     name: str
@@ -105,6 +125,12 @@ class RawLog:
         """Name the file and line (or topic and message) of a row."""
         segment = self.segments[bisect_right([s.first for s in self.segments], row) - 1]
         return f"{segment.label}, {segment.unit} {segment.number + row - segment.first}"
+
+
+def left_out_note(counts: Mapping[str, int], kinds: str) -> tuple[str, ...]:
+    """Return the note on road users that were left out, none if `counts` by their class is empty; `kinds` names who is read."""
+    counted = ", ".join(f"{count} × {kind or 'unknown'}" for kind, count in sorted(counts.items()))
+    return (f"who is no {kinds} was left out: {counted}",) if counted else ()
 
 
 def natural(name: str) -> tuple[int, int, str]:

@@ -1,27 +1,28 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""From a path to encounters: choose the reader, clean, smooth, cut."""
+"""From files to encounters: choose the reader, clean, smooth, group, cut."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib import import_module
 from itertools import combinations
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from scenario_gen.bags.storage.files import files_of
 from scenario_gen.base.errors import guarded, InputError, needs, reading
 from scenario_gen.base.registry import Registry
-from scenario_gen.logs.adapters import commonroad
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.encounters import Piece, pieces_of
 from scenario_gen.logs.groups import distances, find_groups, Group
-from scenario_gen.logs.quality import Dropped, EncounterQuality, find_overlaps, Quality, VehicleQuality
+from scenario_gen.logs.quality import EncounterQuality, find_overlaps, Quality, VehicleQuality
 from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog
 from scenario_gen.logs.smoothing import DOUBTED
 from scenario_gen.types import cut, Encounter, Vehicle
@@ -54,14 +55,14 @@ def read_log(path: Path | str | Sequence[Path | str], config: LogConfig = LogCon
     paths = [Path(p) for p in ([path] if isinstance(path, (str, Path)) else path)]
     try:
         return encounters_of(read_raw(paths, config), config)
-    except InputError as error:  # what is wrong with an encounter, or with a vehicle's clock, knows of no files
+    except InputError as error:  # some errors, e.g. on a vehicle's clock, do not name the file
         if str(error).startswith(("parameter ", *(str(known)[:100] for known in paths))):
             raise
         raise InputError(f"{paths[0]}: {error}") from error
 
 
 def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
-    """Cut what was read, or heard, into encounters; as `read_log` does.
+    """Cut a raw log, from files or streams, into encounters, as `read_log` does.
 
     Raises:
         InputError: there is no encounter in it; the message says why.
@@ -70,7 +71,7 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         return as_recorded(log, config)
     tracks, drops, origin = clean(log, config)
     if len(tracks) < 2:
-        raise InputError(too_few(log, [track.id for track in tracks], drops))
+        raise InputError(explain_few_vehicles(log, [track.id for track in tracks], drops))
     tracks = tuple(sorted(tracks, key=lambda track: natural(track.id)))
     dt_ns = round(config.period * 1e9)
     origin_ns = min(int(track.fix_ns[0]) for track in tracks) // dt_ns * dt_ns
@@ -85,20 +86,20 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
         vehicles.append(quality)
     groups, notes = find_groups(pieces, config)
     if not groups:
-        raise InputError(no_meeting(log, pieces, config))
-    notes += unmet(
+        raise InputError(explain_no_encounter(log, pieces, config))
+    notes += notes_on_vehicles(
         vehicles, unusable(log, tracks, config), {pieces[m].track.id for group in groups for m in group.members}, config
     )
     encounters = []
     for k, group in enumerate(groups):
         name = log.name if len(groups) == 1 else f"{log.name}-{k + 1:0{len(str(len(groups)))}d}"
-        encounter, remarks = make_encounter(name, group, pieces, origin_ns, origin, config)
+        encounter, remarks = cut_encounter(name, group, pieces, origin_ns, origin, config)
         encounters.append(encounter)
         notes += remarks
     summary = Quality(
         name=log.name,
         rows=log.rows,
-        dropped=tuple(Dropped(reason, count, log.where(drops.first[reason])) for reason, count in drops.count.items()),
+        dropped=drops.of(log),
         vehicles=tuple(vehicles),
         encounters=tuple(encounter_quality(encounter) for encounter in encounters),
         notes=(*log.notes, *dict.fromkeys(notes)),
@@ -108,50 +109,52 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
 
 def unusable(log: RawLog, tracks: Sequence[Observations], config: LogConfig) -> list[str]:
     """Return the vehicles of a log of which fewer than two positions were left."""
-    asked = picked([vehicle.id for vehicle in log.vehicles], config, log.name)
-    return sorted(set(asked) - {track.id for track in tracks}, key=natural)
+    requested = picked([vehicle.id for vehicle in log.vehicles], config, log.name)
+    return sorted(set(requested) - {track.id for track in tracks}, key=natural)
 
 
-def unmet(vehicles: Sequence[VehicleQuality], nowhere: list[str], met: set[str], config: LogConfig) -> tuple[str, ...]:
-    """Say who is in no encounter, who has no positions, and whose measured speeds were not believed."""
+def notes_on_vehicles(
+    vehicles: Sequence[VehicleQuality], without_positions: list[str], met: set[str], config: LogConfig
+) -> tuple[str, ...]:
+    """Return notes on vehicles that are in no encounter, have no positions, or whose measured speeds are not used."""
     doubted = [v.id for v in vehicles if v.changed > DOUBTED]
     left = [v for v in vehicles if v.id not in met]
     if len(left) > config.max_vehicles:
-        said = [f"{len(left)} of {len(vehicles)} vehicles are in no encounter: {', '.join(v.id for v in left)}"]
+        notes = [f"{len(left)} of {len(vehicles)} vehicles are in no encounter: {', '.join(v.id for v in left)}"]
     else:
-        said = [f"vehicle {v.id} is in no encounter: there for {v.seconds:.1f} s" for v in left]
-    if nowhere:
-        said.append(f"fewer than two usable positions: vehicle {', '.join(nowhere)}")
-    return (*said, *(f"vehicle {name}: its measured speeds contradict its positions and are not used" for name in doubted))
+        notes = [f"vehicle {v.id} is in no encounter: there for {v.seconds:.1f} s" for v in left]
+    if without_positions:
+        notes.append(f"fewer than two usable positions: vehicle {', '.join(without_positions)}")
+    return (*notes, *(f"vehicle {name}: its measured speeds contradict its positions and are not used" for name in doubted))
 
 
 def as_recorded(log: RawLog, config: LogConfig) -> LogResult:
-    """Encounters that were recorded as such stay as they are, bit for bit; only the window and the vehicles are chosen."""
+    """Return encounters that were recorded as such, unchanged but for the chosen window and vehicles."""
     found = [between(encounter, config) for encounter in log.encounters]
     encounters = tuple(encounter for encounter, _ in found)
-    notes = (*log.notes, *(note for _, said in found for note in said))
+    notes = (*log.notes, *(note for _, notes in found for note in notes))
     return LogResult(encounters, Quality(log.name, log.rows, (), (), tuple(map(encounter_quality, encounters)), notes))
 
 
 def between(encounter: Encounter, config: LogConfig) -> tuple[Encounter, tuple[str, ...]]:
-    """Return the encounter in the asked time window and with the asked vehicles, and who is not there in that window.
+    """Return the encounter in the chosen time window and with the chosen vehicles, and notes on those not there in the window.
 
     Raises:
         InputError: a vehicle is unknown, or fewer than two vehicles or samples are left.
     """
     ids = [vehicle.id for vehicle in encounter.vehicles]
-    asked = [ids.index(name) for name in picked(ids, config, encounter.name)]
+    requested = [ids.index(name) for name in picked(ids, config, encounter.name)]
     if config.start >= encounter.duration:
         raise InputError(f"parameter start is {config.start:g} s, but {encounter.name} is only {encounter.duration:.1f} s long")
     first = math.ceil(config.start / encounter.dt - 1e-9)
     last = math.floor(config.end / encounter.dt + 1e-9) + 1 if config.end else len(encounter.time)
     last = min(last, len(encounter.time))
     inside = cut(encounter.present, first, last)
-    rows = [n for n in asked if inside[n, 1] > inside[n, 0]]
-    notes = tuple(f"vehicle {ids[n]} is left out: it is not there in the asked time" for n in asked if n not in rows)
+    rows = [n for n in requested if inside[n, 1] > inside[n, 0]]
+    notes = tuple(f"vehicle {ids[n]} is left out: it is not there in the asked time" for n in requested if n not in rows)
     if len(rows) < 2:
         raise InputError(
-            f"encounter {encounter.name!r}: {len(rows)} of {len(asked)} vehicles are there between {config.start:g} s and "
+            f"encounter {encounter.name!r}: {len(rows)} of {len(requested)} vehicles are there between {config.start:g} s and "
             f"{(last - 1) * encounter.dt:g} s; at least 2 are needed: see the parameters start, end and vehicles"
         )
     first, last = first + int(inside[rows, 0].min()), first + int(inside[rows, 1].max()) + 1
@@ -166,7 +169,7 @@ def between(encounter: Encounter, config: LogConfig) -> tuple[Encounter, tuple[s
 
 
 def encounter_quality(encounter: Encounter) -> EncounterQuality:
-    """The facts of an encounter."""
+    """Return the quality of an encounter."""
     ids = tuple(vehicle.id for vehicle in encounter.vehicles)
     last = len(encounter.time) - 1
     partly = tuple(
@@ -177,7 +180,7 @@ def encounter_quality(encounter: Encounter) -> EncounterQuality:
     return EncounterQuality(encounter.name, ids, encounter.duration, find_overlaps(encounter), partly)
 
 
-def make_encounter(
+def cut_encounter(
     name: str,
     group: Group,
     pieces: Sequence[Piece],
@@ -185,7 +188,7 @@ def make_encounter(
     origin: tuple[float, float] | None,
     config: LogConfig,
 ) -> tuple[Encounter, tuple[str, ...]]:
-    """Cut a group out of its pieces; a vehicle whose heading nobody knows faces east, and the note says so."""
+    """Cut a group out of its pieces; a vehicle of unknown heading faces east, with a note."""
     members = [pieces[m] for m in group.members]
     notes = []
     position, heading, speed = [], [], []
@@ -213,9 +216,9 @@ def make_encounter(
     return encounter, tuple(notes)
 
 
-def too_few(log: RawLog, names: list[str], drops: Drops) -> str:
-    """Say why there are fewer than two vehicles."""
-    causes = "; ".join(f"{count} × {reason}, first at {log.where(drops.first[reason])}" for reason, count in drops.count.items())
+def explain_few_vehicles(log: RawLog, names: list[str], drops: Drops) -> str:
+    """Return the error message on fewer than two vehicles."""
+    causes = "; ".join(map(str, drops.of(log)))
     have = f"only vehicle {names[0]}" if names else "no vehicle"
     return (
         f"{log.segments[0].label}: {have} has usable positions; an encounter needs at least two vehicles on one clock "
@@ -223,8 +226,8 @@ def too_few(log: RawLog, names: list[str], drops: Drops) -> str:
     )
 
 
-def no_meeting(log: RawLog, pieces: Sequence[Piece], config: LogConfig) -> str:
-    """Say why no encounter was found."""
+def explain_no_encounter(log: RawLog, pieces: Sequence[Piece], config: LogConfig) -> str:
+    """Return the error message on a log without encounters."""
     pairs = [(a, b) for a, b in combinations(pieces, 2) if a.track.id != b.track.id and len(distances(a, b))]
     who = "no two vehicles are there at the same time"
     if pairs:
@@ -254,7 +257,7 @@ def is_spmd(path: Path) -> bool:
 
 
 def is_table(path: Path) -> bool:
-    """Return whether the name says table."""
+    """Return whether the name is that of a table."""
     return path.suffix.lower() in TABLES
 
 
@@ -267,28 +270,30 @@ def is_known(path: Path, name: str) -> bool:
     return recognised(path) == name
 
 
-def _read_bag(paths: Sequence[Path], config: LogConfig) -> RawLog:
-    needs("bags", "lz4", "mcap", "rosbags", "zstandard")
-    from scenario_gen.logs import bag
-
-    return bag.read(paths, config)
+Reader = Callable[[Sequence[Path], LogConfig], RawLog]
 
 
-def _read_public(paths: Sequence[Path], config: LogConfig, name: str) -> RawLog:
-    from scenario_gen.logs.adapters import tracks
+def late(module: str, extra: tuple[str, ...] = (), **options: Any) -> Reader:
+    """Return the function `read` of a module of this room, which is loaded when it reads: libraries take up to a second.
 
-    return tracks.read(paths, config, name=name)
+    Args:
+        module: in `scenario_gen.logs`.
+        extra: the extra that brings its libraries, and their names.
+        options: further arguments of its `read`.
+    """
 
+    def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
+        if extra:
+            needs(*extra)
+        log: RawLog = import_module(f"scenario_gen.logs.{module}").read(paths, config, **options)
+        return log
 
-def _read_table(paths: Sequence[Path], config: LogConfig, *, spmd: bool) -> RawLog:
-    from scenario_gen.logs import tables
-
-    return tables.read(paths, config, spmd=spmd)
+    return read
 
 
 @dataclass(frozen=True)
 class LogFormat:
-    """A format of logs; what its reader imports is loaded when it reads, for each library takes up to a second.
+    """A format of logs.
 
     Attributes:
         accepts: whether a file (or a bag's folder) is of this format, by its name and first bytes; it never fails on others.
@@ -297,20 +302,20 @@ class LogFormat:
     """
 
     accepts: Callable[[Path], bool]
-    read: Callable[[Sequence[Path], LogConfig], RawLog]
+    read: Reader
 
 
 FORMATS = Registry[LogFormat](
     "scenario_gen.logs",
-    {  # tried in this order: a headerless table is SPMD
-        "bag": LogFormat(is_bag, _read_bag),
-        "commonroad": LogFormat(is_commonroad, commonroad.read),
-        "spmd": LogFormat(is_spmd, partial(_read_table, spmd=True)),
+    {  # tried in this order: a table without a header is SPMD
+        "bag": LogFormat(is_bag, late("bag", ("bags", "lz4", "mcap", "rosbags", "zstandard"))),
+        "commonroad": LogFormat(is_commonroad, late("adapters.commonroad")),
+        "spmd": LogFormat(is_spmd, late("tables", spmd=True)),
         **{
-            name: LogFormat(partial(is_known, name=name), partial(_read_public, name=name))
+            name: LogFormat(partial(is_known, name=name), late("adapters.tracks", name=name))
             for name in ("argoverse2", "interaction", "ind", "highd")
         },
-        "table": LogFormat(is_table, partial(_read_table, spmd=False)),
+        "table": LogFormat(is_table, late("tables")),
     },
     LogFormat,
 )
@@ -326,16 +331,16 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
     with guarded(str(paths[0]), OSError):  # no permission, a name too long, a file that goes away
         files = [file for path in paths for file in present(path)]
         if config.format == "auto":
-            found = next((known for known in FORMATS.values() if all(known.accepts(file) for file in files)), None)
+            known = next((known for known in FORMATS.values() if all(map(known.accepts, files))), None)
         else:
-            found = FORMATS[config.format]
-    if found is None:
+            known = FORMATS[config.format]
+    if known is None:
         raise InputError(
             f"{paths[0]} is none of the known logs: {', '.join(TABLES)} tables and SPMD files, "
             "CommonRoad scenarios, rosbag2 folders, .mcap, .db3; set the parameter format if its name misleads"
         )
     with reading(files[0]):
-        return found.read(files, config)
+        return known.read(files, config)
 
 
 def present(path: Path) -> list[Path]:

@@ -4,7 +4,7 @@
 """Reconciling positions with measured speeds: a vehicle moves forward along a smooth path.
 
 A track becomes a path (a curve by arc length, `Path`) and a motion along it (place and speed over time, `Motion`), fitted in
-turn. The path is smooth in *distance*, so GPS noise does not become heading noise however slowly the vehicle creeps; the motion
+turn. The path is smooth in *distance*, so GPS noise does not become heading noise however slowly the vehicle moves; the motion
 is smooth in *time*, never runs backwards, keeps to the limits of a car and is still where the car stands. So position, speed and
 heading agree by construction: the distance between samples is the mean of their speeds times dt, and the heading is the path's
 direction, held while standing.
@@ -22,16 +22,15 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.path import fit_path, Headings, headings_of, MOVES, Path, straight_path
 from scenario_gen.logs.raw import Observations
 from scenario_gen.numerics import Bools, exact, Floats, Ints, runs, wrap_angle
-from scenario_gen.numerics.exact.sparse import Columns
 
 STANDS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
 STILL = 0.1  # m/s: below this it is not on its way to or from standing
-CREEPS = 1.0  # m: fixes that move further than this while the speed is zero say that the speed is wrong
-DOUBTED = 3.0  # m/s: a speed that differs more from that of the fixes has no say in the first layout; if most do, in nothing
-MOVED = 0.5  # m: who moves less has no direction of travel
+SHIFTED = 1.0  # m: if fixes move further while the speed is zero, the speed is wrong
+DOUBTED = 3.0  # m/s: a speed that differs more from that of the fixes is not used in the first layout; if most do, none is used
+MOVED = 0.5  # m: a vehicle that moves less has no direction of travel
 ROUNDS = 3  # of path and motion in turn
 LEAST_NOISE, MOST_NOISE = 0.1, 1.5  # m: of fixes, as estimated
-ENOUGH = 30  # moving fixes from which their noise can be told
+ENOUGH = 30  # moving fixes from which their noise can be estimated
 SETTLES = 0.3  # s at either end of a stand that are left to the motion: a car comes to rest, and starts, without a step
 STRAIGHT = 3.0  # m: a shorter path has no shape of its own
 
@@ -45,7 +44,7 @@ class Motion:
     """
 
     def __init__(self, stands: Bools, config: LogConfig) -> None:
-        """Set the program up; `stands` (T,) tells at which ticks the speed is zero."""
+        """Set the program up; the speed is zero at the ticks of which `stands` (T,) is true."""
         dt = config.period
         self.dt, self.ticks = dt, len(stands)
         self.variable = np.concatenate([[0], np.cumsum(~stands)])  # v_i = 0 makes c_{i+1} the variable of c_i
@@ -59,7 +58,8 @@ class Motion:
         rows = [np.repeat(top + np.arange(len(at)), values.shape[1]) for top, (at, values) in zip(above, blocks, strict=False)]
         columns = [(at[:, None] + np.arange(values.shape[1])).ravel() for at, values in blocks]
         entries = np.concatenate([values.ravel() for _, values in blocks])
-        self.constraints = Columns.of_entries(np.concatenate(rows), np.concatenate(columns), entries, (above[-1], self.size))
+        shape = (above[-1], self.size)
+        self.constraints = exact.Columns.of_entries(np.concatenate(rows), np.concatenate(columns), entries, shape)
 
     def _merged(self, tick: Ints, weights: Floats) -> tuple[Ints, Floats]:
         """Rows (F, E) over the coefficients from `tick` (F,) on, as the first variable (F,) and rows (F, E) from there."""
@@ -69,7 +69,7 @@ class Motion:
         return self.variable[tick], out
 
     def _differences(self, order: int) -> tuple[Ints, Floats]:
-        """Differences of the coefficients, over the merged variables, as `_merged` gives rows."""
+        """Return differences of the coefficients over the merged variables, as rows like those of `_merged`."""
         stencil = {1: [-1.0, 1.0], 2: [1.0, -2.0, 1.0], 3: [-1.0, 3.0, -3.0, 1.0]}[order]
         tick = np.arange(len(self.variable) - order)
         return self._merged(tick, np.tile(stencil, (len(tick), 1)))
@@ -111,7 +111,7 @@ class Motion:
             linear = linear - pull
         place = np.tile(np.arange(self.size), 4)
         column = place + np.repeat(np.arange(4), self.size)
-        upper = Columns.of_entries(place, column, quadratic[:, : self.size].ravel(), (self.size, self.size))
+        upper = exact.Columns.of_entries(place, column, quadratic[:, : self.size].ravel(), (self.size, self.size))
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
@@ -119,7 +119,7 @@ class Motion:
         solution = clarabel.DefaultSolver(upper, linear[: self.size], self.constraints, self.bounds, cones, settings).solve()
         if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
             raise InputError(f"speeds and positions cannot be reconciled ({solution.status}); check their units")
-        merged = np.maximum.accumulate(np.asarray(solution.x))  # the solver's tolerance must not drive backwards
+        merged = np.maximum.accumulate(np.asarray(solution.x))  # within the solver's tolerance it may run backwards
         return np.asarray(merged[self.variable])
 
     def place(self, coefficients: Floats, seconds: Floats) -> Floats:
@@ -140,7 +140,7 @@ class Smooth:
     Attributes:
         first: index of the first sample on the common clock.
         position: (T, 2) metres.
-        heading: (T,) rad, unwrapped; NaN if the vehicle never moved and its log does not say.
+        heading: (T,) rad, unwrapped; NaN if the vehicle never moved and none is recorded.
         speed: (T,) m/s.
         before: (S,) measured speed less the speed of the raw fixes [m/s].
         after: (T,) published speed less the speed of the published positions [m/s].
@@ -148,7 +148,7 @@ class Smooth:
         moved: (F,) distance of the raw fixes from the published positions at their stamps [m].
         noise: standard deviation of the fixes [m], as estimated or as given.
         turned: (H,) recorded headings less the published ones [rad] where the vehicle moves.
-        headings: (H',) for each recorded heading whether it had a say.
+        headings: (H',) for each recorded heading whether it was used.
     """
 
     first: int
@@ -195,13 +195,13 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
     for _ in range(ROUNDS):
         path = path_of(guess, piece, weight, noise, np.gradient(guess, fix_t), headings)
         place, aside = path.project(guess, piece.fix)
-        drive = motion.solve([*measured, (fix_t, place, noise / np.sqrt(weight), False)])
-        guess = motion.place(drive, fix_t)
+        coefficients = motion.solve([*measured, (fix_t, place, noise / np.sqrt(weight), False)])
+        guess = motion.place(coefficients, fix_t)
         if not config.position_noise:
             noise = noise_about(first_noise, np.interp(fix_t, ticks, stands) < 0.5, aside, place - guess)
         weight = np.minimum(1.0, 2.0 * noise / np.maximum(exact.hypot(aside, place - guess), 1e-9))  # Huber's
         headings = headings_of(piece.heading, path.pose(guess)[1], np.gradient(guess, fix_t))
-    place, published = motion.at_ticks(drive)
+    place, published = motion.at_ticks(coefficients)
     position, heading = path.pose(place)
     if np.ptp(place) < MOVED and not np.isfinite(piece.heading).any():
         heading = np.full(len(place), np.nan)
@@ -255,7 +255,7 @@ def path_of(guess: Floats, piece: Observations, weight: Floats, noise: float, sp
         weight: (F,) in (0, 1].
         noise: standard deviation of the fixes [m].
         speed: (F,) at the fixes [m/s].
-        headings: what the log says of them.
+        headings: recorded ones, if there are any.
     """
     low, high = float(guess.min()), float(guess.max())
     if high - low >= STRAIGHT:
@@ -271,7 +271,7 @@ def path_of(guess: Floats, piece: Observations, weight: Floats, noise: float, sp
 
 
 def speed_of_fixes(seconds: Floats, fix: Floats, window: float = 0.5) -> Floats:
-    """(F,) speeds of the raw fixes over `window` seconds around each [m/s]."""
+    """Return the speeds (F,) of the raw fixes over `window` seconds around each [m/s]."""
     early = np.searchsorted(seconds, seconds - window / 2.0 - 1e-9)
     late = np.searchsorted(seconds, seconds + window / 2.0 + 1e-9) - 1
     early, late = (
@@ -297,10 +297,10 @@ def estimated_noise(fix: Floats) -> float:
 def noise_about(guess: float, moves: Bools, aside: Floats, ahead: Floats) -> float:
     """Return the standard deviation [m] of fixes about the path and motion fitted to them, at most twice the first estimate.
 
-    Without that bound noise and smoothness would drive each other up: what is smoothed away is noise of long memory.
+    Without that bound noise and smoothness would increase each other: smoothing leaves noise of long memory.
 
     Args:
-        guess: the first estimate; it stays if few fixes are of a moving vehicle: those of a standing one are often repeated.
+        guess: the first estimate; it is kept if few fixes are of a moving vehicle: those of a standing one are often repeated.
         moves: (F,) whether it moves there.
         aside: (F,) of the fixes from the path [m].
         ahead: (F,) of the fixes from the motion along it [m].
@@ -312,7 +312,7 @@ def noise_about(guess: float, moves: Bools, aside: Floats, ahead: Floats) -> flo
 
 
 def white_equivalent(noise: Floats) -> float:
-    """Return the standard deviation of the white noise that says as little about the mean as this coloured noise (T,) [m, m/s].
+    """Return the deviation of the white noise whose mean is as uncertain as that of this coloured noise (T,) [m, m/s].
 
     Values beyond three robust deviations are pulled in; the deviation is then scaled by the root of the autocorrelation
     time, 1 + 2 Σ ρ_l over the lags before the first ρ_l below 0.1.
@@ -346,10 +346,10 @@ def standing(ticks: Floats, fix_t: Floats, fix: Floats, speed_t: Floats, speed: 
     stands = np.zeros(len(ticks), dtype=bool)
     for begin, end in runs(smooth < STANDS):
         still = begin + np.flatnonzero(smooth[begin:end] <= max(STILL, 1.5 * float(np.median(smooth[begin:end]))))
-        begin, end = int(still[0]), int(still[-1]) + 1  # noqa: PLW2901 - rolling to the stop and away from it is no standing
+        begin, end = int(still[0]), int(still[-1]) + 1  # noqa: PLW2901 - rolling before and after the stop is not standing
         inside = fix[(fix_t >= ticks[begin]) & (fix_t <= ticks[end - 1])]
         k = max(len(inside) // 5, 1)
         if (end - begin) * dt >= 1.0 and len(inside):
             shift = np.median(inside[-k:], axis=0) - np.median(inside[:k], axis=0)
-            stands[begin:end] = exact.hypot(*shift) <= CREEPS
+            stands[begin:end] = exact.hypot(*shift) <= SHIFTED
     return stands

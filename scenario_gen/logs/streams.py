@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Fixes and speeds as they come → samples on the common clock, and the log that they amount to.
+"""Live fixes and speeds → samples on the common clock, and a log of all of them.
 
-There is no second way to read here: the last seconds of the streams are a small `RawLog` and cleaned like any other, and all
-that was buffered is one too, which `encounters_of` reads as if it came from a file.
+Nothing is read in a second way: the last seconds of the streams are a small `RawLog` that is cleaned like any other, and all that
+was buffered is a `RawLog` too, which `encounters_of` reads as if it came from a file.
 """
 
 from collections.abc import Sequence
@@ -21,10 +21,10 @@ from scenario_gen.logs.smoothing import speed_of_fixes
 from scenario_gen.numerics import Floats
 from scenario_gen.types import Vehicle
 
-WINDOW_NS = 3_000_000_000  # of the past that is cleaned again for every sample: enough to tell a jump from a new place
+WINDOW_NS = 3_000_000_000  # of the past that is cleaned again for every sample: enough to distinguish a jump from a new place
 FAR_NS = 10_000_000_000  # a stamp this far from the newest one belongs to another time, or is wrong
 MOST = 100  # messages of one kind per vehicle and second that are kept
-EVERY = 2  # ticks that are made at once: one cleaning serves them all
+EVERY = 2  # ticks that are sampled at once, after one cleaning
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class Streams:
         self._count = 0
         self._first = self._newest = -1  # stamps
         self._next = -1  # number of the next tick, once there were any
-        self._strange = 0
+        self._n_strange = 0
 
     @property
     def config(self) -> LogConfig:
@@ -78,15 +78,15 @@ class Streams:
         return (self._newest - self._first) * 1e-9
 
     def breaks(self, stamp_ns: int) -> bool:
-        """Say whether the clock was set: several messages in a row are far from those before, this one being the last.
+        """Return whether the clock was set: this message is the last of several that are far from those before.
 
-        A single such message is a wrong one, and `put_fix` and `put_speed` leave it out.
+        A single such message is wrong, and `put_fix` and `put_speed` leave it out.
         """
         if self._newest < 0 or abs(stamp_ns - self._newest) <= FAR_NS:
-            self._strange = 0
+            self._n_strange = 0
             return False
-        self._strange += 1
-        return self._strange >= RELOCATED
+        self._n_strange += 1
+        return self._n_strange >= RELOCATED
 
     def put_fix(self, vehicle: str, stamp_ns: int, latitude: float, longitude: float) -> None:
         """Take a position in [degrees]; NaN where there is no fix."""
@@ -119,7 +119,7 @@ class Streams:
         """Return the samples that have become complete; a tick at which fewer than two vehicles are there has none.
 
         Raises:
-            InputError: a clock stands or runs backwards; what came lately is forgotten.
+            InputError: a clock stands or runs backwards; the last seconds are forgotten.
         """
         last = (self._newest - self._late_ns) // self._dt_ns // EVERY * EVERY
         following = self._first // self._dt_ns if self._next < 0 else self._next
@@ -156,12 +156,12 @@ class Streams:
         return clean(log, self.config)[0]
 
     def _awaited(self, track: Observations, tick: int) -> bool:
-        """Say whether a vehicle's next fix may still come: it has been there, and is slower than the others."""
+        """Return whether a vehicle's next fix may still come: its source may be slower than the others."""
         silent = (self._newest - self._late_ns - int(track.fix_ns[-1])) * 1e-9
         return bool(track.fix_ns[-1] < tick) and silent <= longest_bridge(np.diff(track.fix_ns) * 1e-9, self._config)
 
     def _place(self, vehicle: str) -> str:
-        """The first sound fix of a vehicle, to about a metre, as an origin for all that follows."""
+        """Return the first sound fix of a vehicle, to about a metre, as an origin for all that follows."""
         on_globe = (row for row in self._recent[vehicle].fixes if 0.0 < abs(row[2]) <= 90.0 and abs(row[3]) <= 180.0)
         _, _, latitude, longitude, _ = min(on_globe)
         return f"{latitude:.5f},{longitude:.5f}"
@@ -191,7 +191,7 @@ class Streams:
 
 
 def sample_at(tracks: Sequence[Observations], stamp_ns: int, config: LogConfig) -> Sample | None:
-    """Return who is where at an instant; between two fixes that are not too far apart; None for fewer than two vehicles."""
+    """Return the vehicles with fixes around an instant that are not too far apart; None for fewer than two vehicles."""
     vehicles, position, speed = [], [], []
     for track in tracks:
         after = int(np.searchsorted(track.fix_ns, stamp_ns))

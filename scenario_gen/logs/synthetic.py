@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The bundled log: the paper's three cases (V-A, Fig. 3), made up and named synthetic everywhere (docs/logs.md)."""
+"""The bundled logs: the paper's three cases (V-A, Fig. 3), invented and called synthetic everywhere (docs/logs.md)."""
 
 from pathlib import Path
 

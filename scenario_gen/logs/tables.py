@@ -17,14 +17,22 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, LONGEST_HEADER, Observations, RawLog, Segment
 from scenario_gen.numerics import Floats, Ints
 
+PARQUET = (".parquet", ".pq")
 LONGEST = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
 LONGEST_NUMBER = 300  # characters
-LARGEST = 100.0  # m: what is longer is no vehicle
+LARGEST = 100.0  # m: no vehicle is longer
 EPOCH_NS = 1_072_915_200 * 10**9  # 2004-01-01 UTC in Unix time; Gentime of SPMD counts microseconds from there
 COLUMNS = (  # of a basic safety message in the files of the Safety Pilot Model Deployment
     *("RxDevice", "FileId", "TxDevice", "Gentime", "TxRandom", "MsgCount", "DSecond", "Latitude", "Longitude", "Elevation"),
     *("Speed", "Heading", "Ax", "Ay", "Az", "Yawrate", "PathCount", "RadiusOfCurve", "Confidence"),
 )
+QUANTITIES = {
+    "vehicle": Column("TxDevice"),
+    "lat": Column("Latitude"),
+    "lon": Column("Longitude"),
+    "speed": Column("Speed"),
+    "heading": Column("Heading", math.pi / 180.0, clockwise=True),
+}
 
 
 def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> RawLog:
@@ -42,23 +50,32 @@ def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> Raw
     for path in paths:
         size += path.stat().st_size
         check_size(str(path), size, row, config)
-        unit, first = "line", 1 if spmd else 2
-        if spmd:
-            frames.append(read_messages(path, row, config))
-        elif path.suffix.lower() in (".parquet", ".pq"):
-            needs("parquet", "pyarrow")
-            from scenario_gen.logs.parquet import read_columns
-
-            frames.append(to_numbers(*read_columns(path, row, config), path))
-            unit, first = "row", 1
-        else:
-            frame = read_text(path, row, config)
-            frames.append(to_numbers(frame, find_columns([str(name) for name in frame.columns], path, config.columns), path))
-        segments.append(Segment(row, str(path), unit, first))
+        frames.append(read_messages(path, row, config) if spmd else read_columns(path, row, config))
+        segments.append(segment_of(path, row, header=not spmd))
         row += len(frames[-1])
     if len({"lat" in frame for frame in frames}) > 1:
         raise InputError(f"{paths[0]} and the files beside it mix latitude/longitude and x/y; read them one by one")
     return from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
+
+
+def read_columns(path: Path, before: int, config: LogConfig) -> pd.DataFrame:
+    """Read the needed columns of one table in our units; `before` rows were read from other files.
+
+    Raises:
+        InputError: as `read`.
+    """
+    if path.suffix.lower() in PARQUET:
+        needs("parquet", "pyarrow")
+        from scenario_gen.logs import parquet
+
+        return to_numbers(*parquet.read_columns(path, before, config), path)
+    frame = read_text(path, before, config)
+    return to_numbers(frame, find_columns([str(name) for name in frame.columns], path, config.columns), path)
+
+
+def segment_of(path: Path, row: int, *, header: bool = True) -> Segment:
+    """Return the place of a file's rows, the first of which is `row` of the log; text may have no line of names."""
+    return Segment(row, str(path), "row", 1) if path.suffix.lower() in PARQUET else Segment(row, str(path), "line", 1 + header)
 
 
 def read_text(path: Path, before: int, config: LogConfig, **options: Any) -> pd.DataFrame:
@@ -92,7 +109,7 @@ def read_text(path: Path, before: int, config: LogConfig, **options: Any) -> pd.
 
 
 def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> pd.DataFrame:
-    """Return the needed columns in our units; what is not a number becomes NaN. Stamps become integer nanoseconds.
+    """Return the needed columns in our units; texts that are no numbers become NaN. Stamps become integer nanoseconds.
 
     Raises:
         InputError: a column is of no kind that the quantity can have.
@@ -117,14 +134,14 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
 
 
 def reals(values: "pd.Series[Any]") -> "pd.Series[float]":
-    """Numbers, or texts that are numbers, as float64; NaN where they are none."""
+    """Return numbers, or texts that are numbers, as float64; NaN where they are none."""
     if not pd.api.types.is_numeric_dtype(values):
         values = values.where(values.astype(str).str.len() < LONGEST_NUMBER)  # pandas fails on a number beyond float64
     return pd.to_numeric(values, errors="coerce").astype(float)
 
 
 def vehicle_name(value: Any) -> str:
-    """A vehicle's name as text: 17, 17.0 and "17" are the same vehicle."""
+    """Return a vehicle's name as text: 17, 17.0 and "17" are the same vehicle."""
     if pd.isna(value):
         return ""
     if isinstance(value, float) and value.is_integer():
@@ -133,7 +150,7 @@ def vehicle_name(value: Any) -> str:
 
 
 def nanoseconds(values: "pd.Series[Any]", factor: float) -> tuple["pd.Series[int]", "pd.Series[bool]"]:
-    """Stamps as integer nanoseconds, `LONGEST` where they are beyond it, and which of them are numbers (or dates) at all.
+    """Return stamps as integer nanoseconds, `LONGEST` where they are beyond it, and which of them are numbers (or dates) at all.
 
     Args:
         values: numbers, or texts that are numbers or dates.
@@ -173,7 +190,7 @@ def from_frame(frame: pd.DataFrame, paths: Sequence[Path], segments: tuple[Segme
 
 
 def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> Observations:
-    """One vehicle's rows as observations; a row is both a fix and a speed."""
+    """Return one vehicle's rows as observations; a row is both a fix and a speed."""
 
     def column(quantity: str) -> Floats:
         return group[quantity].to_numpy(float) if quantity in group else np.full(len(group), np.nan)
@@ -183,21 +200,10 @@ def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> O
         values = values[np.isfinite(values) & (values > 0.0) & (values < LARGEST)]
         return float(np.median(values)) if len(values) else math.nan
 
+    states = np.column_stack([column(quantity) for quantity in (*position, "heading", "speed")])
     stamps: Ints = group["time"].to_numpy(np.int64)
     rows: Ints = group["row"].to_numpy(np.int64)
-    measured = slice(None) if "speed" in group else slice(0, 0)
-    return Observations(
-        id=name,
-        fix_ns=stamps,
-        fix=np.column_stack([column(position[0]), column(position[1])]),
-        fix_row=rows,
-        heading=column("heading"),
-        speed_ns=stamps[measured],
-        speed=column("speed")[measured],
-        speed_row=rows[measured],
-        length=median("length"),
-        width=median("width"),
-    )
+    return Observations.of_rows(name, stamps, states, rows, (median("length"), median("width")), measured="speed" in group)
 
 
 def read_messages(path: Path, before: int, config: LogConfig) -> pd.DataFrame:
@@ -212,20 +218,9 @@ def read_messages(path: Path, before: int, config: LogConfig) -> pd.DataFrame:
             f"{path} has {raw.shape[1]} columns on line 1; basic safety messages have {len(COLUMNS)}: {', '.join(COLUMNS)}"
         )
     raw.columns = pd.Index(COLUMNS)
-
-    def numbers(name: str) -> "pd.Series[float]":
-        return reals(raw[name])
-
-    stamps = numbers("Gentime")  # microseconds stay exact in float64 until the year 2289
-    known = stamps.notna() & (stamps.abs() < 8e15)
-    return pd.DataFrame(
-        {
-            "time": stamps.where(known, 0.0).round().astype(np.int64) * 1000 + EPOCH_NS,
-            "time_ok": known,
-            "vehicle": numbers("TxDevice").map(vehicle_name),
-            "lat": numbers("Latitude"),
-            "lon": numbers("Longitude"),
-            "speed": numbers("Speed"),
-            "heading": math.pi / 2.0 - np.radians(numbers("Heading")),
-        }
-    )
+    raw["TxDevice"] = reals(raw["TxDevice"])
+    frame = to_numbers(raw, QUANTITIES, path)
+    stamps = reals(raw["Gentime"])  # microseconds stay exact in float64 until the year 2289
+    frame["time_ok"] = stamps.notna() & (stamps.abs() < 8e15)
+    frame["time"] = stamps.where(frame["time_ok"], 0.0).round().astype(np.int64) * 1000 + EPOCH_NS
+    return frame

@@ -21,8 +21,9 @@ from msg_conventions.autoware import AutowareEncoder
 from msg_conventions.ego import encode_state
 from msg_conventions.tracks import encode_tracks
 from msg_conventions.trajectory import TYPE as TRACKS
-from scenario_gen.bags.recordings.samples import FIX, ODOMETRY, TWIST
-from scenario_gen.bags.recordings.tracked import store, TRACKED
+from scenario_gen.bags.storage.autoware import TRACKED
+from scenario_gen.bags.storage.definitions import type_store
+from scenario_gen.bags.vehicles import FIX, ODOMETRY, TWIST
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams
 from scenario_gen.logs.bag import read_streams, read_tracked, read_tracks, Topic, USED
@@ -143,7 +144,7 @@ def written(bag: Path, storage: StoragePlugin, messages: Sequence[tuple[str, str
     """Write messages (topic, type, stamp, CDR bytes) as a bag; return its one file."""
     with Writer(bag, version=9, storage_plugin=storage) as writer:
         kinds = {topic: kind for topic, kind, _, _ in messages}
-        connections = {topic: writer.add_connection(topic, kind, typestore=store()) for topic, kind in kinds.items()}
+        connections = {topic: writer.add_connection(topic, kind, typestore=type_store()) for topic, kind in kinds.items()}
         for topic, _, stamp, data in messages:
             writer.write(connections[topic], stamp, data)
     (file,) = (file for file in bag.iterdir() if file.suffix in (".mcap", ".db3"))
@@ -184,15 +185,15 @@ def decode(data: bytes, _folder: Path) -> None:
     topics: dict[tuple[str, str], Topic] = {}
     for used in (kind,) if kind in (ODOMETRY, TRACKS, TRACKED) else (FIX, TWIST):
         for number, (name, stamp, message) in enumerate(recorded()[used]):
-            topic = topics.setdefault((used, name), Topic(name, used))
+            topic = topics.setdefault((used, name), Topic(name, used, "log.mcap"))
             topic.stamps.append(stamp)
             topic.data.append(data[1:] if used == kind and number % 7 == 0 else message)
     if kind == TRACKS:
-        log = read_tracks(list(topics.values()), "log", "log.mcap", [])
+        log = read_tracks(list(topics.values()), "log", [])
     elif kind == TRACKED:
-        log = read_tracked(list(topics.values()), "log", "log.mcap", [])
+        log = read_tracked(list(topics.values()), "log", [])
     else:
-        log = read_streams(list(topics.values()), "log", "log.mcap", SHORT)
+        log = read_streams(list(topics.values()), "log", SHORT)
     encounters_of(log, SHORT)
 
 

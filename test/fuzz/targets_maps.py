@@ -17,7 +17,8 @@ import numpy as np
 from rosbags.typesys import get_typestore, Stores
 from targets_bags import in_file, values
 
-from msg_conventions.lanes import decode_lanes, encode_lanes, MARKER_TYPE
+from msg_conventions.lanes import decode_lanes, encode_lanes
+from msg_conventions.markers import TYPE as MARKER_TYPE
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.roads import build_road

@@ -24,11 +24,11 @@ from msg_conventions.changepoints import (
 from msg_conventions.diagnostics import decode_diagnostics
 from msg_conventions.diagnostics import TYPE as DIAGNOSTICS_TYPE
 from msg_conventions.ego import decode_state, ego_messages
-from msg_conventions.ego import STATE_TYPE as ODOMETRY_TYPE
 from msg_conventions.fits import decode_fit
 from msg_conventions.frames import decode_frames, encode_frames
 from msg_conventions.frames import TYPE as TF_TYPE
 from msg_conventions.hashes import decode_hashes, hash_of
+from msg_conventions.odometry import TYPE as ODOMETRY_TYPE
 from msg_conventions.paths import decode_path, decode_route, encode_route
 from msg_conventions.paths import TYPE as PATH_TYPE
 from msg_conventions.pictures import decode_footprint, encode_footprint, FOOTPRINT_TYPE

@@ -25,12 +25,14 @@ import numpy as np
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from scenario_gen.bags.recordings.samples import FIX, STORES, TWIST
+from scenario_gen.bags.storage.definitions import type_store
+from scenario_gen.bags.vehicles import FIX, TWIST
 from scenario_gen.logs.geodesy import geodetic
 from scenario_gen.logs.synthetic import CASES, RESOURCES
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types.encounter import Vehicle
 
+STORES = type_store()
 ORIGIN = (42.3, -83.7)  # degrees; the roads are invented, nothing was recorded there
 START_NS = 1_767_225_600 * 10**9  # 2026-01-01 00:00:00 UTC
 PERIOD = 0.1  # s between messages

@@ -115,9 +115,11 @@ def tracked(folder):
     """Write a bag of autoware_perception_msgs/TrackedObjects."""
     from rosbags.rosbag2 import StoragePlugin, Writer
 
-    from scenario_gen.bags.recordings.tracked import LABELS, store, TRACKED
+    from scenario_gen.bags.storage.autoware import TRACKED
+    from scenario_gen.bags.storage.definitions import type_store
+    from scenario_gen.bags.vehicles import KINDS
 
-    types = store().types
+    types = type_store().types
 
     def make(name, **values):
         return types[name](**values)
@@ -131,7 +133,7 @@ def tracked(folder):
 
     path = folder / "perception"
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
-        connection = bag.add_connection("/perception/object_recognition/tracking/objects", TRACKED, typestore=store())
+        connection = bag.add_connection("/perception/object_recognition/tracking/objects", TRACKED, typestore=type_store())
         for k, t in enumerate(T):
             objects = []
             for track, label in (("7", "car"), ("8", "bus"), ("9", "pedestrian")):
@@ -155,7 +157,7 @@ def tracked(folder):
                     footprint=make("geometry_msgs/msg/Polygon", points=[]),
                     dimensions=size,
                 )
-                kind = make("autoware_perception_msgs/msg/ObjectClassification", label=LABELS.index(label), probability=0.9)
+                kind = make("autoware_perception_msgs/msg/ObjectClassification", label=KINDS.index(label), probability=0.9)
                 doubt = make("autoware_perception_msgs/msg/ObjectClassification", label=0, probability=0.1)
                 number = make("unique_identifier_msgs/msg/UUID", uuid=np.full(16, int(track), dtype=np.uint8))
                 objects.append(
@@ -170,7 +172,7 @@ def tracked(folder):
                 )
             stamp = make("builtin_interfaces/msg/Time", sec=int(t), nanosec=round((t % 1.0) * 1e9))
             message = make(TRACKED, header=make("std_msgs/msg/Header", stamp=stamp, frame_id="map"), objects=objects)
-            bag.write(connection, round(t * 1e9), store().serialize_cdr(message, TRACKED))
+            bag.write(connection, round(t * 1e9), type_store().serialize_cdr(message, TRACKED))
     return path, {"pedestrian"}
 
 
@@ -204,10 +206,10 @@ def test_what_was_written_is_read(tmp_path, name):
         assert np.allclose(encounter.heading[n], heading, atol=0.05)
 
 
-def test_every_column_has_a_unit_and_every_format_its_source():
-    for known in FORMATS.values():
-        assert known.source and all(quantity.unit for quantity in known.columns.values())
-        assert LogConfig(format=known.name).format == known.name
+def test_every_column_has_a_factor_and_every_format_its_source():
+    for name, known in FORMATS.items():
+        assert known.source and all(0.0 < column.factor < np.inf for column in known.columns.values())
+        assert LogConfig(format=name).format == name
 
 
 def test_what_is_missing_is_named(tmp_path):
@@ -240,7 +242,7 @@ def test_pedestrians_of_no_known_kind_are_counted_too(tmp_path):
 def test_what_nobody_foresaw_names_the_file(tmp_path, monkeypatch):
     """A reader that fails in a way of its own is an error of ours all the same, which the fuzzing counts as a finding."""
     path, _ = argoverse2(tmp_path)
-    monkeypatch.setattr(tracks, "nanoseconds", lambda *_: {}["gone"])
+    monkeypatch.setattr(tracks, "to_numbers", lambda *_: {}["gone"])
     with pytest.raises(UnforeseenError, match=r"scenario_s1\.parquet cannot be read: KeyError 'gone'"):
         read_log(path)
 

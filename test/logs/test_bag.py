@@ -12,11 +12,13 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from synthetic_cases import fix_message, nanoseconds_to_time, twist_message
 
 from msg_conventions.tracks import encode_tracks
-from scenario_gen.bags.recordings.samples import FIX, ODOMETRY, STORES, TWIST
+from scenario_gen.bags.storage.definitions import type_store
+from scenario_gen.bags.vehicles import FIX, ODOMETRY, TWIST
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.types.encounter import Encounter, Vehicle
 
+STORES = type_store()
 TRACKS = "trajectory_msgs/msg/MultiDOFJointTrajectory"
 STRING = "std_msgs/msg/String"
 

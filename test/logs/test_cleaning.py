@@ -118,7 +118,7 @@ def test_a_slow_source_is_not_cut_to_bits(tmp_path):
     [
         (
             lambda rows: rows.assign(x_m=np.nan),
-            r"log\.csv holds no usable position.*position is not a number: 242, first at .*line 2",
+            r"log\.csv holds no usable position.*242 × position is not a number, first at .*line 2",
         ),
         (lambda rows: rows[rows["vehicle_id"] == "a"], r"log\.csv: only vehicle a"),
         (lambda rows: rows.assign(t_s=5.0), r"log\.csv, line 4: the clock of vehicle a stands still"),

@@ -20,6 +20,8 @@ from msg_conventions import (
     diagnostics,
     ego,
     lanes,
+    markers,
+    odometry,
     paths,
     pictures,
     roads,
@@ -46,7 +48,7 @@ def _messages():
         yield changepoints.POSTERIOR_TYPE, changepoints.encode_posterior(template, parts)
         yield trajectory.TYPE, scenarios.encode_scenario(scenario(seed, n), 17)
         state = np.array([1.5, -2.5, 3.0, 8.25])
-        yield ego.STATE_TYPE, ego.encode_state(state, f"vehicle_{'x' * seed}", frame, 17)
+        yield odometry.TYPE, ego.encode_state(state, f"vehicle_{'x' * seed}", frame, 17)
         yield paths.TYPE, paths.encode_route(route(seed), ANCHORS, frame)
         yield paths.TYPE, paths.encode_path(np.zeros((seed - 1, 3)), np.arange(seed - 1), frame, 3)
         ends = np.array([[1.0, 2.0, 3.0]] * (seed - 1)).reshape(-1, 3)
@@ -54,14 +56,14 @@ def _messages():
         yield roads.MAP_TYPE, roads.encode_map(road, 5)
         border = np.column_stack((np.arange(seed + 1.0), np.zeros(seed + 1)))
         network = LaneNetwork("m", (Lane("7", border + 1.0, border, (0,), (), 8.5 * seed, "j" * seed),), ("née",))
-        yield lanes.MARKER_TYPE, lanes.encode_lanes(network if seed > 1 else None, frame, 5)
+        yield markers.TYPE, lanes.encode_lanes(network if seed > 1 else None, frame, 5)
         yield roads.POSES_TYPE, roads.encode_poses(road.entries, frame, 5)
         sent = scenario(seed)
         asked = BoundaryStates(np.zeros((2, 4)), np.ones((2, 4)))
         entry = scenario_info.scenario_entry(sent, b"", frame, "/n" * seed, template=sent.vehicles, asked=asked)
         yield diagnostics.TYPE, diagnostics.encode_diagnostics([entry.status] * (seed - 1), 1)
         yield pictures.FOOTPRINT_TYPE, pictures.encode_footprint(Vehicle("a"), 3, frame)
-        yield pictures.MARKERS_TYPE, pictures.scenario_markers(scenario(seed), 3)
+        yield markers.ARRAY_TYPE, pictures.scenario_markers(scenario(seed), 3)
 
 
 MESSAGES = list(_messages())

@@ -14,9 +14,10 @@ import pytest
 
 from msg_conventions.cdr import CdrWriter
 from msg_conventions.diagnostics import decode_diagnostics, Level
-from msg_conventions.driving import decode_odometry, encode_odometry, encode_twist
+from msg_conventions.driving import encode_twist
 from msg_conventions.ego import decode_state
 from msg_conventions.frames import decode_frames
+from msg_conventions.odometry import decode_odometry, encode_odometry
 from msg_conventions.paths import encode_path
 from msg_conventions.roads import decode_map
 from scenario_gen.bags.recordings.write import result_messages, write_recording
@@ -95,9 +96,9 @@ def test_a_planner_in_lock_step_gets_the_verdict_that_it_gets_in_process(traffic
     assert (tmp_path / "results" / "drives.json").is_file() and (tmp_path / "results" / "junit.xml").is_file()
 
     told = [decode_odometry(data) for data in client.heard["vehicle_1/odom"][:10]]
-    stamps = sorted({stamp for stamp, _, _ in told})  # where everyone is at the start may have been told twice
+    stamps = sorted({stamp for stamp, *_ in told})  # where everyone is at the start may have been told twice
     assert np.diff(stamps).tolist() == [100_000_000] * (len(stamps) - 1) and len(stamps) > 5
-    assert all(frame == run.road.frame_id and np.isfinite(state).all() for _, frame, state in told)
+    assert all(frame == run.road.frame_id and np.isfinite(state).all() for _, frame, _, state in told)
     assert {child for _, _, child, _ in decode_frames(client.heard["/tf"][0])} == {"vehicle_1", "vehicle_bus_2"}
     grid = decode_map(client.heard["traffic/local_map"][0])[1]
     assert not grid.drivable.all() and grid.drivable.any()

@@ -10,7 +10,7 @@ from scenario_gen import Encounter, Road, RoadConfig
 REACH = 80.0  # metres from the crossing to the end of each arm
 
 
-def draw(_: Encounter | None, config: RoadConfig) -> Road:
+def draw(name: str, _: Encounter | None, config: RoadConfig) -> Road:
     """Return the road; it has one size, whatever the template."""
     centre = np.arange(0.5 * config.resolution - REACH, REACH, config.resolution)
     x, y = np.meshgrid(centre, centre)
@@ -22,4 +22,4 @@ def draw(_: Encounter | None, config: RoadConfig) -> Road:
         drivable |= np.abs(along[0] * y - along[1] * x) < config.lane_width
         exits.append([*(REACH * along + right), outward])
         entries.append([*(REACH * along - right), outward + np.pi])
-    return Road("skew_crossing", drivable, config.resolution, np.full(2, -REACH), np.array(entries), np.array(exits))
+    return Road(name, drivable, config.resolution, np.full(2, -REACH), np.array(entries), np.array(exits))

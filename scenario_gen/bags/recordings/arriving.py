@@ -1,36 +1,35 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Scenarios as they arrive live: whatever comes first, their messages, their entry, or the witness of their ego."""
+"""Scenarios as they arrive live, in any order of their messages, their entries and the witnesses of their egos."""
 
 from typing import TypeVar
 
 from msg_conventions.ego import WITNESS
 from msg_conventions.scenario_info import decode_info, INFO, ScenarioEntry
 from msg_conventions.scenarios import digest
-from scenario_gen.bags.recordings.of_scenarios import decode_with_witness
 from scenario_gen.bags.recordings.requests import Match, RequestTracker
+from scenario_gen.bags.recordings.scenarios import decode_with_witness, SCENARIOS
 from scenario_gen.types import Scenario
 
-SCENARIOS = "scenarios"
 TOPICS = (SCENARIOS, INFO, WITNESS)
 MOST = 10_000  # witnesses, and scenarios without theirs, that are remembered; beyond, the oldest are forgotten
 Kept = TypeVar("Kept")
-Arrived = tuple[ScenarioEntry, int, Scenario]  # its entry, the template's stamp [ns], and itself, with its witness
+Arrived = tuple[ScenarioEntry, int, Scenario]  # its entry, the template's stamp [ns], and the scenario with its witness
 
 
 class ArrivingScenarios:
-    """Puts together what belongs to one scenario."""
+    """Joins the messages that belong to one scenario."""
 
     def __init__(self) -> None:
         self._tracker = RequestTracker(MOST)
-        self._entries: dict[str, ScenarioEntry] = {}  # by SHA-256, whole: the tracker keeps no texts
+        self._entries: dict[str, ScenarioEntry] = {}  # by SHA-256; complete, while the tracker keeps no texts
         self._witnesses: dict[str, bytes] = {}  # by SHA-256
         self._waiting: dict[str, tuple[ScenarioEntry, bytes]] = {}  # by SHA-256 of the witness that has not come
-        self.unmatched = 0  # messages of scenarios that have come, and did not make one whole
+        self.unmatched = 0  # messages of scenarios that came, and of which no scenario was completed
 
     def take(self, topic: str, data: bytes) -> list[Arrived]:
-        """Take a message; return the scenarios that are whole with it.
+        """Take a message; return the scenarios that it completes.
 
         Args:
             topic: one of `TOPICS`.
@@ -43,7 +42,7 @@ class ArrivingScenarios:
             sha256 = digest(data)
             _remember(self._witnesses, sha256, data)
             waiting = self._waiting.pop(sha256, None)
-            return [] if waiting is None else self._whole(*waiting)
+            return [] if waiting is None else self._complete(*waiting)
         if topic == SCENARIOS:
             self.unmatched += 1
             return self._matched([self._tracker.add_scenario(digest(data), data)])
@@ -56,16 +55,18 @@ class ArrivingScenarios:
         return found
 
     def _matched(self, matches: list[Match | None]) -> list[Arrived]:
-        whole = [(match[1], match[2]) for match in matches if match is not None]
-        return [one for entry, data in whole for one in self._with_witness(self._entries.pop(entry.sha256, entry), data)]
+        complete = [(match[1], match[2]) for match in matches if match is not None]
+        return [
+            arrived for entry, data in complete for arrived in self._with_witness(self._entries.pop(entry.sha256, entry), data)
+        ]
 
     def _with_witness(self, entry: ScenarioEntry, data: bytes) -> list[Arrived]:
         if entry.witness and entry.witness not in self._witnesses:
             _remember(self._waiting, entry.witness, (entry, data))
             return []
-        return self._whole(entry, data)
+        return self._complete(entry, data)
 
-    def _whole(self, entry: ScenarioEntry, data: bytes) -> list[Arrived]:
+    def _complete(self, entry: ScenarioEntry, data: bytes) -> list[Arrived]:
         self.unmatched -= len(entry.messages)
         return [(entry, *decode_with_witness(data, entry, 0, self._witnesses.pop(entry.witness, None), SCENARIOS, WITNESS))]
 

@@ -5,14 +5,14 @@
 
 from collections.abc import Iterator
 
+from msg_conventions import odometry
 from msg_conventions.autoware import AutowareEncoder, EGO, OBJECTS, QUALITY, TRACKS
-from msg_conventions.ego import STATE_TYPE
 from scenario_gen.bags.storage.autoware import PREDICTED, TRACKED
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.types import Scenario
 
-TYPES = {OBJECTS: PREDICTED, TRACKS: TRACKED, EGO: STATE_TYPE}
+TYPES = {OBJECTS: PREDICTED, TRACKS: TRACKED, EGO: odometry.TYPE}
 
 
 def autoware_messages(others: Scenario, ego: Scenario | None, start_ns: int) -> Iterator[tuple[str, bytes, int]]:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is needed to make a scenario again, as texts in the summary of its request: parameters and versions, out and in."""
+"""What regenerates a scenario, as texts in the summary of its request: parameters and versions, written and read."""
 
 from collections.abc import Mapping
 from importlib import metadata
@@ -45,7 +45,7 @@ def read_parameters(config: Config, texts: Mapping[str, str], prefix: str, what:
 
 
 def _number(kind: type, text: str) -> Any:
-    """The number that the text says; the text itself if it is none, for `updated` to refuse."""
+    """Return the number in a text; the text itself if it is none, for `updated` to refuse."""
     try:
         return kind(text)
     except ValueError:

@@ -3,8 +3,8 @@
 
 """Which scenarios of a request are there: entries and summaries of `scenarios/info` matched with the scenarios.
 
-Both topics come in any order; what comes twice (by a sampler that was started again, or to a subscriber that was found again)
-counts once.
+Messages come in any order. A message that comes twice (from a sampler that was restarted, or after a subscriber was lost and
+found again) counts once.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ from scenario_gen.base.errors import InputError
 MOST_ENTRIES = 300_000  # that are remembered; beyond, the oldest requests are forgotten
 MOST_UNMATCHED = 10_000  # scenarios that wait for their entry; beyond, the oldest are forgotten
 MOST_WHOLE = 1000  # requests that are remembered as whole
-NO_STATUS = Status("", Level.OK, "")  # of entries that wait: their texts are long, and there may be very many
+NO_STATUS = Status("", Level.OK, "")  # of waiting entries: their texts are long, and there may be very many
 
 
 @dataclass
@@ -27,12 +27,13 @@ class TrackedRequest:
     """One request: which entries of it came, and which scenarios.
 
     Attributes:
-        request: its id; seed: None until an entry says it.
+        request: its id.
+        seed: None until an entry names it.
         entries: SHA-256 of its scenarios by index, in the order of the entries.
         awaited: entries whose scenarios have not come, by SHA-256.
-        came: how many scenarios have.
+        came: how many scenarios have come.
         summary: its summary, once there is one.
-        kept: scenarios, of who calls `keep`.
+        kept: scenarios, where `keep` is called.
     """
 
     request: str
@@ -45,28 +46,28 @@ class TrackedRequest:
 
     @property
     def whole(self) -> bool:
-        """Whether it is closed and nothing is missing."""
+        """Whether it is closed and no scenario is missing."""
         return self.summary is not None and not self.missing
 
     @property
     def missing(self) -> int:
-        """How many scenarios that were published are not there."""
+        """How many published scenarios have not come."""
         return max(0, (self.summary.published if self.summary else len(self.entries)) - self.came)
 
     def keep(self, entry: ScenarioEntry, data: bytes, seed: int, most: int) -> None:
-        """Keep a scenario, or one less of more than `most`: the same ones of the same seed, in whatever order they come."""
+        """Keep a scenario; of more than `most`, drop one by lot, which depends on the seed and not on the order of arrival."""
         lot = digest(f"{seed} {entry.sha256}".encode())
         heapq.heappush(self.kept, (lot, entry.index, entry, data))
         if len(self.kept) > most:
             heapq.heappop(self.kept)
 
     def in_order(self) -> list[tuple[bytes, ScenarioEntry]]:
-        """Return what is kept, in the order of the entries."""
+        """Return the kept scenarios with their entries, in the order of the entries."""
         kept = {index: (data, entry) for _, index, entry, data in self.kept}
         return [kept[index] for index in self.entries if index in kept]
 
     def sentence(self) -> str:
-        """Say what is missing."""
+        """Return a sentence on what is missing."""
         if self.summary is None:
             return f"request {self.request} was not closed: {self.came} scenarios are there, {self.missing} more have an entry"
         return f"request {self.request}: {self.came} of {self.summary.published} scenarios are there, {self.missing} are missing"
@@ -81,14 +82,16 @@ class RequestTracker:
     def __init__(self, most_unmatched: int = MOST_UNMATCHED) -> None:
         self.open: dict[str, TrackedRequest] = {}  # by request
         self._awaited: dict[str, list[str]] = {}  # SHA-256 -> requests
-        self._unmatched: dict[str, list[bytes]] = {}  # SHA-256 -> what came with scenarios that came before their entry
+        self._unmatched: dict[str, list[bytes]] = {}  # SHA-256 -> data of scenarios that came before their entry
         self._whole: dict[str, tuple[int | None, int]] = {}  # request -> seed and number of scenarios
         self._most_unmatched = most_unmatched
         self._entries = 0  # of all open requests
-        self._partial: dict[str, tuple[str, ...]] = {}  # SHA-256 of a message -> of all messages of its scenario, last: of it all
+        self._partial: dict[
+            str, tuple[str, ...]
+        ] = {}  # SHA-256 of a message -> those of all messages of its scenario, then that of the scenario
 
     def add_scenario(self, sha256: str, data: bytes = b"") -> Match | None:
-        """Take a scenario, with what is to be given back with its entry: now, if that was there.
+        """Take a scenario and its data; return them with the entry, if that has come.
 
         A message of a scenario that has several is kept until the others and the entry are there.
         """
@@ -128,7 +131,7 @@ class RequestTracker:
         if tracked.seed is None:
             tracked.seed = entry.seed
         if entry.seed != tracked.seed or tracked.entries.get(entry.index, sha256) != sha256:
-            self.forget(request)  # another sampler, which counts its requests from 1 again
+            self.forget(request)  # by another sampler, which counts its requests from 1 again
             tracked = self.open[request] = TrackedRequest(request, entry.seed)
         repeated = entry.index in tracked.entries
         if not repeated:
@@ -147,7 +150,7 @@ class RequestTracker:
         return tracked, entry, data or b""
 
     def _parts_of(self, entry: ScenarioEntry) -> tuple[str, ...]:
-        """Remember the messages of an entry's scenario, if there are several, with the SHA-256 of it all at the end."""
+        """Remember the messages of an entry's scenario, if there are several, with the scenario's own SHA-256 at the end."""
         messages = entry.messages
         if len(messages) == 1:
             return ()
@@ -184,7 +187,7 @@ class RequestTracker:
             self._awaited.pop(sha256, None)
 
     def forget(self, request: str) -> None:
-        """Wait for no scenario of a request any more."""
+        """Stop waiting for scenarios of a request."""
         tracked = self.open.pop(request, None)
         if tracked is not None:
             self._entries -= len(tracked.entries)
@@ -192,7 +195,7 @@ class RequestTracker:
                 self._await_no_more(sha256, request)
 
     def settle(self) -> None:
-        """Forget the requests that are whole."""
+        """Forget the requests that are complete."""
         for request, tracked in list(self.open.items()):
             if tracked.summary is None:
                 continue

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A template as its messages tell it: tracks, changepoints, road, fit and routes; and what the diagnostics say of it."""
+"""A template from its messages: tracks, changepoints, road, fit and routes, and the diagnostics about it."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -22,7 +22,7 @@ from scenario_gen.types import Encounter, Fit, GenerationResult, Route, tokens
 
 
 def missing_topics(messages: Mapping[str, bytes]) -> list[str]:
-    """Return the topics without which `decode_template` cannot do and that are not among the messages.
+    """Return the topics that `decode_template` needs and that are not among the messages.
 
     Raises:
         InputError: `tracks` is damaged.
@@ -37,7 +37,7 @@ def missing_topics(messages: Mapping[str, bytes]) -> list[str]:
 def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
     """Return the fitted template that the messages (by topic) describe; the road's entries, exits and lanes may be missing.
 
-    Of the fit it has the states asked, not what was decided for each vehicle, which the messages do not say.
+    Its fit holds the requested states, but not what was decided for each vehicle: the messages do not hold that.
 
     Raises:
         InputError: a message is damaged, in another frame than the map, or missing.
@@ -45,7 +45,7 @@ def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
     encounter = decode_tracks(messages["tracks"])
     segmentation = decode_changepoints(messages["changepoints"], encounter)
     _, road = decode_map(messages["map"], messages.get("road/entries"), messages.get("road/exits"), messages.get(LANES))
-    _, frame, asked, poses = decode_fit(messages["fit"])
+    _, frame, requested, poses = decode_fit(messages["fit"])
     anchors = anchor_stamps(encounter, segmentation.changepoints)
     if poses.shape[:2] != (len(encounter.vehicles), len(anchors)):
         raise InputError(
@@ -56,7 +56,7 @@ def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
     for topic, other, _ in routes:
         if {frame, other} != {road.frame_id}:
             raise InputError(f"{topic}: frame {other!r}, fit {frame!r} and map {road.frame_id!r} must be one and the same")
-    fit = Fit(encounter.vehicles, (), anchor_index(encounter, segmentation.changepoints), asked, ())
+    fit = Fit(encounter.vehicles, (), anchor_index(encounter, segmentation.changepoints), requested, ())
     return GenerationResult(encounter, segmentation, road, fit, tuple(route for _, _, route in routes))
 
 
@@ -76,7 +76,7 @@ def decode_routes(messages: Mapping[str, bytes], encounter: Encounter, anchors_n
 
 
 def lanes_beside(grid: bytes, maps: Iterable[bytes], lanes: Sequence[bytes], infos: Iterable[bytes]) -> bytes | None:
-    """Return the lanes that belong to a map: those that a `fit/info` names beside it; where none does, those of a bag of one map.
+    """Return the lanes of a map: those that a `fit/info` names beside it; where none does, those of a bag of one map.
 
     Args:
         grid: the map's message.
@@ -101,12 +101,12 @@ def anchor_index(encounter: Encounter, changepoints: Ints) -> Ints:
 
 
 def template_statuses(messages: Iterable[bytes], stamp_ns: int, nodes: str = "/") -> dict[str, Mapping[str, str]]:
-    """Return the key-values of diagnostics about one template, by subject ("/planner: fit" is "fit"); the last word counts.
+    """Return the key-values of diagnostics about one template, by subject ("/planner: fit" is "fit"); the last value counts.
 
     Args:
         messages: of /diagnostics.
         stamp_ns: the template's stamp.
-        nodes: what the full names of the nodes begin with.
+        nodes: the beginning of the nodes' full names.
     """
     found: dict[str, Mapping[str, str]] = {}
     for data in messages:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One encounter as bytes, both ways, for whoever keeps very many of them: the same that a bag holds on `tracks`."""
+"""One encounter as bytes and back, for stores of very many of them: the message that a bag holds on `tracks`."""
 
 from dataclasses import replace
 

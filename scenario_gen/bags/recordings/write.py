@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A recording written: one generation as messages and as a bag: the bytes that the nodes publish, at stamps without a clock."""
+"""Recordings written: a generation as messages and as a bag, the same bytes that the nodes publish."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -20,7 +20,7 @@ from msg_conventions.scenario_info import encode_info, INFO, request_summary, sc
 from msg_conventions.scenarios import digest, encode_scenario, messages_of
 from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import encode_tracks
-from scenario_gen.bags.recordings.read import SCENARIOS
+from scenario_gen.bags.recordings.scenarios import SCENARIOS
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
 from scenario_gen.types import Encounter, GenerationResult, Scenario, tokens
@@ -32,7 +32,7 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
     """Yield topic (without namespace), CDR bytes and log stamp [ns] of every message of a result, in order of the stamps.
 
     Args:
-        result: all that one request made of one template on one road.
+        result: of one request, for one template on one road.
         request: its id.
 
     Raises:
@@ -110,7 +110,7 @@ def add_results(bag: BagWriter, results: Mapping[str, GenerationResult]) -> None
 
 def add_message(bag: BagWriter, name: str, data: bytes, stamp_ns: int) -> None:
     """Write a message of one of the suite's topics, by its full name, to a bag."""
-    kind, quality = topic_entry(name.lstrip("/"))  # in a bag of ours the diagnostics are a latched topic of the namespace
+    kind, quality = topic_entry(name.lstrip("/"))  # in our bags the diagnostics are a latched topic of the namespace
     bag.add_topic(name, kind, qos_yaml(quality))
     bag.write(name, data, stamp_ns)
 
@@ -121,6 +121,6 @@ def scenario_bytes(scenario: Scenario, encounter: Encounter) -> tuple[bytes, str
     return data, digest(data)
 
 
-def same_tracks(one: Encounter, other: Encounter) -> bool:
-    """Say whether two encounters are the same message."""
-    return encode_tracks(one) == encode_tracks(other)
+def same_tracks(first: Encounter, second: Encounter) -> bool:
+    """Return whether two encounters are the same message."""
+    return encode_tracks(first) == encode_tracks(second)

@@ -10,7 +10,7 @@ import heapq
 import io
 from pathlib import Path
 import tempfile
-from typing import Any
+from typing import BinaryIO
 
 import zstandard
 
@@ -18,7 +18,7 @@ from scenario_gen.bags.storage.config import Allowance, BagConfig
 from scenario_gen.bags.storage.files import files_of, METADATA
 from scenario_gen.bags.storage.mcap import McapFile, open_mcap
 from scenario_gen.bags.storage.metadata import quality_of
-from scenario_gen.bags.storage.records import DamagedError
+from scenario_gen.bags.storage.records import DamagedError, StoredTopic
 from scenario_gen.bags.storage.sqlite import open_sqlite, SqliteFile
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
@@ -30,7 +30,7 @@ COPIED = 1 << 20  # bytes at a time
 
 @dataclass(frozen=True)
 class BagTopic:
-    """A topic of a bag: its full name, type, what its (first) publisher offered, and its number of messages."""
+    """A topic of a bag: its full name, type, the quality that its (first) publisher offered, and its number of messages."""
 
     name: str
     type: str
@@ -49,7 +49,7 @@ class BagMessage:
 
 
 class StoredBag:
-    """A bag that is open."""
+    """An open bag."""
 
     def __init__(
         self, path: Path, files: list[tuple[Path, McapFile | SqliteFile]], compression: str, allowance: Allowance
@@ -66,9 +66,11 @@ class StoredBag:
             InputError: a file is damaged.
         """
         found: dict[str, BagTopic] = {}
-        for name, kind, qos, count in (entry for file, storage in self._files for entry in _listed(file, storage)):
-            topic = found.get(name) or BagTopic(name, kind, quality_of(qos), 0)
-            found[name] = replace(topic, count=topic.count + count)
+        for file, storage in self._files:
+            for stored in _topics(file, storage).values():
+                _check_type(stored, file)
+                topic = found.get(stored.name) or BagTopic(stored.name, stored.type, quality_of(stored.qos), 0)
+                found[stored.name] = replace(topic, count=topic.count + stored.count)
         return tuple(found[name] for name in sorted(found))
 
     def messages(self, wanted: Callable[[str, str], bool] = lambda _topic, _type: True) -> Iterator[BagMessage]:
@@ -82,18 +84,17 @@ class StoredBag:
             yield message
 
     def _of_file(self, file: Path, storage: McapFile | SqliteFile, wanted: Callable[[str, str], bool]) -> Iterator[BagMessage]:
-        if isinstance(storage, SqliteFile):
-            topics = {topic.id: (topic.name, topic.type, topic.encoding) for topic in storage.topics}
-            logged = storage.messages(_of(topics, wanted, file))
-        else:
-            with _place(file):
-                storage.complete()
-            topics = {c.id: (c.topic, _type(storage, c.schema_id), c.encoding) for c in storage.channels.values()}
-            own = _of(topics, wanted, file)
-            logged = _strictly(file, storage.in_order(set(own))) if own else iter(())
-        for stamp, number, data in logged:
-            name, kind, _ = topics[number]
-            yield BagMessage(name, kind, self._whole(data, file), stamp)
+        topics = {number: topic for number, topic in _topics(file, storage).items() if wanted(topic.name, topic.type)}
+        for topic in topics.values():
+            _check_type(topic, file)
+            if topic.encoding != "cdr":
+                name, encoding = shown(topic.name), shown(topic.encoding)
+                raise InputError(f"{file}: topic {name} is encoded as {encoding!r}, not as 'cdr'; only CDR is read")
+        if not topics:
+            return
+        with _place(file):
+            for stamp, number, data in storage.in_order(topics):
+                yield BagMessage(topics[number].name, topics[number].type, self._whole(data, file), stamp)
 
     def _whole(self, data: bytes, file: Path) -> bytes:
         """Return a message, decompressed where the bag compresses each by itself."""
@@ -108,39 +109,20 @@ class StoredBag:
         return whole
 
 
-def _listed(file: Path, storage: McapFile | SqliteFile) -> Iterator[tuple[str, str, str, int]]:
-    """Yield name, type, offered QoS profiles as YAML and number of messages of each topic of a file."""
-    if isinstance(storage, SqliteFile):
-        yield from ((topic.name, topic.type, topic.qos, topic.count) for topic in storage.topics)
-        return
+def _topics(file: Path, storage: McapFile | SqliteFile) -> dict[int, StoredTopic]:
+    """Return the topics of a file by the numbers that its messages bear."""
     with _place(file):
-        storage.complete()
-        for channel in storage.channels.values():
-            if channel.schema_id not in storage.schemas:
-                raise DamagedError(0, f"the type of topic {shown(channel.topic)} is missing (schema {channel.schema_id})")
-            count = (storage.counts or {}).get(channel.id, 0)
-            kind = storage.schemas[channel.schema_id].name
-            yield channel.topic, kind, channel.metadata.get("offered_qos_profiles", ""), count
+        return {topic.id: topic for topic in storage.list_topics()}
 
 
-def _type(storage: McapFile, schema_id: int) -> str:
-    schema = storage.schemas.get(schema_id)
-    return "" if schema is None else schema.name
-
-
-def _of(topics: dict[int, tuple[str, str, str]], wanted: Callable[[str, str], bool], file: Path) -> tuple[int, ...]:
-    """Return the ids of the topics that are wanted.
+def _check_type(topic: StoredTopic, file: Path) -> None:
+    """Refuse a topic whose type is missing in its file.
 
     Raises:
-        InputError: the type of one is missing, or its messages are not CDR.
+        InputError: it is.
     """
-    own = tuple(number for number, (name, kind, _) in topics.items() if wanted(name, kind))
-    for name, kind, encoding in (topics[number] for number in own):
-        if not kind:
-            raise InputError(f"{file}: damaged, the type of topic {shown(name)} is missing; {_remedy(file)}")
-        if encoding != "cdr":
-            raise InputError(f"{file}: topic {shown(name)} is encoded as {shown(encoding)!r}, not as 'cdr'; only CDR is read")
-    return own
+    if not topic.type:
+        raise InputError(f"{file}: damaged, the type of topic {shown(topic.name)} is missing; {_remedy(file)}")
 
 
 def _remedy(file: Path) -> str:
@@ -150,18 +132,13 @@ def _remedy(file: Path) -> str:
 
 @contextmanager
 def _place(file: Path) -> Iterator[None]:
-    """Say which file is damaged."""
+    """Name the file in errors about damage."""
     try:
         yield
     except DamagedError as error:
         raise InputError(f"{file}: cut off or damaged, at {error}; {_remedy(file)}") from error
     except OSError as error:
         raise InputError(f"{file}: cannot be read ({error.strerror or error})") from error
-
-
-def _strictly(file: Path, logged: Iterator[Any]) -> Iterator[Any]:
-    with _place(file):
-        yield from logged
 
 
 @contextmanager
@@ -213,20 +190,23 @@ def _unpacked(file: Path, stack: ExitStack, allowance: Allowance) -> Path:
     """
     target = stack.enter_context(scratch(Path(tempfile.gettempdir()))) / file.stem
     with file.open("rb") as packed, target.open("wb") as whole:
-        with guarded(f"{file}: cannot be decompressed", remedy="copy it again"):
-            reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
-        while True:
-            with guarded(f"{file}: cannot be decompressed", remedy="copy it again"):
-                block = reader.read(COPIED)
-            if not block:
-                return target
+        for block in _blocks(packed, file):
             allowance.unpack(len(block))
             whole.write(block)
+    return target
+
+
+def _blocks(packed: BinaryIO, file: Path) -> Iterator[bytes]:
+    """Yield the content of a compressed file, piece by piece."""
+    with guarded(f"{file}: cannot be decompressed", remedy="copy it again"):
+        reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
+        while block := reader.read(COPIED):
+            yield block
 
 
 @contextmanager
 def within(path: Path) -> Iterator[None]:
-    """Name the bag in errors about what lies in it: a decoder knows the topic only.
+    """Name the bag in errors about its content: a decoder knows the topic only.
 
     Raises:
         InputError: as raised inside, with the bag's name.

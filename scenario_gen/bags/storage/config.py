@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is read of a bag at most."""
+"""Bounds of reading a bag."""
 
 from dataclasses import dataclass
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 
-MESSAGE_BYTES = 256  # what a message costs beside its own bytes
-FOUND_BYTES = 1024  # what finding a message in a chunk counts for: time, where a few bytes hold very many messages
+MESSAGE_BYTES = 256  # that a message costs beside its own
+FOUND_BYTES = 1024  # that finding a message in a chunk counts for: a chunk of few bytes may hold very many messages
 SHRINK = 100  # times that a file may grow by decompression before it is suspected; maps shrink most, 10 to 50 times
 
 
@@ -29,10 +29,10 @@ class BagConfig(Parameters):
 
 
 class Allowance:
-    """Counts what reading one bag takes, and refuses what is too much."""
+    """Counts the bytes that reading one bag takes, and refuses too many."""
 
     def __init__(self, config: BagConfig, what: str, file_bytes: int, bound: str = "bag.most_bytes") -> None:
-        """Begin to count.
+        """Start with nothing counted.
 
         Args:
             config: the bounds.
@@ -60,7 +60,7 @@ class Allowance:
             )
 
     def hold(self, count: int) -> None:
-        """Count a message that is handed on.
+        """Count a message that is passed on.
 
         Raises:
             InputError: there are too many.

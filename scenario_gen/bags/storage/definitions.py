@@ -30,7 +30,7 @@ def type_store() -> Any:
 
 
 def _register_installed(kind: str) -> None:
-    """Read `kind`, and what it is made of, from the share folders of AMENT_PREFIX_PATH."""
+    """Read `kind` and the types of its fields from the share folders of AMENT_PREFIX_PATH."""
     package, _, name = kind.partition("/msg/")
     prefixes = [Path(p) for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
     paths = [prefix / "share" / package / "msg" / f"{name}.msg" for prefix in prefixes]
@@ -53,7 +53,7 @@ def _register_installed(kind: str) -> None:
 
 @cache
 def kept() -> dict[str, tuple[str, str]]:
-    """Return what `definition` returns of the types that `resources/definitions.json` has."""
+    """Return the definitions in `resources/definitions.json`, by type, as `definition` does."""
     document = json.loads(KEPT.read_text(encoding="utf-8"))
     return {kind: (entry["text"], entry["hash"]) for kind, entry in document.items()}
 

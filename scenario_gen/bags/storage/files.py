@@ -12,7 +12,7 @@ from scenario_gen.base.errors import InputError
 
 SUFFIXES = (".mcap", ".db3")
 METADATA = "metadata.yaml"
-LOST = "scenario_gen.lost:"  # begins the keys of custom_data that tell what is not in the bag, by topic
+LOST = "scenario_gen.lost:"  # begins the keys of custom_data that name what is not in the bag, by topic
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def _listed(document: Any, metadata: Path) -> tuple[list[str], str]:
     """Return the files' names and the mode of compression.
 
     Raises:
-        InputError: the document does not say them.
+        InputError: the document does not hold them.
     """
     info = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
     listed = info.get("relative_file_paths") if isinstance(info, dict) else None
@@ -77,17 +77,17 @@ def _listed(document: Any, metadata: Path) -> tuple[list[str], str]:
     return [Path(name).name for name in listed], "" if mode == "none" else mode
 
 
-def remark(path: Path) -> str:
-    """Return what is to be said of a folder that is read though its metadata.yaml is missing, or says what was not recorded."""
+def remarks(path: Path) -> tuple[str, ...]:
+    """Return remarks on a bag's folder that is read though its metadata.yaml is missing, or names what was not recorded."""
     if not path.is_dir():
-        return ""
+        return ()
     if (path / METADATA).exists():
-        return "; ".join(f"not whole, by its recorder: {topic}: {words}" for topic, words in _lost(path / METADATA).items())
-    return f"{path} has no metadata.yaml: its files are read in order of their names; `scenario-gen reindex {path}` writes it"
+        return tuple(f"not whole, by its recorder: {topic}: {words}" for topic, words in _lost(path / METADATA).items())
+    return (f"{path} has no metadata.yaml: its files are read in order of their names; `scenario-gen reindex {path}` writes it",)
 
 
 def _lost(metadata: Path) -> dict[str, str]:
-    """Return what a recorder wrote of what it did not record, by topic."""
+    """Return the recorder's notes on messages that it did not record, by topic."""
     try:
         custom = read_yaml(metadata)["rosbag2_bagfile_information"]["custom_data"]
         return {shown(key[len(LOST) :]): shown(text, 400) for key, text in custom.items() if key.startswith(LOST)}

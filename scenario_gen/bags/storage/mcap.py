@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A whole MCAP file, read strictly: what is damaged is an error."""
+"""Whole MCAP files, read strictly: damage is an error."""
 
 from collections import Counter
 from collections.abc import Collection, Iterator
@@ -10,34 +10,32 @@ import heapq
 from typing import BinaryIO
 
 from mcap.opcode import Opcode
+from mcap.records import Channel, Header, Schema, Statistics
 import numpy as np
 
 from scenario_gen.bags.storage.config import Allowance
 from scenario_gen.bags.storage.records import (
-    Channel,
     ChunkHead,
     content,
     Contents,
     DamagedError,
     decompress,
+    Fields,
     HEAD,
     LATEST,
     MAGIC,
     MESSAGE,
     Messages,
-    read_channel,
     read_chunk_head,
     read_contents,
-    read_counts,
-    read_header,
     read_schema,
     Record,
     records,
-    Schema,
+    StoredTopic,
     TAIL_BYTES,
 )
 
-CHUNK_HEAD_BYTES = 64  # enough for the head of a chunk, whatever its compression is called
+CHUNK_HEAD_BYTES = 64  # enough for the head of a chunk with any name of its compression
 Logged = tuple[int, int, bytes]  # stamp [ns], channel, message
 
 
@@ -72,7 +70,7 @@ Block = ChunkBlock | LooseBlock
 
 @dataclass
 class McapFile:
-    """What an MCAP file holds: schemas and channels by id, blocks of messages, and their number by channel where it says so."""
+    """The content of an MCAP file: schemas and channels by id, blocks of messages, and their number by channel if it is known."""
 
     file: BinaryIO
     allowance: Allowance
@@ -82,7 +80,7 @@ class McapFile:
     counts: dict[int, int] | None = None
 
     def take(self, record: Record) -> None:
-        """Take note of a record at the top level of the file.
+        """Add a record at the top level of the file.
 
         Raises:
             DamagedError: its content is damaged.
@@ -105,18 +103,32 @@ class McapFile:
             schema = read_schema(content(self.file, record, most), record.start)
             self.schemas[schema.id] = schema
         elif record.opcode == Opcode.CHANNEL:
-            channel = read_channel(content(self.file, record, most), record.start)
+            channel = Channel.read(Fields(content(self.file, record, most), record.start))
             self.channels[channel.id] = channel
         elif record.opcode == Opcode.STATISTICS:
-            self.counts = read_counts(content(self.file, record, most), record.start)
+            self.counts = Statistics.read(Fields(content(self.file, record, most), record.start)).channel_message_counts
 
     def learn(self, contents: Contents) -> None:
-        """Take the schemas and channels of a chunk."""
+        """Add the schemas and channels of a chunk."""
         self.schemas |= {schema.id: schema for schema in contents.schemas}
         self.channels |= {channel.id: channel for channel in contents.channels}
 
+    def list_topics(self) -> list[StoredTopic]:
+        """Return the channels, with their types and numbers of messages.
+
+        Raises:
+            DamagedError: a chunk is damaged.
+        """
+        self.complete()
+        found = []
+        for channel in self.channels.values():
+            kind = self.schemas[channel.schema_id].name if channel.schema_id in self.schemas else ""
+            qos, count = channel.metadata.get("offered_qos_profiles", ""), (self.counts or {}).get(channel.id, 0)
+            found.append(StoredTopic(channel.id, channel.topic, kind, qos, channel.message_encoding, count))
+        return found
+
     def complete(self) -> None:
-        """Read the chunks for channels and numbers of messages, where the file does not sum them up.
+        """Read the chunks for channels and numbers of messages, if the file has no summary of them.
 
         Raises:
             DamagedError: a chunk is damaged.
@@ -182,7 +194,7 @@ class McapFile:
 
 
 def open_mcap(file: BinaryIO, size: int, allowance: Allowance) -> McapFile:
-    """Return what an MCAP file of `size` bytes holds.
+    """Return the content of an MCAP file of `size` bytes.
 
     Raises:
         DamagedError: it is damaged, was not closed, or is no recording of ROS 2.
@@ -204,7 +216,7 @@ def open_mcap(file: BinaryIO, size: int, allowance: Allowance) -> McapFile:
     first = next(whole)
     if first.opcode != Opcode.HEADER:
         raise DamagedError(first.start, "no header at the beginning of the file")
-    profile = read_header(content(file, first, allowance.config.most_chunk_bytes), first.start)
+    profile = Header.read(Fields(content(file, first, allowance.config.most_chunk_bytes), first.start)).profile
     if profile != "ros2":
         raise DamagedError(first.start, f"the profile is {profile[:40]!r}, not 'ros2'")
     for record in whole:

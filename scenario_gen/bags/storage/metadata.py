@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""rosbag2's metadata.yaml, version 9, and QoS profiles: as it writes them, and as any version of it wrote them."""
+"""rosbag2's metadata.yaml, version 9, written; QoS profiles, written, and read as any version of rosbag2 wrote them."""
 
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
@@ -29,7 +29,7 @@ class _PlainDumper(yaml.SafeDumper):  # type: ignore[misc]
 
 @dataclass
 class TopicInfo:
-    """What the metadata says of one topic; `qos` is a YAML list of profiles."""
+    """The metadata of one topic; `qos` is a YAML list of profiles."""
 
     name: str
     type: str
@@ -40,7 +40,7 @@ class TopicInfo:
 
 @dataclass
 class FileInfo:
-    """What the metadata says of one file: stamps in nanoseconds."""
+    """The metadata of one file: stamps in nanoseconds."""
 
     path: str
     start_ns: int = 2**63 - 1
@@ -60,7 +60,7 @@ class FileInfo:
 
 @dataclass
 class BagInfo:
-    """What the metadata says of a bag."""
+    """The metadata of a bag."""
 
     topics: list[TopicInfo] = field(default_factory=list)
     files: list[FileInfo] = field(default_factory=list)
@@ -92,7 +92,7 @@ def qos_yaml(quality: Quality) -> str:
 
 @lru_cache(maxsize=256)
 def _topic_yaml(name: str, type_name: str, qos: str, type_hash: str) -> str:
-    """Return what metadata.yaml says of a topic, up to the number of its messages."""
+    """Return a topic's entry in metadata.yaml, up to the number of its messages."""
     metadata = {
         "name": name,
         "type": type_name,
@@ -100,7 +100,7 @@ def _topic_yaml(name: str, type_name: str, qos: str, type_hash: str) -> str:
         "offered_qos_profiles": profiles(qos),
         "type_description_hash": type_hash,
     }
-    text = dump({"bag": {"topics": [{"topic_metadata": metadata, "message_count": 0}]}})  # as deep as it will stand
+    text = dump({"bag": {"topics": [{"topic_metadata": metadata, "message_count": 0}]}})  # indented as in the document
     return text.split("\n", 2)[2].removesuffix("0\n")
 
 
@@ -138,21 +138,21 @@ def metadata_yaml(info: BagInfo) -> str:
             }
         }
     )
-    topics = "".join(f"{_topic_yaml(one.name, one.type, one.qos, one.type_hash)}{one.count}\n" for one in info.topics)
+    topics = "".join(f"{_topic_yaml(topic.name, topic.type, topic.qos, topic.type_hash)}{topic.count}\n" for topic in info.topics)
     return text.replace(" []\n", "\n" + topics, 1) if topics else text
 
 
 def profiles(text: str) -> list[dict[str, Any]]:
-    """Return the profiles, none if the text is damaged: who reads a bag can do without them."""
+    """Return the profiles, none if the text is damaged: a bag can be read without them."""
     try:
         found = parse_yaml(text, "offered_qos_profiles") if text else []
     except InputError:
         return []
-    return found if isinstance(found, list) and all(_is_whole(one) for one in found) else []
+    return found if isinstance(found, list) and all(map(_is_whole, found)) else []
 
 
 def _is_whole(profile: Any) -> bool:
-    """Whether a profile has what every reader looks for."""
+    """Return whether a profile has the entries that every reader needs."""
     return (
         isinstance(profile, dict)
         and isinstance(profile.get("depth"), int)

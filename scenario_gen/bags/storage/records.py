@@ -4,11 +4,12 @@
 """The records of an MCAP file (mcap.dev/spec), read with every length held against the bytes that are there.
 
 The readers of mcap and rosbags trust the lengths that a file announces, so a damaged one takes all memory, or fails in any way.
-Here it is a `DamagedError`, which says where: an error to who reads a bag, a gap to who saves what is left of one.
+Here single records are read by mcap through `Fields`, which is bounded, and damage is a `DamagedError` with its place: an error
+for the reader of a bag, a gap for `reindex`.
 """
 
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 import io
 import struct
@@ -16,7 +17,9 @@ from typing import Any, BinaryIO
 import zlib
 
 import lz4.frame
+from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
+from mcap.records import Channel, Schema
 import zstandard
 
 from scenario_gen.bags.storage.config import Allowance, FOUND_BYTES
@@ -29,11 +32,11 @@ CHUNK = struct.Struct("<QQQI")
 FOOTER_BYTES = 20
 TAIL_BYTES = HEAD.size + FOOTER_BYTES + len(MAGIC)
 LATEST = 2**63  # rosbag2's stamps are signed
-_WINDOW = 128 * 1024**2  # zstd's own limit where no other is asked for
+_WINDOW = 128 * 1024**2  # zstd's own default
 
 
 class DamagedError(ScenarioGenError):
-    """What lies at byte `offset` of a file is no whole record; it is caught inside this package."""
+    """There is no whole record at byte `offset` of a file; caught inside this package."""
 
     def __init__(self, offset: int, problem: str) -> None:
         super().__init__(f"byte {offset}: {problem}")
@@ -55,100 +58,63 @@ class Record:
 
 
 @dataclass(frozen=True)
-class Schema:
-    """A message type: id, name, encoding of its definition and the definition."""
+class StoredTopic:
+    """A topic in a file of any storage: its number there, name, type ("" if missing), QoS profiles, encoding, message count."""
 
     id: int
     name: str
+    type: str
+    qos: str
     encoding: str
-    text: str
+    count: int
 
 
-@dataclass(frozen=True)
-class Channel:
-    """A topic: id, id of its schema, name, encoding of its messages, metadata."""
+class Fields(ReadDataStream):  # type: ignore[misc]  # mcap has no types
+    """The fields of one record as mcap reads them, but nothing is read beyond its end.
 
-    id: int
-    schema_id: int
-    topic: str
-    encoding: str
-    metadata: Mapping[str, str] = field(default_factory=dict)
-
-
-class Fields:
-    """Reads the fields of one record."""
+    Raises:
+        DamagedError: from every method, where a field is longer than what is left, or a text is not UTF-8.
+    """
 
     def __init__(self, data: bytes, offset: int) -> None:
-        self._data = data
-        self._offset = offset  # in the file, for messages
-        self.at = 0
+        """Take the record's content and its offset in the file."""
+        super().__init__(io.BytesIO(data))
+        self._size, self._offset = len(data), offset
 
-    @property
-    def left(self) -> int:
-        """How many bytes are left."""
-        return len(self._data) - self.at
-
-    def take(self, size: int) -> bytes:
-        """Return the next `size` bytes.
+    def read(self, length: int) -> bytes:
+        """Return the next bytes.
 
         Raises:
             DamagedError: so many are not left.
         """
-        if size > self.left:
-            raise DamagedError(self._offset + self.at, f"{size} bytes are announced where {self.left} are left")
-        self.at += size
-        return self._data[self.at - size : self.at]
+        left = self._size - self.count
+        if length > left:
+            raise DamagedError(self._offset + self.count, f"{length} bytes are announced where {left} are left")
+        data: bytes = super().read(length)
+        return data
 
-    def number(self, size: int) -> int:
-        """Return the next unsigned integer of `size` bytes."""
-        return int.from_bytes(self.take(size), "little")
+    def read_prefixed_string(self) -> str:
+        """Return the text that follows its length."""
+        return self.decoded(self.read(self.read4()))
 
-    def blob(self) -> bytes:
-        """Return bytes after their uint32 length."""
-        return self.take(self.number(4))
-
-    def text(self) -> str:
-        """Return a text.
+    def decoded(self, data: bytes) -> str:
+        """Return the text of bytes that were just read.
 
         Raises:
-            DamagedError: it is not UTF-8, or not all there.
+            DamagedError: it is not UTF-8.
         """
-        data = self.blob()
         try:
             return data.decode()
         except UnicodeDecodeError:
-            raise DamagedError(self._offset + self.at - len(data), "a text is not UTF-8") from None
-
-
-def read_header(data: bytes, offset: int) -> str:
-    """Return the profile that a Header record names."""
-    return Fields(data, offset).text()
+            raise DamagedError(self._offset + self.count - len(data), "a text is not UTF-8") from None
 
 
 def read_schema(data: bytes, offset: int) -> Schema:
-    """Return what a Schema record says."""
+    """Return a Schema record, whose definition is a text."""
     fields = Fields(data, offset)
-    return Schema(fields.number(2), fields.text(), fields.text(), fields.text())
-
-
-def read_channel(data: bytes, offset: int) -> Channel:
-    """Return what a Channel record says."""
-    fields = Fields(data, offset)
-    number, schema, topic, encoding = fields.number(2), fields.number(2), fields.text(), fields.text()
-    pairs = Fields(fields.blob(), offset)
-    metadata = {}
-    while pairs.left:
-        key = pairs.text()
-        metadata[key] = pairs.text()
-    return Channel(number, schema, topic, encoding, metadata)
-
-
-def read_counts(data: bytes, offset: int) -> dict[int, int]:
-    """Return the number of messages by channel that a Statistics record names."""
-    fields = Fields(data, offset)
-    fields.take(42)
-    counts = Fields(fields.blob(), offset)
-    return {counts.number(2): counts.number(8) for _ in range(counts.left // 10)}
+    schema = Schema.read(fields)
+    fields.decoded(schema.data)
+    return schema
 
 
 def records(file: BinaryIO, start: int, end: int) -> Iterator[Record]:
@@ -188,7 +154,7 @@ def content(file: BinaryIO, record: Record, most: int) -> bytes:
 
 @dataclass(frozen=True)
 class ChunkHead:
-    """What a Chunk record says of itself: stamps [ns], size and checksum of the records in it, and where they lie in the file."""
+    """The head of a Chunk record: stamps [ns], size and checksum of its records, and where they lie in the file."""
 
     start_ns: int
     end_ns: int
@@ -205,12 +171,12 @@ def read_chunk_head(data: bytes, record: Record) -> ChunkHead:
         DamagedError: its lengths contradict each other.
     """
     fields = Fields(data, record.start)
-    start_ns, end_ns, size, crc = CHUNK.unpack(fields.take(CHUNK.size))
-    compression = fields.text()
-    length = fields.number(8)
-    if fields.at + length != record.length:
+    start_ns, end_ns, size, crc = CHUNK.unpack(fields.read(CHUNK.size))
+    compression = fields.read_prefixed_string()
+    length = fields.read8()
+    if fields.count + length != record.length:
         raise DamagedError(record.start, f"a chunk of {length} bytes does not fill its record of {record.length}")
-    return ChunkHead(start_ns, end_ns, size, crc, compression, Record(Opcode.CHUNK, record.start + fields.at, length))
+    return ChunkHead(start_ns, end_ns, size, crc, compression, Record(Opcode.CHUNK, record.start + fields.count, length))
 
 
 @dataclass
@@ -223,7 +189,7 @@ class Messages:
     lengths: Any = field(default_factory=lambda: array("Q"))
 
     def add(self, head: bytes, start: int, length: int, offset: int) -> None:
-        """Take note of a message record that begins with `head`, at `start`; `offset` is its place in the file, for messages.
+        """Add a message record that begins with `head`, at `start`; `offset` is its place in the file, for errors.
 
         Raises:
             DamagedError: it is none.
@@ -246,7 +212,7 @@ class Contents(Messages):
     data: bytes = b""
     schemas: list[Schema] = field(default_factory=list)
     channels: list[Channel] = field(default_factory=list)
-    damage: str = ""  # what ended the reading before the end of the chunk
+    damage: str = ""  # why the reading ended before the end of the chunk
 
 
 def decompress(data: bytes, head: ChunkHead, allowance: Allowance) -> bytes:
@@ -311,7 +277,7 @@ def read_contents(raw: bytes, offset: int, allowance: Allowance) -> Contents:
             elif opcode == Opcode.SCHEMA:
                 found.schemas.append(read_schema(raw[at : at + length], offset))
             elif opcode == Opcode.CHANNEL:
-                found.channels.append(read_channel(raw[at : at + length], offset))
+                found.channels.append(Channel.read(Fields(raw[at : at + length], offset)))
             at += length
     except DamagedError as error:
         found.damage = str(error)

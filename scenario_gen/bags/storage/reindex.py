@@ -11,12 +11,14 @@ import heapq
 from pathlib import Path
 from typing import Any
 
+from mcap.records import Channel, Schema
+
 from scenario_gen.bags.storage.config import Allowance, BagConfig
 from scenario_gen.bags.storage.definitions import definition
 from scenario_gen.bags.storage.files import METADATA
 from scenario_gen.bags.storage.mcap import Logged, McapFile
 from scenario_gen.bags.storage.metadata import profiles
-from scenario_gen.bags.storage.records import Channel, DamagedError, Schema
+from scenario_gen.bags.storage.records import DamagedError
 from scenario_gen.bags.storage.salvage import Gap, Salvage, salvage
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
 from scenario_gen.base.documents import read_yaml, shown
@@ -29,7 +31,7 @@ MOST_LINES = 20  # of what was lost, on a terminal
 
 @dataclass(frozen=True)
 class Reindexed:
-    """What came of it.
+    """The result of `reindex`.
 
     Attributes:
         messages: how many were saved.
@@ -44,7 +46,7 @@ class Reindexed:
     unclosed: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
-        """Say what was lost, where, and what can be done about it; nothing where nothing was."""
+        """Return what was lost, where, and what can be done about it, line by line; no line if nothing was."""
         lines = [f"{name} was not closed: what its recorder still held is not in it" for name in self.unclosed]
         for name, gap in self.gaps:
             known = f", {gap.messages} messages by its index" if gap.messages else ""
@@ -116,7 +118,7 @@ def _types(found: list[tuple[Path, Salvage]], folder: Path) -> dict[str, str]:
 
 
 def _types_in_metadata(path: Path) -> dict[str, str]:
-    """Return topic and type as far as metadata.yaml tells them; it may be damaged, too."""
+    """Return topics and types as far as metadata.yaml, which may be damaged too, names them."""
     found: dict[str, str] = {}
     try:
         listed: Any = read_yaml(path)["rosbag2_bagfile_information"]["topics_with_message_count"]
@@ -130,7 +132,7 @@ def _types_in_metadata(path: Path) -> dict[str, str]:
 
 
 def _write(bag: BagWriter, found: list[tuple[Path, Salvage]], types: dict[str, str]) -> tuple[int, Counter[str]]:
-    """Write what was found; return how many messages, and how many could not be written, by the reason."""
+    """Write the messages that were found; return how many, and how many could not be written, by the reason."""
     topics = [_announce(bag, part.whole, types) for _, part in found]
     saved, undescribed = 0, Counter[str]()
     streams = [_logged(k, path, part.whole) for k, (path, part) in enumerate(found)]
@@ -148,7 +150,7 @@ def _logged(number: int, path: Path, whole: McapFile) -> Iterator[tuple[int, Log
     try:
         for message in whole.in_order(None, strict=False):
             yield number, message
-    except DamagedError as error:  # it was whole a moment ago
+    except DamagedError as error:  # the salvage has found it whole
         raise InputError(f"{path}: changed while it was read ({error})") from error
 
 
@@ -161,8 +163,8 @@ def _announce(bag: BagWriter, whole: McapFile, types: dict[str, str]) -> dict[in
         name = f"topic {shown(channel.topic)}"
         if not kind:
             lost = f"the type of {name} is not described in what is left"
-        elif channel.encoding != "cdr":
-            lost = f"{name} is encoded as {shown(channel.encoding)!r}, not as 'cdr'"
+        elif channel.message_encoding != "cdr":
+            lost = f"{name} is encoded as {shown(channel.message_encoding)!r}, not as 'cdr'"
         elif kind != types[channel.topic]:
             lost = f"{name} is of two types, {shown(types[channel.topic])} and {shown(kind)}"
         else:
@@ -177,9 +179,9 @@ def _announced(bag: BagWriter, channel: Channel, kind: str, schema: Schema | Non
     try:
         definition(kind)
     except InputError as error:
-        if schema is None or not schema.text:
+        if schema is None or not schema.data:
             return str(error)
-        known = (schema.encoding, schema.text)  # a type that is not installed here, as the recorder described it
+        known = (schema.encoding, schema.data.decode())  # a type that is not installed here, as the recorder described it
     qos, type_hash = (channel.metadata.get(key, "") for key in ("offered_qos_profiles", "topic_type_hash"))
     bag.add_topic(channel.topic, kind, qos if profiles(qos) else "", type_hash, known)
     return ""

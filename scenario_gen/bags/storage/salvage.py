@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is whole of an MCAP file that was cut off or damaged; what is not is passed over and reported.
+"""The whole records of an MCAP file that was cut off or damaged; the rest is passed over and reported.
 
 A record is taken where its lengths agree with themselves and with what follows. After a damaged one the search goes on for the
-next place at which records follow one another; a chunk says its length twice, so one is believed by itself.
+next place at which records follow one another; a chunk holds its length twice, so one alone is enough.
 """
 
 from dataclasses import dataclass, field, replace
@@ -36,13 +36,13 @@ FEWEST = {  # bytes of a record's content; some kinds have always the same numbe
     Opcode.METADATA_INDEX: 20,
 }
 ALWAYS = {Opcode.FOOTER: 20, Opcode.DATA_END: 4, Opcode.SUMMARY_OFFSET: 17}
-PRIVATE = 0x80  # opcodes from here on are anybody's
-IN_A_ROW = 3  # records that follow one another are no chance
+PRIVATE = 0x80  # opcodes from here on are for private use
+IN_A_ROW = 3  # so many records that follow one another are not there by chance
 
 
 @dataclass(frozen=True)
 class Gap:
-    """What was passed over: where it begins, how many bytes in the file, why, and of how many messages it is known."""
+    """Bytes that were passed over: the first one, how many, why, and how many messages were in them as far as known."""
 
     offset: int
     size: int
@@ -52,7 +52,7 @@ class Gap:
 
 @dataclass
 class Salvage:
-    """What is left of a file.
+    """The sound part of a file.
 
     Attributes:
         whole: its blocks and types, to be read with `strict=False`.
@@ -109,7 +109,7 @@ def _take(found: Salvage, data: Any, at: int) -> int:
 
 
 def _keep(found: Salvage, record: Record) -> None:
-    """Take note of a record, and look into a chunk: whether it is whole, and what its first stamp is.
+    """Add a record, and check a chunk: whether it is whole, and what its first stamp is.
 
     Raises:
         DamagedError: it is damaged.
@@ -145,7 +145,7 @@ def _record(data: Any, at: int) -> Record | None:
 
 
 def _chunk_is_sound(data: Any, record: Record) -> bool:
-    """Whether both lengths of a chunk agree."""
+    """Return whether both lengths of a chunk agree."""
     try:
         read_chunk_head(data[record.start : min(record.start + CHUNK_HEAD_BYTES, record.end)], record)
     except DamagedError:
@@ -154,7 +154,7 @@ def _chunk_is_sound(data: Any, record: Record) -> bool:
 
 
 def _follows(data: Any, at: int, count: int) -> bool:
-    """Whether records follow one another from byte `at`, `count` of them or up to the end of the file."""
+    """Return whether records follow one another from byte `at`, `count` of them or up to the end of the file."""
     for _ in range(count):
         if at == len(data) or data[at : at + 2 * len(MAGIC)] == MAGIC:
             return True

@@ -3,9 +3,8 @@
 
 """A bag in SQLite, as rosbag2 wrote by default before Jazzy."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 import itertools
 from pathlib import Path
 import sqlite3
@@ -13,47 +12,33 @@ from typing import Any
 from urllib.parse import quote
 
 from scenario_gen.bags.storage.config import Allowance
-from scenario_gen.bags.storage.records import LATEST
+from scenario_gen.bags.storage.records import LATEST, StoredTopic
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
 
 NEEDED = {"topics": {"id", "name", "type"}, "messages": {"topic_id", "timestamp", "data"}}
-STEPS = 1_000_000  # of SQLite's machine, after which it is looked at
+STEPS = 1_000_000  # of SQLite's machine between two checks of a query
 FREE_STEPS, STEPS_PER_BYTE = 50_000_000, 10  # a row has thirty bytes or more, and takes a hundred steps or fewer
 
 
-@dataclass(frozen=True)
-class Table:
-    """One row of `topics`: id, name, type, offered QoS profiles, encoding, number of messages."""
-
-    id: int
-    name: str
-    type: str
-    qos: str
-    encoding: str
-    count: int
-
-
 class SqliteFile:
-    """A database that is open."""
+    """An open database."""
 
     def __init__(self, connection: sqlite3.Connection, what: str, allowance: Allowance) -> None:
         self._connection = connection
         self._what = what
         self._allowance = allowance
-        self.topics = self._topics()
+        self._topics = self._read_topics()
 
     def _rows(self, query: str, values: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         with guarded(f"{self._what}: damaged", remedy="copy it again, or save what is whole with `sqlite3 FILE .recover`"):
-            cursor = self._connection.execute(query, values)
-        while True:
-            with guarded(f"{self._what}: damaged", remedy="copy it again, or save what is whole with `sqlite3 FILE .recover`"):
-                row = cursor.fetchone()
-            if row is None:
-                return
-            yield row
+            yield from iter(self._connection.execute(query, values).fetchone, None)
 
-    def _topics(self) -> tuple[Table, ...]:
+    def list_topics(self) -> tuple[StoredTopic, ...]:
+        """Return the rows of `topics`."""
+        return self._topics
+
+    def _read_topics(self) -> tuple[StoredTopic, ...]:
         for table, needed in NEEDED.items():
             kind = next(iter(self._rows("SELECT type FROM sqlite_master WHERE name = ?", (table,))), ("",))[0]
             columns = {row[1] for row in self._rows(f"PRAGMA table_info({table})")}
@@ -68,10 +53,10 @@ class SqliteFile:
             number, name, kind, profiles, encoded = row
             if not isinstance(number, int) or not all(isinstance(text, str) for text in row[1:]):
                 raise InputError(f"{self._what}: damaged, its table topics has the row {shown(row)}")
-            found.append(Table(number, name, kind, profiles, encoded, counts.get(number, 0)))
+            found.append(StoredTopic(number, name, kind, profiles, encoded, counts.get(number, 0)))
         return tuple(found)
 
-    def messages(self, ids: tuple[int, ...]) -> Iterator[tuple[int, int, bytes]]:
+    def in_order(self, ids: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
         """Yield stamp [ns], topic's id and bytes of the messages of some topics, in order of their stamps.
 
         Raises:
@@ -79,7 +64,7 @@ class SqliteFile:
         """
         marks = ",".join("?" for _ in ids)
         query = f"SELECT timestamp, topic_id, data FROM messages WHERE topic_id IN ({marks}) ORDER BY timestamp, rowid"
-        for stamp, topic, data in self._rows(query, ids):
+        for stamp, topic, data in self._rows(query, tuple(ids)):
             if not isinstance(stamp, int) or not -LATEST <= stamp < LATEST or not isinstance(data, bytes):
                 raise InputError(f"{self._what}: damaged, a message has timestamp {shown(stamp)} and data {shown(data, 40)}")
             self._allowance.unpack(len(data))
@@ -100,7 +85,7 @@ def open_sqlite(path: Path, allowance: Allowance) -> Iterator[SqliteFile]:
         connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(1000, allowance.config.most_chunk_bytes))
         left = (FREE_STEPS + STEPS_PER_BYTE * path.stat().st_size) // STEPS
         looks = itertools.count()
-        connection.set_progress_handler(lambda: next(looks) > left, STEPS)  # ends a query that comes to no end by itself
+        connection.set_progress_handler(lambda: next(looks) > left, STEPS)  # ends an endless query
         yield SqliteFile(connection, what, allowance)
     finally:
         connection.close()

@@ -37,7 +37,7 @@ class BagWriter:
 
         Raises:
             InputError: the folder exists.
-            OSError: it cannot be made.
+            OSError: it cannot be created.
         """
         self.folder = folder
         self.info = BagInfo()
@@ -46,7 +46,7 @@ class BagWriter:
         self._split = split
         self._topics: dict[str, tuple[TopicInfo, tuple[str, str]]] = {}
         self._broken = False
-        self.held = False  # whether messages have come since the last `let_go`
+        self.held = False  # whether messages were written since the last `let_go`
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
@@ -118,7 +118,7 @@ class BagWriter:
             raise InputError(f"{name}: stamp {stamp_ns} ns is before 1970; an MCAP file cannot hold it")
         try:
             self._write(name, data, stamp_ns)
-        except OSError:  # a record may be there in part
+        except OSError:  # part of a record may be written
             self._broken = True
             raise
 
@@ -132,14 +132,14 @@ class BagWriter:
         with naming(self.folder / self._file.path):
             channel = self._channel(name)
             self._writer.add_message(channel, log_time=stamp_ns, data=data, publish_time=stamp_ns, sequence=topic.count)
-            self._stream.flush()  # of what the writer has let go: a chunk once it is full
+            self._stream.flush()  # a full chunk, which the writer has just written
         self._file.add(stamp_ns)
         self._bytes += len(data)
         topic.count += 1
         self.held = True
 
     def let_go(self) -> None:
-        """Write the chunk that is begun, if there is one, so that a killed process does not lose it.
+        """Write the current chunk, if there is one, so that a killed process does not lose it.
 
         Raises:
             OSError: the disk is full, or fails; nothing more can be written.
@@ -182,7 +182,7 @@ class BagWriter:
 
 @contextmanager
 def atomic_bag(folder: Path, kind: Kind = WRITTEN, inputs: Iterable[Path] = (), **options: Any) -> Iterator[BagWriter]:
-    """Give a bag to write that is there whole or not at all, in the place of nothing or of an earlier one of the same kind.
+    """Yield a bag to write: it appears complete or not at all, and may replace an earlier one of the same kind.
 
     Args:
         folder: where it will be.
@@ -194,6 +194,6 @@ def atomic_bag(folder: Path, kind: Kind = WRITTEN, inputs: Iterable[Path] = (), 
         InputError: `folder` is there and may not be replaced, its place cannot be written, or the disk is full, or fails.
     """
     with replaced_folder(folder, kind, inputs) as partial:
-        partial.rmdir()  # the writer makes its own
+        partial.rmdir()  # the writer creates it
         with BagWriter(partial, **options) as writer:
             yield writer

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Folders of results: whole or not at all, and in the place of nothing but an earlier result of the same kind."""
+"""Folders of results: complete or not at all, replacing nothing but an earlier result of the same kind."""
 
 from scenario_gen.base.folders.disk import naming, sync, write_text
 from scenario_gen.base.folders.marker import Kind, MARKER, sha256_of

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who is writing a result: a folder beside its place, with a lock that the kernel lets go of when its process dies.
+"""Claims on results: a folder beside the result's place, with a lock that the kernel releases when its process dies.
 
-    .scenario_gen-XXXXXXXX/owner.json   locked; says for which result, and who, where and since when
-                          /new/NAME     the result in the making; after an exchange, what was in its place
-                          /old/NAME     what was in its place, where the system cannot exchange two folders at once
+    .scenario_gen-XXXXXXXX/owner.json   locked; holds which result, which process, where and since when
+                          /new/NAME     the result being written; after an exchange, the earlier one
+                          /old/NAME     the earlier result, if the system cannot exchange two folders at once
 
-Such folders are looked through, and made, by one process at a time: it holds `.scenario_gen.lock` for that moment.
+One process at a time examines and creates such folders: it holds `.scenario_gen.lock` for that moment.
 """
 
 from collections.abc import Iterator
@@ -30,12 +30,12 @@ from scenario_gen.base.interrupts import ending
 PREFIX, GUARD = ".scenario_gen-", ".scenario_gen.lock"
 OWNER, NEW, OLD = "owner.json", "new", "old"
 PATIENCE = 20.0
-"""Seconds to wait for others who look through the same folder; removing what a large run left takes longest."""
+"""Seconds to wait for others who examine the same folder; removing the leftovers of a large run takes longest."""
 
 
 @dataclass(frozen=True)
 class _Owner:
-    """Who writes: the result's name beside the claim, and the process."""
+    """The owner of a claim: the result's name beside the claim, and the process."""
 
     target: str
     pid: int
@@ -44,7 +44,7 @@ class _Owner:
 
     @classmethod
     def read(cls, descriptor: int) -> "_Owner | None":
-        """Return what the open file says, None if that is nothing of ours."""
+        """Return the owner that the open file holds, None if it holds none."""
         try:
             found = cls(**json.loads(os.pread(descriptor, 65536, 0)))
         except (ValueError, TypeError, RecursionError):
@@ -72,7 +72,7 @@ class Claim:
         return self.folder / OLD / self.place.name
 
     def release(self) -> None:
-        """Remove all that is not in its place; but an earlier result that could not be put back stays for the next run."""
+        """Remove the claim's folder, unless it holds an earlier result that could not be put back: the next run will."""
         try:
             if is_gone(self.old) or os.path.lexists(self.place):
                 _remove(self.folder)
@@ -85,7 +85,7 @@ def _locked(path: Path) -> int:
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if os.fstat(descriptor).st_nlink:  # else whoever had it has removed the file since
+        if os.fstat(descriptor).st_nlink:  # else its former owner has removed the file
             return descriptor
     except BlockingIOError:
         pass
@@ -98,14 +98,14 @@ def _locked(path: Path) -> int:
 
 @contextmanager
 def alone(parent: Path, patience: float = PATIENCE) -> Iterator[None]:
-    """Let no other process of ours look through `parent`, or make a claim in it, meanwhile.
+    """Let no other process of ours examine `parent`, or make a claim in it, during the work inside.
 
     Args:
         parent: the folder.
         patience: seconds to wait for others.
 
     Raises:
-        InputError: a file of another's has the lock's name, or a process that was stopped holds it.
+        InputError: a foreign file has the lock's name, or a process holds it for too long.
         OSError: the folder cannot be written.
     """
     path = parent / GUARD
@@ -142,8 +142,8 @@ def claim(place: Path) -> Claim:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             owner = _Owner(place.name, os.getpid(), socket.gethostname(), datetime.now().isoformat(" ", "seconds"))
             os.write(lock, json.dumps(asdict(owner)).encode())
-        made = Claim(place, folder, lock)
-        made.new.mkdir(parents=True)
+        result = Claim(place, folder, lock)
+        result.new.mkdir(parents=True)
     except BaseException:
         try:
             _remove(folder)
@@ -151,11 +151,11 @@ def claim(place: Path) -> Claim:
             if lock >= 0:
                 os.close(lock)
         raise
-    return made
+    return result
 
 
 def settle(place: Path) -> None:
-    """Finish what killed runs left beside `place`: put an earlier result back, remove the rest; to be called `alone`.
+    """Finish the claims of killed runs beside `place`: put an earlier result back, remove the rest; to be called `alone`.
 
     Raises:
         InputError: a living process writes to `place`; the message says which.
@@ -163,7 +163,7 @@ def settle(place: Path) -> None:
     with os.scandir(place.parent) as found:
         claims = [Path(entry.path) for entry in found if entry.name.startswith(PREFIX) and entry.is_dir(follow_symlinks=False)]
     for folder in claims:
-        with suppress(OSError):  # another user's: no concern of ours
+        with suppress(OSError):  # another user's
             _settle(folder, place)
 
 
@@ -171,7 +171,7 @@ def _settle(folder: Path, place: Path) -> None:
     try:
         lock = os.open(folder / OWNER, os.O_RDWR | os.O_NOFOLLOW)
     except FileNotFoundError:
-        folder.rmdir()  # empty, or it is not ours
+        folder.rmdir()  # empty; else it is not ours, and this fails
         return
     try:
         owner = _Owner.read(lock)
@@ -186,13 +186,13 @@ def _settle(folder: Path, place: Path) -> None:
         if owner is not None and content <= {OWNER, NEW, OLD}:
             _finish(Claim(folder.parent / owner.target, folder, lock))
         elif content == {OWNER} and not os.fstat(lock).st_size:
-            _remove(folder)  # killed before it said for what
+            _remove(folder)  # killed before it wrote its owner
     finally:
         os.close(lock)
 
 
 def _finish(dead: Claim) -> None:
-    """Finish a claim whose process is dead; what might be another's is left where it is."""
+    """Finish a claim whose process is dead; files that might be another's stay."""
     if any(set(above.iterdir()) - {own} for own in (dead.new, dead.old) if (above := own.parent).is_dir()):
         return
     if dead.old.exists():
@@ -206,7 +206,7 @@ def _finish(dead: Claim) -> None:
 
 
 def _remove(folder: Path) -> None:
-    """Remove a claim, its owner when nothing else is left: so it can be known as ours until it is gone."""
+    """Remove a claim, its owner last, so that it can be recognised as ours until it is gone."""
     inside = (folder / NEW, folder / OLD)
     for path in inside:
         discard(path)

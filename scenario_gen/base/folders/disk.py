@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a result needs of the file system: errors that name the file, bytes on the disk, two folders exchanged at once."""
+"""The file system: errors that name the file, data flushed to the disk, two folders exchanged at once."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -12,7 +12,7 @@ from pathlib import Path
 import shutil
 
 AT_FDCWD, RENAME_EXCHANGE = -100, 2
-# what a kernel or a file system says that knows no exchange
+# errors of a kernel or a file system that knows no exchange
 UNKNOWN = {errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EPERM}
 
 
@@ -33,7 +33,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def sync(path: Path) -> None:
-    """Let a file's content, or a folder's list of names, be on the disk before this returns."""
+    """Flush a file's content, or a folder's list of names, to the disk."""
     with naming(path):
         descriptor = os.open(path, os.O_RDONLY)
         try:
@@ -68,7 +68,7 @@ def exchange(one: Path, other: Path) -> bool:
 
 
 def is_gone(path: Path) -> bool:
-    """Say whether there surely is nothing of that name."""
+    """Return whether there certainly is nothing of that name."""
     try:
         path.lstat()
     except FileNotFoundError:

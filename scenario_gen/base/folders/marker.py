@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""By what an earlier result is known: a marker in its folder that names its kind and every file with its SHA-256."""
+"""Markers by which earlier results are recognised: a file that holds a result's kind and the SHA-256 of every file."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,14 +19,14 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of result: its name in the marker, and how a folder is known that a version without markers wrote."""
+    """A kind of result: its name in the marker, and how a folder of a version without markers is recognised."""
 
     name: str
     unmarked: Callable[[Path], bool] = lambda _: False
 
 
 def finish(folder: Path, kind: Kind) -> None:
-    """Mark a new result, the last that is written of it, and let all of it be on the disk.
+    """Write the marker of a new result, after all its other files, and flush all of them to the disk.
 
     Raises:
         OSError: a file cannot be read or written; it is named.
@@ -52,12 +52,12 @@ def entries(folder: Path, above: str = "") -> Iterator[str]:
 
 
 def is_marked(folder: Path) -> bool:
-    """Say whether a folder bears a marker, whatever is in it, or may bear one."""
+    """Return whether a folder has a marker, whatever its content, or may have one."""
     return not is_gone(folder / MARKER)
 
 
 def objection(folder: Path, kind: Kind | None) -> str:
-    """Return why a folder may not be replaced or removed, "" if it may; what is missing of a result is no reason.
+    """Return why a folder may not be replaced or removed, "" if it may; missing files of a result are no reason.
 
     Args:
         folder: it exists.
@@ -89,7 +89,7 @@ def objection(folder: Path, kind: Kind | None) -> str:
 
 
 def _digest(path: Path) -> str:
-    """SHA-256 of a regular file; "" for a link and what else is none."""
+    """Return the SHA-256 of a regular file, "" for a link or any other kind of file."""
     if path.is_symlink() or not path.is_file():
         return ""
     with path.open("rb") as stream:
@@ -97,7 +97,7 @@ def _digest(path: Path) -> str:
 
 
 def _read(path: Path) -> dict[str, Any] | None:
-    """The marker, None if it is not as this version writes it."""
+    """Return the marker, None if it is not as this version writes it."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError):

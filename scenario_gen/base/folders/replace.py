@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The one way in which a result takes its place."""
+"""Results take their places: written beside it, checked, and exchanged with an earlier result."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, ExitStack, suppress
@@ -21,15 +21,15 @@ FORBIDDEN = {errno.EACCES, errno.EPERM, errno.EROFS}  # no right to write, or a 
 
 @contextmanager
 def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> Iterator[Path]:
-    """Give an empty folder to write a result to, and put it to `target` at the end, all of it on the disk.
+    """Yield an empty folder to write a result to, and move it to `target` at the end, flushed to the disk.
 
-    Until then `target` stays as it is; so it does if the body raises, or the process is killed. What is in the way must be an
-    empty folder or an earlier result of the same kind, as it was written. Leftovers of killed runs beside it are removed.
+    Until then `target` stays as it is, also if the body raises, or the process is killed. It may be an empty folder or an
+    unchanged earlier result of the same kind. Leftovers of killed runs beside it are removed.
 
     Args:
-        target: where the result is to be; folders above are made.
+        target: place of the result; folders above are created.
         kind: of the result.
-        inputs: files and folders that are read for it: none of them may lie in what is replaced.
+        inputs: files and folders that are read for it: none of them may lie in `target`.
 
     Yields:
         A folder of the same name, beside `target`.
@@ -75,7 +75,7 @@ def _place(target: Path, inputs: Iterable[Path]) -> Path:
     """Return the target's absolute path.
 
     Raises:
-        InputError: no result may ever be there, or one of the inputs lies there.
+        InputError: no result may be there, or one of the inputs lies there.
     """
     if target.is_symlink():
         raise InputError(f"{target} is a link; name the folder that it leads to, or another one")
@@ -90,7 +90,7 @@ def _place(target: Path, inputs: Iterable[Path]) -> Path:
         raise InputError(f"{target} is the folder that you are in, or above it, and not an earlier result; name another one")
     if os.path.ismount(place):
         raise InputError(f"{target} is a mount point, which cannot be replaced; name a folder in it")
-    if not place.stat().st_mode & stat.S_IWUSR:  # root may write everywhere, but such a folder is meant to stay
+    if not place.stat().st_mode & stat.S_IWUSR:  # also for root, who may write everywhere
         raise InputError(f"{target} is read-only; name another folder")
     for path in (path for given in inputs for path in _all_of(given)):
         if _above(place, path):
@@ -99,27 +99,27 @@ def _place(target: Path, inputs: Iterable[Path]) -> Path:
 
 
 def _all_of(given: Path) -> list[Path]:
-    """An input and all files in it; none where it cannot be looked at: whoever reads it says what is wrong with it."""
+    """Return an input and all files in it; none where it cannot be read: its reader reports that."""
     with suppress(OSError, ValueError):
         return [given, *(given.rglob("*") if given.is_dir() else ())]
     return []
 
 
 def _above(place: Path, path: Path) -> bool:
-    """Say whether a path is a folder or lies in it, by its name or by where its links lead."""
+    """Return whether a path is a folder or lies in it, by its name or by the targets of its links."""
     with suppress(OSError, RuntimeError, ValueError):
         return any(found.is_relative_to(place) for found in (path.resolve(), path.parent.resolve() / path.name))
     return False
 
 
 def _check(target: Path, place: Path, kind: Kind) -> None:
-    """Raise InputError if there is what may not be replaced."""
+    """Raise InputError if the content of `place` may not be replaced."""
     if not is_gone(place) and (reason := objection(place, kind)):
         raise InputError(f"{target} is not replaced: {reason}; move that away, or name another folder")
 
 
 def _put(target: Path, own: Claim, kind: Kind) -> None:
-    """Put the new result to its place, or leave everything as it was.
+    """Move the new result to its place, or leave everything as it was.
 
     Raises:
         InputError: something came into the earlier result at the last moment, or that could not be put back.
@@ -163,7 +163,7 @@ def _system_errors(target: Path, folder: Path) -> Iterator[None]:
 
 
 def _failed(target: Path, error: Exception) -> InputError:
-    """Return an error of the system as one of ours, with a file in the making named as if it were in the target already."""
+    """Return an error of the system as one of ours; a file being written is named as if it were in the target already."""
     forbidden = isinstance(error, OSError) and error.errno in FORBIDDEN
     remedy = "it cannot be written to: name another folder" if forbidden else "make room, or name another folder"
     advice = f"; what was there is untouched; {remedy}"

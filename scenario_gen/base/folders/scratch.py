@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Folders of intermediate files: gone with the command, by Ctrl-C too; what a killed one left goes with the next command.
+"""Folders of intermediate files: removed with the command, also by Ctrl-C; the next command removes those of killed ones.
 
-A scratch folder is a claim (`claim.py`) on a result that never takes its place, so whoever looks through a folder knows one of
-a dead process by its lock, and one of a living process stays.
+A scratch folder is a claim (`claim.py`) on a result that never takes its place, so its lock shows whether its process lives.
 """
 
 from collections.abc import Iterable, Iterator
@@ -23,7 +22,7 @@ DEPTHS = ("*/", "*/*/")  # at which a corpus and a batch write below their own f
 
 @contextmanager
 def scratch(parent: Path) -> Iterator[Path]:
-    """Give an empty folder in `parent`, which only this user may enter, and remove it at the end.
+    """Yield an empty folder in `parent`, which only this user may enter, and remove it at the end.
 
     Raises:
         OSError: there is no room, or no right to write.
@@ -48,14 +47,14 @@ def scratch(parent: Path) -> Iterator[Path]:
 
 
 def _claimed(place: Path) -> Claim:
-    """A claim; made again where somebody swept it in the moment between its folder and its lock."""
+    """Return a claim; a second one if another process removed the first between its creation and its lock."""
     with suppress(FileNotFoundError, BlockingIOError):
         return claim(place)
     return claim(place)
 
 
 def sweep(folder: Path) -> None:
-    """Remove what killed processes left in a folder; what cannot be removed, or is in the hands of another, stays."""
+    """Remove the leftovers of killed processes in a folder, unless they cannot be removed or another process holds them."""
     with suppress(OSError, InputError):
         with os.scandir(folder) as found:
             left = any(entry.name.startswith(PREFIX) or entry.name == GUARD for entry in found)
@@ -65,13 +64,13 @@ def sweep(folder: Path) -> None:
 
 
 def sweep_tree(folder: Path) -> None:
-    """`sweep` a folder and those in it, where the caller is alone already."""
+    """`sweep` a folder and those in it; to be called `alone`."""
     for above in sorted({path.parent for path in folder.rglob(f"{PREFIX}*")}):
         settle(above / GUARD)
 
 
 def sweep_beside(words: Iterable[str]) -> None:
-    """`sweep` every folder that a command's words name, with those in it, the one above, and that of temporary files."""
+    """`sweep` every folder among a command's arguments, with those in it, the one above, and that of temporary files."""
     folders = {Path(tempfile.gettempdir())}
     for word in words:
         with suppress(OSError, ValueError):

@@ -27,14 +27,14 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element, read_xml
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
+from scenario_gen.logs.raw import check_size, check_vehicles, left_out_note, Observations, RawLog, Segment
 
 KINDS = ("car", "truck", "bus", "taxi", "priorityvehicle")
 _SKIPPED = frozenset(("lanelet", "trafficSign", "trafficLight", "intersection", "planningProblem", "staticObstacle"))
 
 
 def is_commonroad(path: Path) -> bool:
-    """Return whether a file's name and beginning say CommonRoad."""
+    """Return whether a file is CommonRoad by its name and beginning."""
     if path.suffix.lower() != ".xml":
         return False
     with path.open("rb") as file:
@@ -64,47 +64,31 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     check_vehicles(str(path), len(obstacles), config)
     for obstacle in obstacles:
         kind = obstacle.first("type")
-        said = kind.text.strip() if kind is not None else "unknown"
-        states = [state for tag in ("initialState",) for state in obstacle.all(tag)]
+        name = kind.text.strip() if kind is not None else "unknown"
         trajectory = obstacle.first("trajectory")
-        states += trajectory.all("state") if trajectory is not None else []
-        if said.lower() not in KINDS or trajectory is None:
-            left_out[said if said.lower() not in KINDS else f"{said} without a trajectory"] += 1
+        if name.lower() not in KINDS or trajectory is None:
+            left_out[name if name.lower() not in KINDS else f"{name} without a trajectory"] += 1
             continue
+        states = [*obstacle.all("initialState"), *trajectory.all("state")]
         check_size(str(path), 0, row + len(states), config)
         vehicles.append(_observations(obstacle, states, step, row))
         row += len(states)
     if not vehicles:
         raise InputError(f"{path}: no car, truck or bus with a trajectory in it")
-    notes = ["read as CommonRoad"]
-    if left_out:
-        counted = ", ".join(f"{count} × {said}" for said, count in sorted(left_out.items()))
-        notes.append(f"who is no car, truck or bus that drives was left out: {counted}")
-    return RawLog(path.stem, False, tuple(vehicles), row, (Segment(0, str(path), "state", 1),), tuple(notes))
+    notes = ("read as CommonRoad", *left_out_note(left_out, "car, truck or bus that drives"))
+    return RawLog(path.stem, False, tuple(vehicles), row, (Segment(0, str(path), "state", 1),), notes)
 
 
 def _observations(obstacle: Element, states: list[Element], step: float, row: int) -> Observations:
     values = np.array([_state(state) for state in states]).reshape(-1, 5)
     stamps = np.round(values[:, 0] * (step * 1e9)).astype(np.int64)
-    rows = np.arange(row, row + len(states))
     box = obstacle.first("shape", "rectangle")
     length, width = (box.one(name).value() if box is not None else math.nan for name in ("length", "width"))
-    return Observations(
-        id=obstacle.get("id"),
-        fix_ns=stamps,
-        fix=values[:, 1:3],
-        fix_row=rows,
-        heading=values[:, 3],
-        speed_ns=stamps,
-        speed=values[:, 4],
-        speed_row=rows,
-        length=length,
-        width=width,
-    )
+    return Observations.of_rows(obstacle.get("id"), stamps, values[:, 1:], np.arange(row, row + len(states)), (length, width))
 
 
 def _state(state: Element) -> tuple[float, float, float, float, float]:
-    """Steps, x, y, heading, speed; NaN for heading and speed where they are not said."""
+    """Return steps, x, y, heading, speed; NaN for heading and speed where they are missing."""
     point = state.first("position", "point") or state.first("position", "rectangle", "center")
     if point is None:
         raise InputError(f"{state.place} has no position that is a point")

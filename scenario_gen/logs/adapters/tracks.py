@@ -5,6 +5,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 import math
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,8 @@ import pandas as pd
 from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.logs.adapters.formats import Format, FORMATS
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import check_size, RawLog, Segment
-from scenario_gen.logs.tables import from_frame, nanoseconds, read_text, reals, vehicle_name
+from scenario_gen.logs.raw import check_size, left_out_note, RawLog
+from scenario_gen.logs.tables import from_frame, read_text, reals, segment_of, to_numbers, vehicle_name
 from scenario_gen.numerics import exact
 
 
@@ -32,101 +33,89 @@ def read(paths: Sequence[Path], config: LogConfig, *, name: str) -> RawLog:
         InputError: a file is damaged or missing, has not the format's columns, or there are several recordings.
     """
     known = FORMATS[name]
-    tracks = [path for path in paths if not _is_companion(path, known)]
-    main = [path for path in tracks if not path.name.startswith("pedestrian")]
+    tracks = [path for path in paths if not _companion_ending(path, known)]
+    main = [path for path in tracks if not _is_of_pedestrians(path)]
     if len(main) != 1:
         names = ", ".join(path.name for path in main) or "none"
         raise InputError(
             f"{paths[0]}: one recording of {known.title} has one file of tracks, here are {names}; give one at a time"
         )
-    frames, segments, row, notes = [], [], 0, []
+    frames, segments, row = [], [], 0
     left_out: Counter[str] = Counter()
     for path in tracks:
-        table = _table(path, known, row, config)
-        if len(table) and path not in main:  # pedestrians have files of their own
-            walkers = table.groupby(table["kind"].astype(str))["vehicle"].nunique() if "kind" in table else {"pedestrian": 1}
-            left_out.update({str(kind): int(count) for kind, count in walkers.items()})
-            continue
+        table = _read_table(path, known, row, config)
         kinds = _kinds(path, known, table)
-        keep = kinds.isin(known.kinds).to_numpy()
-        left_out.update(
-            {str(kind): int(count) for kind, count in table[~keep].groupby(kinds[~keep])["vehicle"].nunique().items()}
-        )
-        frames.append(_ours(table, path, known, config))
-        frames[-1] = frames[-1].assign(row=np.arange(row, row + len(table)))[keep]
-        segments.append(
-            Segment(row, str(path), "row" if path.suffix == ".parquet" else "line", 1 if path.suffix == ".parquet" else 2)
-        )
-        row += len(table)
-    if left_out:
-        counted = ", ".join(f"{count} × {kind or 'unknown'}" for kind, count in sorted(left_out.items()))
-        notes.append(f"who is no car, van, truck or bus was left out: {counted}")
-    notes.insert(0, f"read as {known.title}")
-    log = from_frame(pd.concat(frames, ignore_index=True), [main[0]], tuple(segments), config)
-    return RawLog(main[0].stem, log.geographic, log.vehicles, row, log.segments, (*notes, *log.notes), dropped=log.dropped)
+        keep = kinds.isin(known.kinds).to_numpy() & (path in main)
+        vehicles = table.loc[~keep, known.columns["vehicle"].name]
+        left_out.update({str(kind): int(count) for kind, count in vehicles.groupby(kinds[~keep]).nunique().items()})
+        if path in main:
+            frames.append(_convert(table, path, known).assign(row=np.arange(row, row + len(table)))[keep])
+            segments.append(segment_of(path, row))
+            row += len(table)
+    notes = (f"read as {known.title}", *left_out_note(left_out, "car, van, truck or bus"))
+    return replace(from_frame(pd.concat(frames, ignore_index=True), main, tuple(segments), config), rows=row, notes=notes)
 
 
 def recognised(path: Path) -> str:
     """Return the name of the format that a file's header is of, "" if of none; of a companion, that of its tracks."""
-    if path.suffix.lower() not in (".csv", ".parquet"):
-        return ""
     if path.suffix.lower() == ".parquet":
         needs("parquet", "pyarrow")
         from pyarrow import parquet
 
         try:
             names = set(parquet.read_schema(path).names)
-        except Exception:  # the reader of tables says what is wrong with it
+        except Exception:  # the reader of tables reports what is wrong with it
             return ""
-    else:
+    elif path.suffix.lower() == ".csv":
         for known in FORMATS.values():
-            if _is_companion(path, known):
-                main = (
-                    path.with_name(path.name.removesuffix(_ending(path, known)) + known.companion[0]) if known.companion else path
-                )
-                return recognised(main) if main.is_file() and main != path else ""
+            if known.companions and (ending := _companion_ending(path, known)):
+                main = path.with_name(path.name.removesuffix(ending) + known.companions[0])
+                return recognised(main) if main.is_file() else ""
         with path.open(encoding="utf-8-sig", errors="replace") as file:
             names = {field.strip() for field in file.readline().split(",")}
         if path.name.startswith("pedestrian_tracks") and {"track_id", "timestamp_ms", "agent_type"} <= names:
             return "interaction"
-    return next((known.name for known in FORMATS.values() if known.needed <= names), "")
+    else:
+        return ""
+    return next((name for name, known in FORMATS.items() if known.needed <= names), "")
 
 
-def _ending(path: Path, known: Format) -> str:
-    return next((ending for ending in (known.companion or ())[1:] if path.name.endswith(ending)), "")
+def _companion_ending(path: Path, known: Format) -> str:
+    """Return the ending by which a file belongs to another one of tracks, "" if it does not."""
+    return next((ending for ending in (known.companions or ())[1:] if path.name.endswith(ending)), "")
 
 
-def _is_companion(path: Path, known: Format) -> bool:
-    return bool(_ending(path, known))
+def _is_of_pedestrians(path: Path) -> bool:
+    """Return whether a file holds pedestrians alone, who have files of their own in INTERACTION."""
+    return path.name.startswith("pedestrian")
 
 
-def _table(path: Path, known: Format, before: int, config: LogConfig) -> pd.DataFrame:
-    """The columns of a file by quantity, as they stand."""
+def _read_table(path: Path, known: Format, before: int, config: LogConfig) -> pd.DataFrame:
+    """Return the columns of a file as they stand; `before` rows were read from other files."""
     check_size(str(path), path.stat().st_size, before, config)
     if path.suffix.lower() == ".parquet":
         needs("parquet", "pyarrow")
         from scenario_gen.logs.parquet import read_table
 
-        raw = read_table(path, sorted(known.needed), before, config)
+        table = read_table(path, sorted(known.needed), before, config)
     else:
-        raw = read_text(path, before, config, sep=",")
-    raw.columns = pd.Index([str(column).strip() for column in raw.columns])
-    pedestrians = path.name.startswith("pedestrian")
-    missing = sorted(known.needed - set(raw.columns)) if not pedestrians else []
-    if missing:
-        raise InputError(f"{path} lacks columns of {known.title}: {', '.join(missing)}; it has {', '.join(raw.columns)}")
-    return pd.DataFrame({q: raw[column.column] for q, column in known.columns.items() if column.column in raw.columns})
+        table = read_text(path, before, config, sep=",")
+    table.columns = pd.Index([str(column).strip() for column in table.columns])
+    missing = sorted(known.needed - set(table.columns))
+    if missing and not _is_of_pedestrians(path):
+        raise InputError(f"{path} lacks columns of {known.title}: {', '.join(missing)}; it has {', '.join(table.columns)}")
+    return table
 
 
-def _beside(path: Path, known: Format, which: int, columns: tuple[str, ...]) -> pd.DataFrame:
-    """A companion of a file of tracks.
+def _read_companion(path: Path, known: Format, which: int, columns: tuple[str, ...]) -> pd.DataFrame:
+    """Return a companion of a file of tracks.
 
     Raises:
         InputError: it is not there, or lacks a column.
     """
-    assert known.companion is not None
-    ending = known.companion[0]
-    file = path.with_name(path.name.removesuffix(ending) + known.companion[which])
+    assert known.companions is not None
+    ending = known.companions[0]
+    file = path.with_name(path.name.removesuffix(ending) + known.companions[which])
     if not path.name.endswith(ending) or not file.is_file():
         raise InputError(f"{path}: {known.title} has {file.name} beside it, which is not there; put it there under its own name")
     with guarded(f"{file} cannot be read as a table"):
@@ -138,37 +127,30 @@ def _beside(path: Path, known: Format, which: int, columns: tuple[str, ...]) -> 
 
 
 def _kinds(path: Path, known: Format, table: pd.DataFrame) -> "pd.Series[Any]":
-    """The class of every row, in small letters."""
-    if "kind" in table:
-        return table["kind"].astype(str).str.strip().str.lower()
-    column = known.columns["vehicle"].column
-    meta = _beside(path, known, 1, (column, "class"))
+    """Return the class of every row, in small letters."""
+    if "kind" in known.columns:
+        column = known.columns["kind"].name
+        kinds = table[column] if column in table else pd.Series("pedestrian", index=table.index)
+        return kinds.astype(str).str.strip().str.lower()
+    column = known.columns["vehicle"].name
+    meta = _read_companion(path, known, 1, (column, "class"))
     classes = dict(zip(meta[column].map(vehicle_name), meta["class"].astype(str).str.strip().str.lower(), strict=True))
-    return table["vehicle"].map(vehicle_name).map(lambda name: classes.get(name, "without a class"))
+    return table[column].map(vehicle_name).map(lambda name: classes.get(name, "without a class"))
 
 
-def _ours(table: pd.DataFrame, path: Path, known: Format, config: LogConfig) -> pd.DataFrame:
-    """The table in our quantities and units."""
-    factor = known.columns["time"].factor
-    if known.companion:
-        rates = reals(_beside(path, known, 2, ("frameRate",))["frameRate"])
-        rate = float(rates.iloc[0])
+def _convert(table: pd.DataFrame, path: Path, known: Format) -> pd.DataFrame:
+    """Return the table in our quantities and units."""
+    columns = {quantity: column for quantity, column in known.columns.items() if quantity != "kind"}
+    if known.companions:
+        rate = float(reals(_read_companion(path, known, 2, ("frameRate",))["frameRate"]).iloc[0])
         if not 0.1 <= rate <= 1000.0:
             raise InputError(f"{path}: the recordingMeta beside it says {rate:g} frames per second; 0.1 to 1000 are read")
-        factor = 1.0 / rate
-    value = {
-        q: reals(table[q]) * c.factor for q, c in known.columns.items() if q not in ("vehicle", "time", "kind") and q in table
-    }
-    out = pd.DataFrame({"vehicle": table["vehicle"].map(vehicle_name).astype(object)})
-    out["time"], out["time_ok"] = nanoseconds(table["time"], factor)
-    vx, vy = value["vx"].to_numpy(float), value["vy"].to_numpy(float)
-    x, y = value["x"].to_numpy(float), value["y"].to_numpy(float)
+        columns["time"] = replace(columns["time"], factor=1.0 / rate)
+    out = to_numbers(table, columns, path)
     if known.image:
-        x, y, vy = x + value["length"].to_numpy(float) / 2.0, -(y + value["width"].to_numpy(float) / 2.0), -vy
-    out["x"], out["y"] = x, y
+        out["x"], out["y"], out["vy"] = out["x"] + out["length"] / 2.0, -(out["y"] + out["width"] / 2.0), -out["vy"]
+    vx, vy = out["vx"].to_numpy(float), out["vy"].to_numpy(float)
     out["speed"] = exact.hypot(vx, vy)
-    out["heading"] = value["heading"] if "heading" in value else np.where(out["speed"] > 0.1, exact.arctan2(vy, vx), math.nan)
-    for size in ("length", "width"):
-        if size in value:
-            out[size] = value[size]
+    if "heading" not in out:
+        out["heading"] = np.where(out["speed"] > 0.1, exact.arctan2(vy, vx), math.nan)
     return out

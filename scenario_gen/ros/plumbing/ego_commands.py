@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from msg_conventions import driving
+from msg_conventions.odometry import decode_odometry
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
@@ -79,7 +80,7 @@ def understood(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int)
         track = Track.of((way.time_ns - FIRST_STAMP) * 1e-9, way.poses)
         asked: Callable[[State], Command | Pose | None] = lambda state: track.command(state.ego, state.time, period)  # noqa: E731
     else:
-        stamp, said, state = driving.decode_odometry(data, topic)
+        stamp, said, _, state = decode_odometry(data, topic)
         pose = Pose(*state[:4].tolist())
         asked = lambda _: pose  # noqa: E731
     if said != frame:

@@ -12,6 +12,8 @@ from msg_conventions import driving
 from msg_conventions.autoware import encode_kinematic_state, encode_predicted_objects, HORIZON_NS, OBJECTS, STEP_NS
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.frames import encode_frames
+from msg_conventions.odometry import encode_odometry
+from msg_conventions.pictures import vehicle_markers
 from msg_conventions.topics import vehicle_topic
 from scenario_gen.closed_loop.local_map import local_map
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
@@ -34,7 +36,7 @@ def encode_odometries(states: Sequence[State], children: Sequence[str], period: 
     before, state = states[0], states[-1]
     turned = (state.vehicles[:, 2] - before.vehicles[:, 2]) / period
     for i in np.flatnonzero(state.here).tolist():
-        yield i, driving.encode_odometry(state.vehicles[i], float(turned[i]), children[i], frame, stamp_of(state))
+        yield i, encode_odometry(state.vehicles[i], float(turned[i]), children[i], frame, stamp_of(state))
 
 
 def encode_poses(state: State, children: Sequence[str], frame: str) -> bytes:
@@ -115,7 +117,7 @@ def surroundings(
     yield "/tf", encode_poses(state, children, frame)
     if is_heard("traffic/markers"):
         vehicles = loop.scenario.vehicles
-        yield "traffic/markers", driving.encode_traffic_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp)
+        yield "traffic/markers", vehicle_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp)
     every = max(round(GRID_EVERY / loop.config.step), 1)
     if state.step % every == 0 and loop.road is not None and is_heard("traffic/local_map"):
         yield "traffic/local_map", encode_surroundings(loop, state)
