@@ -79,7 +79,6 @@ LATE_OURS = {
     "logs/adapters/tracks.py": "needs pyarrow",
     "logs/read.py": "adapters need extras",
     "logs/tables.py": "needs pyarrow",
-    "method/routing/plan.py": "needs ompl",
     "method/routing/search/ompl/planners.py": "needs ompl",
     "ros/plumbing/doctor.py": "the standard library alone must do for it",
     "ros/plumbing/launching.py": "launch files must be read in no time",
