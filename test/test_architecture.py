@@ -79,7 +79,6 @@ LATE_OURS = {
     "logs/adapters/tracks.py": "needs pyarrow",
     "logs/read.py": "adapters need extras",
     "logs/tables.py": "needs pyarrow",
-    "method/routing/plan.py": "needs ompl",
     "method/routing/search/ompl/planners.py": "needs ompl",
     "ros/plumbing/sampling_answer.py": "loads all stages, and few requests need them",
     "ros/plumbing/start.py": "loads rclpy",

@@ -161,10 +161,10 @@ def export_scenarios(
     from scenario_gen.bags.storage.config import BagConfig
     from scenario_gen.base.parameters import assigned
     from scenario_gen.output.exchange.config import ExportConfig
-    from scenario_gen.output.exchange.export import export_bag, TARGETS
+    from scenario_gen.output.exchange.export import export_bag, EXPORTS
 
-    if to not in TARGETS:
-        raise InputError(f"--to {to!r} is none of {', '.join(TARGETS)}")
+    if to not in EXPORTS:
+        raise InputError(f"--to {to!r} is none of {', '.join(EXPORTS.names())}")
     config, bag_config = ExportConfig(ego=ego), BagConfig()
     for option in options or []:
         if option.startswith("bag."):

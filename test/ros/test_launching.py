@@ -86,6 +86,13 @@ def test_the_nodes_that_are_started(tmp_path):
     assert launched(log=LOG, params=str(file))[0].executable == "recorder"
 
 
+def test_a_road_of_an_installed_package_can_be_named(monkeypatch):
+    monkeypatch.setattr("scenario_gen.ros.plumbing.launching.installed", lambda group: {"plaza": group})
+    assert launched(log=LOG, road="plaza")
+    with pytest.raises(InputError, match=r"road:=nowhere: neither one of straight, .*, corridor, plaza nor a map_server"):
+        launched(log=LOG, road="nowhere")
+
+
 def test_arguments_are_declared_as_the_nodes_declare_them():
     modules = [importlib.import_module(f"scenario_gen.ros.nodes.{node}") for node in ("recorder", *SUITE)]
     known = {}
