@@ -45,6 +45,9 @@ OF_TARGETS = {
     "message_fit": ("fits.py",),
 }
 OWN = {  # modules that parse, but no file that a user is given by others, and why that is so
+    "cli/doctor.py": "what its own probes write",
+    "cli/launching.py": "parameter files, through `documents`",
+    "cli/suite.py": "what its own processes write",
     "corpus/batch.py": "its own notes in its own folder, through `documents`",
     "corpus/mine.py": "its own intermediate tables, which are written whole or not at all",
     "corpus/meetings.py": "its own intermediate tables, likewise",
