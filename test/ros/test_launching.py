@@ -18,8 +18,8 @@ import yaml
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
+from scenario_gen.cli.launching import ENTRIES, LIVE, OF_LAUNCH, OTHER_NAMES, ROADS
 from scenario_gen.roads import BUILT_IN
-from scenario_gen.ros.plumbing.launching import ENTRIES, LIVE, OF_LAUNCH, OTHER_NAMES, ROADS
 
 SUITE = ("road_server", "segmenter", "planner", "gp_sampler", "evaluator", "log_player")
 LOG = str(RESOURCES / "synthetic_c")
@@ -177,7 +177,7 @@ def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(domai
 
 def test_what_is_written_for_a_launch_is_removed_at_its_end(tmp_path):
     code = (
-        "import sys; from pathlib import Path; from scenario_gen.ros.plumbing.launching import read_arguments;"
+        "import sys; from pathlib import Path; from scenario_gen.cli.launching import read_arguments;"
         "print(read_arguments({'log': sys.argv[1], 'ego': '007'}).parameter_files(Path('suite.yaml'))[-1]);"
         "assert not any(name.split('.')[0] in ('numba', 'rclpy') for name in sys.modules)"
     )
@@ -191,7 +191,7 @@ def test_a_drive_is_launched_with_its_parameters(domain, client, tmp_path):
     """The values that launch_ros would write for `traffic`: each is one of its parameters, and takes effect."""
     from rcl_interfaces.srv import GetParameters
 
-    from scenario_gen.ros.plumbing.traffic_config import Config
+    from scenario_gen.ros.plumbing.driving import Config
 
     (only, *pictures) = launched("drive.launch.py", ego="2", policy="replay", lock_step="true", namespace="/a", rviz="true")
     assert (only.executable, only.namespace, [one.executable for one in pictures]) == ("traffic", "/a", ["rviz2"])

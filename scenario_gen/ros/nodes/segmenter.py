@@ -25,8 +25,8 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs import encounters_of, LogConfig, RawLog
 from scenario_gen.method.segmentation import LiveSegmenter, OnlineConfig, segment, SegmentationConfig
-from scenario_gen.ros.plumbing.base import StageNode
 from scenario_gen.ros.plumbing.live import LiveConfig, LiveStreams
+from scenario_gen.ros.plumbing.stage_node import StageNode
 from scenario_gen.types import Sample
 
 
