@@ -24,7 +24,7 @@ def main() -> None:
     (encounter,) = read_log(bundled(CASE)).encounters
     found = segment(encounter, seed=SEED)
     road = build_road("t_intersection", encounter)
-    made = generate(encounter, road, count=COUNT, seed=SEED)
+    result = generate(encounter, road, count=COUNT, seed=SEED)
     pyplot.rcParams |= {"font.size": 8}
     figure, axes_of = pyplot.subplot_mosaic("ac;bc", figsize=(9.0, 4.2), width_ratios=(1.4, 1.0), layout="constrained")
     recorded, generated, speeds = (axes_of[name] for name in "abc")
@@ -36,13 +36,13 @@ def main() -> None:
         )
     for time in encounter.time[found.changepoints]:
         speeds.axvline(time, color="#bbbbbb", linewidth=0.8, linestyle=":")
-    for scenario in made.generated.scenarios:
+    for scenario in result.generated.scenarios:
         draw(generated, scenario, 0.4)
         for n, speed in enumerate(scenario.speed):
             speeds.plot(scenario.time, speed, color=COLOURS[n], alpha=0.4, linewidth=0.7)
     draw_road(generated, road)
     recorded.set_title(f"recorded: {encounter.name}, {len(found.changepoints)} changepoints")
-    generated.set_title(f"generated: {len(made.generated.scenarios)} scenarios on {road.name}")
+    generated.set_title(f"generated: {len(result.generated.scenarios)} scenarios on {road.name}")
     speeds.set_title("speeds: recorded (thick), generated (thin)")
     speeds.set(xlabel="time [s]", ylabel="speed [m/s]")
     speeds.legend(frameon=False)

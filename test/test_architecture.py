@@ -55,23 +55,22 @@ BESIDE_THE_DOOR = {
     "method.validity.collision": "kernels, named by what they prove",
     "method.validity.containment": "kernels, named by what they prove",
 }
-# What may be imported inside a function: extras and what takes long to load, and modules of ours that load such.
+# What may be imported inside a function, and why: libraries, and modules of ours that load such.
 LATE = {
-    "arviz",
-    "dask",
-    "distributed",
-    "duckdb",
-    "jsonschema",
-    "multiprocessing",
-    "ompl",
-    "pandas",
-    "pyarrow",
-    "rclpy",
-    "rich",
-    "rosbags",
-    "sklearn",
-    "std_msgs",
-    "yaml",
+    "arviz": "tests alone install it",
+    "dask": "extra corpus",
+    "distributed": "extra corpus",
+    "duckdb": "extra corpus",
+    "jsonschema": "slow to load",
+    "multiprocessing": "slow to load",
+    "pandas": "slow to load",
+    "pyarrow": "extra parquet",
+    "rclpy": "extra ros",
+    "rich": "extra cli",
+    "rosbags": "extra bags",
+    "sklearn": "tests alone install it",
+    "std_msgs": "extra ros",
+    "yaml": "slow to load",
 }
 LATE_OURS = {
     "__main__.py": "a command loads what it needs",
@@ -173,16 +172,17 @@ def imports_in_functions(path: Path) -> set[str]:
 
 
 def test_functions_import_extras_and_what_is_slow_to_load_alone():
-    used = set()
+    used, libraries = set(), set()
     for path in PYTHON_FILES:
         name = path.relative_to(PACKAGE if PACKAGE in path.parents else ROOT).as_posix()
         for imported_name in imports_in_functions(path):
             if imported_name.split(".")[0] in LATE:
+                libraries.add(imported_name.split(".")[0])
                 continue
             own = [known for known in LATE_OURS if name.startswith(known)]
             assert own and imported_name.startswith("scenario_gen"), f"{name} imports {imported_name} inside a function"
             used.add(own[0])
-    assert used == set(LATE_OURS)
+    assert used == set(LATE_OURS) and libraries == set(LATE)
 
 
 def test_the_conventions_stand_on_the_types_and_below_bags_and_nodes():

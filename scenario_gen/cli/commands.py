@@ -192,21 +192,6 @@ def demo(
 
 
 @app.command()
-def reproduce(
-    log: Annotated[list[Path] | None, typer.Argument(help="as for generate; without one, the three bundled cases")] = None,
-    count: Annotated[int, typer.Option(min=2, help="scenarios per encounter, with and without changepoints")] = 50,
-    seed: Annotated[int, typer.Option(min=0, help="same seed, same page")] = 7,
-    out: Annotated[Path, typer.Option(help="folder of reproduce.html and reproduce.json")] = Path("out/reproduced"),
-) -> None:
-    """Draw figures 2 to 5 of the paper with its own settings, each beside its claim and what is measured for it."""
-    from scenario_gen.logs import bundled, CASES
-    from scenario_gen.output.reproduce import reproduce as reproduce_figures
-
-    logs = [log] if log else [[bundled(case)] for case in CASES]
-    reproduce_figures(logs, out, count=count, seed=seed, say=say)
-
-
-@app.command()
 def evaluate(
     bag: Annotated[Path, typer.Argument(help="a bag with tracks and scenarios, ours or not")],
     out: Annotated[Path | None, typer.Option(help="folder for report.html, evaluation.json and evaluation.md")] = None,

@@ -22,7 +22,6 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.path import fit_path, Headings, headings_of, MOVES, Path, straight_path
 from scenario_gen.logs.raw import Observations
 from scenario_gen.numerics import Bools, exact, Floats, Ints, runs, wrap_angle
-from scenario_gen.numerics.exact.sparse import Columns
 
 STANDS = 0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
 STILL = 0.1  # m/s: below this it is not on its way to or from standing
@@ -59,7 +58,8 @@ class Motion:
         rows = [np.repeat(top + np.arange(len(at)), values.shape[1]) for top, (at, values) in zip(above, blocks, strict=False)]
         columns = [(at[:, None] + np.arange(values.shape[1])).ravel() for at, values in blocks]
         entries = np.concatenate([values.ravel() for _, values in blocks])
-        self.constraints = Columns.of_entries(np.concatenate(rows), np.concatenate(columns), entries, (above[-1], self.size))
+        shape = (above[-1], self.size)
+        self.constraints = exact.Columns.of_entries(np.concatenate(rows), np.concatenate(columns), entries, shape)
 
     def _merged(self, tick: Ints, weights: Floats) -> tuple[Ints, Floats]:
         """Rows (F, E) over the coefficients from `tick` (F,) on, as the first variable (F,) and rows (F, E) from there."""
@@ -111,7 +111,7 @@ class Motion:
             linear = linear - pull
         place = np.tile(np.arange(self.size), 4)
         column = place + np.repeat(np.arange(4), self.size)
-        upper = Columns.of_entries(place, column, quadratic[:, : self.size].ravel(), (self.size, self.size))
+        upper = exact.Columns.of_entries(place, column, quadratic[:, : self.size].ravel(), (self.size, self.size))
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere

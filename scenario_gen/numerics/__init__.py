@@ -1,20 +1,24 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Arrays, curves, exact arithmetic, compiled kernels: nothing of traffic."""
+"""Arrays, curves, compiled kernels, and `exact`, the one door to arithmetic that is the same on every CPU; nothing of traffic."""
 
 from scenario_gen.numerics.arrays import (
     Bools,
     canonical_heading,
     canonical_poses,
     Floats,
+    freeze,
     frozen,
+    frozen_bools,
     frozen_ints,
     Ints,
     runs,
+    sealed,
     wrap_angle,
 )
 
 __all__ = [
-    "Bools", "Floats", "Ints", "canonical_heading", "canonical_poses", "frozen", "frozen_ints", "runs", "wrap_angle",
+    "Bools", "Floats", "Ints", "canonical_heading", "canonical_poses", "freeze", "frozen", "frozen_bools", "frozen_ints", "runs",
+    "sealed", "wrap_angle",
 ]  # fmt: skip

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Array types used in signatures, and the one helper that makes an array safe to share."""
+"""Array types used in signatures; arrays made safe to share; angles in one form."""
+
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -9,26 +11,36 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
+Array = TypeVar("Array", bound=npt.NDArray[Any])
 
 LARGEST_ANGLE = 3.141592653  # the last whole nanoradian inside (-pi, pi); rounding must not step over the cut
 
 
-def frozen(values: npt.ArrayLike) -> Floats:
-    """Return `values` as a C-contiguous, read-only float64 array of any shape (a copy if it was writable)."""
-    return _sealed(np.array(values, dtype=np.float64, order="C"))
-
-
-def _sealed(array: Floats) -> Floats:
+def sealed(array: Array) -> Array:
     """Make an array of our own read-only, without a copy."""
     array.setflags(write=False)
     return array
 
 
+def frozen(values: npt.ArrayLike) -> Floats:
+    """Return `values` as a C-contiguous, read-only float64 array of any shape (a copy if it was writable)."""
+    return sealed(np.array(values, dtype=np.float64, order="C"))
+
+
 def frozen_ints(values: npt.ArrayLike) -> Ints:
     """Return `values` as a C-contiguous, read-only int64 array of any shape (a copy if it was writable)."""
-    array = np.array(values, dtype=np.int64, order="C")
-    array.setflags(write=False)
-    return array
+    return sealed(np.array(values, dtype=np.int64, order="C"))
+
+
+def frozen_bools(values: npt.ArrayLike) -> Bools:
+    """Return `values` as a C-contiguous, read-only array of truth values of any shape (a copy if it was writable)."""
+    return sealed(np.array(values, dtype=np.bool_, order="C"))
+
+
+def freeze(record: object, **fields: Any) -> None:
+    """Set fields of a frozen dataclass in its `__post_init__`."""
+    for name, value in fields.items():
+        object.__setattr__(record, name, value)
 
 
 def wrap_angle(angle: Floats) -> Floats:
@@ -50,7 +62,7 @@ def canonical_heading(heading: npt.ArrayLike) -> Floats:
     """Canonical angles (..., T) [rad] made continuous along the last axis (time or path)."""
     angle = canonical_angle(heading)
     jumps = (np.abs(angle[..., 1:] - angle[..., :-1]) > np.pi).any()
-    return _sealed(np.unwrap(angle, axis=-1) if jumps else angle + 0.0)  # most have none, and unwrapping costs ten times as much
+    return sealed(np.unwrap(angle, axis=-1) if jumps else angle + 0.0)  # most have none, and unwrapping costs ten times as much
 
 
 def canonical_poses(poses: npt.ArrayLike, *, continuous: bool = False) -> Floats:

@@ -30,34 +30,34 @@ Told = Callable[[int, int, float], None]  # kernels that are there, kernels that
 _workers: list["subprocess.Popen[bytes]"] = []
 
 
-def make_ready(told: Told = lambda *_: None) -> int:
+def make_ready(report: Told = lambda *_: None) -> int:
     """Load every kernel of the modules that have been imported; compile what is not there; return their number.
 
     Several processes may do so at once: one has the rest compiled, the others wait for what they need. Where no folder can be
     written to, this process compiles for itself.
 
     Args:
-        told: called now and then while something is not there.
+        report: called now and then while something is not there.
     """
     needed, started = kernels.registered(), monotonic()
     folder = kernel_cache.folder()
     absent = list(needed)
 
-    def tell() -> list[Entry]:
+    def look() -> list[Entry]:
         absent[:] = missing(absent)
         if absent:
-            told(len(needed) - len(absent), len(needed), monotonic() - started)
+            report(len(needed) - len(absent), len(needed), monotonic() - started)
         return absent
 
-    while folder is not None and tell():
+    while folder is not None and look():
         with _lock(str(folder / LOCK)) as lock:
             if lock is not None:
-                _compile(absent, lock, lambda: bool(tell()))
+                _compile(absent, lock, lambda: bool(look()))
                 break
         sleep(LOOK)
     for done, (compiled, argument_types) in enumerate(needed):
         if folder is None:
-            told(done, len(needed), monotonic() - started)
+            report(done, len(needed), monotonic() - started)
         compiled.compile(argument_types)
     return len(needed)
 
@@ -151,14 +151,14 @@ def main() -> None:
     end = "\r" if sys.stdout.isatty() else "\n"
     last = ""
 
-    def tell(done: int, needed: int, seconds: float) -> None:
+    def show(done: int, needed: int, seconds: float) -> None:
         nonlocal last
         text = words(done, needed, seconds)
         if sys.stdout.isatty() or text[:16] != last[:16]:
             print(text, end=end, flush=True)
         last = text
 
-    count = make_ready(tell)
+    count = make_ready(show)
     kernel_cache.sweep({Path(kernel_cache.keep(compiled).cache_path or "").name for compiled, _ in kernels.registered()})
     print(f"{count} kernels ready after {monotonic() - started:.1f} s", flush=True)
 

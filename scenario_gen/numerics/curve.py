@@ -10,6 +10,7 @@ import numpy as np
 
 from scenario_gen.numerics import exact
 from scenario_gen.numerics.arrays import Floats, frozen, Ints
+from scenario_gen.numerics.plane import edge_lengths, edge_yaws, meeting_shares
 
 TOGETHER = 64  # positions that are projected at once, on the edges that can be nearest to any of them
 
@@ -30,18 +31,15 @@ class Curve:
     @classmethod
     def through(cls, xy: Floats) -> "Curve":
         """Lay a curve on points (M, 2) [m]; the yaw of each is the mean direction of its two neighbouring edges."""
-        step = np.diff(xy, axis=0)
-        keep = np.concatenate(([True], exact.hypot(step[:, 0], step[:, 1]) > 1e-9))
-        xy = xy[keep]
-        edge = np.unwrap(exact.arctan2(np.diff(xy[:, 1]), np.diff(xy[:, 0])))
+        xy = xy[np.concatenate(([True], edge_lengths(xy) > 1e-9))]
+        edge = np.unwrap(edge_yaws(xy))
         yaw = np.concatenate((edge[:1], (edge[1:] + edge[:-1]) / 2.0, edge[-1:]))
         return cls(np.column_stack((xy, yaw)))
 
     @cached_property
     def station(self) -> Floats:
         """(M,) arc length [m] of each point."""
-        step = np.diff(self.points[:, :2], axis=0)
-        return frozen(np.concatenate(([0.0], np.cumsum(exact.hypot(step[:, 0], step[:, 1])))))
+        return frozen(np.concatenate(([0.0], np.cumsum(edge_lengths(self.points[:, :2])))))
 
     @property
     def length(self) -> float:
@@ -115,11 +113,7 @@ def crossings(first: Curve, second: Curve, min_angle: float = 0.35) -> Floats:
     """Stations (K, 2) at which `first` crosses `second` at an angle of at least `min_angle` [rad], in order along `first`."""
     a, b = first.points[:, :2], second.points[:, :2]
     u, v = np.diff(a, axis=0), np.diff(b, axis=0)
-    w = b[None, :-1] - a[:-1, None]
-    det = u[:, None, 0] * v[None, :, 1] - u[:, None, 1] * v[None, :, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = (w[..., 0] * v[None, :, 1] - w[..., 1] * v[None, :, 0]) / det
-        q = (w[..., 0] * u[:, None, 1] - w[..., 1] * u[:, None, 0]) / det
+    t, q, det = meeting_shares(a[:-1, None], u[:, None], b[None, :-1], v[None])
     sine = np.abs(det) / (exact.hypot(u[:, 0], u[:, 1])[:, None] * exact.hypot(v[:, 0], v[:, 1])[None, :])
     hit = (t >= 0.0) & (t < 1.0) & (q >= 0.0) & (q < 1.0) & (sine >= exact.sin(min_angle))
     i, j = np.nonzero(hit)

@@ -34,10 +34,10 @@ F = types.float64
 I = types.int64  # noqa: E741 - the field's letter for integers
 B = types.boolean
 F1, F2, F3, F4 = (_array(F, n, readonly=True) for n in (1, 2, 3, 4))
-I1, I2, I3 = (_array(I, n, readonly=True) for n in (1, 2, 3))
-B1, B2, B3 = (_array(B, n, readonly=True) for n in (1, 2, 3))
+I1, I2 = (_array(I, n, readonly=True) for n in (1, 2))
+B1, B2 = (_array(B, n, readonly=True) for n in (1, 2))
 OUT1, OUT2, OUT3, OUT4 = (_array(F, n, readonly=False) for n in (1, 2, 3, 4))
-OUTI1, OUTI2, OUTI3 = (_array(I, n, readonly=False) for n in (1, 2, 3))
+OUTI1, OUTI2 = (_array(I, n, readonly=False) for n in (1, 2))
 OUTB1, OUTB2 = (_array(B, n, readonly=False) for n in (1, 2))
 
 OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": None, "no_cfunc_wrapper": True}

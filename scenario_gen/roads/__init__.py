@@ -4,9 +4,8 @@
 """Occupancy grids, their entries and exits, and the readers of map formats."""
 
 from scenario_gen.roads.arms import Arm, arms_of, reverse, ring_of, unused_arms
-from scenario_gen.roads.axis import bent_axis
-from scenario_gen.roads.build import build_road, road_and_template
-from scenario_gen.roads.builtin import BUILT_IN, draw, layout_for
+from scenario_gen.roads.build import build_road, BUILT_IN, road_and_template
+from scenario_gen.roads.builtin import draw, layout_for
 from scenario_gen.roads.clearance import (
     clearance_field,
     clearance_in_cells,
@@ -22,6 +21,7 @@ from scenario_gen.roads.clearance import (
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.connectivity import common_component, component_cells
 from scenario_gen.roads.obstacles import read_obstacles
+from scenario_gen.roads.shaped import bent_axis
 from scenario_gen.roads.vector.ground import along_lanes, drives_against, own_ground
 from scenario_gen.roads.vector.match import Course
 from scenario_gen.roads.vector.place import laid, placements

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, frozen, wrap_angle
+from scenario_gen.numerics import exact, Floats, frozen
+from scenario_gen.numerics.plane import angle_between, unit, unit_left
 from scenario_gen.roads.ways import relative
 from scenario_gen.types import Road
 
@@ -56,7 +57,7 @@ def arms_of(road: Road) -> tuple[Arm, ...]:
         gap = np.abs(in_offset[:, None] - out_offset[None])
         i, o = np.unravel_index(int(np.argmin(gap)), gap.shape)
         middle = float(in_offset[i] + out_offset[o]) / 2.0
-        pose = leave + middle * np.array([-exact.sin(leave[2]), exact.cos(leave[2]), 0.0])
+        pose = leave + middle * np.array([*unit_left(leave[2]), 0.0])
         arms.append(Arm(frozen(pose), frozen(np.sort(in_offset - middle)), frozen(np.sort(out_offset - middle))))
     return tuple(arms)
 
@@ -75,15 +76,15 @@ def ring_of(road: Road) -> tuple[Floats, float] | None:
     arms = arms_of(road)
     if len(arms) < 3:
         return None
-    normal = np.array([[-exact.sin(arm.pose[2]), exact.cos(arm.pose[2])] for arm in arms])
-    reach = (normal * np.stack([arm.pose[:2] for arm in arms])).sum(axis=1)
+    poses = np.stack([arm.pose for arm in arms])
+    normal = unit_left(poses[:, 2])
+    reach = (normal * poses[:, :2]).sum(axis=1)
     centre = exact.lstsq(normal, reach)
     if np.abs((normal * centre).sum(axis=1) - reach).max() > _LEVEL or road.drivable_at(centre[None])[0]:
         return None
     out = np.arange(0.0, _LARGEST_ISLAND, road.resolution / 2.0)
     islands = []
-    for arm in arms:
-        along = np.array([exact.cos(arm.pose[2]), exact.sin(arm.pose[2])])
+    for along in unit(poses[:, 2]):
         free = road.drivable_at(centre + out[:, None] * along)
         islands.append(float(out[np.argmax(free)]) if free.any() else 0.0)
     width = 2.0 * min(float(np.abs(offsets).min()) for arm in arms for offsets in (arm.inward, arm.outward))
@@ -94,5 +95,4 @@ def ring_of(road: Road) -> tuple[Floats, float] | None:
 
 def _beside(pose: Floats, other: Floats) -> bool:
     ahead, left = relative(pose, other[:2])
-    turned = abs(float(wrap_angle(np.asarray(other[2] - pose[2]))))
-    return turned < _PARALLEL and abs(ahead) < _LEVEL and abs(left) < _WIDEST
+    return abs(angle_between(other[2], pose[2])) < _PARALLEL and abs(ahead) < _LEVEL and abs(left) < _WIDEST

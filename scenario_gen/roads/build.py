@@ -3,30 +3,21 @@
 
 """One door to every road: built-in, drawn around the template, or read from a map."""
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError, reading, RefusedError
-from scenario_gen.roads.builtin import BUILT_IN, draw, draw_corridor, draw_paper, junction_centre, layout_for
+from scenario_gen.roads.builtin import draw, draw_corridor, draw_paper, layout_for
 from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.junctions import draw_junction, draw_roundabout
 from scenario_gen.roads.nav2 import read_map
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
-from scenario_gen.roads.shaped import (
-    bends,
-    draw_along,
-    draw_bent,
-    draw_junction,
-    draw_merge,
-    draw_roundabout,
-    fitting_width,
-    PLAIN_LINE,
-)
-from scenario_gen.roads.vector.read import is_vector_map, READERS, vector_road
-from scenario_gen.template import clean_tracks, main_line, mirrored, own_paths, refuse_too_large, to_frenet, Track, traffic_side
+from scenario_gen.roads.shaped import bends, draw_along, draw_merge, fitting_width, PLAIN_LINE
+from scenario_gen.roads.vector.read import FORMATS, is_vector_map, vector_road
+from scenario_gen.template import clean_tracks, main_line, mirrored, refuse_too_large, to_frenet, traffic_side
 from scenario_gen.types import Encounter, MIRRORED, Road
 
 
@@ -34,16 +25,15 @@ def build_road(name_or_path: str, encounter: Encounter | None = None, config: Ro
     """Return the road `name_or_path`, with the obstacles of `config` drawn into it.
 
     Args:
-        name_or_path: `straight`, `curve`, `t_intersection`, `four_way`, `merge`, `roundabout`, `corridor`, or the path of a
-            nav2 map_server YAML,
-            or of a vector map (.osm, .xodr, .xml), of which `#box=x0,y0,x1,y1`, `#lanelet=ID` or `#junction=ID` chooses a part.
+        name_or_path: one of `DRAWN`, or the path of a nav2 map_server YAML or of a vector map (.osm, .xodr, .xml), of which
+            `#box=x0,y0,x1,y1`, `#lanelet=ID` or `#junction=ID` chooses a part.
         encounter: the template, to which built-in roads are sized (None: plain sizes), and for which the best place on a vector
             map is searched; `corridor` cannot do without.
         config: how it is drawn.
 
     Raises:
         InputError: no such road, a map that cannot be used, or an obstacle that stands nowhere on it.
-        RefusedError: `corridor`, and the recorded vehicles overlap so far that they cannot be told apart.
+        RefusedError: `corridor`, and the recorded vehicles overlap so far that they cannot be separated.
     """
     return with_obstacles(_bare_road(name_or_path, encounter, config), read_obstacles(config.obstacles))
 
@@ -67,7 +57,6 @@ def road_and_template(
     refuse_too_large(encounter)
     if isinstance(name_or_path, Road):
         return name_or_path, encounter
-    road: Road | None = None
     refusal: RefusedError | None = None
     try:
         road = build_road(name_or_path, encounter, config)
@@ -75,16 +64,16 @@ def road_and_template(
         if not is_vector_map(name_or_path):
             raise
         refusal = error
-    if road is not None and not _on_other_side(encounter, road):
-        return road, encounter
+    else:
+        if not _on_other_side(encounter, road):
+            return road, encounter
     other = mirrored(encounter)
     with suppress(RefusedError):
         there = build_road(name_or_path, other, config)
         if there.lanes is not None and _on_other_side(encounter, there):
-            said = f"{MIRRORED}: traffic on road {there.name} keeps to the {there.lanes.traffic_side}"
-            return replace(there, lanes=replace(there.lanes, notes=(said, *there.lanes.notes))), other
-    if road is None:
-        assert refusal is not None
+            note = f"{MIRRORED}: traffic on road {there.name} keeps to the {there.lanes.traffic_side}"
+            return replace(there, lanes=replace(there.lanes, notes=(note, *there.lanes.notes))), other
+    if refusal is not None:
         raise refusal
     return road, encounter
 
@@ -95,50 +84,52 @@ def _on_other_side(encounter: Encounter, road: Road) -> bool:
     return side not in ("", traffic_side(encounter) or "right")
 
 
+Drawer = Callable[[str, Encounter | None, RoadConfig], Road]
+"""Draws the road of a name for a template; None: in plain sizes."""
+
+
 def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfig) -> Road:
-    if name_or_path in BUILT_IN:
-        if config.paper:
-            if name_or_path not in ("straight", "t_intersection"):
-                raise InputError(f"road {name_or_path} has no paper version; choose straight or t_intersection")
-            return draw_paper(name_or_path, config)
-        return _built_in(name_or_path, None if encounter is None else clean_tracks(encounter), config)
-    if name_or_path == "corridor":
-        if encounter is None:
-            raise InputError("road corridor is drawn around a template; give a log too")
-        return draw_corridor(own_paths(encounter).tracks, config)
+    """The road without its obstacles."""
+    if config.paper and name_or_path in BUILT_IN:
+        return draw_paper(name_or_path, config)
+    if name_or_path in DRAWN:
+        return DRAWN[name_or_path](name_or_path, encounter, config)
     if is_vector_map(name_or_path):
         return vector_road(name_or_path, None if encounter is None else clean_tracks(encounter), config)
     path = Path(name_or_path)
     if path.suffix.lower() not in (".yaml", ".yml"):
-        names = ", ".join((*BUILT_IN, "corridor"))
-        kinds = f"a map_server YAML file or a vector map ({', '.join(READERS)})"
+        kinds = f"a map_server YAML file or a vector map ({', '.join(FORMATS)})"
         part = "; one part behind one # can be named of a vector map alone" if "#" in name_or_path else ""
-        raise InputError(f"road {shown(name_or_path, 200)!r} is neither one of {names} nor the path of {kinds}{part}")
+        raise InputError(f"road {shown(name_or_path, 200)!r} is neither one of {', '.join(DRAWN)} nor the path of {kinds}{part}")
     with reading(path):
         return read_map(path, config)
 
 
-def _built_in(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -> Road:
-    """A built-in road in plain sizes, or shaped to a template."""
-    if tracks is None:
+def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
+    """A main road and the side arms that the road `name` has: in plain sizes, along the template's bends, or a junction."""
+    if encounter is None:
         if name == "curve":
             return draw_along(name, PLAIN_LINE, max(config.lanes, 1), config)
-        if name == "roundabout":
-            return draw_roundabout(None, np.zeros(2), config)
-        return draw_merge(None, None, config) if name == "merge" else draw(name, layout_for(name, None, config), config)
+        return draw(name, layout_for(name, None, config), config)
+    tracks = clean_tracks(encounter)
     config = fitting_width(tracks, config)
-    if name == "roundabout":
-        return draw_roundabout(tracks, junction_centre(tracks), config)
     try:
         frenet = to_frenet(tracks)
     except RefusedError:  # turns or crossings: a junction's template
         if name in ("t_intersection", "four_way") and not any(track.makes_u_turn for track in tracks):
-            return draw_junction(name, tracks, junction_centre(tracks), config)
-        if name == "merge":
-            raise
-        return draw(name, layout_for(name, tracks, config), config)
-    if name == "merge":
-        return draw_merge(tracks, frenet, config)
-    if bends(name, main_line(frenet, tracks)):
-        return draw_bent(name, tracks, frenet.spread(), config)
+            return draw_junction(name, tracks, config)
+    else:
+        main = main_line(frenet, tracks)
+        if bends(name, main):
+            return draw_along(name, main, config.lanes or frenet.spread().lanes, config)
     return draw(name, layout_for(name, tracks, config), config)
+
+
+BUILT_IN: dict[str, Drawer] = {
+    **dict.fromkeys(("straight", "curve", "t_intersection", "four_way"), draw_main_road),
+    "merge": draw_merge,
+    "roundabout": draw_roundabout,
+}
+"""The built-in roads that need no template, by name."""
+DRAWN: dict[str, Drawer] = {**BUILT_IN, "corridor": draw_corridor}
+"""All roads that are drawn, by name."""

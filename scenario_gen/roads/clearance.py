@@ -3,17 +3,13 @@
 
 """Distance to the nearest obstacle, whether discs and footprints have room, and the nearest pose that has."""
 
-from weakref import WeakKeyDictionary
-
 import numpy as np
 
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.numerics import Bools, exact, Floats, sealed
 from scenario_gen.numerics.kernels import B2, F, F2, kernel, OUT2, OUTB1
-from scenario_gen.types import Road
+from scenario_gen.types import once_per_object, Road
 
 CONTACT = 1e-9  # [cells] what lies nearer than this touches
-
-_fields: "WeakKeyDictionary[Road, tuple[Floats, Floats]]" = WeakKeyDictionary()
 
 
 def clearance_field(road: Road) -> Floats:
@@ -32,16 +28,11 @@ def clearance_in_cells(road: Road) -> Floats:
     return _both(road)[1]
 
 
+@once_per_object
 def _both(road: Road) -> tuple[Floats, Floats]:
-    known = _fields.get(road)
-    if known is None:
-        cells = np.empty(road.drivable.shape)
-        distance_transform(road.drivable, cells)
-        metres = cells * road.resolution
-        cells.setflags(write=False)
-        metres.setflags(write=False)
-        known = _fields.setdefault(road, (metres, cells))
-    return known
+    cells = np.empty(road.drivable.shape)
+    distance_transform(road.drivable, cells)
+    return sealed(cells * road.resolution), sealed(cells)
 
 
 def to_cells(road: Road, xy: Floats) -> Floats:

@@ -10,45 +10,36 @@ middle), so every step is a move that the disc can really make: where two cells 
 
 from collections.abc import Iterator
 import math
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, frozen_ints, Ints
+from scenario_gen.numerics import exact, Floats, Ints, sealed
 from scenario_gen.roads.clearance import clearance_in_cells, segment_free, segments_free, to_metres
 from scenario_gen.roads.labels import labelled
-from scenario_gen.types import Road
-
-_labels: "WeakKeyDictionary[Road, dict[float, Ints]]" = WeakKeyDictionary()
-_cells: "WeakKeyDictionary[Road, dict[tuple[float, int], tuple[Ints, Ints]]]" = WeakKeyDictionary()
+from scenario_gen.types import once_per_object, Road
 
 
+@once_per_object
 def components(road: Road, radius: float) -> Ints:
     """Connected components for a disc of `radius` [m]: (H, W), 0 where its centre cannot be, else 1, 2, …; read-only, cached."""
-    known = _labels.setdefault(road, {})
-    if radius not in known:
-        known[radius] = frozen_ints(labelled(clearance_in_cells(road) > radius / road.resolution))
-    return known[radius]
+    return sealed(labelled(clearance_in_cells(road) > radius / road.resolution))
 
 
+@once_per_object
 def component_cells(road: Road, radius: float, label: int) -> tuple[Ints, Ints]:
     """Flat indices of the cells of one component, in order, for a disc of `radius` [m]; cached.
 
     Returns:
         All of them (n,), and those (c,) that lie diagonally before a convex corner of what the disc cannot enter.
     """
-    known = _cells.setdefault(road, {})
-    if (radius, label) not in known:
-        inside = np.zeros(np.add(road.drivable.shape, 2), dtype=np.bool_)
-        inside[1:-1, 1:-1] = components(road, radius) == label
-        corner = np.zeros(road.drivable.shape, dtype=np.bool_)
-        rows, columns = road.drivable.shape
-        for di, dj in ((0, 0), (0, 2), (2, 0), (2, 2)):  # the diagonal neighbour is closed, the two between are open
-            beside, above = inside[1:-1, dj : dj + columns], inside[di : di + rows, 1:-1]
-            corner |= ~inside[di : di + rows, dj : dj + columns] & beside & above
-        corner &= inside[1:-1, 1:-1]
-        known[radius, label] = np.flatnonzero(inside[1:-1, 1:-1]), np.flatnonzero(corner)
-    return known[radius, label]
+    inside = np.pad(components(road, radius) == label, 1)
+    corner = np.zeros(road.drivable.shape, dtype=np.bool_)
+    rows, columns = road.drivable.shape
+    for di, dj in ((0, 0), (0, 2), (2, 0), (2, 2)):  # the diagonal neighbour is closed, the two between are open
+        beside, above = inside[1:-1, dj : dj + columns], inside[di : di + rows, 1:-1]
+        corner |= ~inside[di : di + rows, dj : dj + columns] & beside & above
+    corner &= inside[1:-1, 1:-1]
+    return np.flatnonzero(inside[1:-1, 1:-1]), np.flatnonzero(corner)
 
 
 def component_at(road: Road, xy: Floats, radius: float) -> int:

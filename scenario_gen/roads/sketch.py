@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A drawing of a road: strips, corners and swept footprints as polygons in metres, and the grid that they make."""
+"""A drawing of a road: its arms, and strips, corners and swept footprints as polygons in metres; and the grid that they make."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,19 +11,46 @@ from PIL import Image, ImageDraw
 
 from scenario_gen.numerics import Bools, exact, Floats
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import corners, unit, unit_left
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.labels import labelled
 from scenario_gen.types import Road
 
+ARM_COUNT = {"straight": 2, "curve": 2, "t_intersection": 3, "four_way": 4, "roundabout": 4}
+ROOM = 6.0  # metres kept free behind the first and before the last footprint
+SLACK = 12.0  # metres by which a junction's geometry, and ways through it, may differ from the template's
+SHORTEST = 30.0  # metres of an arm
+LANE_GAP = 2.0  # metres sideways that make another lane
 _BORDER = 2.0  # metres of wall around the grid
-_SLIVER = 60.0  # m²: smaller holes are none
+_SLIVER = 60.0  # m²: smaller holes are filled
 _STEP = 0.5  # metres between two cross sections of a strip
 _FLAT = np.radians(165.0)  # kerbs that meet at more make no corner
 
 
 @dataclass(frozen=True, eq=False)
+class PlannedArm:
+    """The end (3,) of an arm's dividing line, heading out, and its numbers of lanes in and out."""
+
+    pose: Floats
+    inward: int
+    outward: int
+
+    def lane(self, k: int, config: RoadConfig, *, inward: bool) -> Floats:
+        """The pose (3,) [m, m, rad] of lane k, counted from the dividing line, heading as its traffic does."""
+        left = (k + 0.5) * config.lane_width * (1.0 if inward == (config.traffic_side == "right") else -1.0)
+        yaw = self.pose[2]
+        return np.array([*(self.pose[:2] + left * unit_left(yaw)), yaw + np.pi if inward else yaw])
+
+
+def lane_ends(arms: Sequence[PlannedArm], config: RoadConfig) -> tuple[Floats, Floats]:
+    """The entries (E, 3) and exits (X, 3) [m, m, rad] of some arms."""
+    entries = [arm.lane(k, config, inward=True) for arm in arms for k in range(arm.inward)]
+    return np.array(entries), np.array([arm.lane(k, config, inward=False) for arm in arms for k in range(arm.outward)])
+
+
+@dataclass(frozen=True, eq=False)
 class Sketch:
-    """Polygons (K, 2) [m] that are drivable, and those that are not after all (islands)."""
+    """Polygons (K, 2) [m] that are drivable, and islands in them that are not."""
 
     drivable: list[Floats] = field(default_factory=list)
     islands: list[Floats] = field(default_factory=list)
@@ -38,53 +66,49 @@ class Sketch:
 
     def sweep(self, line: Curve, length: float, width: float) -> None:
         """Add what a footprint of `length` and `width` [m] covers on its way along a line."""
-        poses = line.cut(0.0, line.length, _STEP).points
-        cos, sin = exact.cos(poses[:, 2])[:, None], exact.sin(poses[:, 2])[:, None]
-        u = np.array([1.0, -1.0, -1.0, 1.0]) * length / 2.0
-        v = np.array([1.0, 1.0, -1.0, -1.0]) * width / 2.0
-        self.drivable.extend(np.stack((poses[:, :1] + u * cos - v * sin, poses[:, 1:2] + u * sin + v * cos), axis=-1))
+        self.drivable.extend(corners(line.cut(0.0, line.length, _STEP).points, length, width))
 
-    def corner(self, at: Floats, one: float, other: float, radius: float) -> None:
-        """Round the corner `at` (2,) between kerbs that lead away at `one` and `other` [rad], one clockwise of other."""
-        angle = float((other - one) % (2.0 * np.pi))
+    def corner(self, at: Floats, first: float, second: float, radius: float) -> None:
+        """Round the corner `at` (2,) between kerbs that lead away at `first` and `second` [rad], the first clockwise."""
+        angle = float((second - first) % (2.0 * np.pi))
         if not 0.05 < angle < _FLAT:
             return
         tangent = radius / exact.tan(angle / 2.0)
-        middle = one + angle / 2.0
-        centre = at + radius / exact.sin(angle / 2.0) * np.array([exact.cos(middle), exact.sin(middle)])
-        first = at + tangent * np.array([exact.cos(one), exact.sin(one)])
-        last = at + tangent * np.array([exact.cos(other), exact.sin(other)])
-        arc = _arc(centre, first, last, radius)
-        self.drivable.append(np.vstack((at[None], first[None], arc, last[None])))
+        centre = at + radius / exact.sin(angle / 2.0) * unit(first + angle / 2.0)
+        begin, end = (at + tangent * unit(kerb) for kerb in (first, second))
+        self.drivable.append(np.vstack((at[None], begin[None], _arc(centre, begin, end, radius), end[None])))
 
-    def raster(self, name: str, entries: Floats, exits: Floats, config: RoadConfig) -> Road:
-        """The road, its lower-left corner at (0, 0).
+    def grid(self, name: str, config: RoadConfig) -> tuple[Floats, Bools]:
+        """The lower-left corner (2,) [m] of the grid that holds everything, and whether its cells (H, W) are drivable.
 
         Raises:
             RefusedError: it has more cells than are allowed.
         """
         everything = np.concatenate(self.drivable)
         low = np.floor(everything.min(axis=0) - _BORDER)
-        size = np.ceil((everything.max(axis=0) + _BORDER - low) / config.resolution).astype(int)
-        refuse_too_many_cells(name, int(size[0]), int(size[1]), config)
-        image = Image.new("1", (int(size[0]), int(size[1])))
+        width, height = np.ceil((everything.max(axis=0) + _BORDER - low) / config.resolution).astype(int).tolist()
+        refuse_too_many_cells(name, width, height, config)
+        image = Image.new("1", (width, height))
         brush = ImageDraw.Draw(image)
         for polygons, fill in ((self.drivable, 1), (self.islands, 0)):
             for polygon in polygons:
                 cells = (polygon - low) / config.resolution - 0.5  # PIL's integers are cell centres
-                brush.polygon([(float(x), float(y)) for x, y in cells], fill=fill)
+                brush.polygon([(x, y) for x, y in cells.tolist()], fill=fill)
+        return low, np.array(image, dtype=np.bool_)
+
+    def road(self, name: str, entries: Floats, exits: Floats, config: RoadConfig) -> Road:
+        """The road, its lower-left corner at (0, 0); small holes between polygons are filled unless islands were drawn.
+
+        Raises:
+            RefusedError: it has more cells than are allowed.
+        """
+        low, drivable = self.grid(name, config)
+        if not self.islands:
+            holes = labelled(~drivable)
+            small = np.bincount(holes.ravel()) <= int(_SLIVER / np.square(config.resolution))
+            drivable |= small[holes] & (holes > 0)
         shift = np.array([*low, 0.0])
-        drivable = _without_slivers(np.asarray(image, dtype=np.bool_), int(_SLIVER / np.square(config.resolution)), self.islands)
         return Road(name, drivable, config.resolution, np.zeros(2), entries - shift, exits - shift)
-
-
-def _without_slivers(drivable: Bools, most: int, islands: list[Floats]) -> Bools:
-    """Fill holes of at most so many cells: what strips and sweeps left between them; islands that were drawn stay."""
-    if islands:
-        return drivable
-    holes = labelled(~drivable)
-    size = np.bincount(holes.ravel())
-    return np.asarray(drivable | ((size <= most)[holes] & (holes > 0)))
 
 
 def _arc(centre: Floats, first: Floats, last: Floats, radius: float) -> Floats:
@@ -92,22 +116,4 @@ def _arc(centre: Floats, first: Floats, last: Floats, radius: float) -> Floats:
     a, b = first - centre, last - centre
     start = float(exact.arctan2(a[1], a[0]))
     turn = float(exact.arctan2(a[0] * b[1] - a[1] * b[0], float((a * b).sum())))
-    angle = start + np.linspace(0.0, turn, 9)
-    return np.asarray(centre + radius * np.column_stack((exact.cos(angle), exact.sin(angle))))
-
-
-def convex_hull(points: Floats) -> Floats:
-    """Return the convex hull (H, 2) of points (M, 2) [m], counter-clockwise (Andrew 1979)."""
-    order = points[np.lexsort((points[:, 1], points[:, 0]))]
-    halves = []
-    for row in (order, order[::-1]):
-        half: list[Floats] = []
-        for point in row:
-            while len(half) > 1:
-                u, v = half[-1] - half[-2], point - half[-1]
-                if u[0] * v[1] - u[1] * v[0] > 0.0:
-                    break
-                half.pop()
-            half.append(point)
-        halves += half[:-1]
-    return np.array(halves)
+    return np.asarray(centre + radius * unit(start + np.linspace(0.0, turn, 9)))

@@ -12,18 +12,19 @@ from functools import lru_cache
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, frozen, wrap_angle
+from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import ahead_and_left, angle_between, place, polyline_of, unit
 
 Fits = Callable[[Floats], bool]
 
 _STEP = 0.25  # metres
 _PARALLEL = np.radians(8.0)
-_BLENDED = np.radians(35.0)  # a turn by up to this can also be made while changing to the line of the exit
+_BLENDED = np.radians(35.0)  # a turn by up to this is also possible while changing to the line of the exit
 _RAMP = 1.0 / 3.0  # share of a bend's length on which its curvature rises, and falls again
 _SHORT_RAMP = 0.12
 _TIGHTEST = 0.2  # 1/m
-_LADDER = (1.0, 0.8, 1.25, 0.64, 1.56, 0.5, 1.95, 2.4)  # times the curvature asked for
+_LADDER = (1.0, 0.8, 1.25, 0.64, 1.56, 0.5, 1.95, 2.4)  # times the requested curvature
 _PLAIN = 0.09  # 1/m, where nothing is known of the vehicle
 _LAST = (0.13, 0.155, 0.18, _TIGHTEST)  # 1/m, with short ramps: what a car can just drive
 _STEEPEST_SHIFT = 0.05  # 1/m, curvature of a change of lanes on the way
@@ -43,12 +44,12 @@ def draw_route(entry: Floats, leave: Floats, fits: Fits, sharpness: float | None
 
     Source: clothoid, arc, clothoid, as roads are laid out.
     """
-    turn = float(wrap_angle(np.asarray(leave[2] - entry[2])))
+    turn = angle_between(leave[2], entry[2])
     ahead, left = relative(entry, leave[:2])
     if abs(turn) < _PARALLEL:
         return _accepted(_beside(entry, ahead, left, turn), fits) if ahead > 1.0 else None
     if abs(turn) > np.pi - _PARALLEL:
-        return None  # a U-turn: where along the road is for the template to say, see draw_u_turn
+        return None  # a U-turn: the template says where along the road, see draw_u_turn
     along_exit = left / exact.sin(turn)  # from the lines' intersection to the exit
     along_entry = ahead - along_exit * exact.cos(turn)
     wanted = sharpness or _PLAIN
@@ -68,7 +69,7 @@ def draw_route(entry: Floats, leave: Floats, fits: Fits, sharpness: float | None
 
 def draw_u_turn(entry: Floats, leave: Floats, apex: float, fits: Fits) -> Curve | None:
     """The route between two poses (3,) that drives `apex` metres, makes a half circle and leaves by the lane beside it."""
-    turn = float(wrap_angle(np.asarray(leave[2] - entry[2])))
+    turn = angle_between(leave[2], entry[2])
     ahead, left = relative(entry, leave[:2])
     radius = abs(left) / 2.0
     if abs(turn) < np.pi - _PARALLEL or radius < _TIGHTEST_U_TURN or apex - ahead <= 1.0 or apex <= 1.0:
@@ -109,17 +110,13 @@ def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float,
         count = max(round(length / _STEP), 1)
         yaw += (yaw[-1] + curvature * length * np.arange(1, count + 1) / count).tolist()
         steps += [length / count] * count
-    lengths = np.array(steps)
     turned = np.array(yaw)
-    middle = (turned[1:] + turned[:-1]) / 2.0
-    xy = np.vstack(
-        (np.zeros((1, 2)), np.cumsum(lengths[:, None] * np.column_stack((exact.cos(middle), exact.sin(middle))), axis=0))
-    )
+    xy = polyline_of(turned, np.array(steps))
     end = np.array(relative(entry, leave[:2]))
     if exact.hypot(*(xy[-1] - end)) > 1.0:
         return None
     xy += np.linspace(0.0, 1.0, len(xy))[:, None] * (end - xy[-1])  # what rounding leaves
-    return _accepted(Curve(np.column_stack((_placed(entry, xy), entry[2] + turned))), fits)
+    return _accepted(Curve(np.column_stack((place(entry, xy[:, 0], xy[:, 1]), entry[2] + turned))), fits)
 
 
 def flare_begins(radius: float, aside: float) -> float:
@@ -129,9 +126,8 @@ def flare_begins(radius: float, aside: float) -> float:
 
 def relative(pose: Floats, xy: Floats) -> tuple[float, float]:
     """How far [m] `xy` (2,) lies ahead and to the left of a pose (3,)."""
-    d = xy - pose[:2]
-    cos, sin = exact.cos(pose[2]), exact.sin(pose[2])
-    return float(d[0] * cos + d[1] * sin), float(d[1] * cos - d[0] * sin)
+    ahead, left = ahead_and_left(xy - pose[:2], pose[2])
+    return float(ahead), float(left)
 
 
 def line_between(shape: Curve, entry: Floats, leave: Floats) -> tuple[Curve, float] | None:
@@ -143,7 +139,7 @@ def line_between(shape: Curve, entry: Floats, leave: Floats) -> tuple[Curve, flo
         The line, and the arc length [m] on it at which the shape begins; None if the two poses are not so to each other.
     """
     own = float(shape.points[-1, 2] - shape.points[0, 2])
-    extra = float(wrap_angle(np.asarray(leave[2] - entry[2] - own)))
+    extra = angle_between(leave[2] - entry[2], own)
     if abs(extra) > np.radians(25.0):
         return None
     bent = _bent(shape, extra)
@@ -171,14 +167,8 @@ def _bent(shape: Curve, extra: float) -> Floats:
     count = max(int(np.ceil(shape.length / _STEP)), 1)
     s = np.linspace(0.0, shape.length, count + 1)
     yaw = np.interp(s, shape.station, shape.points[:, 2])
-    return _integrated(yaw - yaw[0] + extra * s / shape.length, shape.length / count)
-
-
-def _integrated(yaw: Floats, step: float) -> Floats:
-    """(M, 3) poses of a path from the origin whose heading is `yaw` (M,) at equal steps [m]."""
-    middle = (yaw[1:] + yaw[:-1]) / 2.0
-    xy = np.cumsum(step * np.column_stack((exact.cos(middle), exact.sin(middle))), axis=0)
-    return np.column_stack((np.vstack((np.zeros((1, 2)), xy)), yaw))
+    yaw = yaw - yaw[0] + extra * s / shape.length
+    return np.column_stack((polyline_of(yaw, shape.length / count), yaw))
 
 
 @lru_cache(maxsize=512)
@@ -189,8 +179,8 @@ def _bend(turn: float, curvature: float, ramp: float) -> Floats:
     x = np.linspace(0.0, 1.0, count + 1)
     rise = np.minimum(np.square(np.minimum(x, ramp)) / (2.0 * ramp) + np.maximum(x - ramp, 0.0), 1.0 - ramp)
     fall = np.square(np.maximum(x - (1.0 - ramp), 0.0)) / (2.0 * ramp)
-    share = np.where(x > 1.0 - ramp, x - ramp / 2.0 - fall, rise) / (1.0 - ramp)  # of the turn that is made
-    return frozen(_integrated(turn * share, length / count))
+    share = np.where(x > 1.0 - ramp, x - ramp / 2.0 - fall, rise) / (1.0 - ramp)  # of the turn
+    return frozen(np.column_stack((polyline_of(turn * share, length / count), turn * share)))
 
 
 def _accepted(curve: Curve | None, fits: Fits) -> Curve | None:
@@ -205,7 +195,7 @@ def _beside(entry: Floats, ahead: float, left: float, turn: float) -> Curve | No
     slope = float(exact.tan(turn))
     aside = left - slope * ahead / 2.0  # how far the two lines are apart half-way
     if abs(left) < 0.05 and abs(turn) < 1e-3:
-        return Curve(np.array([[*entry[:2], entry[2]], [*_placed(entry, np.array([[ahead, left]]))[0], entry[2]]]))
+        return Curve(np.array([entry[:3], [*place(entry, ahead, left), entry[2]]]))
     reach = max(
         float(np.sqrt(abs(aside) * 5.7735 / _STEEPEST_SHIFT)),  # the blend's steepest second derivative is 5.7735
         1.875 * abs(slope) / _STEEPEST_SHIFT,
@@ -218,21 +208,14 @@ def _beside(entry: Floats, ahead: float, left: float, turn: float) -> Curve | No
     cube = exact.power(x, 3)
     y = end * cube * (10.0 - 15.0 * x + 6.0 * np.square(x)) + slope * reach * cube * (-4.0 + 7.0 * x - 3.0 * np.square(x))
     along = np.concatenate(([0.0], first + reach * x, [ahead]))
-    return Curve.through(_placed(entry, np.column_stack((along, np.concatenate(([0.0], y, [left]))))))
-
-
-def _placed(pose: Floats, xy: Floats) -> Floats:
-    """Points (M, 2) [m] ahead and left of a pose (3,), in its frame's parent."""
-    cos, sin = exact.cos(pose[2]), exact.sin(pose[2])
-    return np.column_stack((pose[0] + xy[:, 0] * cos - xy[:, 1] * sin, pose[1] + xy[:, 0] * sin + xy[:, 1] * cos))
+    return Curve.through(place(entry, along, np.concatenate(([0.0], y, [left]))))
 
 
 def _joined(entry: Floats, before: float, bend: Floats, after: float) -> Curve:
     """Straight for `before` metres, the bend (M, 3) given from the origin along x, straight for `after` metres."""
     points = bend + np.array([before, 0.0, 0.0])
-    turn = float(points[-1, 2])
-    end = points[-1] + np.array([after * exact.cos(turn), after * exact.sin(turn), 0.0])
+    end = points[-1] + np.array([*(after * unit(points[-1, 2])), 0.0])
     pieces = [np.zeros((1, 3))] if before > 1e-6 else []
     pieces += [points, end[None]] if after > 1e-6 else [points]
     local = np.vstack(pieces)
-    return Curve(np.column_stack((_placed(entry, local[:, :2]), entry[2] + local[:, 2])))
+    return Curve(np.column_stack((place(entry, local[:, 0], local[:, 1]), entry[2] + local[:, 2])))

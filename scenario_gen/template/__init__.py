@@ -18,7 +18,7 @@ from scenario_gen.template.interaction import (
     waits_to_keep,
 )
 from scenario_gen.template.manoeuvre import in_words, keeps, manoeuvre_of, MOST_CHANGE, sharpness_of, turn_of, turns_to_keep
-from scenario_gen.template.path_crossing import path_crossing, PathCrossing
+from scenario_gen.template.path_crossing import pair_crossings, path_crossing, PathCrossing
 from scenario_gen.template.reactions import reactions_of
 from scenario_gen.template.separation import footprint_gap, least_gap, least_gaps, own_paths, separate, smallest_gaps
 from scenario_gen.template.side import mirrored, traffic_side
@@ -29,6 +29,7 @@ __all__ = [
     "MOST_CHANGE", "MOST_SAMPLES", "MOST_VEHICLES", "STAND_SPEED", "WAIT_SPEED", "Conflict", "FrenetTracks", "MainLine",
     "Motion", "PathCrossing", "Track", "Wait", "clean_tracks", "closest_crossing", "conflict_of", "find_conflicts",
     "find_waits", "footprint_gap", "in_words", "keeps", "lag_behind", "least_gap", "least_gaps", "main_line", "manoeuvre_of",
-    "mirrored", "orders_asked", "own_paths", "pair_conflict", "path_crossing", "reactions_of", "refuse_too_large", "separate",
-    "sharpness_of", "smallest_gaps", "time_gaps", "to_frenet", "traffic_side", "turn_of", "turns_to_keep", "waits_to_keep",
+    "mirrored", "orders_asked", "own_paths", "pair_conflict", "pair_crossings", "path_crossing", "reactions_of",
+    "refuse_too_large", "separate", "sharpness_of", "smallest_gaps", "time_gaps", "to_frenet", "traffic_side", "turn_of",
+    "turns_to_keep", "waits_to_keep",
 ]  # fmt: skip

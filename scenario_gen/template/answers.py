@@ -7,7 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.template.interaction import Conflict, pair_conflict, WAIT_SPEED
 from scenario_gen.types import Vehicle
 
@@ -80,9 +81,9 @@ def time_gaps(motion: Motion, who: int, whom: int) -> Floats:
     """Return the time gaps (k,) [s], centre to centre, of a vehicle that drives (2 m/s or more) behind another one."""
     (a, b), (c, d) = motion.present[[who, whom]].tolist()
     at = slice(max(a, c), min(b, d) + 1)
-    speed, yaw = motion.speed[who, at], motion.heading[who, at]
+    speed = motion.speed[who, at]
     between = motion.position[whom, at] - motion.position[who, at]
-    along = between[:, 0] * exact.cos(yaw) + between[:, 1] * exact.sin(yaw)
+    along, _ = ahead_and_left(between, motion.heading[who, at])
     apart = np.sqrt(np.square(between).sum(axis=1))
     drives = (speed > SLOWEST) & (along > 0.5 * apart)
     return np.asarray(apart[drives] / speed[drives])

@@ -15,7 +15,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Bools, exact, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.template.manoeuvre import turn_of
-from scenario_gen.template.tracks import presence_of, smoothing_spline, Track
+from scenario_gen.template.tracks import smoothing_spline, Track
 
 _ALONG = np.radians(50.0)  # a vehicle along the road is never turned from it by more
 _SAME_LANE = 1.75  # metres of offset within which two vehicles may share a lane
@@ -54,6 +54,11 @@ class FrenetTracks:
     lanes: int
     between: tuple[int, int] = (0, 0)
 
+    def span(self, tracks: tuple[Track, ...]) -> tuple[float, float]:
+        """The lowest and highest station [m] that a footprint reaches."""
+        half = np.array([[track.vehicle.length / 2.0] for track in tracks])
+        return float((self.station - half).min()), float((self.station + half).max())
+
     def spread(self) -> "FrenetTracks":
         """The same with the lanes between oncoming vehicles counted."""
         ahead, against = self.between
@@ -86,8 +91,7 @@ def main_line(frenet: FrenetTracks, tracks: tuple[Track, ...]) -> MainLine:
 
     It is straight where no vehicle turns by more than 10°; else the reference line without its wiggles.
     """
-    half = np.array([[track.vehicle.length / 2.0] for track in tracks])
-    low, high = float((frenet.station - half).min()), float((frenet.station + half).max())
+    low, high = frenet.span(tracks)
     if max(abs(turn_of(track)) for track in tracks) <= _STRAIGHT:
         shape = Curve(np.array([[0.0, 0.0, 0.0], [high - low, 0.0, 0.0]]))
         return MainLine(shape, frozen([low, high]), frozen([0.0, high - low]))
@@ -213,7 +217,7 @@ def _lanes(tracks: tuple[Track, ...], direction: Ints, station: Floats, offset: 
         done = np.clip((right[i] - ends[i, 0]) / (ends[i, 1] - ends[i, 0]), 0.0, 1.0)
         change[i] = np.maximum.accumulate(done)
     there = np.stack((change < 0.5, (change >= 0.5) | ~changes[:, None]), axis=1)  # when each is in its first, in its last lane
-    there &= np.stack([presence_of(track) for track in tracks])[:, None]
+    there &= np.stack([track.there for track in tracks])[:, None]
     lane = np.zeros((len(tracks), 2), dtype=np.int64)
     for sign in (1, -1):
         members = np.flatnonzero(direction == sign)

@@ -19,7 +19,7 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import exact, Floats, Ints, runs
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1
-from scenario_gen.types import ALWAYS, Encounter, once_per_encounter, Segmentation, Vehicle
+from scenario_gen.types import ALWAYS, Encounter, once_per_object, Segmentation, Vehicle
 
 WAIT_SPEED = 0.5  # m/s
 WAIT_DURATION = 1.0  # s
@@ -77,7 +77,7 @@ class Conflict:
         return self.entry_second - self.entry_first
 
 
-@once_per_encounter
+@once_per_object
 def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
     """Return the waits of every vehicle, in order of vehicle and time.
 
@@ -121,12 +121,9 @@ def find_conflicts(
         present: (N, 2) first and last sample of each vehicle; default: everybody throughout.
     """
     time, position, heading = (np.ascontiguousarray(array, dtype=np.float64) for array in (time, position, heading))
-    found = []
-    for a, b in combinations(range(len(vehicles)), 2):
-        answer = pair_conflict(vehicles, time, position, heading, a, b, present)
-        if answer is not None:
-            found.append(answer)
-    return tuple(found)
+    pairs = combinations(range(len(vehicles)), 2)
+    found = (pair_conflict(vehicles, time, position, heading, a, b, present) for a, b in pairs)
+    return tuple(conflict for conflict in found if conflict is not None)
 
 
 def orders_asked(conflicts: Sequence[Conflict], order: str) -> tuple[int | None, ...]:
@@ -149,13 +146,13 @@ def orders_asked(conflicts: Sequence[Conflict], order: str) -> tuple[int | None,
         raise RefusedError(
             "order: in the template nobody crosses another one's path or merges into it, so no order can be swapped"
         )
-    return tuple(one.second if one is closest else one.first if one.following else None for one in conflicts)
+    return tuple(c.second if c is closest else c.first if c.following else None for c in conflicts)
 
 
 def closest_crossing(conflicts: Sequence[Conflict]) -> Conflict | None:
     """Return the crossing or merging conflict with the least post-encroachment time; None without one."""
-    crossing = [one for one in conflicts if not one.following]
-    return min(crossing, key=lambda one: one.encroachment, default=None)
+    crossing = [conflict for conflict in conflicts if not conflict.following]
+    return min(crossing, key=lambda conflict: conflict.encroachment, default=None)
 
 
 def pair_conflict(

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from scenario_gen.numerics import wrap_angle
+from scenario_gen.numerics.plane import angle_between
 from scenario_gen.template.tracks import Track
 
 MOST_CHANGE: Final = np.radians(25.0)  # a manoeuvre is kept if its turn differs by no more, and it has the same name
@@ -36,7 +36,7 @@ def manoeuvre_of(turn: float) -> str:
 
 def keeps(template: float, road: float) -> bool:
     """Whether a turn on a road [rad] is that of the template [rad]: at most 25° different, and of the same name."""
-    change = abs(float(wrap_angle(np.asarray(road - template))))
+    change = abs(angle_between(road, template))
     return change <= _DOUBT or (change <= MOST_CHANGE and manoeuvre_of(template) == manoeuvre_of(road))
 
 

@@ -3,6 +3,7 @@
 
 """Where two tracks cross: the point at which their paths cross, also a little beyond their recorded ends."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,24 +19,41 @@ _HEAD_ON = np.radians(30.0)  # nearer to head-on than this, a crossing is a matt
 
 @dataclass(frozen=True)
 class PathCrossing:
-    """Arc lengths [m] on the first and on the second track at which they cross; below 0 or above the path's length if beyond."""
+    """Where two tracks cross.
+
+    Attributes:
+        first: arc length [m] on the first track; below 0 or above the path's length if it lies beyond.
+        second: likewise on the second one.
+        driven: whether both vehicles drive as far as that.
+    """
 
     first: float
     second: float
+    driven: bool
 
 
 def path_crossing(a: Track, b: Track) -> PathCrossing | None:
     """The crossing that both come nearest to reaching (of several, the squarest and nearest in time), or None."""
-    one, two = (t.curve.cut(-_BEYOND, t.travelled + _BEYOND) for t in (a, b))
-    found = crossings(one, two, _ANGLE) - _BEYOND
+    first, second = (track.curve.cut(-_BEYOND, track.travelled + _BEYOND) for track in (a, b))
+    found = crossings(first, second, _ANGLE) - _BEYOND
     angle = a.curve.at(found[:, 0])[:, 2] - b.curve.at(found[:, 1])[:, 2]
-    found, angle = found[exact.cos(angle) > -exact.cos(_HEAD_ON)], angle[exact.cos(angle) > -exact.cos(_HEAD_ON)]
+    aslant = exact.cos(angle) > -exact.cos(_HEAD_ON)
+    found, angle = found[aslant], angle[aslant]
     if len(found) == 0:
         return None
     short = _outside(found[:, 0], a.travelled) + _outside(found[:, 1], b.travelled)
     lag = np.abs(_sample(a, found[:, 0]) - _sample(b, found[:, 1]))
     best = int(np.argmin(short * 10.0 + lag * 0.05 + 25.0 * (1.0 - np.abs(exact.sin(angle)))))
-    return PathCrossing(float(found[best, 0]), float(found[best, 1]))
+    return PathCrossing(float(found[best, 0]), float(found[best, 1]), bool(short[best] == 0.0))
+
+
+def pair_crossings(tracks: Sequence[Track]) -> Iterator[tuple[int, int, PathCrossing]]:
+    """Yield the crossings of all pairs of tracks: the index of the first, the lower one of the second, where they cross."""
+    for a, first in enumerate(tracks):
+        for b, second in enumerate(tracks[:a]):
+            crossing = path_crossing(first, second)
+            if crossing is not None:
+                yield a, b, crossing
 
 
 def _outside(station: Floats, length: float) -> Floats:

@@ -14,9 +14,10 @@ import math
 import numpy as np
 
 from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
+from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.template.answers import SLOWEST, time_gaps
 from scenario_gen.template.interaction import Conflict, find_conflicts, find_waits
-from scenario_gen.types import Encounter, FOLLOW, once_per_encounter, Reaction, ReactionGraph, YIELD
+from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, ReactionGraph, YIELD
 
 FAR = 60.0  # m, within which one follows
 LONG_ENOUGH = 3.0  # s, for which it drives behind the other
@@ -38,19 +39,18 @@ _SLOWS_BY, _SLOWS_TO, _BENDS = 2.0, 0.6, 0.7  # m/s, share of the speed, and wha
 _NEAR = 25.0  # m from the shared area, within which one waits for it
 
 
-@once_per_encounter
+@once_per_object
 def reactions_of(encounter: Encounter) -> ReactionGraph:
     """Return who reacts to whom."""
     follows = _nearest_leaders(encounter)
     conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
-    yields = [one for one in (_yields(encounter, conflict) for conflict in conflicts) if one is not None]
+    yields = [edge for conflict in conflicts if (edge := _yields(encounter, conflict)) is not None]
     led = {edge.who: edge for edge in follows}
-    kept = [one for one in yields if not _explained(one, led.get(one.who), encounter)]
+    kept = [edge for edge in yields if not _explained(edge, led.get(edge.who), encounter)]
     best: dict[tuple[int, float], Reaction] = {}
-    for one in kept:  # of several that a wait is for, the last to clear lets it go
-        key = one.who, one.until
-        if key not in best or one.confidence > best[key].confidence:
-            best[key] = one
+    for edge in kept:  # of several that a wait is for, the last to clear lets it go
+        key = edge.who, edge.until
+        best[key] = max(best.get(key, edge), edge, key=lambda known: known.confidence)
     return without_circles([*follows, *best.values()], len(encounter.vehicles))
 
 
@@ -59,7 +59,7 @@ def without_circles(edges: Sequence[Reaction], count: int) -> ReactionGraph:
     kept: list[Reaction] = []
     cut: list[Reaction] = []
     behind: list[set[int]] = [set() for _ in range(count)]  # all whom a vehicle reacts to, directly or through others
-    for edge in sorted(edges, key=lambda one: (-one.confidence, one.who, one.whom)):
+    for edge in sorted(edges, key=lambda edge: (-edge.confidence, edge.who, edge.whom)):
         if edge.who == edge.whom or edge.who in behind[edge.whom]:
             cut.append(edge)
             continue
@@ -69,7 +69,7 @@ def without_circles(edges: Sequence[Reaction], count: int) -> ReactionGraph:
             if n == edge.who or edge.who in behind[n]:
                 behind[n] |= reached
     order = tuple(sorted(range(count), key=lambda n: (len(behind[n]), n)))
-    kept.sort(key=lambda one: (order.index(one.who), one.whom, one.kind, one.until))
+    kept.sort(key=lambda edge: (order.index(edge.who), edge.whom, edge.kind, edge.until))
     return ReactionGraph(tuple(kept), order, tuple(cut))
 
 
@@ -87,7 +87,7 @@ def _nearest_leaders(encounter: Encounter) -> list[Reaction]:
         edges = [_follows(encounter, who, whom, ahead[whom] & (apart[whom] <= nearest), apart[whom]) for whom in ahead]
         sure = [edge for edge in edges if edge is not None]
         if sure:
-            found.append(max(sure, key=lambda one: (one.until - one.since) * one.confidence))
+            found.append(max(sure, key=lambda edge: (edge.until - edge.since) * edge.confidence))
     return found
 
 
@@ -97,8 +97,7 @@ def is_behind(encounter: Encounter, who: int, whom: int) -> Bools:
     yaw_a, yaw_b = encounter.heading[who], encounter.heading[whom]
     both = encounter.there[who] & encounter.there[whom]
     between = b - a
-    cos, sin = exact.cos(yaw_a), exact.sin(yaw_a)
-    along, across = between[:, 0] * cos + between[:, 1] * sin, between[:, 1] * cos - between[:, 0] * sin
+    along, across = ahead_and_left(between, yaw_a)
     alike = np.abs(wrap_angle(yaw_b - yaw_a)) < _ALIKE
     straight = (along > 0.0) & (np.abs(across) < _LANE) & alike
     step = max(round(0.5 / encounter.dt), 1)
@@ -166,7 +165,7 @@ def _starts_behind(encounter: Encounter, who: int, whom: int, behind: Bools) -> 
         lags = [wait.end - end for end in leaders if 0.0 < wait.end - end <= LAGS[1]]
         if wait.vehicle == who and lags and behind[int(np.searchsorted(encounter.time, wait.end - 1e-9))]:
             found.append((min(lags), _soon(min(lags), encounter.duration)))
-    return max(found, key=lambda one: one[1], default=None)
+    return max(found, key=lambda start: start[1], default=None)
 
 
 def _soon(lag: float, duration: float) -> float:
@@ -205,7 +204,7 @@ def _best_lag(own: Floats, other: Floats, behind: Bools, dt: float) -> tuple[flo
     return lag, explained * explained
 
 
-_STANDARD_LAG = 1.2  # s, of a follower whose record does not tell
+_STANDARD_LAG = 1.2  # s, of a follower whose record does not show it
 
 
 def _standard_error(a: Floats, b: Floats) -> float:

@@ -6,14 +6,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.template.tracks import clean_tracks, presence_of, Track
-from scenario_gen.types import Encounter, once_per_encounter, together, Vehicle
+from scenario_gen.numerics.plane import ahead_and_left, unit
+from scenario_gen.template.tracks import clean_tracks, Track
+from scenario_gen.types import Encounter, once_per_object, together, Vehicle
 
 _ROUNDS = 400
 _ALONG = 0.3  # how readily a vehicle is set forward or back on its path
@@ -58,7 +60,7 @@ def footprint_gap(a: Vehicle, poses_a: Floats, b: Vehicle, poses_b: Floats) -> t
     gap = np.full(len(between), -np.inf)
     axis = np.zeros((len(between), 2))
     for yaw in (poses_a[:, 2], poses_a[:, 2] + np.pi / 2.0, poses_b[:, 2], poses_b[:, 2] + np.pi / 2.0):
-        n = np.column_stack((exact.cos(yaw), exact.sin(yaw)))
+        n = unit(yaw)
         along = (between * n).sum(axis=1)
         reach = _reach(a, poses_a[:, 2] - yaw) + _reach(b, poses_b[:, 2] - yaw)
         separation = np.abs(along) - reach
@@ -74,7 +76,7 @@ def smallest_gaps(tracks: Sequence[Track]) -> Floats:
     poses = [track.poses for track in tracks]
     for i in range(len(tracks)):
         for j in range(i):
-            gaps[i, j] = gaps[j, i] = _worst(tracks, poses, i, j)[0]
+            gaps[i, j] = gaps[j, i] = _least_gap(tracks, poses, i, j).size
     return gaps
 
 
@@ -99,31 +101,24 @@ def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sid
     poses = list(base)
     ease = np.array([_ALONG, sideways])
     pairs = _near_pairs(tracks, base, clearance + 2.0 * max_shift)
-    known: dict[tuple[int, int], tuple[float, int, int, int, Floats]] = {}
+    known: dict[tuple[int, int], _Gap] = {}
     for _ in range(_ROUNDS):
-        for i, j in pairs:
-            if (i, j) not in known:
-                known[i, j] = _worst(tracks, poses, i, j)
-        worst = min(known.values(), key=lambda found: found[0], default=None)
-        if worst is None or worst[0] >= clearance - 1e-3:
-            worst = (clearance, -1, -1, 0, np.zeros(2))
-        gap_now, i, j, at, normal = worst
-        if i < 0:
+        known |= {pair: _least_gap(tracks, poses, *pair) for pair in pairs if pair not in known}
+        worst = min(known.values(), key=lambda gap: gap.size, default=_Gap(np.inf, (0, 0), 0, np.zeros(2)))
+        if worst.size >= clearance - 1e-3:
             break
-        levers = np.array([_lever(poses[i][at, 2], normal), -_lever(poses[j][at, 2], normal)])
+        i, j = worst.pair
+        levers = np.array([ahead_and_left(axis, poses[k][worst.sample, 2]) for k, axis in ((i, worst.axis), (j, -worst.axis))])
         power = (ease * np.square(levers)).sum()
-        if power < 1e-6:
-            raise RefusedError(_too_close(tracks[i], tracks[j], gap_now, clearance, max_shift))
-        push = (clearance - gap_now) / power * ease * levers
-        shift[i] += push[0]
-        shift[j] += push[1]
-        if exact.hypot(*shift.T).max() > max_shift:
-            raise RefusedError(_too_close(tracks[i], tracks[j], gap_now, clearance, max_shift))
+        if power >= 1e-6:
+            shift[[i, j]] += (clearance - worst.size) / power * ease * levers
+        if power < 1e-6 or exact.hypot(*shift.T).max() > max_shift:
+            raise RefusedError(_too_close(tracks, worst, clearance, max_shift))
         for k in (i, j):
             poses[k] = _place(tracks[k], shift[k]).poses
-        known = {pair: found for pair, found in known.items() if i not in pair and j not in pair}
+        known = {pair: gap for pair, gap in known.items() if i not in pair and j not in pair}
     else:
-        raise RefusedError(_too_close(tracks[i], tracks[j], gap_now, clearance, max_shift))
+        raise RefusedError(_too_close(tracks, worst, clearance, max_shift))
     moved = exact.hypot(*shift.T)
     before = smallest_gaps(tracks).min(axis=1)
     notes = tuple(
@@ -138,33 +133,31 @@ def separate(tracks: Sequence[Track], clearance: float, max_shift: float, *, sid
 
 def _near_pairs(tracks: Sequence[Track], poses: Sequence[Floats], room: float) -> list[tuple[int, int]]:
     """Pairs (i, j), j < i, that are there together, and whose footprints come within `room` [m] of each other at most."""
+    diagonal = [float(exact.hypot(track.vehicle.length, track.vehicle.width)) for track in tracks]
     found = []
     for i in range(len(tracks)):
         for j in range(i):
-            both = presence_of(tracks[i]) & presence_of(tracks[j])
-            reach = (_diagonal(tracks[i].vehicle) + _diagonal(tracks[j].vehicle)) / 2.0
+            both = tracks[i].there & tracks[j].there
+            reach = (diagonal[i] + diagonal[j]) / 2.0
             if both.any() and exact.hypot(*(poses[i] - poses[j])[both, :2].T).min() < room + reach:
                 found.append((i, j))
     return found
 
 
-def _diagonal(vehicle: Vehicle) -> float:
-    return float(exact.hypot(vehicle.length, vehicle.width))
+class _Gap(NamedTuple):
+    """The least gap [m] of a pair of vehicles while both are there, the sample of it, and the axis (2,) from the second one."""
+
+    size: float
+    pair: tuple[int, int]
+    sample: int
+    axis: Floats
 
 
-def _worst(tracks: Sequence[Track], poses: Sequence[Floats], i: int, j: int) -> tuple[float, int, int, int, Floats]:
-    """The least gap [m] of two vehicles while both are there, who they are, the sample, and the axis (2,)."""
+def _least_gap(tracks: Sequence[Track], poses: Sequence[Floats], i: int, j: int) -> _Gap:
     gap, axis = footprint_gap(tracks[i].vehicle, poses[i], tracks[j].vehicle, poses[j])
-    gap = np.where(presence_of(tracks[i]) & presence_of(tracks[j]), gap, np.inf)
+    gap = np.where(tracks[i].there & tracks[j].there, gap, np.inf)
     at = int(np.argmin(gap))
-    return float(gap[at]), i, j, at, axis[at]
-
-
-def _lever(yaw: float, normal: Floats) -> Floats:
-    """How far a unit shift along and to the left moves a vehicle along `normal`."""
-    return np.array(
-        [exact.cos(yaw) * normal[0] + exact.sin(yaw) * normal[1], -exact.sin(yaw) * normal[0] + exact.cos(yaw) * normal[1]]
-    )
+    return _Gap(float(gap[at]), (i, j), at, axis[at])
 
 
 def _place(track: Track, shift: Floats) -> Track:
@@ -182,9 +175,10 @@ def _place(track: Track, shift: Floats) -> Track:
     return replace(track, curve=curve, progress=frozen(progress))
 
 
-def _too_close(a: Track, b: Track, gap: float, clearance: float, max_shift: float) -> str:
+def _too_close(tracks: Sequence[Track], gap: _Gap, clearance: float, max_shift: float) -> str:
+    first, second = (tracks[k].vehicle.id for k in gap.pair)
     return (
-        f"vehicles {a.vehicle.id} and {b.vehicle.id} come within {gap:.2f} m of each other and cannot be kept {clearance:.2f} m "
+        f"vehicles {first} and {second} come within {gap.size:.2f} m of each other and cannot be kept {clearance:.2f} m "
         f"apart by shifting their paths up to {max_shift:.1f} m"
     )
 
@@ -193,7 +187,7 @@ OWN_CLEARANCE = 0.5  # metres between footprints
 OWN_MAX_SHIFT = 3.0
 
 
-@once_per_encounter
+@once_per_object
 def own_paths(encounter: Encounter) -> Separation:
     """Clean the template's paths and separate its vehicles.
 
@@ -210,7 +204,7 @@ def own_paths(encounter: Encounter) -> Separation:
     return replace(separation, notes=(*notes, *separation.notes))
 
 
-@once_per_encounter
+@once_per_object
 def least_gaps(encounter: Encounter) -> Floats:
     """Return the least gap (N,) [m] of each vehicle to any other, negative if they overlap; inf if it is never beside one."""
     poses = np.concatenate([encounter.position, encounter.heading[..., None]], axis=-1)

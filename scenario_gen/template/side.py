@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.numerics import exact, wrap_angle
+from scenario_gen.numerics import wrap_angle
+from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.types import Encounter
 
 _OPPOSITE = np.radians(150.0)  # between headings, at least
@@ -24,9 +25,7 @@ def traffic_side(encounter: Encounter) -> str:
     votes = 0
     for a in range(len(encounter.vehicles)):
         both = encounter.there[a] & encounter.there & (encounter.speed[a] > _MOVES) & (encounter.speed > _MOVES)
-        offset = encounter.position - encounter.position[a]
-        cos, sin = exact.cos(encounter.heading[a]), exact.sin(encounter.heading[a])
-        ahead, left = offset[..., 0] * cos + offset[..., 1] * sin, offset[..., 1] * cos - offset[..., 0] * sin
+        ahead, left = ahead_and_left(encounter.position - encounter.position[a], encounter.heading[a])
         passing = both & (np.abs(wrap_angle(encounter.heading - encounter.heading[a])) > _OPPOSITE) & (np.abs(ahead) < _ABREAST)
         passing &= (np.abs(left) > _BESIDE[0]) & (np.abs(left) < _BESIDE[1])
         votes += int(np.sign(left[passing]).sum())

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How large an encounter can be, in time and in space, so that its scenarios are had in minutes and in a few gigabytes."""
+"""How large an encounter can be, in time and in space, so that its scenarios take minutes and some gigabytes at most."""
 
 from itertools import combinations
 

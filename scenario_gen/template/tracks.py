@@ -11,7 +11,8 @@ and turn as far as before. Standing
 phases collapse to a point, time enters only through u(t), and no sample turns back.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
+from functools import cached_property
 import math
 
 import numpy as np
@@ -19,7 +20,8 @@ import numpy as np
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.numerics import Bools, exact, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.types import ALWAYS, Encounter, once_per_encounter, Vehicle
+from scenario_gen.numerics.plane import polyline_of, unit
+from scenario_gen.types import Encounter, mask, once_per_object, Vehicle
 
 _WAVELENGTHS = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)  # metres at which the filter halves an oscillation
 _MAX_CURVATURE = 0.2  # 1/m, a car's tightest turn but for a little
@@ -51,12 +53,13 @@ class Track:
     speed: Floats
     still: bool
     deviation: float
-    present: Ints = field(default_factory=lambda: ALWAYS[:0, 0])
-    recorded_turn: float = math.nan
+    present: Ints
+    recorded_turn: float
 
-    def __post_init__(self) -> None:
-        if len(self.present) != 2:
-            object.__setattr__(self, "present", frozen_ints([0, len(self.progress) - 1]))
+    @cached_property
+    def there(self) -> Bools:
+        """(T,) whether it is there at each sample."""
+        return np.asarray(mask(self.present[None], len(self.progress))[0])
 
     @property
     def travelled(self) -> float:
@@ -91,13 +94,7 @@ class Track:
         return abs(self.turning(30.0)) > _TURN
 
 
-def presence_of(track: Track) -> Bools:
-    """(T,) whether a vehicle is there at each sample."""
-    at = np.arange(len(track.progress))
-    return np.asarray((at >= track.present[0]) & (at <= track.present[1]))
-
-
-@once_per_encounter
+@once_per_object
 def clean_tracks(encounter: Encounter) -> tuple[Track, ...]:
     """Return one cleaned track per vehicle."""
     return tuple(_clean(encounter, i) for i in range(len(encounter.vehicles)))
@@ -107,26 +104,34 @@ def _clean(encounter: Encounter, i: int) -> Track:
     """Clean one vehicle's motion while it is there."""
     first, last = encounter.present[i].tolist()
     there = slice(first, last + 1)
-    before, after = first, encounter.speed.shape[1] - 1 - last
-    track = _cleaned(encounter, i, encounter.position[i, there], encounter.heading[i, there], encounter.speed[i, there])
-    return replace(
-        track,
-        progress=frozen(np.pad(track.progress, (before, after), mode="edge")),
+    heading, speed = encounter.heading[i, there], encounter.speed[i, there]
+    claimed = np.concatenate(([0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 * encounter.dt)))
+    spread = float(exact.hypot(*np.ptp(encounter.position[i, there], axis=0)))
+    still = bool(claimed[-1] < _STILL or spread < _STILL)
+    cleaned = _standing if still else _smoothed
+    curve, progress, deviation = cleaned(encounter.position[i, there], heading, speed, claimed)
+    return Track(
+        vehicle=encounter.vehicles[i],
+        curve=curve,
+        progress=frozen(np.pad(progress, (first, encounter.speed.shape[1] - 1 - last), mode="edge")),
         speed=encounter.speed[i],
+        still=still,
+        deviation=deviation,
         present=frozen_ints([first, last]),
-        recorded_turn=math.nan if track.still else float(encounter.heading[i, last] - encounter.heading[i, first]),
+        recorded_turn=math.nan if still else float(heading[-1] - heading[0]),
     )
 
 
-def _cleaned(encounter: Encounter, i: int, position: Floats, heading: Floats, speed: Floats) -> Track:
-    claimed = np.concatenate(([0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 * encounter.dt)))
-    spread = float(exact.hypot(*np.ptp(position, axis=0)))
-    if claimed[-1] < _STILL or spread < _STILL:
-        centre = position.mean(axis=0)
-        yaw = float(exact.arctan2(exact.sin(heading).mean(), exact.cos(heading).mean()))
-        curve = Curve(np.array([[*centre, yaw], [centre[0] + exact.cos(yaw), centre[1] + exact.sin(yaw), yaw]]))
-        deviation = float(exact.hypot(*(position - centre).T).max())
-        return Track(encounter.vehicles[i], curve, frozen(np.zeros(len(speed))), speed, True, deviation)
+def _standing(position: Floats, heading: Floats, speed: Floats, _claimed: Floats) -> tuple[Curve, Floats, float]:
+    """The path of a vehicle that stands, its progress, and how far its positions lie from it."""
+    centre = position.mean(axis=0)
+    yaw = float(exact.arctan2(exact.sin(heading).mean(), exact.cos(heading).mean()))
+    curve = Curve(np.array([[*centre, yaw], [*(centre + unit(yaw)), yaw]]))
+    return curve, np.zeros(len(speed)), float(exact.hypot(*(position - centre).T).max())
+
+
+def _smoothed(position: Floats, heading: Floats, speed: Floats, claimed: Floats) -> tuple[Curve, Floats, float]:
+    """The drivable path of positions (T, 2) at distances (T,) that the speed claims, the progress, and the largest deviation."""
     best: tuple[float, Curve, Floats, float] | None = None
     for wavelength in _WAVELENGTHS:
         stop_if_cancelled()
@@ -149,7 +154,7 @@ def _cleaned(encounter: Encounter, i: int, position: Floats, heading: Floats, sp
         curve = _eased(curve)
         progress = share * curve.length
         deviation = float(exact.hypot(*(curve.at(progress)[:, :2] - position).T).max())
-    return Track(encounter.vehicles[i], _aligned(curve, heading, speed, progress), frozen(progress), speed, False, deviation)
+    return _aligned(curve, heading, speed, progress), progress, deviation
 
 
 def _eased(curve: Curve) -> Curve:
@@ -171,8 +176,7 @@ def _eased(curve: Curve) -> Curve:
         bend[1:] += excess[:-1] / 2.0
         bend[:-1] += excess[1:] / 2.0
     yaw = even[0, 2] + np.concatenate(([0.0], np.cumsum(bend)))
-    middle = (yaw[1:] + yaw[:-1]) / 2.0
-    xy = np.vstack(([0.0, 0.0], np.cumsum(step * np.column_stack((exact.cos(middle), exact.sin(middle))), axis=0)))
+    xy = polyline_of(yaw, step)
     xy += (even[:, :2] - xy).mean(axis=0)
     return Curve(np.column_stack((xy, yaw)))
 

@@ -5,14 +5,16 @@
 
 from scenario_gen.types.body import height, is_truck, rear_axle, shifted, WHEELBASE
 from scenario_gen.types.coverage import Coverage, Spread
+from scenario_gen.types.derived import once_per_object
 from scenario_gen.types.ego import join_ego, split_off, with_witness
-from scenario_gen.types.encounter import Encounter, once_per_encounter, Tracks, Vehicle
+from scenario_gen.types.encounter import Encounter, Tracks, Vehicle
 from scenario_gen.types.evaluation import as_markdown, CheckCounts, Evaluation, formatted, Interval, Metric, Row, SCHEMA, TEMPLATE
 from scenario_gen.types.fit import Fit, FittedVehicle, Loss
 from scenario_gen.types.generation import ERRORS, GenerationResult, NARROW, ORACLE, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.lanes import Lane, LaneNetwork, MIRRORED
 from scenario_gen.types.measures import Measure, Measures
 from scenario_gen.types.names import token, tokens, vehicle_index
+from scenario_gen.types.pieces import join_pieces, read_numbers, split_pieces
 from scenario_gen.types.presence import ALWAYS, always, at_ends, canonical_presence, cut, mask, together
 from scenario_gen.types.qos import Quality
 from scenario_gen.types.reaction import FOLLOW, NOT_KEPT, Reaction, ReactionGraph, YIELD, yielders_of
@@ -24,12 +26,13 @@ from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
 from scenario_gen.types.target import Pair, Reached, Target, UNITS
 
 __all__ = [
-    "ALWAYS", "COARSEST", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "MIRRORED", "NARROW", "NOT_KEPT", "ORACLE",
-    "ORDERS", "SCHEMA", "TEMPLATE", "UNIFORM", "UNITS", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates", "Cause",
-    "CheckCounts", "Coverage", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle", "GenerationResult", "Interval",
-    "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair", "Quality", "Reached",
-    "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "Scenario", "ScenarioSet", "Segmentation", "Spread",
-    "State", "Target", "Tracks", "Vehicle", "Verdict", "Violation", "always", "as_markdown", "at_ends", "canonical_presence",
-    "cut", "formatted", "height", "is_truck", "join_ego", "mask", "once_per_encounter", "read_states", "rear_axle",
-    "routes_in_words", "shifted", "split_off", "together", "token", "tokens", "vehicle_index", "with_witness", "yielders_of",
+    "ALWAYS", "COARSEST", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "MIRRORED", "NARROW", "NOT_KEPT",
+    "ORACLE", "ORDERS", "SCHEMA", "TEMPLATE", "UNIFORM", "UNITS", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates",
+    "Cause", "CheckCounts", "Coverage", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle", "GenerationResult",
+    "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair", "Quality",
+    "Reached", "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "Scenario", "ScenarioSet", "Segmentation",
+    "Spread", "State", "Target", "Tracks", "Vehicle", "Verdict", "Violation", "always", "as_markdown", "at_ends",
+    "canonical_presence", "cut", "formatted", "height", "is_truck", "join_ego", "join_pieces", "mask", "once_per_object",
+    "read_numbers", "read_states", "rear_axle", "routes_in_words", "shifted", "split_off", "split_pieces", "together",
+    "token", "tokens", "vehicle_index", "with_witness", "yielders_of",
 ]  # fmt: skip

@@ -1,9 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a vehicle's footprint says of its body: where its rear axle is, what kind it is, how high; for formats that ask."""
+"""What is assumed of a vehicle's body from its footprint: kind, height, rear axle; for formats that need them."""
 
-from scenario_gen.numerics import exact, Floats
+import numpy as np
+
+from scenario_gen.numerics import Floats
+from scenario_gen.numerics.plane import unit
 from scenario_gen.types.encounter import Vehicle
 
 REAR_AXLE = 0.3  # of the length, from the footprint's centre back: 1.44 m of a car of 4.8 m
@@ -13,23 +16,20 @@ CAR_HEIGHT, TRUCK_HEIGHT = 1.5, 3.2  # metres
 
 
 def is_truck(vehicle: Vehicle) -> bool:
-    """Whether it is so long that it is taken for a truck; logs do not say."""
+    """Whether it is so long that it counts as a truck; logs do not hold the kind."""
     return vehicle.length >= TRUCK_LENGTH
 
 
 def height(vehicle: Vehicle) -> float:
-    """Height in metres, by kind; logs do not say."""
+    """Height in metres, by kind; logs do not hold it."""
     return TRUCK_HEIGHT if is_truck(vehicle) else CAR_HEIGHT
 
 
 def rear_axle(vehicle: Vehicle) -> float:
-    """Metres from the footprint's centre back to the middle of the rear axle; logs do not say, so it is a share of the length."""
+    """Metres from the footprint's centre back to the middle of the rear axle; a share of the length, for logs do not hold it."""
     return REAR_AXLE * vehicle.length
 
 
 def shifted(position: Floats, heading: Floats, ahead: float) -> Floats:
     """Return points (..., 2) [m] that lie `ahead` metres along headings (...) [rad] from positions (..., 2) [m]."""
-    moved = position.copy()
-    moved[..., 0] += ahead * exact.cos(heading)
-    moved[..., 1] += ahead * exact.sin(heading)
-    return moved
+    return np.asarray(position + ahead * unit(heading))

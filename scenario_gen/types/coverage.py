@@ -53,12 +53,12 @@ class Coverage:
 
         spreads = {
             name: {
-                "label": one.label,
-                "unit": one.unit,
-                "values": [number(value) for value in one.values],
-                "template": number(one.template),
+                "label": spread.label,
+                "unit": spread.unit,
+                "values": [number(value) for value in spread.values],
+                "template": number(spread.template),
             }
-            for name, one in self.spreads.items()
+            for name, spread in self.spreads.items()
         }
         return {
             "index": list(self.index),

@@ -3,19 +3,14 @@
 
 """An encounter: N vehicles near each other on one clock (paper II-A, eqs 1-2)."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property, wraps
-from typing import TypeVar
-from weakref import WeakKeyDictionary
+from functools import cached_property
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Bools, canonical_heading, Floats, frozen, Ints
+from scenario_gen.numerics import Bools, canonical_heading, Floats, freeze, frozen, Ints
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
-
-Derived = TypeVar("Derived")
 
 
 @dataclass(frozen=True)
@@ -55,8 +50,7 @@ class Tracks:
     present: Ints = field(default_factory=lambda: ALWAYS)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position", frozen(self.position))
-        object.__setattr__(self, "speed", frozen(self.speed))
+        freeze(self, position=frozen(self.position), speed=frozen(self.speed))
         n, t = self.speed.shape
         if n < 1 or t < 2:
             raise InputError(f"{self.name!r} has {n} vehicle(s) and {t} sample(s); at least 1 and 2 are needed")
@@ -64,20 +58,19 @@ class Tracks:
             raise InputError(f"encounter {self.name!r}: arrays disagree in shape")
         if not all(np.isfinite(a).all() for a in (self.position, self.heading, self.speed)):
             raise InputError(f"encounter {self.name!r} holds a value that is not finite")
-        object.__setattr__(self, "heading", canonical_heading(self.heading))
+        freeze(self, heading=canonical_heading(self.heading))
         if (self.speed < 0.0).any():
             raise InputError(f"encounter {self.name!r} holds a negative speed")
         ids = [vehicle.id for vehicle in self.vehicles]
         if len(set(ids)) != n:
             raise InputError(f"encounter {self.name!r}: vehicle ids are not unique: {', '.join(ids)}")
-        object.__setattr__(self, "present", canonical_presence(self.present, n, t, f"encounter {self.name!r}"))
+        freeze(self, present=canonical_presence(self.present, n, t, f"encounter {self.name!r}"))
         if self.present[:, 0].min() > 0 or self.present[:, 1].max() < t - 1:
             raise InputError(
                 f"encounter {self.name!r}: nobody is present at its first or at its last sample; cut it to its vehicles"
             )
-        if not always(self.present, t):
-            for name in ("position", "heading", "speed"):
-                object.__setattr__(self, name, frozen(held(getattr(self, name), self.present)))
+        for name in ("position", "heading", "speed"):
+            freeze(self, **{name: held(getattr(self, name), self.present)})
 
     @property
     def dt(self) -> float:
@@ -117,16 +110,3 @@ class Encounter(Tracks):
         if n < 2 or t < 2:
             raise InputError(f"encounter {self.name!r} has {n} vehicle(s) and {t} sample(s); at least 2 of each are needed")
         super().__post_init__()
-
-
-def once_per_encounter(function: "Callable[[Encounter], Derived]") -> "Callable[[Encounter], Derived]":
-    """Keep what a function derives from an encounter as long as the encounter is there; a refusal is not kept."""
-    kept: WeakKeyDictionary[Encounter, Derived] = WeakKeyDictionary()
-
-    @wraps(function)
-    def derived(encounter: Encounter) -> Derived:
-        if encounter not in kept:
-            kept[encounter] = function(encounter)
-        return kept[encounter]
-
-    return derived

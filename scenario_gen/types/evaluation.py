@@ -53,6 +53,7 @@ SCHEMA = _object(
     ),
 )
 """Of the JSON that `to_json` writes."""
+_KEYS = {"duration": "duration_s", "level": "confidence_level"}  # of fields that are named otherwise in JSON
 TEMPLATE = "template"
 """Name of the row that `evaluate` adds: the recorded encounter itself."""
 
@@ -68,15 +69,15 @@ class Interval:
 
 @dataclass(frozen=True)
 class CheckCounts:
-    """What the checker said about the candidates of one row: how many there were, and how many fell by their first cause."""
+    """The checker's account of the candidates of one row: how many there were, and how many were refused, by first cause."""
 
     candidates: int
     refused: Mapping[Cause, int] = field(default_factory=dict)
 
     @classmethod
-    def of_set(cls, made: ScenarioSet) -> "CheckCounts":
+    def of_set(cls, generated: ScenarioSet) -> "CheckCounts":
         """Take the account of a request."""
-        return cls(made.candidates, dict(made.refused))
+        return cls(generated.candidates, dict(generated.refused))
 
     @classmethod
     def of_verdicts(cls, verdicts: Iterable[Verdict]) -> "CheckCounts":
@@ -85,7 +86,7 @@ class CheckCounts:
         return cls(len(verdicts), Counter(verdict.violations[0].cause for verdict in verdicts if not verdict.valid))
 
     def share_of(self, causes: Sequence[Cause]) -> tuple[int, int]:
-        """Return how many candidates fell by one of `causes`, and the number of candidates."""
+        """Return how many candidates were refused for one of `causes`, and the number of candidates."""
         return sum(self.refused.get(cause, 0) for cause in causes), self.candidates
 
 
@@ -168,25 +169,15 @@ class Evaluation:
 
     def to_json(self, indent: int | None = 2) -> str:
         """Return JSON; what is not a number is null, figures have six significant digits."""
-        document = {
-            "encounter": self.encounter,
-            "road": self.road,
-            "vehicles": list(self.vehicles),
+        document = {_KEYS.get(name, name): value for name, value in vars(self).items()} | {
             "duration_s": _number(self.duration),
-            "changepoints": self.changepoints,
-            "confidence_level": self.level,
-            "resamples": self.resamples,
-            "seed": self.seed,
             "metrics": [vars(metric) for metric in self.metrics],
             "rows": [
                 {
                     "name": row.name,
                     "samples": row.samples,
-                    "notes": list(row.notes),
-                    "values": {
-                        key: {"value": _number(e.value), "low": _number(e.low), "high": _number(e.high)}
-                        for key, e in row.values.items()
-                    },
+                    "notes": row.notes,
+                    "values": {key: {name: _number(figure) for name, figure in vars(e).items()} for key, e in row.values.items()},
                 }
                 for row in self.rows
             ],
@@ -205,18 +196,11 @@ class Evaluation:
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> "Evaluation":
         """Return the evaluation that a document says, which keeps `SCHEMA`."""
-        return cls(
-            encounter=document["encounter"],
-            road=document["road"],
-            vehicles=tuple(document["vehicles"]),
-            duration=document["duration_s"],
-            changepoints=document["changepoints"],
-            level=document["confidence_level"],
-            resamples=document["resamples"],
-            seed=document["seed"],
-            metrics=tuple(Metric(**{key: metric[key] for key in METRIC_KEYS}) for metric in document["metrics"]),
-            rows=tuple(_row(row) for row in document["rows"]),
-        )
+        fields = {name: document[_KEYS.get(name, name)] for name in cls.__dataclass_fields__}
+        fields["vehicles"] = tuple(document["vehicles"])
+        fields["metrics"] = tuple(Metric(**{key: metric[key] for key in METRIC_KEYS}) for metric in document["metrics"])
+        fields["rows"] = tuple(_row(row) for row in document["rows"])
+        return cls(**fields)
 
     def to_markdown(self) -> str:
         """Return a table: metrics down, rows across, each figure with its interval."""
@@ -267,11 +251,8 @@ def _number(value: float) -> float | None:
 
 
 def _row(document: Mapping[str, Any]) -> Row:
-    def number(value: float | None) -> float:
-        return math.nan if value is None else value
-
     values = {
-        key: Interval(number(entry["value"]), number(entry["low"]), number(entry["high"]))
+        key: Interval(*(math.nan if entry[bound] is None else entry[bound] for bound in ("value", "low", "high")))
         for key, entry in document["values"].items()
     }
     return Row(document["name"], document["samples"], values, tuple(document["notes"]))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, canonical_poses, Floats, frozen, Ints
+from scenario_gen.numerics import Bools, canonical_poses, Floats, freeze, frozen, Ints
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import BoundaryStates
 
@@ -36,9 +36,7 @@ class FittedVehicle:
     path: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "anchors", canonical_poses(self.anchors))
-        object.__setattr__(self, "moved", frozen(self.moved))
-        object.__setattr__(self, "path", frozen(self.path))
+        freeze(self, anchors=canonical_poses(self.anchors), moved=frozen(self.moved), path=frozen(self.path))
 
     def figures(self) -> dict[str, Any]:
         """Return what the fitting decided, ready for JSON: manoeuvre, scale, largest move [m], turns [deg, left positive]."""
@@ -74,9 +72,9 @@ class Fit:
 
     Attributes:
         vehicles: N identities and footprints.
-        fitted: N fitted vehicles; none where only the states asked are known.
+        fitted: N fitted vehicles; none where only the requested states are known.
         anchor_index: (K + 2,) sample index in the template of each anchor (0, changepoints, T - 1).
-        asked: start and end states asked of every scenario (after repair).
+        asked: start and end states requested of every scenario (after repair).
         notes: what was decided, in sentences (an entry chosen and why, an anchor moved by how much).
         lost: what of the template's turns, conflicts and neighbours is lost on this road; none where nothing is.
     """
@@ -92,5 +90,5 @@ class Fit:
         """Return what is lost, and by vehicle what was decided, ready for JSON."""
         return {
             "lost": [{"kind": loss.kind, "vehicles": list(loss.vehicles), "said": loss.said} for loss in self.lost],
-            "vehicles": {v.id: one.figures() for v, one in zip(self.vehicles, self.fitted, strict=False)},
+            "vehicles": {vehicle.id: fitted.figures() for vehicle, fitted in zip(self.vehicles, self.fitted, strict=False)},
         }

@@ -46,7 +46,7 @@ class GenerationResult:
         row: name of the evaluation's row of `generated`.
         provenance: what is needed to make it again: log hashes, versions, parameters.
         coverage: what `generated` covers, None if it was not measured.
-        apart: what `generated` was asked for and the references were not (a target, a choice, an order): they are not compared.
+        apart: what was requested of `generated` and not of the references (a target, a choice, an order): they are not compared.
         valid: how many of those scenarios are valid, where all of a bag's are shown; None: all of them are.
     """
 
@@ -80,19 +80,19 @@ class GenerationResult:
 
     def outdone(self) -> tuple[str, ...]:
         """Return a sentence for each reference that is more like the template than what was generated, by a thousandth."""
-        said = []
+        sentences = []
         for row in self.compared[1:]:
             better = []
             for metric, what in ERRORS.items():
-                own, other = (self.evaluation.value(one, metric) for one in (self.row, row))
+                own, other = (self.evaluation.value(name, metric) for name in (self.row, row))
                 if math.isfinite(own - other) and round(other, 3) < round(own, 3):
                     better.append(f"E {what} {other:.3f} against {own:.3f}")
             if better:
-                said.append(f"{_WORDS[row]} it better here: {', '.join(better)}")
-        return tuple(said)
+                sentences.append(f"{_WORDS[row]} it better here: {', '.join(better)}")
+        return tuple(sentences)
 
     def similarity(self) -> dict[str, Any]:
-        """Return E of `generated` and of the rows beside it, by row, which is the best one, and what is said of it."""
+        """Return E of `generated` and of the rows beside it, by row, which is the best one, and sentences about it."""
 
         def figures(row: str) -> dict[str, float | None]:
             values = {metric: self.evaluation.value(row, metric) for metric in ERRORS}
@@ -125,8 +125,8 @@ class GenerationResult:
     @property
     def reacting(self) -> dict[str, Any]:
         """Who reacts to whom in the template, and what the scenarios keep of it, as a document."""
-        made, ids = self.generated, [vehicle.id for vehicle in self.encounter.vehicles]
-        return {"edges": [], "cut": [], "sentences": []} if made.graph is None else made.graph.document(ids, made.reactions)
+        graph, ids = self.generated.graph, [vehicle.id for vehicle in self.encounter.vehicles]
+        return {"edges": [], "cut": [], "sentences": []} if graph is None else graph.document(ids, self.generated.reactions)
 
     @property
     def published(self) -> int:

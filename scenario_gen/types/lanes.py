@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats, frozen
+from scenario_gen.numerics import Floats, freeze, frozen
+from scenario_gen.numerics.plane import edge_yaws
 
 MIRRORED = "the template is mirrored"  # begins the note of a map whose traffic keeps to the other side than the template's
 _ONCOMING = -0.9  # cosine between directions of traffic
@@ -40,8 +41,7 @@ class Lane:
     junction: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "left", frozen(self.left))
-        object.__setattr__(self, "right", frozen(self.right))
+        freeze(self, left=frozen(self.left), right=frozen(self.right))
         if self.left.shape != self.right.shape or self.left.ndim != 2 or self.left.shape[1] != 2 or len(self.left) < 2:
             raise InputError(
                 f"lane {self.id}: borders of shapes {self.left.shape} and {self.right.shape}; (M, 2), M >= 2, are needed"
@@ -53,6 +53,16 @@ class Lane:
     def centre(self) -> Floats:
         """(M, 2) metres, the middle of each cross-section."""
         return frozen((self.left + self.right) / 2.0)
+
+    @cached_property
+    def middle(self) -> Floats:
+        """(M - 1, 2) metres, the middle between each two neighbouring cross-sections."""
+        return frozen((self.centre[1:] + self.centre[:-1]) / 2.0)
+
+    @cached_property
+    def yaw(self) -> Floats:
+        """(M - 1,) rad, the direction from each cross-section to the next."""
+        return frozen(edge_yaws(self.centre))
 
     @cached_property
     def outline(self) -> Floats:

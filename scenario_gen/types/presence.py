@@ -10,10 +10,9 @@ last value there, which says nothing of where it is. So whoever looks at a motio
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, frozen, Ints, sealed
 
-ALWAYS: Ints = np.zeros((0, 2), dtype=np.int64)  # the default of a field `present`: everybody is there throughout
-ALWAYS.setflags(write=False)
+ALWAYS: Ints = sealed(np.zeros((0, 2), dtype=np.int64))  # the default of a field `present`: everybody is there throughout
 
 
 def canonical_presence(present: Ints, count: int, samples: int, name: str) -> Ints:
@@ -30,24 +29,19 @@ def canonical_presence(present: Ints, count: int, samples: int, name: str) -> In
             outside of 0 … T - 1.
     """
     if np.shape(present) == (0, 2):
-        return _sealed(np.tile(np.array([0, samples - 1], dtype=np.int64), (count, 1)))
+        return sealed(np.tile(np.array([0, samples - 1], dtype=np.int64), (count, 1)))
     if np.asarray(present).dtype.kind not in "iu":
         raise InputError(f"{name}: presence is of type {np.asarray(present).dtype}; whole numbers are needed")
-    made = np.array(present, dtype=np.int64, order="C")
-    if made.shape != (count, 2):
-        raise InputError(f"{name}: presence has shape {made.shape}; {count} rows of first and last sample are needed")
-    bad = np.flatnonzero((made[:, 0] < 0) | (made[:, 1] >= samples) | (made[:, 0] >= made[:, 1]))
+    rows = np.array(present, dtype=np.int64, order="C")
+    if rows.shape != (count, 2):
+        raise InputError(f"{name}: presence has shape {rows.shape}; {count} rows of first and last sample are needed")
+    bad = np.flatnonzero((rows[:, 0] < 0) | (rows[:, 1] >= samples) | (rows[:, 0] >= rows[:, 1]))
     if len(bad):
-        first, last = made[bad[0]].tolist()
+        first, last = rows[bad[0]].tolist()
         raise InputError(
             f"{name}: row {bad[0]} is present from sample {first} to {last} of {samples}; at least two samples inside are needed"
         )
-    return _sealed(made)
-
-
-def _sealed(array: Ints) -> Ints:
-    array.setflags(write=False)
-    return array
+    return sealed(rows)
 
 
 def at_ends(present: Ints, samples: int) -> Bools:
@@ -67,8 +61,7 @@ def held(values: Floats, present: Ints) -> Floats:
     if always(present, samples):
         return values
     at = np.clip(np.arange(samples), present[:, :1], present[:, 1:])
-    rows: Floats = values[np.arange(len(values))[:, None], at]
-    return rows
+    return frozen(values[np.arange(len(values))[:, None], at])
 
 
 def mask(present: Ints, samples: int) -> Bools:

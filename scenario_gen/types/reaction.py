@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from scenario_gen.types.pieces import split_pieces
+
 FOLLOW, YIELD = "follow", "yield"
-DOUBTFUL = 0.5  # confidence below which an edge is said to be doubtful
+DOUBTFUL = 0.5  # confidence below which an edge is called doubtful
 _FOLLOWS, _YIELDS = " follows ", " yields to "  # of names
 NOT_KEPT = "on this road a reaction is not kept"  # begins the sentence of a set's adaptations that gives the figures
 
@@ -56,16 +58,16 @@ class Reaction:
         """Return the reaction in words, with the vehicles' ids."""
         who, whom = f"vehicle {ids[self.who]}", f"vehicle {ids[self.whom]}"
         if self.kind == FOLLOW:
-            said = f"{who} follows {whom}, {self.headway[1]:.1f} s behind, and answers its speed after {self.lag:.1f} s"
+            text = f"{who} follows {whom}, {self.headway[1]:.1f} s behind, and answers its speed after {self.lag:.1f} s"
         else:
             verb = "waits for" if self.stands else "slows down for"
             when = f"{self.lag:.1f} s after" if self.lag >= 0.0 else f"{-self.lag:.1f} s before it has"
-            said = f"{who} {verb} {whom} to pass and leaves {when}"
-        return f"{said} (doubtful)" if self.doubtful else said
+            text = f"{who} {verb} {whom} to pass and leaves {when}"
+        return f"{text} (doubtful)" if self.doubtful else text
 
     @property
     def doubtful(self) -> bool:
-        """Whether the record tells it from none, but hardly."""
+        """Whether the record hardly distinguishes it from none."""
         return self.confidence < DOUBTFUL
 
     def document(self, ids: Sequence[str]) -> dict[str, str | float | bool]:
@@ -92,11 +94,11 @@ class ReactionGraph:
     cut: tuple[Reaction, ...] = ()
 
     def sentences(self, ids: Sequence[str], kept: Sequence[Reaction] | None = None) -> tuple[str, ...]:
-        """Return what is said of the graph, one sentence an edge; which edges are not among those `kept` is said, too."""
+        """Return one sentence for each edge of the graph, which also names those that are not among the `kept`."""
         free = "" if kept is None else ": the scenarios are not held to it"
-        said = [edge.words(ids) if edge in (kept or ()) else f"{edge.words(ids)}{free}" for edge in self.edges]
-        said += [f"{edge.words(ids)}: left out, for it closes a circle of reactions" for edge in self.cut]
-        return tuple(said) or ("nobody is seen to react to anybody",)
+        sentences = [edge.words(ids) if edge in (kept or ()) else f"{edge.words(ids)}{free}" for edge in self.edges]
+        sentences += [f"{edge.words(ids)}: left out, for it closes a circle of reactions" for edge in self.cut]
+        return tuple(sentences) or ("nobody is seen to react to anybody",)
 
     def document(self, ids: Sequence[str], kept: Sequence[Reaction] | None = None) -> dict[str, Any]:
         """Return the graph as a document: edges, those that were cut, sentences; and of each edge whether it is `kept`."""
@@ -109,5 +111,5 @@ class ReactionGraph:
 
 def yielders_of(names: str, ids: Sequence[str]) -> tuple[tuple[int, int], ...]:
     """Return (who, whom) of the yielding reactions that an entry names ("2 yields to 1; 3 follows 2"), of vehicles `ids`."""
-    pairs = [name.split(_YIELDS) for name in names.split("; ") if _YIELDS in name]
+    pairs = [name.split(_YIELDS) for name in split_pieces(names) if _YIELDS in name]
     return tuple((ids.index(who), ids.index(whom)) for who, whom in pairs if who in ids and whom in ids)

@@ -1,11 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How an ego slot and start and end states are asked for: as text, the same on the command line and as ROS parameters."""
+"""A request for an ego slot, states, targets, a choice, an order: the same text on the command line and in ROS parameters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-import math
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.numerics import Floats
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.names import vehicle_index
+from scenario_gen.types.pieces import join_pieces, read_numbers, split_pieces
 from scenario_gen.types.target import read_targets, Target
 
 State = tuple[float, ...]  # x [m], y [m], yaw [rad] and, unless it is the template's, speed [m/s]
@@ -24,7 +24,7 @@ _FORM = "id: x y yaw [speed]"
 
 @dataclass(frozen=True)
 class Request(Parameters):
-    """What one request asks for."""
+    """All that one request may demand."""
 
     ego: str = parameter("", "id of the vehicle that is left out for a planner under test; its track is given instead")
     starts: str = parameter(
@@ -51,12 +51,12 @@ class Request(Parameters):
 
     @property
     def targets(self) -> tuple[Target, ...]:
-        """The ranges asked for."""
+        """The requested ranges."""
         return read_targets(self.target)
 
     @property
     def moves(self) -> bool:
-        """Whether start or end states are asked for, so that the template must be fitted and planned anew."""
+        """Whether start or end states are requested, so that the template must be fitted and planned anew."""
         return bool(self.starts or self.goals)
 
     @property
@@ -65,7 +65,7 @@ class Request(Parameters):
         return replace(self, target="", choose="natural", order="keep")
 
     def states(self, end: str) -> dict[str, State]:
-        """Return the states asked for at one end ("starts" or "goals"), by vehicle id.
+        """Return the requested states at one end ("starts" or "goals"), by vehicle id.
 
         Raises:
             InputError: the text is not of the form; the message names the parameter and the piece.
@@ -74,11 +74,11 @@ class Request(Parameters):
 
     def with_states(self, end: str, states: Mapping[str, State]) -> "Request":
         """Return the request with other states at one end."""
-        text = "; ".join(f"{name}: {' '.join(f'{value:.10g}' for value in state)}" for name, state in states.items())
-        return replace(self, starts=text) if end == "starts" else replace(self, goals=text)
+        text = join_pieces(f"{name}: {' '.join(f'{value:.10g}' for value in state)}" for name, state in states.items())
+        return replace(self, **{end: text})
 
     def rows(self, end: str, encounter: Encounter) -> Floats:
-        """Return the states at one end as the fitting takes them: (N, 4), NaN where nothing is asked.
+        """Return the states at one end as the fitting takes them: (N, 4), NaN where nothing is requested.
 
         Raises:
             InputError: a vehicle is not the encounter's; the message lists those that are.
@@ -104,14 +104,10 @@ def read_states(text: str, what: str) -> dict[str, State]:
         InputError: it is not of that form, a value is not finite, a speed is negative, or a vehicle comes twice.
     """
     found: dict[str, State] = {}
-    for piece in filter(None, (part.strip() for part in text.split(";"))):
-        name, colon, numbers = piece.rpartition(":")
-        name = name.strip()
-        try:
-            state = tuple(float(word) for word in numbers.replace(",", " ").split())
-        except ValueError:
-            state = ()
-        if not (colon and name and len(state) in (3, 4) and all(map(math.isfinite, state))):
+    for piece in split_pieces(text):
+        name, _, numbers = piece.rpartition(":")
+        name, state = name.strip(), read_numbers(numbers)
+        if not name or len(state) not in (3, 4):
             raise InputError(f"{what}: {piece!r} is not of the form `{_FORM}` with finite numbers, e.g. `1: 10.5 -1.75 0.0 8.0`")
         if len(state) == 4 and state[3] < 0.0:
             raise InputError(f"{what}: {piece!r} asks for a negative speed")

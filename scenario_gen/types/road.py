@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Bools, canonical_poses, Floats, frozen, Ints
+from scenario_gen.numerics import Bools, canonical_poses, Floats, freeze, frozen, frozen_bools, Ints
 from scenario_gen.types.lanes import LaneNetwork
 
 FINEST, COARSEST = 0.001, 10.0  # metres of a cell: nothing is seen of a vehicle in larger ones
@@ -43,18 +43,16 @@ class Road:
     obstructed: Bools | None = None
 
     def __post_init__(self) -> None:
-        drivable = np.array(self.drivable, dtype=np.bool_, order="C")
-        drivable.setflags(write=False)
-        object.__setattr__(self, "drivable", drivable)
-        if self.obstructed is not None:
-            obstructed = np.array(self.obstructed, dtype=np.bool_, order="C")
-            obstructed.setflags(write=False)
-            object.__setattr__(self, "obstructed", obstructed)
-        object.__setattr__(self, "resolution", float(np.float32(self.resolution)))
-        object.__setattr__(self, "origin", frozen(self.origin))
-        object.__setattr__(self, "entries", canonical_poses(np.reshape(self.entries, (-1, 3))))
-        object.__setattr__(self, "exits", canonical_poses(np.reshape(self.exits, (-1, 3))))
-        if drivable.ndim != 2 or drivable.size == 0 or not drivable.any():
+        freeze(
+            self,
+            drivable=frozen_bools(self.drivable),
+            obstructed=None if self.obstructed is None else frozen_bools(self.obstructed),
+            resolution=float(np.float32(self.resolution)),
+            origin=frozen(self.origin),
+            entries=canonical_poses(np.reshape(self.entries, (-1, 3))),
+            exits=canonical_poses(np.reshape(self.exits, (-1, 3))),
+        )
+        if self.drivable.ndim != 2 or not self.drivable.any():
             raise InputError(f"road {self.name!r} has no drivable cell")
         if not FINEST <= self.resolution <= COARSEST:
             raise InputError(f"road {self.name!r} has resolution {self.resolution:g} m; {FINEST:g} to {COARSEST:g} m are read")

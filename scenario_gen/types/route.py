@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from scenario_gen.numerics import canonical_poses, Floats, frozen, frozen_ints, Ints
+from scenario_gen.numerics import canonical_poses, Floats, freeze, frozen, frozen_ints, Ints
 
 FAR_OFF = 1.5
-"""Metres between a route and its fitted path from which on it is said."""
+"""Metres between a route and its fitted path from which on it is reported."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,9 +37,8 @@ class Route:
     farthest: float = float("nan")
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", canonical_poses(self.points, continuous=True))
-        object.__setattr__(self, "anchor", frozen_ints(self.anchor))
-        object.__setattr__(self, "length", frozen(self.length))
+        points = canonical_poses(self.points, continuous=True)
+        freeze(self, points=points, anchor=frozen_ints(self.anchor), length=frozen(self.length))
 
     def figures(self) -> dict[str, Any]:
         """Return what is known of how it was planned, ready for JSON: legs, anchors left out, distance to the fitted path [m]."""
@@ -52,15 +51,15 @@ class Route:
 
     def remarks(self, vehicle: str) -> list[str]:
         """Return sentences about what a user should know: far from the fitted path, anchors left out."""
-        said = []
+        sentences = []
         if self.farthest > FAR_OFF:
-            said.append(f"vehicle {vehicle}: its route passes {self.farthest:.1f} m from its fitted path")
+            sentences.append(f"vehicle {vehicle}: its route passes {self.farthest:.1f} m from its fitted path")
         if self.left_out:
             which = ", ".join(str(k) for k in self.left_out)
-            said.append(
+            sentences.append(
                 f"vehicle {vehicle}: no free way leads through its changepoint {which} as fitted; its route passes beside"
             )
-        return said
+        return sentences
 
 
 def routes_in_words(routes: Sequence[Route]) -> str:
@@ -68,12 +67,12 @@ def routes_in_words(routes: Sequence[Route]) -> str:
 
     What is not known is left out, up to nothing.
     """
-    said = []
+    sentences = []
     known = [(route.joined, route.searched) for route in routes if route.joined is not None and route.searched is not None]
     if known:
         joined, searched = (sum(int(each[k]) for each in known) for k in (0, 1))
-        said.append(f"{joined} legs joined at once, {searched} searched for")
+        sentences.append(f"{joined} legs joined at once, {searched} searched for")
     far = [route.farthest for route in routes if not math.isnan(route.farthest)]
     if far:
-        said.append(f"at most {max(far):.2f} m from the fitted paths")
-    return ", ".join(said)
+        sentences.append(f"at most {max(far):.2f} m from the fitted paths")
+    return ", ".join(sentences)

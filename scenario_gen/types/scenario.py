@@ -10,7 +10,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, canonical_heading, canonical_poses, Floats, frozen, Ints
+from scenario_gen.numerics import Bools, canonical_heading, canonical_poses, Floats, freeze, frozen, Ints
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
 from scenario_gen.types.reaction import Reaction, ReactionGraph
@@ -56,15 +56,12 @@ class Scenario:
     facts: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("position", "speed", "acceleration"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
-        object.__setattr__(self, "time", frozen(np.round(self.time, 9)))  # whole nanoseconds, as on the wire
-        object.__setattr__(self, "heading", canonical_heading(self.heading))
         n, t = len(self.vehicles), len(self.time)
-        object.__setattr__(self, "present", canonical_presence(self.present, n, t, f"scenario {self.index}"))
-        if not always(self.present, t):
-            for name in ("position", "heading", "speed", "acceleration"):
-                object.__setattr__(self, name, frozen(held(getattr(self, name), self.present)))
+        present = canonical_presence(self.present, n, t, f"scenario {self.index}")
+        freeze(self, time=frozen(np.round(self.time, 9)), present=present)  # whole nanoseconds, as on the wire
+        freeze(self, heading=held(canonical_heading(self.heading), present))
+        for name in ("position", "speed", "acceleration"):
+            freeze(self, **{name: held(frozen(getattr(self, name)), present)})
 
     @property
     def all_present(self) -> bool:
@@ -79,11 +76,11 @@ class Scenario:
 
 @dataclass(frozen=True, eq=False)
 class BoundaryStates:
-    """What was asked of each vehicle's first and last instant.
+    """What was requested of each vehicle's first and last instant.
 
     Attributes:
         start, end: (N, 4) x [m], y [m], yaw [rad], speed [m/s].
-        freed: (N, 2, 2) metres and m/s by which a scenario's start and end may differ from that; 0 where it was asked for.
+        freed: (N, 2, 2) metres and m/s by which a scenario's start and end may differ from that; 0 where it was requested.
     """
 
     start: Floats
@@ -91,9 +88,8 @@ class BoundaryStates:
     freed: Floats = field(default_factory=lambda: np.zeros((0, 2, 2)))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "freed", frozen(self.freed if len(self.freed) else np.zeros((len(self.start), 2, 2))))
-        object.__setattr__(self, "start", canonical_poses(self.start))
-        object.__setattr__(self, "end", canonical_poses(self.end))
+        freed = self.freed if len(self.freed) else np.zeros((len(self.start), 2, 2))
+        freeze(self, freed=frozen(freed), start=canonical_poses(self.start), end=canonical_poses(self.end))
 
 
 class Cause(StrEnum):
@@ -103,7 +99,7 @@ class Cause(StrEnum):
     OVERLAP = "overlap"  # two footprints touch at some instant
     OFF_ROAD = "off_road"  # a footprint leaves drivable space
     WRONG_WAY = "wrong_way"  # a vehicle drives against its lane
-    BOUNDARY_STATE = "boundary_state"  # start or end differs from what was asked
+    BOUNDARY_STATE = "boundary_state"  # start or end differs from what was requested
     SPEED = "speed"  # negative or above the limit
     LONGITUDINAL_ACCELERATION = "longitudinal_acceleration"
     LATERAL_ACCELERATION = "lateral_acceleration"
@@ -113,7 +109,7 @@ class Cause(StrEnum):
     REACTION = "reaction"  # who reacts in the template goes too early, too late, or at another distance
     CONFLICT_LOST = "conflict_lost"  # the stretch in which all are there leaves out a conflict of the template
     NOT_FINITE = "not_finite"
-    OUT_OF_RANGE = "out_of_range"  # not in the range that was asked for; it was not checked
+    OUT_OF_RANGE = "out_of_range"  # not in the requested range; it was not checked
 
     @classmethod
     def _missing_(cls, value: object) -> "Cause | None":
@@ -150,7 +146,7 @@ class Verdict:
 
 @dataclass(frozen=True, eq=False)
 class EgoSlot:
-    """A vehicle that is left out for a planner, and the states (4,) x [m], y [m], yaw [rad], speed [m/s] that are asked of it."""
+    """A vehicle that is left out for a planner, and the states (4,) x [m], y [m], yaw [rad], speed [m/s] required of it."""
 
     vehicle: Vehicle
     start: Floats

@@ -6,7 +6,7 @@
 from dataclasses import dataclass
 import math
 
-from scenario_gen.numerics import Floats, frozen, frozen_ints, Ints
+from scenario_gen.numerics import Floats, freeze, frozen, frozen_ints, Ints
 from scenario_gen.types.encounter import Vehicle
 
 LONG_WITHOUT = 15.0  # s without a changepoint that are worth a word
@@ -31,9 +31,8 @@ class Segmentation:
     r_hat: float = math.nan
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "labels", frozen_ints(self.labels))
-        object.__setattr__(self, "changepoints", frozen_ints(self.changepoints))
-        object.__setattr__(self, "changepoint_probability", frozen(self.changepoint_probability))
+        freeze(self, labels=frozen_ints(self.labels), changepoints=frozen_ints(self.changepoints))
+        freeze(self, changepoint_probability=frozen(self.changepoint_probability))
 
     @property
     def n_primitives(self) -> int:

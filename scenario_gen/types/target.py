@@ -9,6 +9,7 @@ import math
 from scenario_gen.base.errors import InputError
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.names import vehicle_index
+from scenario_gen.types.pieces import join_pieces, split_pieces
 
 UNITS = {"pet": "s", "ttc": "s", "gap": "m", "arrival_gap": "s", "closing_speed": "m/s"}
 """The figures that a target can be set on, with their units; `scenario_gen.method.evaluation.measures` defines them."""
@@ -64,7 +65,7 @@ class Reached:
     """What directed sampling came to.
 
     Attributes:
-        targets: what was asked.
+        targets: what was requested.
         stages: of the adaptation; candidates: of all of them.
         share: estimated share of natural candidates that are valid and in the range, with its 95 % interval low, high.
         directed: whether a proposal was used; else candidates are as without a target, and all weights are 1.
@@ -91,12 +92,12 @@ class Reached:
 
     def sentence(self) -> str:
         """Say it."""
-        asked = "; ".join(map(str, self.targets))
+        requested = join_pieces(self.targets)
         share, low, high = (f"{100 * value:.3g}" for value in (self.share, self.low, self.high))
-        said = f"target {asked}: {share} % [{low}, {high}] of natural candidates are valid and in the range"
+        text = f"target {requested}: {share} % [{low}, {high}] of natural candidates are valid and in the range"
         if not self.directed:
-            return f"{said}; drawn as without a target, all weights are 1"
-        return f"{said}; drawn from a proposal (stages: {self.stages}, candidates: {self.candidates}), each with its weight"
+            return f"{text}; drawn as without a target, all weights are 1"
+        return f"{text}; drawn from a proposal (stages: {self.stages}, candidates: {self.candidates}), each with its weight"
 
 
 def read_targets(text: str) -> tuple[Target, ...]:
@@ -106,7 +107,7 @@ def read_targets(text: str) -> tuple[Target, ...]:
         InputError: it is not of that form, a figure is unknown or comes twice, or a range is empty.
     """
     found: list[Target] = []
-    for piece in filter(None, (part.strip() for part in text.split(";"))):
+    for piece in split_pieces(text):
         head, _, bounds = piece.partition("=")
         name, bracket, inside = head.strip().partition("[")
         ids = tuple(word.strip() for word in inside.rstrip("] ").split(",")) if bracket else ()

@@ -46,7 +46,7 @@ def run(monkeypatch, capsys, tmp_path):
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """One result of each kind; `page` is a stand-in for what reproduce takes long to draw."""
+    """One result of each kind."""
     folder = tmp_path_factory.mktemp("made")
     bag = folder / "generated" / "bag"
     for words in (
@@ -121,7 +121,6 @@ def test_inputs_stay(run, made, tmp_path):
         ("evaluate", bag, "--out", "o2"),
         ("evaluate", bag, "--out", bag),
         ("reindex", bag, "--out", bag),
-        ("reproduce", "o2/log", "--out", "o2"),
     ):
         code, said = run(*words)
         assert code == 2 and "error:" in said, words
@@ -132,7 +131,7 @@ def test_inputs_stay(run, made, tmp_path):
 def test_an_out_that_cannot_be(run, tmp_path, out):
     (tmp_path / "file").touch()
     (tmp_path / "link").symlink_to("nowhere")
-    for words in (GENERATE, ("reproduce", bundled("c")), ("demo",), ("reindex", bundled("c"))):
+    for words in (GENERATE, ("demo",), ("reindex", bundled("c"))):
         code, said = run(*words, "--out", out)
         assert code == 2 and len(said) <= len("error: \n") + 500 and "Traceback" not in said, said
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "link"]

@@ -56,7 +56,6 @@ OWN = {  # modules that parse, but no file that a user is given by others, and w
     "numerics/kernels.py": "source files of the package, to see which have kernels",
     "__init__.py": "its own stub, for the public names",
     "output/report/html.py": "assets of the package",
-    "output/reproduce/page.py": "whether a folder is an earlier result: anything else is none",
     "output/results.py": "whether a folder is an earlier result: anything else is none",
     "bags/storage/definitions.py": "definitions of messages that ROS 2 has installed",
 }

@@ -5,27 +5,30 @@
 
     python counts.py [--write PAGE]
 
-* code lines: lines with a token that is no comment, outside docstrings, of scenario_gen/ and msg_conventions/;
+* code lines: lines that are not blank, no comment and no docstring, of scenario_gen/ and msg_conventions/;
 * rooms: folders of scenario_gen, msg_conventions, and modules of the root;
-* arrows: ordered pairs (A, B) of rooms of which A imports B, at any depth; up: B stands behind A in the order of
-  test_architecture.py; mutual: pairs whose inverse is an arrow too;
+* arrows: ordered pairs (A, B) of rooms of which A imports B, at any depth; up: B stands behind A in the order of ROOMS in
+  test_architecture.py, and the conventions behind the types; mutual: pairs whose inverse is an arrow too;
 * floors: rooms of the longest chain of imports;
 * parameters: of functions outside numba kernels, `self` and `cls` included.
 """
 
 import argparse
 import ast
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, cached_property
-import io
 from pathlib import Path
 import re
-import tokenize
+import sys
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "test"))
+
+from test_architecture import ROOMS  # noqa: E402 - needs the path
+
 MARKS = ("<!-- counts -->\n", "<!-- end of counts -->\n")
-BLANK = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 MOST_PARAMETERS, MOST_LINES = 8, 60
 BEFORE = {  # of commit 4ef626c
@@ -53,23 +56,35 @@ class Source:
         """All nodes of its tree, the module first."""
         return tuple(ast.walk(ast.parse(self.text)))
 
-    @property
-    def functions(self) -> Iterator[ast.FunctionDef]:
+    @cached_property
+    def functions(self) -> tuple[ast.FunctionDef, ...]:
         """All functions, at any depth."""
-        return (node for node in self.nodes if isinstance(node, ast.FunctionDef))
+        return tuple(node for node in self.nodes if isinstance(node, ast.FunctionDef))
+
+    @cached_property
+    def imports(self) -> tuple[ast.Import | ast.ImportFrom, ...]:
+        """All import statements, at any depth."""
+        return tuple(node for node in self.nodes if isinstance(node, ast.Import | ast.ImportFrom))
 
     @cached_property
     def code_lines(self) -> int:
         """The number of lines that hold code: no docstring, no comment, not blank."""
         docstrings: set[int] = set()
+        strings: set[int] = set()  # whose lines are code though they look blank, or like comments
         for node in self.nodes:
-            if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            if isinstance(node, DOCUMENTED) and node.body and is_text(node.body[0]):
                 docstrings |= set(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
-        lines: set[int] = set()
-        for token in tokenize.generate_tokens(io.StringIO(self.text).readline):
-            if token.type not in BLANK:
-                lines |= set(range(token.start[0], token.end[0] + 1))
-        return len(lines - docstrings)
+            elif isinstance(node, ast.Constant | ast.JoinedStr):
+                strings |= set(range(node.lineno, (node.end_lineno or 0) + 1))
+        lines = {k for k, line in enumerate(self.text.splitlines(), start=1) if (bare := line.strip()) and bare[0] != "#"}
+        return len((lines | strings) - docstrings)
+
+
+def is_text(statement: ast.stmt) -> bool:
+    """Whether a statement is a string and nothing else."""
+    return (
+        isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant) and isinstance(statement.value.value, str)
+    )
 
 
 @cache
@@ -84,22 +99,27 @@ def sources() -> tuple[Source, ...]:
     return tuple(found)
 
 
+@cache
 def arrows() -> set[tuple[str, str]]:
     """Return which rooms import which."""
     rooms = {source.room for source in sources()}
     found = set()
     for source in sources():
-        for node in source.nodes:
-            names: list[str] = []
-            if isinstance(node, ast.ImportFrom) and node.module:
-                names = [f"{node.module}.{alias.name}" for alias in node.names]
-            elif isinstance(node, ast.Import):
-                names = [alias.name for alias in node.names]
+        for node in source.imports:
+            package = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
+            names = [f"{package}{alias.name}" for alias in node.names]
             for parts in (name.split(".") for name in names):
                 room = parts[0] if parts[0] == "msg_conventions" else ".".join(parts[1:2])
                 if parts[0] in ("scenario_gen", "msg_conventions") and room in rooms and room != source.room:
                     found.add((source.room, room))
     return found
+
+
+def up_or_mutual(pairs: set[tuple[str, str]], rooms: Iterable[str] = ROOMS) -> set[tuple[str, str]]:
+    """Return the arrows to a room that stands behind in the order, and those that go both ways."""
+    place = {room: place for place, room in enumerate(rooms)}
+    place["msg_conventions"] = place.get("types", 0) + 0.5
+    return {(a, b) for a, b in pairs if place[b] > place[a] or (b, a) in pairs}
 
 
 def floors(pairs: set[tuple[str, str]]) -> int:
@@ -152,10 +172,7 @@ def late_imports() -> int:
     """Return the number of imports inside functions."""
     spans = {source: [(one.lineno, one.end_lineno or 0) for one in source.functions] for source in sources()}
     return sum(
-        any(first < node.lineno <= last for first, last in spans[source])
-        for source in sources()
-        for node in source.nodes
-        if isinstance(node, ast.Import | ast.ImportFrom)
+        any(first < node.lineno <= last for first, last in spans[source]) for source in sources() for node in source.imports
     )
 
 
@@ -171,11 +188,20 @@ def totals() -> dict[str, str]:
         "modules at the root; folders beside them": f"{len(root)}; {len(folders)}",
         "files of the nodes": str(len(nodes)),
         "floors": str(floors(pairs)),
-        "import arrows; up or mutual": f"{len(pairs)}; {sum((b, a) in pairs for a, b in pairs)}",
+        "import arrows; up or mutual": f"{len(pairs)}; {len(up_or_mutual(pairs))}",
         f"functions of more than {MOST_PARAMETERS} parameters": str(len(crowded())),
         f"functions of more than {MOST_LINES} lines": str(len(long())),
         "imports inside functions": str(late_imports()),
     }
+
+
+def stages() -> dict[str, int]:
+    """Return the code lines of each stage: a folder or a module of scenario_gen/method."""
+    found: Counter[str] = Counter()
+    for source in sources():
+        if source.room == "method":
+            found[source.path.relative_to(ROOT / "scenario_gen" / "method").parts[0].removesuffix(".py")] += source.code_lines
+    return {name: n for name, n in found.items() if n and name != "__init__"}
 
 
 def tables() -> str:
@@ -191,6 +217,7 @@ def tables() -> str:
         behind = ", ".join(sorted(b for a, b in pairs if a == room))
         lines.append(f"| `{room}` | {len(own)} | {sum(source.code_lines for source in own):,} | {behind} |")
     pages = [*sorted((ROOT / "docs").glob("*.md")), ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+    lines += ["", f"Code lines of the stages: {', '.join(f'`{name}` {n:,}' for name, n in sorted(stages().items()))}."]
     words = {page.name: len(re.findall(r"\w+", without_tables(page.read_text(encoding="utf-8")))) for page in pages}
     lines += ["", f"Words by page ({sum(words.values()):,}): {', '.join(f'{name} {n:,}' for name, n in words.items())}."]
     return "\n".join(lines) + "\n"

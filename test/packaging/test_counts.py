@@ -4,7 +4,7 @@
 """The counts of docs/architecture.md are those of the sources."""
 
 import counts
-from counts import floors, is_kernel, parameters, Source, written
+from counts import floors, is_kernel, parameters, Source, up_or_mutual, written
 
 
 def test_the_page_is_up_to_date():
@@ -19,3 +19,5 @@ def test_what_is_counted():
     assert source.code_lines == 5
     assert parameters(function) == 2 and is_kernel(function)
     assert floors({("a", "b"), ("b", "c"), ("a", "c")}) == 3
+    assert up_or_mutual({("b", "a"), ("c", "a"), ("b", "c"), ("c", "b")}, "abc") == {("b", "c"), ("c", "b")}
+    assert up_or_mutual({("a", "b"), ("c", "a")}, "abc") == {("a", "b")}

@@ -13,6 +13,12 @@ import scenario_gen
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "examples" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
+def anchors(page):
+    """Return the anchors of a page's headings, as Markdown makes them."""
+    titles = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_files_links_and_targets_of_a_page_are_there(page):
     text = page.read_text()
@@ -20,6 +26,8 @@ def test_files_links_and_targets_of_a_page_are_there(page):
     assert not [name for name in named if not (ROOT / name).exists()]
     links = {link.partition("#")[0] for link in re.findall(r"\]\((?!https?:)([^)]+)\)", text)} - {""}
     assert not [link for link in links if not (page.parent / link).exists()]
+    places = re.findall(r"\]\((?!https?:)([^)#]*)#([^)]+)\)", text)
+    assert not [(link, anchor) for link, anchor in places if anchor not in anchors(page.parent / link if link else page)]
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     assert set(re.findall(r"`make ([a-z]+)", text)) <= targets
 

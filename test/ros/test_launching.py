@@ -18,7 +18,7 @@ import yaml
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
-from scenario_gen.roads.builtin import BUILT_IN
+from scenario_gen.roads import BUILT_IN
 from scenario_gen.ros.plumbing.launching import ENTRIES, LIVE, OF_LAUNCH, OTHER_NAMES, ROADS
 
 SUITE = ("road_server", "segmenter", "planner", "gp_sampler", "evaluator", "log_player")

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from hashlib import sha256
 from importlib.resources import files
 import json
+from pathlib import Path
 from typing import Any
 
 import jinja2
@@ -22,7 +23,9 @@ from plotly.offline import get_plotlyjs
 from scenario_gen.types import formatted
 
 
-def render_page(template: str, scripts: Sequence[str], data: Any, *, plotly: bool = True, **values: Any) -> str:
+def render_page(
+    template: str, scripts: Sequence[str], data: Any, *, plotly: bool = True, folder: Path | None = None, **values: Any
+) -> str:
     """Return a page as text; the same input gives the same bytes.
 
     Args:
@@ -30,12 +33,14 @@ def render_page(template: str, scripts: Sequence[str], data: Any, *, plotly: boo
         scripts: names of scripts among the assets, in the order in which they run, after plotly.js.
         data: what the scripts draw, put into the page as JSON; all numbers finite.
         plotly: whether the scripts need plotly.js, which is 4 MB.
+        folder: of further templates and scripts.
         **values: what else the template asks for.
     """
     assets = files("scenario_gen.output.report") / "assets"
 
     def asset(name: str) -> str:
-        return (assets / name).read_text(encoding="utf-8")
+        own = folder / name if folder is not None else None
+        return (own if own is not None and own.is_file() else assets / name).read_text(encoding="utf-8")
 
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(asset),

@@ -7,17 +7,15 @@ Source: CommonRoad's documentation of the XML format, 2018b and 2020a.
 """
 
 import math
-from pathlib import Path
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element, finite, read_xml
+from scenario_gen.base.markup import Element, finite
 from scenario_gen.numerics import Floats
-from scenario_gen.roads.vector.network import Draft, network_of, refuse_too_many_lanes
-from scenario_gen.types import LaneNetwork
+from scenario_gen.roads.vector.network import Draft, MapLanes, refuse_too_many_lanes
 
-_SKIPPED = frozenset(
+SKIPPED = frozenset(
     ("obstacle", "staticObstacle", "dynamicObstacle", "environmentObstacle", "phantomObstacle", "planningProblem", "scenarioTags")
 )
 _NOT_FOR_CARS = frozenset(
@@ -26,24 +24,23 @@ _NOT_FOR_CARS = frozenset(
 _MAX_SPEED = ("274", "274.1", "R2-1", "maxSpeed")  # names and national numbers of the sign
 
 
-def read_commonroad(path: Path) -> LaneNetwork:
+def lanes_of(root: Element) -> MapLanes:
     """Return the lanes of a CommonRoad file.
 
     Raises:
-        InputError: it is broken or holds no lane that cars may use; names file and line.
+        InputError: it is broken; names file and line.
     """
-    root = read_xml(path, f"map {path}", _SKIPPED)
-    if root.tag != "commonRoad":
-        raise InputError(f"{root.place}: the root of a CommonRoad file is <commonRoad>")
     lanelets = {element.get("id"): element for element in root.all("lanelet")}
     refuse_too_many_lanes(len(lanelets), root.file)
     limits = _speed_signs(root)
     junctions = _junctions(root, set(lanelets))
-    drafts, left_out = [], 0
-    for name, lanelet in lanelets.items():
-        if {kind.text.strip() for kind in lanelet.all("laneletType")} & _NOT_FOR_CARS:
-            left_out += 1
-            continue
+    for_cars = {
+        name: lanelet
+        for name, lanelet in lanelets.items()
+        if not {kind.text.strip() for kind in lanelet.all("laneletType")} & _NOT_FOR_CARS
+    }
+    drafts = []
+    for name, lanelet in for_cars.items():
         successors = tuple(after.get("ref") for after in lanelet.all("successor"))
         unknown = next((after for after in successors if after not in lanelets), None)
         if unknown is not None:
@@ -54,25 +51,12 @@ def read_commonroad(path: Path) -> LaneNetwork:
             for side in lanelet.all(tag)
             if side.attributes.get("drivingDir") == "same"
         )
-        drafts.append(
-            Draft(
-                id=name,
-                left=_points(lanelet.one("leftBound")),
-                right=_points(lanelet.one("rightBound")),
-                successors=successors,
-                beside=beside,
-                speed_limit=_speed_limit(lanelet, limits),
-                junction=junctions.get(name, ""),
-                place=lanelet.place,
-            )
-        )
-    notes = [
-        f"CommonRoad {root.attributes.get('commonRoadVersion', '?')}: coordinates as they stand, in metres",
-        *_georeference(root),
-    ]
-    if left_out:
-        notes.append(f"{left_out} lanelets are for others than cars and were left out")
-    return network_of(path.stem, drafts, notes)
+        left, right = (_points(lanelet.one(tag)) for tag in ("leftBound", "rightBound"))
+        limit, junction = _speed_limit(lanelet, limits), junctions.get(name, "")
+        drafts.append(Draft(name, left, right, successors, beside, limit, junction, lanelet.place))
+    version = root.attributes.get("commonRoadVersion", "?")
+    notes = (f"CommonRoad {version}: coordinates as they stand, in metres", *_georeference(root))
+    return MapLanes(drafts, notes, len(lanelets) - len(for_cars))
 
 
 def _georeference(root: Element) -> list[str]:

@@ -4,42 +4,38 @@
 """Nobody drives against a lane: the directions in which each cell may be driven, and a vehicle's own part of the road."""
 
 from dataclasses import replace
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 
-from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
+from scenario_gen.numerics import Bools, exact, Floats, sealed, wrap_angle
+from scenario_gen.numerics.plane import angle_between
 from scenario_gen.roads.clearance import clearance_field, footprint_fits
 from scenario_gen.roads.vector.raster import covered
-from scenario_gen.types import Lane, Road, Vehicle
+from scenario_gen.types import Lane, once_per_object, Road, Vehicle
 
 _BINS = 16  # of directions
-_ALLOWED = np.pi / 2.0 + np.pi / _BINS  # a pose turned from a lane by more drives against it; half a bin is not told apart
+_ALLOWED = (
+    np.pi / 2.0 + np.pi / _BINS
+)  # a pose turned from a lane by more drives against it; the bins' width leaves half a bin open
 _ALL = np.uint16(0xFFFF)
 _ALONG = np.radians(60.0)  # a path uses a lane from whose direction it is turned by less
 _AT_ONCE = 4096  # cells
 _KERB = 1.0  # metres beyond its own lanes that a vehicle's footprint may reach
 
-_known: "WeakKeyDictionary[Road, npt.NDArray[np.uint16]]" = WeakKeyDictionary()
 
-
+@once_per_object
 def directions(road: Road) -> npt.NDArray[np.uint16]:
     """Return (H, W): bit k of a cell says whether one may drive there in direction k · 22.5°; all bits where no lane lies.
 
     Several lanes may lie in a cell, as in a junction; each allows what differs from it by at most 90°.
     """
-    found = _known.get(road)
-    if found is None:
-        found = np.zeros(road.drivable.shape, dtype=np.uint16)
-        lanes = road.lanes.lanes if road.lanes is not None else ()
-        for lane in lanes:
-            rows, columns = _cells(road, lane)
-            found[rows, columns] |= _bits(road, lane, rows, columns)
-        found[found == 0] = _ALL
-        found.setflags(write=False)
-        _known[road] = found
-    return found
+    found = np.zeros(road.drivable.shape, dtype=np.uint16)
+    for lane in road.lanes.lanes if road.lanes is not None else ():
+        rows, columns = _cells(road, lane)
+        found[rows, columns] |= _bits(road, lane, rows, columns)
+    found[found == 0] = _ALL
+    return sealed(found)
 
 
 def _cells(road: Road, lane: Lane) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
@@ -51,13 +47,10 @@ def _cells(road: Road, lane: Lane) -> tuple[npt.NDArray[np.int64], npt.NDArray[n
 
 def _bits(road: Road, lane: Lane, rows: npt.NDArray[np.int64], columns: npt.NDArray[np.int64]) -> npt.NDArray[np.uint16]:
     """The directions that a lane allows in its cells, by the section that is nearest to each."""
-    centre = lane.centre
-    step = np.diff(centre, axis=0)
-    yaw = exact.arctan2(step[:, 1], step[:, 0])
     k = np.arange(_BINS)
-    near = np.abs(wrap_angle(2.0 * np.pi * k / _BINS - yaw[:, None])) <= _ALLOWED
+    near = np.abs(wrap_angle(2.0 * np.pi * k / _BINS - lane.yaw[:, None])) <= _ALLOWED
     allowed = (near * (1 << k)).sum(axis=1).astype(np.uint16)
-    middle = (centre[1:] + centre[:-1]) / 2.0
+    middle = lane.middle
     points = road.origin + (np.column_stack((columns, rows)) + 0.5) * road.resolution
     nearest = np.empty(len(points), dtype=np.int64)
     for part in range(0, len(points), _AT_ONCE):
@@ -121,12 +114,9 @@ def _in_box(lane: Lane, poses: Floats) -> Bools:
 def _along(lane: Lane, poses: Floats) -> Bools:
     """Whether poses (M, 3) in the box about a lane lie in it, about its way."""
     found = np.zeros(len(poses), dtype=np.bool_)
-    step = np.diff(lane.centre, axis=0)
-    yaw = exact.arctan2(step[:, 1], step[:, 0])
-    middle = (lane.centre[1:] + lane.centre[:-1]) / 2.0
     half = exact.hypot(*(lane.left - lane.right).T)[:-1] / 2.0
     for row, (x, y, heading) in enumerate(poses.tolist()):
-        away = exact.hypot(middle[:, 0] - x, middle[:, 1] - y)
+        away = exact.hypot(lane.middle[:, 0] - x, lane.middle[:, 1] - y)
         k = int(np.argmin(away))
-        found[row] = away[k] <= half[k] and abs(float(wrap_angle(np.asarray(yaw[k] - heading)))) < _ALONG
+        found[row] = away[k] <= half[k] and abs(angle_between(lane.yaw[k], heading)) < _ALONG
     return found

@@ -7,20 +7,20 @@ Source: Lanelet2's documents on primitives, tagging and the routing graph (Lanel
 Autoware's on `local_x`, `local_y`, `turn_direction` and `intersection_area`.
 """
 
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 import math
-from pathlib import Path
 import re
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element, finite, read_xml
+from scenario_gen.base.markup import Element, finite
 from scenario_gen.logs import local_frame
 from scenario_gen.numerics import exact, Floats
-from scenario_gen.roads.vector.network import Draft, network_of, refuse_too_long, refuse_too_many_lanes
-from scenario_gen.types import LaneNetwork
+from scenario_gen.roads.vector.network import by_id, Draft, MapLanes, refuse_too_long, refuse_too_many_lanes
 
 _FOR_CARS = ("road", "highway", "play_street", "exit")  # subtypes that cars may use, if no participant is named
 _KMH = 1.0 / 3.6
@@ -45,6 +45,11 @@ class _Border:
     points: Floats
     forth: bool = True
 
+    @property
+    def key(self) -> tuple[str, bool]:
+        """Its way and the direction."""
+        return self.way.get("id"), self.forth
+
     def turned(self) -> "_Border":
         return replace(self, nodes=self.nodes[::-1], points=self.points[::-1], forth=not self.forth)
 
@@ -62,7 +67,7 @@ class _Lanelet:
         return replace(self, name=f"{self.name}r", left=self.right.turned(), right=self.left.turned())
 
 
-def read_lanelet2(path: Path) -> LaneNetwork:
+def lanes_of(root: Element) -> MapLanes:
     """Return the lanes of a Lanelet2 map.
 
     Positions are those of the tags `local_x` and `local_y` if all nodes of lanelets have them, else those of latitude and
@@ -71,47 +76,40 @@ def read_lanelet2(path: Path) -> LaneNetwork:
     Raises:
         InputError: it is broken, has no usable coordinates, or no lanelet for cars; names file and line.
     """
-    root = read_xml(path, f"map {path}")
-    if root.tag != "osm":
-        raise InputError(f"{root.place}: the root of a Lanelet2 map is <osm>")
-    nodes, ways = _by_id(root, "node"), _by_id(root, "way")
-    relations = _by_id(root, "relation")
-    chosen, left_out = [], 0
-    for relation in relations.values():
-        tags = _tags(relation)
-        if tags.get("type") == "lanelet":
-            if _for_cars(tags):
-                chosen.append((relation, tags))
-            else:
-                left_out += 1
-    if not chosen:
-        raise InputError(f"map {path}: none of its {left_out} lanelets is for cars")
-    refuse_too_many_lanes(len(chosen), root.file)
-    used = {ref: ways[ref] for relation, _ in chosen for ref in _refs(relation, ways)}
-    refuse_too_long(sum(len(ways[ref].children) for relation, _ in chosen for ref in _refs(relation, ways)), root.file)
-    positions, note = _positions({n: nodes for way in used.values() for n in _nodes(way, nodes)}, nodes, path)
-    lanelets = []
-    for relation, tags in chosen:
-        lanelet = _lanelet(relation, tags, ways, nodes, positions)
-        lanelets.append(lanelet)
+    nodes, ways, relations = (  # without what editors have marked as deleted
+        by_id(element for element in root.all(tag) if element.attributes.get("action") != "delete")
+        for tag in ("node", "way", "relation")
+    )
+    tagged = [(relation, _tags(relation)) for relation in relations.values()]
+    lanelets = [(relation, tags) for relation, tags in tagged if tags.get("type") == "lanelet"]
+    for_cars = [(relation, tags) for relation, tags in lanelets if _for_cars(tags)]
+    if not for_cars:
+        raise InputError(f"{root.file}: none of its {len(lanelets)} lanelets is for cars")
+    refuse_too_many_lanes(len(for_cars), root.file)
+    refs = [ref for relation, _ in for_cars for ref in _refs(relation, ways)]
+    refuse_too_long(sum(len(ways[ref].children) for ref in refs), root.file)
+    borders, note = _borders({ref: ways[ref] for ref in refs}, nodes, root.file)
+    drawn = []
+    for relation, tags in for_cars:
+        lanelet = _lanelet(relation, tags, [borders[ref] for ref in _refs(relation, ways)])
+        drawn.append(lanelet)
         if tags.get("one_way") in ("no", "false"):
-            lanelets.append(lanelet.turned())
-    limits = {relation.get("id"): _sign_limit(relation, ways) for relation in relations.values()}
-    notes = [f"Lanelet2: {note}"]
-    if left_out:
-        notes.append(f"{left_out} lanelets are for others than cars and were left out")
-    return network_of(path.stem, list(_drafts(lanelets, limits)), notes)
+            drawn.append(lanelet.turned())
+    limits = {relation.get("id"): _sign_limit(relation, tags, ways) for relation, tags in tagged}
+    return MapLanes(list(_drafts(drawn, limits)), (f"Lanelet2: {note}",), len(lanelets) - len(for_cars))
 
 
-def _by_id(root: Element, tag: str) -> dict[str, Element]:
-    found: dict[str, Element] = {}
-    for element in root.all(tag):
-        name = element.get("id")
-        if name in found:
-            raise InputError(f"{element.place}: {tag} {name} is there twice, first on line {found[name].line}")
-        if element.attributes.get("action") != "delete":  # as editors mark it
-            found[name] = element
-    return found
+def _borders(ways: dict[str, Element], nodes: dict[str, Element], file: str) -> tuple[dict[str, _Border], str]:
+    """The ways as borders, and a sentence on how their positions were found.
+
+    Raises:
+        InputError: a way has less than two nodes, a node is not in the map, or its position is not known.
+    """
+    names = {ref: _nodes(way, nodes) for ref, way in ways.items()}
+    positions, note = _positions([nodes[name] for name in dict.fromkeys(chain(*names.values()))], file)
+    return {
+        ref: _Border(way, tuple(names[ref]), np.array([positions[name] for name in names[ref]])) for ref, way in ways.items()
+    }, note
 
 
 def _tags(element: Element) -> dict[str, str]:
@@ -157,61 +155,55 @@ def _nodes(way: Element, nodes: dict[str, Element]) -> list[str]:
     return refs
 
 
-def _positions(used: "dict[str, object]", nodes: dict[str, Element], path: Path) -> tuple[dict[str, Floats], str]:
-    """Metres of each used node, and a sentence on how they were found.
+def _positions(nodes: list[Element], file: str) -> tuple[dict[str, Floats], str]:
+    """Metres of each node by its id, and a sentence on how they were found.
 
     Raises:
         InputError: a node has neither local coordinates nor a latitude and longitude, or they are far apart.
     """
-    tags = {name: _tags(nodes[name]) for name in used}
-    local = [name for name in used if {"local_x", "local_y"} <= tags[name].keys()]
-    if local and len(local) < len(used):
-        lacking = next(name for name in used if name not in set(local))
+    ids, tags = [node.get("id") for node in nodes], [_tags(node) for node in nodes]
+    lacking = [node for node, own in zip(nodes, tags, strict=True) if not {"local_x", "local_y"} <= own.keys()]
+    if lacking and len(lacking) < len(nodes):
         raise InputError(
-            f"{nodes[lacking].place}: node {lacking} has no tags local_x and local_y, but {len(local)} of {len(used)} have; "
-            "two frames cannot be mixed"
+            f"{lacking[0].place}: node {lacking[0].get('id')} has no tags local_x and local_y, but "
+            f"{len(nodes) - len(lacking)} of {len(nodes)} have; two frames cannot be mixed"
         )
-    if local:
-        where = {
-            name: np.array([finite(tags[name][key], f"{nodes[name].place}, tag {key}") for key in ("local_x", "local_y")])
-            for name in used
-        }
-        return where, "coordinates are the tags local_x and local_y, in metres"
-    degrees = np.empty((len(used), 2))
-    for row, name in enumerate(used):
-        node = nodes[name]
-        for column, (key, most) in enumerate((("lat", 90.0), ("lon", 180.0))):
-            if not node.attributes.get(key, ""):
-                raise InputError(f"{node.place}: node {name} has neither tags local_x and local_y nor lat and lon")
-            degrees[row, column] = node.number(key)
-            if abs(degrees[row, column]) > most:
-                raise InputError(
-                    f"{node.place}: {key} is {degrees[row, column]:g}; degrees up to {most:g} are needed. A map in metres gives "
-                    "them in tags local_x and local_y"
-                )
-    middle = np.round((degrees.min(axis=0) + degrees.max(axis=0)) / 2.0, 7)
-    origin = (float(middle[0]), float(middle[1]))
-    metres = local_frame(degrees[:, 0], degrees[:, 1], origin)
-    size = float(exact.hypot(*metres.T).max())
+    if not lacking:
+        metres = [
+            np.array([finite(own[key], f"{node.place}, tag {key}") for key in ("local_x", "local_y")])
+            for node, own in zip(nodes, tags, strict=True)
+        ]
+        return dict(zip(ids, metres, strict=True)), "coordinates are the tags local_x and local_y, in metres"
+    degrees = np.array([[_degrees(node, key, most) for key, most in (("lat", 90.0), ("lon", 180.0))] for node in nodes])
+    latitude, longitude = np.round((degrees.min(axis=0) + degrees.max(axis=0)) / 2.0, 7).tolist()
+    local = local_frame(degrees[:, 0], degrees[:, 1], (latitude, longitude))
+    size = float(exact.hypot(local[:, 0], local[:, 1]).max())
     if not size <= _FARTHEST:
         raise InputError(
-            f"map {path}: its nodes are up to {size / 1000.0:.0f} km from their middle; at most {_FARTHEST / 1000.0:g} are read"
+            f"{file}: its nodes are up to {size / 1000.0:.0f} km from their middle; at most {_FARTHEST / 1000.0:g} are read"
         )
-    note = f"latitude and longitude in metres east and north of {origin[0]:.7f}, {origin[1]:.7f} (azimuthal equidistant, WGS84)"
-    return dict(zip(used, metres, strict=True)), note
+    note = f"latitude and longitude in metres east and north of {latitude:.7f}, {longitude:.7f} (azimuthal equidistant, WGS84)"
+    return dict(zip(ids, local, strict=True)), note
 
 
-def _lanelet(
-    relation: Element, tags: dict[str, str], ways: dict[str, Element], nodes: dict[str, Element], positions: dict[str, Floats]
-) -> _Lanelet:
+def _degrees(node: Element, key: str, most: float) -> float:
+    """A node's latitude or longitude."""
+    if not node.attributes.get(key, ""):
+        raise InputError(f"{node.place}: node {node.get('id')} has neither tags local_x and local_y nor lat and lon")
+    value = node.number(key)
+    if abs(value) > most:
+        raise InputError(
+            f"{node.place}: {key} is {value:g}; degrees up to {most:g} are needed. A map in metres gives them in tags local_x "
+            "and local_y"
+        )
+    return value
+
+
+def _lanelet(relation: Element, tags: dict[str, str], borders: Sequence[_Border]) -> _Lanelet:
     """A lanelet whose borders both go its way.
 
     A file may have them either way round: they are turned so that begin lies at begin, and left is on the left.
     """
-    borders = []
-    for ref in _refs(relation, ways):
-        names = tuple(_nodes(ways[ref], nodes))
-        borders.append(_Border(ways[ref], names, np.array([positions[name] for name in names])))
     left, right = borders
     a, b, c, d = left.points[0], left.points[-1], right.points[0], right.points[-1]
     straight = float(exact.hypot(*(a - c)) + exact.hypot(*(b - d)))
@@ -226,21 +218,21 @@ def _lanelet(
 
 def _drafts(lanelets: list[_Lanelet], limits: dict[str, float]) -> Iterator[Draft]:
     """Lanelets with what the routing graph says: a lane follows where both borders go on, from the same two nodes."""
-    begins: dict[tuple[str, str], list[str]] = {}
-    on_left: dict[tuple[str, bool], list[str]] = {}  # way and direction -> lanelets of which it is the left border
-    on_right: dict[tuple[str, bool], list[str]] = {}
+    begins: dict[tuple[str, str], list[str]] = defaultdict(list)
+    on_left: dict[tuple[str, bool], list[str]] = defaultdict(list)  # border -> lanelets that have it on their left
+    on_right: dict[tuple[str, bool], list[str]] = defaultdict(list)
     for lanelet in lanelets:
-        begins.setdefault((lanelet.left.nodes[0], lanelet.right.nodes[0]), []).append(lanelet.name)
-        on_left.setdefault((lanelet.left.way.get("id"), lanelet.left.forth), []).append(lanelet.name)
-        on_right.setdefault((lanelet.right.way.get("id"), lanelet.right.forth), []).append(lanelet.name)
+        begins[lanelet.left.nodes[0], lanelet.right.nodes[0]].append(lanelet.name)
+        on_left[lanelet.left.key].append(lanelet.name)
+        on_right[lanelet.right.key].append(lanelet.name)
     for lanelet in lanelets:
         left, right = lanelet.left, lanelet.right
         beside = []
         if _may_change(right, to_right=True):
-            beside += on_left.get((right.way.get("id"), right.forth), [])
+            beside += on_left[right.key]
         if _may_change(left, to_right=False):
-            beside += on_right.get((left.way.get("id"), left.forth), [])
-        after = begins.get((left.nodes[-1], right.nodes[-1]), [])
+            beside += on_right[left.key]
+        after = begins[left.nodes[-1], right.nodes[-1]]
         own = lanelet.name.removesuffix("r")
         yield Draft(
             id=lanelet.name,
@@ -274,18 +266,13 @@ def _speed(text: str) -> float:
     return float(found[1]) * _UNITS.get(found[2].lower(), math.nan) if found else math.nan
 
 
-def _sign_limit(relation: Element, ways: dict[str, Element]) -> float:
+def _sign_limit(relation: Element, tags: dict[str, str], ways: dict[str, Element]) -> float:
     """The limit [m/s] that a regulatory element sets, by its `sign_type` or its signs' subtypes (de274-50), NaN if none."""
-    tags = _tags(relation)
     if tags.get("type") != "regulatory_element" or tags.get("subtype") != "speed_limit":
         return math.nan
     texts = [tags.get("sign_type", ""), tags.get("speed_limit", "")]
-    texts += [
-        _tags(ways[member.get("ref")]).get("subtype", "")
-        for member in relation.all("member")
-        if member.attributes.get("ref") in ways
-    ]
-    for text in texts:
+    signs = [ways[member.get("ref")] for member in relation.all("member") if member.attributes.get("ref") in ways]
+    for text in (*texts, *(_tags(sign).get("subtype", "") for sign in signs)):
         sign = re.fullmatch(r"(?:de)?274(?:\.1)?-([0-9]+)", text)
         speed = float(sign[1]) * _KMH if sign else _speed(text)
         if not math.isnan(speed):

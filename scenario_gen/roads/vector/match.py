@@ -10,15 +10,16 @@ to crossings and between vehicles on one lane (least squares, weighted).
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import islice, product
 import math
 
 import numpy as np
 
 from scenario_gen.numerics import exact, Floats, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
+from scenario_gen.numerics.plane import angle_between, edge_lengths
 from scenario_gen.roads.vector.search import Spot
-from scenario_gen.template import path_crossing, PathCrossing, Track
+from scenario_gen.template import pair_crossings, Track
 from scenario_gen.types import LaneNetwork
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
@@ -32,12 +33,7 @@ _CAPPED = 100.0  # m²
 _YAW = 20.0  # m² per unit of 1 - cos
 _OWN_TURN = 40.0  # m² per rad²
 _CHANGING = 4  # chains, the most alike, between which a change of lanes is looked for
-_PRIOR, _CROSSED, _BEYOND, _FOLLOWED = (
-    0.5,
-    1.0,
-    0.25,
-    2.0,
-)  # weights: where the place says; crossings driven, or beyond the ends; gaps
+_PRIOR, _CROSSED, _BEYOND, _FOLLOWED = 0.5, 1.0, 0.25, 2.0  # weights: the place; crossings driven, or beyond the ends; gaps
 _WORTH = 1.5  # m² that a change of lanes must gain
 _TURN = math.radians(40.0)  # a chain may turn by this much more or less than the vehicle in the template
 _CROSS = math.radians(15.0)  # least angle of a crossing
@@ -95,15 +91,14 @@ class Match:
 
 
 class Chains:
-    """The chains of lanes of one network, and their middles, made once."""
+    """The chains of lanes of one network, and their middles, each computed once."""
 
     def __init__(self, network: LaneNetwork) -> None:
         self.network = network
-        self.length = [float(exact.hypot(*np.diff(lane.centre, axis=0).T).sum()) for lane in network.lanes]
+        self.length = [float(edge_lengths(lane.centre).sum()) for lane in network.lanes]
         self.points = np.concatenate([lane.centre[:-1] for lane in network.lanes])
-        steps = [np.diff(lane.centre, axis=0) for lane in network.lanes]
-        self.yaws = np.concatenate([exact.arctan2(step[:, 1], step[:, 0]) for step in steps])
-        self.owner = np.repeat(np.arange(len(steps)), [len(step) for step in steps])
+        self.yaws = np.concatenate([lane.yaw for lane in network.lanes])
+        self.owner = np.repeat(np.arange(len(network.lanes)), [len(lane.yaw) for lane in network.lanes])
         self._curves: dict[tuple[int, ...], Curve] = {}
 
     def curve(self, chain: tuple[int, ...]) -> Curve:
@@ -111,6 +106,10 @@ class Chains:
         if chain not in self._curves:
             self._curves[chain] = middle(np.concatenate([self.network.lanes[k].centre for k in chain]))
         return self._curves[chain]
+
+    def after(self, chain: Sequence[int]) -> list[int]:
+        """The lanes that follow a chain and are not in it."""
+        return [k for k in self.network.lanes[chain[-1]].successors if k not in chain]
 
     def near(self, pose: Floats) -> list[int]:
         """Lanes that pass a pose (3,) x, y [m], yaw [rad] nearby, about its way; the nearest first."""
@@ -136,7 +135,7 @@ class Chains:
             if not open_chains:
                 break
             chain, length = open_chains.pop(0)
-            after = [k for k in self.network.lanes[chain[-1]].successors if k not in chain]
+            after = self.after(chain)
             if not after or length > travelled + self.length[first] + _FORTH:
                 yield tuple(k for k in before if k not in chain) + chain
             else:
@@ -193,13 +192,12 @@ def _course(chains: Chains, track: Track, spot: Spot, scale: float) -> Course | 
         return None
     cost, curve, _ = tried[ranked[0]]
     used = ranked[0]
-    for one in ranked[:_CHANGING] if not track.still else ():
-        for other in ranked[:_CHANGING]:
-            change = _change(tried[one][2], tried[other][2])
-            if change is not None and change[1] < cost - _WORTH and _beside(chains.network, one, other):
-                changed = changed_curve(tried[one][1], tried[other][1], poses[change[0], :2])
-                if changed is not None:
-                    cost, curve, used = change[1], changed, tuple(dict.fromkeys((*one, *other)))
+    for before, after in product(ranked[:_CHANGING], repeat=2) if not track.still else ():
+        change = _change(tried[before][2], tried[after][2])
+        if change is not None and change[1] < cost - _WORTH and _beside(chains.network, before, after):
+            changed = changed_curve(tried[before][1], tried[after][1], poses[change[0], :2])
+            if changed is not None:
+                cost, curve, used = change[1], changed, tuple(dict.fromkeys((*before, *after)))
     station, _ = curve.project(poses[:, :2])
     start = float(np.median(station - np.linspace(0.0, driven, len(station))))
     return Course(used, curve, start, scale * track.progress)
@@ -234,43 +232,43 @@ def _change(before: Floats, after: Floats) -> tuple[int, float] | None:
     return (k, float(forth[k]) / len(before)) if 2 <= k < len(before) - 3 else None
 
 
-def _beside(network: LaneNetwork, one: tuple[int, ...], other: tuple[int, ...]) -> bool:
+def _beside(network: LaneNetwork, chain: tuple[int, ...], other: tuple[int, ...]) -> bool:
     """Whether traffic may change from a chain to another."""
-    return any(k in network.lanes[lane].beside for lane in one for k in other)
+    return any(k in network.lanes[lane].beside for lane in chain for k in other)
 
 
-def changed_curve(one: Curve, other: Curve, at: Floats) -> Curve | None:
+def changed_curve(first: Curve, second: Curve, at: Floats) -> Curve | None:
     """A curve that changes smoothly (x³(10 − 15x + 6x²)) from one curve to another around a place (2,) [m]."""
-    station = float(one.project(at[None])[0][0])
-    _, offset = other.project(one.at(np.array([station]))[:, :2])
+    station = float(first.project(at[None])[0][0])
+    _, offset = second.project(first.at(np.array([station]))[:, :2])
     width = abs(float(offset[0]))
     reach = math.sqrt(max(width, 0.1) * _BLEND / _SHIFT)
-    s = np.arange(0.0, one.length + 1e-9, _STEP)
-    here = one.at(s)
-    there, _ = other.project(here[:, :2])
+    s = np.arange(0.0, first.length + 1e-9, _STEP)
+    here = first.at(s)
+    there, _ = second.project(here[:, :2])
     x = np.clip((s - station) / reach + 0.5, 0.0, 1.0)
     share = exact.power(x, 3) * (10.0 - 15.0 * x + 6.0 * np.square(x))
-    target = other.at(there)[:, :2]
-    kept = (s < station) | ((there > 0.0) & (there < other.length))
+    target = second.at(there)[:, :2]
+    kept = (s < station) | ((there > 0.0) & (there < second.length))
     mixed = (here[:, :2] + share[:, None] * (target - here[:, :2]))[kept]
     return Curve.through(mixed) if len(mixed) > 3 else None
 
 
 def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[Course]:
     """Shift the beginnings so that crossings and gaps on one lane are as far along as in the template (least squares)."""
-    rows: list[tuple[dict[int, float], float, float]] = [({i: 1.0}, course.start, _PRIOR) for i, course in enumerate(courses)]
-    for a, one in enumerate(tracks):
+    one_each = np.eye(len(courses))
+    rows = [(one_each[i], course.start, _PRIOR) for i, course in enumerate(courses)]  # factors, value, weight
+    crossing_of = {(a, b): crossing for a, b, crossing in pair_crossings(tracks)}
+    for a in range(len(tracks)):
         for b in range(a):
-            two = tracks[b]
-            crossing = path_crossing(one, two)
-            if crossing is not None:
-                found = crossings(courses[a].curve, courses[b].curve, _CROSS)
-                if len(found):
-                    want = np.array([courses[a].start + scale * crossing.first, courses[b].start + scale * crossing.second])
-                    at = found[int(np.argmin(np.abs(found - want).sum(axis=1)))]
-                    weight = _CROSSED if _driven(crossing, one, two) else _BEYOND
-                    rows.append(({a: 1.0}, float(at[0]) - scale * crossing.first, weight))
-                    rows.append(({b: 1.0}, float(at[1]) - scale * crossing.second, weight))
+            crossing = crossing_of.get((a, b))
+            found = crossings(courses[a].curve, courses[b].curve, _CROSS) if crossing else ()
+            if crossing and len(found):
+                along = scale * np.array([crossing.first, crossing.second])
+                wanted = np.array([courses[a].start, courses[b].start]) + along
+                at = found[int(np.argmin(np.abs(found - wanted).sum(axis=1)))] - along
+                weight = _CROSSED if crossing.driven else _BEYOND
+                rows += [(one_each[a], float(at[0]), weight), (one_each[b], float(at[1]), weight)]
             for first, second in ((a, b), (b, a)):
                 gap = _follows(tracks[first], tracks[second])
                 if gap is None:
@@ -278,27 +276,18 @@ def _tied(courses: list[Course], tracks: Sequence[Track], scale: float) -> list[
                 station, offset = courses[second].curve.project(courses[first].curve.at(np.array([courses[first].start]))[:, :2])
                 if abs(float(offset[0])) < _SAME:  # of `first`, its start lies so far along the course of `second`
                     shift = float(station[0]) - courses[first].start
-                    rows.append(({first: 1.0, second: -1.0}, scale * gap - shift, _FOLLOWED))
-    matrix, value = np.zeros((len(rows), len(courses))), np.zeros(len(rows))
-    for row, (terms, wanted, weight) in enumerate(rows):
-        for i, factor in terms.items():
-            matrix[row, i] = weight * factor
-        value[row] = weight * wanted
-    solution = exact.lstsq(matrix, value)
+                    rows.append((one_each[first] - one_each[second], scale * gap - shift, _FOLLOWED))
+    factors, values, weights = (np.array(column) for column in zip(*rows, strict=True))
+    solution = exact.lstsq(weights[:, None] * factors, weights * values)
     return [replace(course, start=float(s)) for course, s in zip(courses, solution, strict=True)]
 
 
-def _driven(crossing: PathCrossing, one: Track, two: Track) -> bool:
-    """Whether both vehicles drive as far as their crossing."""
-    return 0.0 <= crossing.first <= one.travelled and 0.0 <= crossing.second <= two.travelled
-
-
-def _follows(one: Track, two: Track) -> float | None:
-    """How far along the path of `two` the path of `one` begins, if it begins on it."""
-    start = one.curve.at(0.0)
-    station, offset = two.curve.project(start[None, :2])
-    turned = abs(float(wrap_angle(np.asarray(two.curve.at(float(station[0]))[2] - start[2]))))
-    on = abs(float(offset[0])) < _SAME and turned < math.radians(30.0) and 0.0 <= station[0] <= two.travelled
+def _follows(track: Track, leader: Track) -> float | None:
+    """How far along the leader's path the track's path begins, if it begins on it."""
+    start = track.curve.at(0.0)
+    station, offset = leader.curve.project(start[None, :2])
+    turned = abs(angle_between(leader.curve.at(float(station[0]))[2], start[2]))
+    on = abs(float(offset[0])) < _SAME and turned < math.radians(30.0) and 0.0 <= station[0] <= leader.travelled
     return float(station[0]) if on else None
 
 
@@ -323,18 +312,16 @@ def judged(chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], s
             reason = reason or f"the lanes turn vehicle {track.vehicle.id} by {math.degrees(turn):.0f}° more than in the template"
         poses = _placed(track, spot)
         fitted = course.curve.at(np.linspace(course.start, course.end, len(poses)))
-        miss = np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1])
-        cost += float(np.minimum(miss, _CAPPED).mean() + _YAW * (1.0 - exact.cos(fitted[:, 2] - poses[:, 2])).mean()) / len(
-            tracks
-        )
-    for a, one in enumerate(tracks):
-        for b, two in enumerate(tracks[:a]):
-            crossing = path_crossing(one, two)
-            if crossing is None or len(crossings(courses[a].curve, courses[b].curve, _CROSS)):
-                continue
-            cost += _LOST
-            if _driven(crossing, one, two):
-                reason = reason or f"vehicles {two.vehicle.id} and {one.vehicle.id} cross in the template, and not on these lanes"
+        miss = np.minimum(np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1]), _CAPPED)
+        turned = 1.0 - exact.cos(fitted[:, 2] - poses[:, 2])
+        cost += float(miss.mean() + _YAW * turned.mean()) / len(tracks)
+    for a, b, crossing in pair_crossings(tracks):
+        if len(crossings(courses[a].curve, courses[b].curve, _CROSS)):
+            continue
+        cost += _LOST
+        if crossing.driven:
+            ids = f"{tracks[b].vehicle.id} and {tracks[a].vehicle.id}"
+            reason = reason or f"vehicles {ids} cross in the template, and not on these lanes"
     aside = [pressed_aside(course, track) for course, track in zip(courses, tracks, strict=True)]
     for (_, forced), track in zip(aside, tracks, strict=True):
         if forced > _NO_GRIP:

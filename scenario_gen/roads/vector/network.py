@@ -11,7 +11,9 @@ import numpy as np
 import shapely
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.markup import Element
 from scenario_gen.numerics import Bools, exact, Floats, Ints, runs
+from scenario_gen.numerics.plane import edge_lengths, meeting_shares
 from scenario_gen.types import Lane, LaneNetwork
 
 _SECTION = 1.0  # metres between cross-sections at most
@@ -57,8 +59,37 @@ class Draft:
                 raise InputError(f"{self.place}: lane {self.id}: {len(names)} lanes {what}; at most {MOST_LINKS} are read")
 
 
+@dataclass(frozen=True)
+class MapLanes:
+    """What a reader finds in a file.
+
+    Attributes:
+        drafts: its lanes for cars.
+        notes: how it was read.
+        left_out: how many lanes for others were passed over.
+    """
+
+    drafts: Sequence[Draft]
+    notes: tuple[str, ...]
+    left_out: int = 0
+
+
+def by_id(elements: Iterable[Element]) -> dict[str, Element]:
+    """Return elements by their attribute `id`.
+
+    Raises:
+        InputError: an id is there twice.
+    """
+    found: dict[str, Element] = {}
+    for element in elements:
+        first = found.setdefault(element.get("id"), element)
+        if first is not element:
+            raise InputError(f"{element.place}: {element.tag} {element.get('id')} is there twice, first on line {first.line}")
+    return found
+
+
 def refuse_too_many_lanes(count: int, place: str) -> None:
-    """Refuse a map, or a part of it, before its lanes are made.
+    """Refuse a map, or a part of it, before its lanes are drawn.
 
     Raises:
         InputError: it has more than `MOST_LANES`.
@@ -68,7 +99,7 @@ def refuse_too_many_lanes(count: int, place: str) -> None:
 
 
 def refuse_too_long(sections: int, place: str) -> None:
-    """Refuse a map, or a part of it, before its cross-sections are made.
+    """Refuse a map, or a part of it, before its cross-sections are computed.
 
     Raises:
         InputError: it has more than `MOST_SECTIONS`.
@@ -79,12 +110,13 @@ def refuse_too_long(sections: int, place: str) -> None:
         )
 
 
-def network_of(name: str, drafts: Sequence[Draft], notes: Iterable[str]) -> LaneNetwork:
+def network_of(name: str, found: MapLanes) -> LaneNetwork:
     """Return the network of what a reader found; neighbours that are no lanes for cars are left out.
 
     Raises:
         InputError: there is no lane, an id is there twice, or a border is no line.
     """
+    drafts, notes = found.drafts, found.notes
     if not drafts:
         raise InputError(f"map {name}: no lane that cars may use")
     index: dict[str, int] = {}
@@ -95,7 +127,7 @@ def network_of(name: str, drafts: Sequence[Draft], notes: Iterable[str]) -> Lane
     lanes, total = [], 0
     for draft in drafts:
         left, right = (draft.left, draft.right) if draft.paired else cross_sections(draft.left, draft.right, draft.place)
-        longest = max(float(exact.hypot(*np.diff(border, axis=0).T).sum()) for border in (left, right))
+        longest = max(float(edge_lengths(border).sum()) for border in (left, right))
         if not longest <= MOST_SECTIONS * _SECTION:  # nor is it NaN
             raise InputError(f"{draft.place}: lane {draft.id} has a border of {longest / 1000.0:.3g} km; check the coordinates")
         total += max(len(left), math.ceil(longest / _SECTION))
@@ -104,7 +136,9 @@ def network_of(name: str, drafts: Sequence[Draft], notes: Iterable[str]) -> Lane
             tuple(dict.fromkeys(index[other] for other in names if other in index)) for names in (draft.successors, draft.beside)
         )
         lanes.append(Lane(draft.id, left, right, after, beside, draft.speed_limit, draft.junction))
-    network = LaneNetwork(name, tuple(lanes), tuple(notes))
+    if found.left_out:
+        notes += (f"{found.left_out} lanelets are for others than cars and were left out",)
+    network = LaneNetwork(name, tuple(lanes), notes)
     return network if any(lane.junction for lane in lanes) else with_junctions(network)
 
 
@@ -116,10 +150,8 @@ def cross_sections(left: Floats, right: Floats, where: str) -> tuple[Floats, Flo
     """
     borders, shares, longest = [], [], 0.0
     for name, border in (("left", left), ("right", right)):
-        step = exact.hypot(*np.diff(border, axis=0).T) if len(border) > 1 else np.zeros(0)
-        keep = np.concatenate(([True], step > 1e-6)) if len(border) else np.zeros(0, dtype=np.bool_)
-        points = border[keep]
-        length = np.concatenate(([0.0], np.cumsum(exact.hypot(*np.diff(points, axis=0).T)))) if len(points) > 1 else np.zeros(1)
+        points = border[np.concatenate(([True], edge_lengths(border) > 1e-6))] if len(border) else border
+        length = np.concatenate(([0.0], np.cumsum(edge_lengths(points))))
         if length[-1] < _SHORTEST:
             raise InputError(f"{where}: the {name} border has {len(border)} point(s) and no length; a line is needed")
         borders.append(points)
@@ -192,17 +224,18 @@ def _crossing(network: LaneNetwork) -> Iterator[tuple[int, int]]:
     boxes = shapely.box(*np.nanmin(ends, axis=1).T, *np.nanmax(ends, axis=1).T)
     tree, compared = shapely.STRtree(boxes), 0
     for k in range(0, len(boxes), _QUERIED):
-        one, two = tree.query(boxes[k : k + _QUERIED])
-        one = one + k
-        one, two = one[owner[one] < owner[two]], two[owner[one] < owner[two]]
-        compared += len(one)
+        first, second = tree.query(boxes[k : k + _QUERIED])
+        first = first + k
+        ordered = owner[first] < owner[second]
+        first, second = first[ordered], second[ordered]
+        compared += len(first)
         if compared > _MOST_COMPARED:
             raise InputError(
                 f"map {network.name}: its lanes lie upon each other in more than {_MOST_COMPARED} places, as at lane "
-                f"{network.lanes[owner[one[0]]].id}; check the coordinates"
+                f"{network.lanes[owner[first[0]]].id}; check the coordinates"
             )
-        for n in range(0, len(one), _COMPARED):
-            a, b = one[n : n + _COMPARED], two[n : n + _COMPARED]
+        for n in range(0, len(first), _COMPARED):
+            a, b = first[n : n + _COMPARED], second[n : n + _COMPARED]
             hit = _cross(start[a], step[a], start[b], step[b], edge[a], edge[b])
             yield from zip(owner[a[hit]].tolist(), owner[b[hit]].tolist(), strict=True)
 
@@ -218,12 +251,8 @@ def _cross(p: Floats, u: Floats, q: Floats, v: Floats, first: Ints, second: Ints
         first: (K, C) of each edge of one: 1 if it is the first of its lane, 2 if it is the last, 3 if it is both.
         second: the same of the other.
     """
-    w = q[:, None] - p[:, :, None]
-    u, v = u[:, :, None], v[:, None]
-    det = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        t = (w[..., 0] * v[..., 1] - w[..., 1] * v[..., 0]) / det
-        s = (w[..., 0] * u[..., 1] - w[..., 1] * u[..., 0]) / det
+    t, s, _ = meeting_shares(p[:, :, None], u[:, :, None], q[:, None], v[:, None])
+    with np.errstate(invalid="ignore"):
         hit = (t >= 0.0) & (t < 1.0) & (s >= 0.0) & (s < 1.0)
     hit &= (first[:, :, None] & second[:, None]) == 0  # two first edges part, and two last ones meet, there
     return np.asarray(hit.any(axis=(1, 2)))

@@ -7,19 +7,27 @@ A lane is named road.section.lane, e.g. 5.0.-1. Elevation and superelevation are
 Source: ASAM OpenDRIVE 1.8, chapters "Roads", "Lanes" and "Junctions".
 """
 
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 import math
-from pathlib import Path
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element, read_xml
+from scenario_gen.base.markup import Element
 from scenario_gen.numerics import exact, Floats
-from scenario_gen.roads.vector.network import Draft, MOST_LINKS, MOST_SECTIONS, network_of, refuse_too_long, refuse_too_many_lanes
+from scenario_gen.numerics.plane import unit_left
+from scenario_gen.roads.vector.network import (
+    by_id,
+    Draft,
+    MapLanes,
+    MOST_LINKS,
+    MOST_SECTIONS,
+    refuse_too_long,
+    refuse_too_many_lanes,
+)
 from scenario_gen.roads.vector.plan_view import Cubics, cubics, reference_line, ReferenceLine
-from scenario_gen.types import LaneNetwork
 
 _FOR_CARS = frozenset(
     ("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "bidirectional", "mwyEntry", "mwyExit", "HOV")
@@ -34,12 +42,44 @@ End = tuple[Key, int]  # a lane and 0 for its end at lower s, 1 for that at high
 
 
 @dataclass(frozen=True, eq=False)
+class _Lane:
+    """A lane of one section.
+
+    Attributes:
+        key: its road, section and id.
+        element: of the file.
+        inner: (M, 2) [m] its border towards the centre lane, in the order of s.
+        outer: (M, 2) [m] the other one.
+        forth: whether it is driven in the direction of growing s.
+    """
+
+    key: Key
+    element: Element
+    inner: Floats
+    outer: Floats
+    forth: bool
+
+    @property
+    def name(self) -> str:
+        """Road, section and id."""
+        return ".".join(map(str, self.key))
+
+    @property
+    def kind(self) -> str:
+        """Its type."""
+        return self.element.attributes.get("type", "none")
+
+    def middle(self, at: int) -> Floats:
+        """(2,) [m] its middle at lower s (0) or at higher s (1)."""
+        return np.asarray((self.outer[-at] + self.inner[-at]) / 2.0)
+
+
+@dataclass(frozen=True, eq=False)
 class _Section:
-    """A lane section: its cross-sections and its lanes, by id."""
+    """A lane section: s of its cross-sections (M,) and its lanes by id."""
 
     s: Floats
-    lanes: dict[int, Element]
-    edges: dict[int, Floats]  # by lane, its outer border (M, 2); 0: the centre lane
+    lanes: dict[int, _Lane]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,25 +91,17 @@ class _Road:
     sections: list[_Section] = field(default_factory=list)
 
 
-def read_opendrive(path: Path) -> LaneNetwork:
+def lanes_of(root: Element) -> MapLanes:
     """Return the lanes of an OpenDRIVE map.
 
     Raises:
-        InputError: it is broken or holds no lane that cars may use; names file and line.
+        InputError: it is broken or has no road; names file and line.
     """
-    root = read_xml(path, f"map {path}")
-    if root.tag != "OpenDRIVE":
-        raise InputError(f"{root.place}: the root of an OpenDRIVE map is <OpenDRIVE>")
     header = root.one("header")
-    notes = [
-        f"OpenDRIVE {header.attributes.get('revMajor', '?')}.{header.attributes.get('revMinor', '?')}: {_projection(header)}"
-    ]
+    version = ".".join(header.attributes.get(name, "?") for name in ("revMajor", "revMinor"))
     roads: dict[str, _Road] = {}
     total, lanes, points = 0.0, 0, 0
-    for element in root.all("road"):
-        name = element.get("id")
-        if name in roads:
-            raise InputError(f"{element.place}: road {name} is there twice, first on line {roads[name].element.line}")
+    for name, element in by_id(root.all("road")).items():
         line = reference_line(element)
         total += line.length
         if total > MOST_SECTIONS * _STEP:
@@ -80,26 +112,22 @@ def read_opendrive(path: Path) -> LaneNetwork:
         points += sum(len(section.lanes) * len(section.s) for section in roads[name].sections)
         refuse_too_long(points, root.file)
     if not roads:
-        raise InputError(f"map {path}: no <road>")
+        raise InputError(f"{root.file}: no <road>")
     joints = _Joints(roads)
     for road in roads.values():
         joints.along(road)
     for junction in root.all("junction"):
         joints.through(junction)
-    notes += joints.notes()
-    return network_of(path.stem, list(_drafts(roads, joints)), notes)
+    return MapLanes(list(_drafts(roads, joints)), (f"OpenDRIVE {version}: {_projection(header)}", *joints.notes()))
 
 
 def _projection(header: Element) -> str:
     reference = header.first("geoReference")
     text = " ".join(reference.text.split()) if reference is not None else ""
+    stated = f"geoReference {text} is stated, not applied" if text else "no geoReference"
     offset = header.first("offset")
     moved = "" if offset is None else f", offset x {offset.number('x', 0.0):g}, y {offset.number('y', 0.0):g} not applied"
-    return (
-        "coordinates as they stand, in metres; "
-        + (f"geoReference {text} is stated, not applied" if text else "no geoReference")
-        + moved
-    )
+    return f"coordinates as they stand, in metres; {stated}{moved}"
 
 
 def _road(element: Element, name: str, line: ReferenceLine) -> _Road:
@@ -114,36 +142,34 @@ def _road(element: Element, name: str, line: ReferenceLine) -> _Road:
     begins = [min(max(section.number("s"), 0.0), line.length) for section in sections]
     for section, begin, end in zip(sections, begins, [*begins[1:], line.length], strict=True):
         breaks = line.begin[np.searchsorted(line.begin, begin, side="right") : np.searchsorted(line.begin, end)]
-        s = np.unique(
-            np.concatenate((np.linspace(begin, max(end, begin + 1e-3), max(math.ceil((end - begin) / _STEP), 1) + 1), breaks))
-        )
-        road.sections.append(_section(section, begin, s, line.at(s), offset))
+        even = np.linspace(begin, max(end, begin + 1e-3), max(math.ceil((end - begin) / _STEP), 1) + 1)
+        s = np.unique(np.concatenate((even, breaks)))
+        road.sections.append(_Section(s, dict(_lanes(road, section, s, line.at(s), offset))))
     return road
 
 
-def _section(section: Element, begin: float, s: Floats, poses: Floats, offset: Cubics) -> _Section:
-    normal = np.column_stack((-exact.sin(poses[:, 2]), exact.cos(poses[:, 2])))
-    lanes: dict[int, Element] = {}
-    edges: dict[int, Floats] = {}
-    middle = offset.at(s)
-    edges[0] = poses[:, :2] + middle[:, None] * normal
+def _lanes(road: _Road, section: Element, s: Floats, poses: Floats, offset: Cubics) -> Iterator[tuple[int, _Lane]]:
+    """The lanes of a section that has its cross-sections at s (M,), where the reference line has these poses (M, 3)."""
+    normal, centre = unit_left(poses[:, 2]), offset.at(s)
+    begin = s[0]
     for side, sign in (("left", 1), ("right", -1)):
         group = section.first(side)
-        across = middle
-        known = group.all("lane") if group else []
-        refuse_too_many_lanes(len(known), section.file)
-        refuse_too_long(len(known) * len(s), section.file)
-        for count, lane in enumerate(sorted(known, key=lambda lane: sign * _lane_id(lane, sign)), 1):
+        across, inner = centre, poses[:, :2] + centre[:, None] * normal
+        elements = group.all("lane") if group else []
+        refuse_too_many_lanes(len(elements), section.file)
+        refuse_too_long(len(elements) * len(s), section.file)
+        for count, lane in enumerate(sorted(elements, key=lambda lane: sign * _lane_id(lane, sign)), 1):
             name = _lane_id(lane, sign)
             if name != sign * count:
                 raise InputError(f"{lane.place}: lane {name} is there twice, or those between it and the centre are missing")
-            lanes[name] = lane
             if lane.all("width"):
                 across = across + sign * np.maximum(cubics(lane.all("width"), "sOffset").at(s - begin), 0.0)
             elif lane.all("border"):
-                across = cubics(lane.all("border"), "sOffset").at(s - begin) + middle
-            edges[name] = poses[:, :2] + across[:, None] * normal
-    return _Section(s, lanes, edges)
+                across = cubics(lane.all("border"), "sOffset").at(s - begin) + centre
+            outer = poses[:, :2] + across[:, None] * normal
+            forth = ((name < 0) != road.left_hand) != (lane.attributes.get("direction") == "reversed")
+            yield name, _Lane((road.id, len(road.sections), name), lane, inner, outer, forth)
+            inner = outer
 
 
 def _lane_id(lane: Element, sign: int) -> int:
@@ -163,66 +189,56 @@ class _Joints:
 
     def __init__(self, roads: dict[str, _Road]) -> None:
         self.roads = roads
-        self.of: dict[End, list[End]] = {}
-        self.apart = 0
-        self.first = ""
+        self.of: dict[End, list[End]] = defaultdict(list)
+        self.apart: list[str] = []  # places of links that join lanes whose ends are apart
 
     def notes(self) -> list[str]:
         """Say what was not believed."""
         if not self.apart:
             return []
         return [
-            f"{self.apart} links join lanes whose ends are more than {_LINKED:g} m apart and were left out, first at {self.first}"
+            f"{len(self.apart)} links join lanes whose ends are more than {_LINKED:g} m apart and were left out, first at "
+            f"{self.apart[0]}"
         ]
 
-    def point(self, end: End) -> Floats:
-        """(2,) [m] the middle of a lane at one of its ends."""
-        (road, section, lane), at = end
-        edges = self.roads[road].sections[section].edges
-        inner = lane - (1 if lane > 0 else -1)
-        k = -1 if at else 0
-        return np.asarray((edges[lane][k] + edges[inner][k]) / 2.0)
-
-    def known(self, end: End) -> bool:
-        """Whether there is such a lane."""
-        (road, section, lane), _ = end
-        return lane in self.roads[road].sections[section].lanes
+    def lane(self, key: Key) -> _Lane | None:
+        """The lane of a key; None if there is none."""
+        road, section, lane = key
+        return self.roads[road].sections[section].lanes.get(lane)
 
     def join(self, a: End, b: End, place: str) -> None:
         """Join two ends, if they are there and near each other."""
-        if not (self.known(a) and self.known(b)):
+        first, second = self.lane(a[0]), self.lane(b[0])
+        if first is None or second is None:
             return
-        if float(exact.hypot(*(self.point(a) - self.point(b)))) > _LINKED:
-            self.apart += 1
-            self.first = self.first or place
+        if float(exact.hypot(*(first.middle(a[1]) - second.middle(b[1])))) > _LINKED:
+            self.apart.append(place)
             return
-        for one, other in ((a, b), (b, a)):
-            if other not in self.of.setdefault(one, []):
-                self.of[one].append(other)
-                if len(self.of[one]) > MOST_LINKS:
-                    raise InputError(f"{place}: more than {MOST_LINKS} lanes are joined to lane {_name(one[0])}")
+        for lane, end, other in ((first, a, b), (second, b, a)):
+            if other not in self.of[end]:
+                self.of[end].append(other)
+                if len(self.of[end]) > MOST_LINKS:
+                    raise InputError(f"{place}: more than {MOST_LINKS} lanes are joined to lane {lane.name}")
 
     def along(self, road: _Road) -> None:
         """Join a road's sections, and it to the roads before and after it."""
-        last = len(road.sections) - 1
         for k, section in enumerate(road.sections):
-            for name, lane in section.lanes.items():
+            for lane in section.lanes.values():
                 for tag, at in (("predecessor", 0), ("successor", 1)):
-                    for link in [found for group in lane.all("link") for found in group.all(tag)]:
+                    beyond = k + (1 if at else -1)
+                    for link in [found for group in lane.element.all("link") for found in group.all(tag)]:
                         other = int(link.number("id"))
-                        end: End = ((road.id, k, name), at)
-                        if 0 <= k + (1 if at else -1) <= last:
-                            self.join(end, ((road.id, k + (1 if at else -1), other), 1 - at), link.place)
+                        if 0 <= beyond < len(road.sections):
+                            self.join((lane.key, at), ((road.id, beyond, other), 1 - at), link.place)
                         else:
-                            self._to_road(road, end, tag, other)
+                            self._to_road(road, (lane.key, at), tag, other)
 
     def _to_road(self, road: _Road, end: End, tag: str, lane: int) -> None:
         link = road.element.first("link", tag)
         if link is None or link.attributes.get("elementType") != "road":
             return
         other = self.road(link, "elementId")
-        contact = link.attributes.get("contactPoint", "start")
-        self.join(end, self.end_of(other, contact, lane), link.place)
+        self.join(end, self.end_of(other, link.attributes.get("contactPoint", "start"), lane), link.place)
 
     def road(self, link: Element, name: str) -> _Road:
         """The road that an attribute names.
@@ -250,79 +266,65 @@ class _Joints:
             contact = connection.attributes.get("contactPoint", "start")
             for link in connection.all("laneLink"):
                 target = self.end_of(connecting, contact, int(link.number("to")))
-                sources = [self.end_of(incoming, side, int(link.number("from"))) for side in ("start", "end")]
-                there = [source for source in sources if self.known(source)]
-                if there and self.known(target):  # the incoming road may touch the junction with either end
-                    goal = self.point(target)
-                    self.join(min(there, key=lambda end: float(exact.hypot(*(self.point(end) - goal)))), target, link.place)
+                goal = self.lane(target[0])
+                if goal is None:
+                    continue
+                distance = {}  # the incoming road may touch the junction with either end
+                for side in ("start", "end"):
+                    source = self.end_of(incoming, side, int(link.number("from")))
+                    lane = self.lane(source[0])
+                    if lane is not None:
+                        distance[source] = float(exact.hypot(*(lane.middle(source[1]) - goal.middle(target[1]))))
+                if distance:
+                    self.join(min(distance, key=distance.__getitem__), target, link.place)
 
 
 def _drafts(roads: dict[str, _Road], joints: _Joints) -> Iterator[Draft]:
     for road in roads.values():
-        for k, section in enumerate(road.sections):
-            for name, lane in section.lanes.items():
-                if lane.attributes.get("type", "none") not in _FOR_CARS:
+        for section in road.sections:
+            for lane in section.lanes.values():
+                wide = float(exact.hypot(*(lane.outer - lane.inner).T).max()) >= 0.1
+                if lane.kind not in _FOR_CARS or not wide:
                     continue
-                inner = name - (1 if name > 0 else -1)
-                if float(exact.hypot(*(section.edges[name] - section.edges[inner]).T).max()) < 0.1:
-                    continue  # a lane that has no width
-                forth = _forth(road, lane, name)
-                for along in (forth, not forth) if lane.attributes.get("type") == "bidirectional" else (forth,):
-                    yield _draft(road, k, name, joints, along=along, second=along != forth)
+                yield _draft(road, section, lane, joints, along=lane.forth)
+                if lane.kind == "bidirectional":
+                    yield _draft(road, section, lane, joints, along=not lane.forth)
 
 
-def _forth(road: _Road, lane: Element, name: int) -> bool:
-    """Whether a lane is driven in the direction of growing s."""
-    forth = (name < 0) != road.left_hand
-    return forth != (lane.attributes.get("direction") == "reversed")
-
-
-def _name(key: Key) -> str:
-    return f"{key[0]}.{key[1]}.{key[2]}"
-
-
-def _draft(road: _Road, k: int, name: int, joints: _Joints, *, along: bool, second: bool) -> Draft:
-    section, key = road.sections[k], (road.id, k, name)
-    lane = section.lanes[name]
-    inner = name - (1 if name > 0 else -1)
-    left, right = (section.edges[inner], section.edges[name]) if name < 0 else (section.edges[name], section.edges[inner])
+def _draft(road: _Road, section: _Section, lane: _Lane, joints: _Joints, *, along: bool) -> Draft:
+    """A lane driven along s or against it; against its own direction its name ends with "r"."""
+    number = lane.key[2]
+    left, right = (lane.inner, lane.outer) if number < 0 else (lane.outer, lane.inner)
     if not along:
         left, right = right[::-1], left[::-1]
     after = []
-    for (other_road, other_section, other), at in joints.of.get((key, 1 if along else 0), []):
-        target = joints.roads[other_road]
-        element = target.sections[other_section].lanes[other]
-        enters = _forth(target, element, other) == (at == 0)
-        if element.attributes.get("type") == "bidirectional":
-            after.append(_name((other_road, other_section, other)) + ("" if enters else "r"))
-        elif enters:
-            after.append(_name((other_road, other_section, other)))
+    for key, at in joints.of[lane.key, 1 if along else 0]:
+        target = joints.lane(key)
+        assert target is not None
+        enters = target.forth == (at == 0)
+        if enters or target.kind == "bidirectional":
+            after.append(target.name + ("" if enters else "r"))
     beside = []
-    for other in (name - 1, name + 1):
-        mark = lane if abs(other) > abs(name) else section.lanes.get(other)
-        if (
-            other in section.lanes
-            and mark is not None
-            and _forth(road, section.lanes[other], other) == along
-            and _crossable(mark)
-        ):
-            beside.append(_name((road.id, k, other)))
+    for other in (number - 1, number + 1):
+        neighbour = section.lanes.get(other)
+        if neighbour is not None and neighbour.forth == along and _crossable(lane if abs(other) > abs(number) else neighbour):
+            beside.append(neighbour.name)
     return Draft(
-        id=_name(key) + ("r" if second else ""),
+        id=lane.name + ("" if along == lane.forth else "r"),
         left=left,
         right=right,
         successors=tuple(after),
         beside=tuple(beside),
-        speed_limit=_speed_limit(road, lane, float(section.s[0])),
+        speed_limit=_speed_limit(road, lane.element, float(section.s[0])),
         junction=road.junction,
-        place=lane.place,
+        place=lane.element.place,
         paired=True,
     )
 
 
-def _crossable(lane: Element) -> bool:
+def _crossable(lane: _Lane) -> bool:
     """Whether a lane's outer mark may be crossed."""
-    marks = lane.all("roadMark")
+    marks = lane.element.all("roadMark")
     return not any(mark.attributes.get("laneChange") == "none" or mark.attributes.get("type") in _MARKED for mark in marks)
 
 

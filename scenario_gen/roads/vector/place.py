@@ -31,7 +31,7 @@ _FORTH = 20.0  # metres of the lanes before and after it
 _SHIFT = 3.0  # metres by which paths may be shifted to be clear of each other
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=4)  # `once_per_object` would keep a network for good, for its chains refer to it
 def chains_of(network: LaneNetwork) -> Chains:
     """Return the chains of a network, the same for the same network."""
     return Chains(network)
@@ -67,14 +67,14 @@ def placements(
         matches = list(streets) if scale == 1.0 else []
         for spot in spots:
             stop_if_cancelled()
-            one = match(chains, tracks, spot, scale)
-            if one.reason or one.cost > _WORST:
-                reasons[one.reason or "vehicles would be too far from where they are in the template"] += 1
+            placement = match(chains, tracks, spot, scale)
+            if placement.reason or placement.cost > _WORST:
+                reasons[placement.reason or "vehicles would be too far from where they are in the template"] += 1
             else:
-                matches.append(one)
-        matches.sort(key=lambda one: round(one.cost, 3))
-        pressed += [(one, scale) for one in matches if one.aside > _PRESSED]
-        found = [(one, scale) for one in matches if one.aside <= _PRESSED]
+                matches.append(placement)
+        matches.sort(key=lambda placement: round(placement.cost, 3))
+        pressed += [(placement, scale) for placement in matches if placement.aside > _PRESSED]
+        found = [(placement, scale) for placement in matches if placement.aside <= _PRESSED]
         yield from found
         if found:
             break
@@ -85,10 +85,10 @@ def placements(
     raise RefusedError(f"the template fits no place on map {network.name}: {why or 'it has no lanes of its directions'}")
 
 
-def laid(one: Match, tracks: Sequence[Track], scale: float) -> tuple[Track, ...]:
+def laid(placement: Match, tracks: Sequence[Track], scale: float) -> tuple[Track, ...]:
     """The template's tracks on their courses."""
     placed = []
-    for course, track in zip(one.courses, tracks, strict=True):
+    for course, track in zip(placement.courses, tracks, strict=True):
         driven = float(course.progress[-1])
         curve = course.curve.cut(course.start, course.start + max(driven, 1.0), 0.25)
         progress = course.progress * (curve.length / driven if driven > 1.0 else 1.0)
@@ -103,18 +103,20 @@ def best_part(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[i
         RefusedError: there is no place for it.
     """
     reason = ""
-    for one, scale in placements(network, tracks, lanes):
+    for placement, scale in placements(network, tracks, lanes):
         try:
-            separate(laid(one, tracks, scale), 0.0, _SHIFT, sideways=0.0)
+            separate(laid(placement, tracks, scale), 0.0, _SHIFT, sideways=0.0)
         except RefusedError as error:
             reason = reason or str(error)
             continue
         points = np.concatenate(
-            [course.curve.at(np.linspace(course.start - _FORTH, course.end + _FORTH, 200))[:, :2] for course in one.courses]
+            [c.curve.at(np.linspace(c.start - _FORTH, c.end + _FORTH, 200))[:, :2] for c in placement.courses]
         )
         box = np.round(np.stack((points.min(axis=0) - _BESIDE, points.max(axis=0) + _BESIDE)))
-        names = dict.fromkeys(network.lanes[k].junction for course in one.courses for k in course.lanes)
-        where = ", ".join(f"junction {name}" for name in names if name) or f"lane {network.lanes[one.courses[0].lanes[0]].id}"
+        names = dict.fromkeys(network.lanes[k].junction for course in placement.courses for k in course.lanes)
+        first = network.lanes[placement.courses[0].lanes[0]]
+        where = ", ".join(f"junction {name}" for name in names if name) or f"lane {first.id}"
         (x0, y0), (x1, y1) = box.tolist()
-        return box, f"the best place for the template is at {where}: #box={x0:g},{y0:g},{x1:g},{y1:g} (cost {one.cost:.1f} m²)"
+        part = f"#box={x0:g},{y0:g},{x1:g},{y1:g} (cost {placement.cost:.1f} m²)"
+        return box, f"the best place for the template is at {where}: {part}"
     raise RefusedError(f"the template fits no place on map {network.name}: {reason}")

@@ -14,6 +14,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.markup import Element
 from scenario_gen.numerics import exact, Floats, Ints
+from scenario_gen.numerics.plane import place
 
 _STEP = 1.0  # metres of a spiral that one rule of Gauss integrates
 _GAUSS = (  # five points on [0, 1], exact for degree 9
@@ -23,6 +24,11 @@ _GAUSS = (  # five points on [0, 1], exact for degree 9
 _SHAPES = ("line", "arc", "spiral", "poly3", "paramPoly3")
 MOST_LENGTH = 1_000_000.0  # metres of a road
 _SHARPEST = 10.0  # 1/m
+
+
+def _piece_at(begin: Floats, s: Floats) -> Ints:
+    """Which of the pieces that begin at (K,) metres holds each s (M,); the first one also before it."""
+    return np.clip(np.searchsorted(begin, s + 1e-9, side="right") - 1, 0, len(begin) - 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +45,7 @@ class Cubics:
 
     def at(self, s: Floats) -> Floats:
         """Values (M,) at s (M,) metres."""
-        piece = np.clip(np.searchsorted(self.begin, s + 1e-9, side="right") - 1, 0, len(self.begin) - 1)
+        piece = _piece_at(self.begin, s)
         ds, f = s - self.begin[piece], self.factors[piece]
         return np.asarray(f[:, 0] + ds * (f[:, 1] + ds * (f[:, 2] + ds * f[:, 3])))
 
@@ -67,7 +73,7 @@ class ReferenceLine:
 
     def at(self, s: Floats) -> Floats:
         """Poses (M, 3) x, y [m], yaw [rad] at s (M,) metres."""
-        which: Ints = np.clip(np.searchsorted(self.begin, s + 1e-9, side="right") - 1, 0, len(self.begin) - 1)
+        which = _piece_at(self.begin, s)
         poses = np.empty((len(s), 3))
         for k in np.unique(which).tolist():
             poses[which == k] = _piece(self.pieces[k], np.maximum(s[which == k] - self.begin[k], 0.0))
@@ -108,9 +114,8 @@ def _piece(piece: Element, ds: Floats) -> Floats:
     """Poses (M, 3) at `ds` (M,) metres from a piece's beginning."""
     shape = _shape(piece)
     u, v, turn = _SHAPE[shape.tag](shape, piece.number("length"), ds)
-    x, y, heading = (piece.number(name) for name in ("x", "y", "hdg"))
-    cos, sin = exact.cos(heading), exact.sin(heading)
-    return np.column_stack((x + u * cos - v * sin, y + u * sin + v * cos, heading + turn))
+    pose = np.array([piece.number(name) for name in ("x", "y", "hdg")])
+    return np.column_stack((place(pose, u, v), pose[2] + turn))
 
 
 def _line(_shape: Element, _length: float, ds: Floats) -> tuple[Floats, Floats, Floats]:

@@ -3,6 +3,8 @@
 
 """One door to vector maps: `map.osm`, `map.xodr` or `map.xml`, and which part of it, behind a `#`."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -10,35 +12,56 @@ import numpy as np
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError, of_system, reading
-from scenario_gen.base.markup import finite
+from scenario_gen.base.markup import Element, finite, read_xml
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.vector.commonroad import read_commonroad
-from scenario_gen.roads.vector.lanelet2 import read_lanelet2
-from scenario_gen.roads.vector.network import extent, part_of
-from scenario_gen.roads.vector.opendrive import read_opendrive
+from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
+from scenario_gen.roads.vector.network import extent, MapLanes, network_of, part_of
 from scenario_gen.roads.vector.place import best_part
 from scenario_gen.roads.vector.raster import road_of
 from scenario_gen.template import Track
 from scenario_gen.types import LaneNetwork, Road
 
-READERS = {".osm": read_lanelet2, ".xodr": read_opendrive, ".xml": read_commonroad}
+
+@dataclass(frozen=True)
+class MapFormat:
+    """A format of vector maps.
+
+    Attributes:
+        name: of a file in it, with its article.
+        root: the name of its root element.
+        lanes_of: finds the lanes below the root.
+        skipped: elements that are passed over with all they hold.
+    """
+
+    name: str
+    root: str
+    lanes_of: Callable[[Element], MapLanes]
+    skipped: frozenset[str] = frozenset()
+
+
+FORMATS = {
+    ".osm": MapFormat("a Lanelet2 map", "osm", lanelet2.lanes_of),
+    ".xodr": MapFormat("an OpenDRIVE map", "OpenDRIVE", opendrive.lanes_of),
+    ".xml": MapFormat("a CommonRoad file", "commonRoad", commonroad.lanes_of, commonroad.SKIPPED),
+}
+"""By the ending of a file's name."""
 PARTS = ("lanelet", "junction", "box")
-_AROUND = 40.0  # metres around lanes that are asked for
+_AROUND = 40.0  # metres around lanes that are requested
 _NAMED = 12  # ids that a message lists
 
 
 def split(name: str) -> tuple[Path, str]:
     """Return the path and the part of `path#part`; a file whose name has a # stands for itself."""
     path, mark, part = name.rpartition("#")
-    if not mark or Path(name).suffix.lower() in READERS:
+    if not mark or Path(name).suffix.lower() in FORMATS:
         return Path(name), ""
     return Path(path), part
 
 
 def is_vector_map(name: str) -> bool:
     """Return whether a road's name is the path of a vector map."""
-    return split(name)[0].suffix.lower() in READERS
+    return split(name)[0].suffix.lower() in FORMATS
 
 
 def read_network(path: Path) -> LaneNetwork:
@@ -58,8 +81,12 @@ def read_network(path: Path) -> LaneNetwork:
 
 @lru_cache(maxsize=2)
 def _read(path: Path, _changed: int, _size: int) -> LaneNetwork:
+    form = FORMATS[path.suffix.lower()]
     with reading(path):
-        return READERS[path.suffix.lower()](path)
+        root = read_xml(path, f"map {path}", form.skipped)
+        if root.tag != form.root:
+            raise InputError(f"{root.place}: the root of {form.name} is <{form.root}>")
+        return network_of(path.stem, form.lanes_of(root))
 
 
 def chosen_lanes(network: LaneNetwork, part: str) -> tuple[int, ...]:
@@ -75,8 +102,8 @@ def chosen_lanes(network: LaneNetwork, part: str) -> tuple[int, ...]:
         rows = [k for k, known in enumerate(own) if known and known == name]
         if not rows:
             known = list(dict.fromkeys(value for value in own if value))
-            said = ", ".join(known[:_NAMED]) + (f" and {len(known) - _NAMED} more" if len(known) > _NAMED else "")
-            raise InputError(f"map {network.name} has no {kind} {shown(name, 40)!r} that cars may use; it has {said or 'none'}")
+            listed = ", ".join(known[:_NAMED]) + (f" and {len(known) - _NAMED} more" if len(known) > _NAMED else "")
+            raise InputError(f"map {network.name} has no {kind} {shown(name, 40)!r} that cars may use; it has {listed or 'none'}")
         found += rows
     return tuple(dict.fromkeys(found))
 
@@ -108,11 +135,11 @@ def refuse_unknown_part(name: str, part: str) -> None:
 
 
 def vector_road(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -> Road:
-    """Return the road of a vector map, or of the part of it that is asked for, or else that suits the template best.
+    """Return the road of a vector map, or of the requested part of it, or else that suits the template best.
 
     Args:
         name: the path, and behind a `#` box=x0,y0,x1,y1, lanelet=ID or junction=ID (several with commas).
-        tracks: of the template; None: the whole map, or what lies around the lanes that are asked for.
+        tracks: of the template; None: the whole map, or what lies around the requested lanes.
         config: cell size, and the most cells.
 
     Raises:

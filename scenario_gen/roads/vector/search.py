@@ -9,7 +9,7 @@ squared distance of the template's samples from the nearest lane of their direct
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from itertools import islice
 import math
 
 import numpy as np
@@ -17,8 +17,8 @@ import numpy as np
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import exact, Floats, Ints, wrap_angle
-from scenario_gen.template import path_crossing, Track
-from scenario_gen.types import LaneNetwork
+from scenario_gen.template import pair_crossings, Track
+from scenario_gen.types import LaneNetwork, once_per_object
 
 _CELL = 1.0  # metres
 _MOST_CELLS = 30_000_000  # of a map: a larger one is looked at in larger cells
@@ -47,13 +47,16 @@ class Spot:
 
     def moved(self, points: Floats) -> Floats:
         """Points (P, 2) [m] of the template on the map."""
-        cos, sin = exact.cos(self.yaw), exact.sin(self.yaw)
-        return np.column_stack(
-            (points[:, 0] * cos - points[:, 1] * sin + self.x, points[:, 0] * sin + points[:, 1] * cos + self.y)
-        )
+        return np.asarray(_turned(points, self.yaw) + np.array([self.x, self.y]))
 
 
-@lru_cache(maxsize=4)
+def _turned(points: Floats, yaw: Floats | float) -> Floats:
+    """Points (..., 2) turned by angles (...) about the origin."""
+    x, y, cos, sin = points[..., 0], points[..., 1], exact.cos(yaw), exact.sin(yaw)
+    return np.stack((x * cos - y * sin, x * sin + y * cos), axis=-1)
+
+
+@once_per_object
 def _field(network: LaneNetwork) -> "_Field":
     return _Field(network)
 
@@ -108,13 +111,8 @@ class _Field:
 
 def _sections(network: LaneNetwork, every: int = 1, lanes: Sequence[int] | None = None) -> tuple[Floats, Floats]:
     """Middles (P, 2) [m] and directions (P,) [rad] of the lanes' sections."""
-    points, yaws = [], []
-    for k in range(len(network.lanes)) if lanes is None else lanes:
-        centre = network.lanes[k].centre
-        step = np.diff(centre, axis=0)
-        points.append(((centre[1:] + centre[:-1]) / 2.0)[::every])
-        yaws.append(exact.arctan2(step[:, 1], step[:, 0])[::every])
-    return np.concatenate(points), np.concatenate(yaws)
+    chosen = network.lanes if lanes is None else [network.lanes[k] for k in lanes]
+    return np.concatenate([lane.middle[::every] for lane in chosen]), np.concatenate([lane.yaw[::every] for lane in chosen])
 
 
 def find_spots(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None) -> list[Spot]:
@@ -129,21 +127,15 @@ def find_spots(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[
     poses, weight = _samples(tracks)
     points, yaws = _sections(network, _EVERY, lanes)
     spots: list[Spot] = []
+    step = max(_TOGETHER // len(poses), 1)
     for anchor in _anchors(tracks):
         turn = yaws - anchor[2]
-        cos, sin = exact.cos(turn), exact.sin(turn)
-        x = points[:, 0] - (anchor[0] * cos - anchor[1] * sin)
-        y = points[:, 1] - (anchor[0] * sin + anchor[1] * cos)
-        cost = np.concatenate(
-            [
-                _costs(field, poses, weight, turn[k : k + step], x[k : k + step], y[k : k + step])
-                for step in (max(_TOGETHER // len(poses), 1),)
-                for k in range(0, len(turn), step)
-            ]
-        )
+        placements = np.column_stack((points - _turned(anchor[:2], turn), turn))
+        parts = [placements[k : k + step] for k in range(0, len(turn), step)]
+        cost = np.concatenate([_costs(field, poses, weight, part) for part in parts])
         stop_if_cancelled()
         best = np.argsort(cost, kind="stable")[: 4 * _REFINED]
-        spots += [Spot(*row) for row in np.column_stack((cost, turn, x, y))[best].tolist()]
+        spots += [Spot(*row) for row in np.column_stack((cost, placements[:, [2, 0, 1]]))[best].tolist()]
     centre = poses[:, :2].mean(axis=0)
     chosen = _distinct(spots, centre, _REFINED)
     return _distinct([_refined(field, poses, weight, spot) for spot in chosen], centre, _REFINED)
@@ -168,43 +160,36 @@ def _samples(tracks: tuple[Track, ...]) -> tuple[Floats, Floats]:
 def _anchors(tracks: tuple[Track, ...]) -> list[Floats]:
     """Poses of the template that are laid onto lanes: where paths cross, and the begin, middle and end of the longest paths."""
     found: list[Floats] = []
-    for a, one in enumerate(tracks):
-        for two in tracks[:a]:
-            crossing = path_crossing(one, two)
-            if crossing is not None and len(found) < 4:
-                found += [one.curve.at(crossing.first), two.curve.at(crossing.second)]
+    for a, b, crossing in islice(pair_crossings(tracks), 2):
+        found += [tracks[a].curve.at(crossing.first), tracks[b].curve.at(crossing.second)]
     for track in sorted(tracks, key=lambda track: -track.travelled)[:2]:
         found += [track.curve.at(share * track.travelled) for share in (0.05, 0.5, 0.95)]
     return found
 
 
-def _costs(field: _Field, poses: Floats, weight: Floats, turn: Floats, x: Floats, y: Floats) -> Floats:
-    """Costs (M,) [m²] of placements."""
-    cos, sin = exact.cos(turn)[:, None], exact.sin(turn)[:, None]
-    points = np.stack(
-        (poses[:, 0] * cos - poses[:, 1] * sin + x[:, None], poses[:, 0] * sin + poses[:, 1] * cos + y[:, None]), axis=-1
-    )
-    return np.asarray((field.squared(points, poses[:, 2] + turn[:, None]) * weight).sum(axis=1))
+def _costs(field: _Field, poses: Floats, weight: Floats, placements: Floats) -> Floats:
+    """Costs (M,) [m²] of placements (M, 3): where the origin lies and how far all is turned."""
+    turn = placements[:, 2, None]
+    points = _turned(poses[:, :2], turn) + placements[:, None, :2]
+    return np.asarray((field.squared(points, poses[:, 2] + turn) * weight).sum(axis=1))
 
 
 def _refined(field: _Field, poses: Floats, weight: Floats, spot: Spot) -> Spot:
     """Pattern search over place and rotation about the template's middle."""
     centre = poses[:, :2].mean(axis=0)
-    state = np.array([*spot.moved(centre[None])[0], spot.yaw])
+    state = np.array([*spot.moved(centre), spot.yaw])
     local = poses - np.array([*centre, 0.0])
     cost, step = spot.cost, np.array([2.0, 2.0, math.radians(4.0)])
     signs = np.concatenate((np.eye(3), -np.eye(3)))
     while step[0] > 0.2:
         trials = state + signs * step
-        costs = _costs(field, local, weight, trials[:, 2], trials[:, 0], trials[:, 1])
+        costs = _costs(field, local, weight, trials)
         best = int(np.argmin(costs))
         if costs[best] < cost - 1e-9:
             state, cost = trials[best], float(costs[best])
         else:
             step /= 2.0
-    cos, sin = exact.cos(float(state[2])), exact.sin(float(state[2]))
-    x = float(state[0] - (centre[0] * cos - centre[1] * sin))
-    return Spot(cost, float(state[2]), x, float(state[1] - (centre[0] * sin + centre[1] * cos)))
+    return Spot(cost, float(state[2]), *(state[:2] - _turned(centre, float(state[2]))).tolist())
 
 
 def _distinct(spots: list[Spot], centre: Floats, most: int) -> list[Spot]:
@@ -212,7 +197,7 @@ def _distinct(spots: list[Spot], centre: Floats, most: int) -> list[Spot]:
     kept: list[Spot] = []
     places = np.empty((0, 3))
     for spot in sorted(spots, key=lambda spot: (round(spot.cost, 6), spot.yaw, spot.x, spot.y)):
-        place = np.array([*spot.moved(centre[None])[0], spot.yaw])
+        place = np.array([*spot.moved(centre), spot.yaw])
         off = np.abs(places - place)
         turned = np.abs(wrap_angle(places[:, 2] - place[2]))
         if not ((off[:, 0] < _ELSEWHERE) & (off[:, 1] < _ELSEWHERE) & (turned < _TURNED)).any():

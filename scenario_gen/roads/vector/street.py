@@ -9,6 +9,7 @@ driver's left become lanes beside it.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 import math
 
 import numpy as np
@@ -33,6 +34,35 @@ _WANDER = 1.8  # metres by which the distance between parallel lanes may differ
 
 
 @dataclass(frozen=True, eq=False)
+class _Stretch:
+    """A stretch of road on which a template may lie.
+
+    Attributes:
+        chain: its lanes.
+        curve: the middle of these.
+        begin: arc length [m] on the curve at which the stretch begins.
+        span: metres that it is long.
+        bend: rad/m, the mean on the stretch.
+    """
+
+    chain: tuple[int, ...]
+    curve: Curve
+    begin: float
+    span: float
+    bend: float
+
+    @property
+    def lead(self) -> float:
+        """Metres of the axis before the stretch."""
+        return min(self.begin, _FORTH)
+
+    @cached_property
+    def axis(self) -> Curve:
+        """The middle, with what lies before and after the stretch."""
+        return self.curve.cut(max(self.begin - _FORTH, 0.0), min(self.begin + self.span + _FORTH, self.curve.length))
+
+
+@dataclass(frozen=True, eq=False)
 class _Side:
     """A lane beside the axis: its chain, its middle, its mean offset [m, left positive]."""
 
@@ -53,22 +83,18 @@ def along_streets(chains: Chains, tracks: tuple[Track, ...], lanes: Sequence[int
         compact = to_frenet(tracks)
     except RefusedError:
         return
-    half = np.array([[track.vehicle.length / 2.0] for track in tracks])
-    low, high = float((compact.station - half).min()) - _ROOM, float((compact.station + half).max()) + _ROOM
-    axes = sorted(_axes(chains, high - low, lanes), key=lambda found: (round(found[0], 4), found[1]))
+    low, high = (end + room for end, room in zip(compact.span(tracks), (-_ROOM, _ROOM), strict=True))
+    stretches = sorted(_stretches(chains, high - low, lanes), key=lambda found: (round(found.bend, 4), found.chain))
     for frenet in (compact.spread(), compact):
-        for bend, chain, begin in axes[:_TRIED]:
+        for stretch in stretches[:_TRIED]:
             stop_if_cancelled()
-            whole = chains.curve(chain)
-            axis = whole.cut(max(begin - _FORTH, 0.0), min(begin + high - low + _FORTH, whole.length))
-            lead = min(begin, _FORTH)
-            match = _laid(chains, axis, lead, high - low, chain, tracks, frenet, low, bend)
+            match = _laid(chains, stretch, tracks, frenet, low)
             if match is not None:
                 yield match
 
 
-def _axes(chains: Chains, span: float, lanes: Sequence[int] | None) -> Iterator[tuple[float, tuple[int, ...], float]]:
-    """Chains of lanes that are long enough: their mean bend [rad/m], the lanes, where the straightest stretch begins."""
+def _stretches(chains: Chains, span: float, lanes: Sequence[int] | None) -> Iterator[_Stretch]:
+    """The straightest stretch of the chain from each lane, where that is long enough."""
     for first in range(len(chains.network.lanes)) if lanes is None else lanes:
         chain = _straight_on(chains, first, span)
         curve = chains.curve(chain)
@@ -79,14 +105,14 @@ def _axes(chains: Chains, span: float, lanes: Sequence[int] | None) -> Iterator[
         turned = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(curve.at(station)[:, 2])))))
         bend = (np.interp(begins + span, station, turned) - np.interp(begins, station, turned)) / span
         k = int(np.argmin(np.round(bend, 6)))
-        yield float(bend[k]), chain, float(begins[k])
+        yield _Stretch(chain, curve, float(begins[k]), span, float(bend[k]))
 
 
 def _straight_on(chains: Chains, first: int, span: float) -> tuple[int, ...]:
     """The chain from a lane that turns least at every fork, as long as needed."""
     chain, length = [first], chains.length[first]
     while length < span + 2.0 * _FORTH:
-        after = [k for k in chains.network.lanes[chain[-1]].successors if k not in chain]
+        after = chains.after(chain)
         if not after:
             break
         chain.append(min(after, key=lambda k: (round(_turn_of(chains, k), 3), k)))
@@ -100,21 +126,19 @@ def _turn_of(chains: Chains, lane: int) -> float:
     return abs(float(exact.arctan2(first[0] * last[1] - first[1] * last[0], first[0] * last[0] + first[1] * last[1])))
 
 
-def _laid(
-    chains: Chains,
-    axis: Curve,
-    lead: float,
-    span: float,
-    chain: tuple[int, ...],
-    tracks: tuple[Track, ...],
-    frenet: FrenetTracks,
-    low: float,
-    bend: float,
-) -> Match | None:
-    """The template on a stretch of road that begins `lead` metres along the axis, None if lanes are missing."""
-    stretch = (lead, lead + span)
-    ahead = sorted(_sides(chains, axis, stretch, 1), key=lambda side: -side.offset)
-    against = sorted(_sides(chains, axis, stretch, -1), key=lambda side: side.offset)
+def _laid(chains: Chains, stretch: _Stretch, tracks: tuple[Track, ...], frenet: FrenetTracks, low: float) -> Match | None:
+    """The template on a stretch of road, None if lanes are missing.
+
+    Args:
+        chains: of the map.
+        stretch: where it goes.
+        tracks: the template.
+        frenet: the same in path coordinates.
+        low: station [m] of the template's reference line at which the stretch begins.
+    """
+    axis = stretch.axis
+    ahead = sorted(_sides(chains, stretch, 1), key=lambda side: -side.offset)
+    against = sorted(_sides(chains, stretch, -1), key=lambda side: side.offset)
     if ahead and against and against[0].offset < ahead[0].offset:  # traffic keeps left: count from the middle of the road
         ahead, against = ahead[::-1], against[::-1]
     courses = []
@@ -124,16 +148,16 @@ def _laid(
         first, last = (int(k) for k in frenet.lane[i])
         if max(first, last) >= len(sides):
             return None
-        along = lead + frenet.station[i] - low
+        station = stretch.lead + frenet.station[i] - low
         curve, used = sides[first].curve, sides[first].chain
         if first != last:
             at = int(np.argmax(frenet.change[i] >= 0.5))
-            changed = changed_curve(curve, sides[last].curve, axis.at(float(along[at]))[:2])
+            changed = changed_curve(curve, sides[last].curve, axis.at(float(station[at]))[:2])
             if changed is None:
                 return None
             curve, used = changed, tuple(dict.fromkeys((*used, *sides[last].chain)))
-        begin, _ = curve.project(axis.at(along[:1])[:, :2])
-        progress = np.zeros(len(along)) if track.still else (along - along[0]) * sign
+        begin, _ = curve.project(axis.at(station[:1])[:, :2])
+        progress = np.zeros(len(station)) if track.still else (station - station[0]) * sign
         courses.append(Course(used, curve, float(begin[0]), np.maximum.accumulate(progress)))
         half = track.vehicle.length / 2.0 + _ROOM / 2.0
         if courses[-1].start < half or courses[-1].end + half > curve.length or _bends_more(courses[-1], track):
@@ -145,7 +169,7 @@ def _laid(
     if any(abs(a - b) < _APART for a in offsets[0] for b in offsets[1]):
         return None  # one lane for both directions
     aside = [pressed_aside(course, track) for course, track in zip(courses, tracks, strict=True)]
-    cost = bend / _STRAIGHT + speeding(chains.network, courses, tracks) + bending([usual for usual, _ in aside])
+    cost = stretch.bend / _STRAIGHT + speeding(chains.network, courses, tracks) + bending([usual for usual, _ in aside])
     return Match(tuple(courses), cost, "", max(forced for _, forced in aside))
 
 
@@ -156,23 +180,23 @@ def _bends_more(course: Course, track: Track) -> bool:
     return abs(own + more) > abs(own) + _TURN
 
 
-def _sides(chains: Chains, axis: Curve, stretch: tuple[float, float], sign: int) -> list[_Side]:
-    """The lanes that run beside an axis, in its direction (+1) or against it (-1), all along a stretch of it."""
-    at = np.linspace(*stretch, max(math.ceil((stretch[1] - stretch[0]) / _EVERY), 1) + 1)
-    poses = axis.at(at)
+def _sides(chains: Chains, stretch: _Stretch, sign: int) -> list[_Side]:
+    """The lanes that run beside a stretch's axis, in its direction (+1) or against it (-1), from end to end."""
+    begin, end = stretch.lead, stretch.lead + stretch.span
+    poses = stretch.axis.at(np.linspace(begin, end, max(math.ceil((end - begin) / _EVERY), 1) + 1))
     start = poses[0 if sign > 0 else -1]
     yaw = start[2] + (0.0 if sign > 0 else np.pi)
     away = exact.hypot(chains.points[:, 0] - start[0], chains.points[:, 1] - start[1])
     near = np.flatnonzero((away < _ASIDE) & (np.abs(wrap_angle(chains.yaws - yaw)) < _PARALLEL))
     found: list[_Side] = []
     for first in sorted(set(chains.owner[near].tolist())):
-        chain = _beside(chains, first, poses if sign > 0 else poses[::-1], sign)
+        chain = _beside(chains, first, poses[::sign], sign)
         back = chains.network.predecessors[first]
         chain = (back[0], *chain) if back and back[0] not in chain else chain
         curve = chains.curve(chain)
         station, _ = curve.project(poses[:, :2])
         turned = np.abs(wrap_angle(curve.at(station)[:, 2] - poses[:, 2] + (0.0 if sign > 0 else np.pi)))
-        _, offset = axis.project(curve.at(np.clip(station, 0.0, curve.length))[:, :2])
+        _, offset = stretch.axis.project(curve.at(np.clip(station, 0.0, curve.length))[:, :2])
         inside = (station > -0.1).all() and (station < curve.length + 0.1).all()
         if inside and (turned < _PARALLEL).all() and np.ptp(offset) < _WANDER:
             mean = float(offset.mean())
@@ -189,7 +213,7 @@ def _beside(chains: Chains, first: int, poses: Floats, sign: int) -> tuple[int, 
         centre = chains.network.lanes[chain[-1]].centre
         if float(exact.hypot(*(centre - goal).T).min()) < _ASIDE and len(chain) > 1 and _passed(centre, poses[-1], sign):
             return tuple(chain)
-        after = [k for k in chains.network.lanes[chain[-1]].successors if k not in chain]
+        after = chains.after(chain)
         if not after:
             return tuple(chain)
         chain.append(min(after, key=lambda k: (round(_off(chains.network.lanes[k].centre[-1], poses), 3), k)))

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from benchmarks._paper_chain import ordinate_posterior, ordinate_samples
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.sampling.gp import Features, Observations, Regression, squared_exponential
-from scenario_gen.output.reproduce.chain import ordinate_posterior, ordinate_samples
 
 
 def dense(x, y, noise, at, sigma, length, degree):

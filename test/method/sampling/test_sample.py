@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from sampling_scenes import CLOCK, route, scene, TIME, turn
 
+from benchmarks._paper_speed_profile import SpeedProfile
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.sampling import Callbacks, draw_scenarios, Plan, regenerate, SamplingConfig
 from scenario_gen.method.sampling.candidates import Scale
@@ -16,7 +17,6 @@ from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.sampling.sampler import LEVEL_SIZE
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import wrap_angle
-from scenario_gen.output.reproduce.speed_profile import SpeedProfile
 from scenario_gen.template.interaction import find_waits, Wait
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Cause, Verdict, Violation

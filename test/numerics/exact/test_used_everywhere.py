@@ -106,3 +106,17 @@ def test_what_depends_on_the_cpu_is_not_used():
     found = [fault for name, path in own.items() for fault in faults(name, path.read_text())]
     assert not found, "\n".join(found)
     assert len(own) > 200 and faults("a.py", "y = np.sin(x)") == ["a.py, line 1: np.sin"]
+
+
+def behind_the_door(text: str) -> list[str]:
+    """What a file imports from within `scenario_gen.numerics.exact`."""
+    names = [node.module or "" for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
+    names += [alias.name for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import) for alias in node.names]
+    return [name for name in names if name.startswith("scenario_gen.numerics.exact")]
+
+
+def test_exact_arithmetic_has_one_door():
+    outside = [path for path in FILES if "numerics" not in path.relative_to(ROOT).parts]
+    found = {path: behind_the_door(path.read_text()) for path in outside}
+    assert not {path: names for path, names in found.items() if names}
+    assert len(outside) > 200 and behind_the_door("from scenario_gen.numerics.exact.algebra import qr")

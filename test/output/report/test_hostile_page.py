@@ -13,10 +13,11 @@ from browser_tab import DESKTOP, Tab
 from evaluation_worlds import report_case
 import pytest
 
+from benchmarks._paper_measure import run_case
+from benchmarks.paper import write_page
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.report.page import render, ReportInput, write_report
-from scenario_gen.output.reproduce import run_case, write_page
 from scenario_gen.types.generation import UNIFORM
 
 RUNS = "top.ran=1"
@@ -112,7 +113,7 @@ def pages(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("name", ["report.html", "reproduce.html"])
+@pytest.mark.parametrize("name", ["report.html", "paper.html"])
 def test_the_policy_names_each_script_and_allows_no_other(pages, name):
     found = Elements((pages / name).read_text(encoding="utf-8"))
     ours = [text for kind, text in found.scripts if not kind]
@@ -141,7 +142,7 @@ class Watched(Tab):
         return self.page.evaluate("'ran' in window") or bool(self.dialogs)
 
 
-@pytest.mark.parametrize("name", ["report.html", "reproduce.html"])
+@pytest.mark.parametrize("name", ["report.html", "paper.html"])
 def test_hostile_names_run_nothing_and_the_page_works(browser, pages, name):
     tab = Watched(browser, pages / name, DESKTOP)
     tab.page.on("dialog", lambda dialog: (tab.dialogs.append(dialog.message), dialog.dismiss()))

@@ -19,7 +19,6 @@ import numpy as np
 from scenario_gen.method.sampling.speed_profile.knots import SpeedKnots
 from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
 from scenario_gen.numerics import Bools, exact, Floats
-from scenario_gen.numerics.exact.sparse import Columns
 
 SMOOTHING = 0.5  # s, ℓ: kinks of the lines are rounded over about this time
 SHARP_WEIGHT = 0.3  # of how near the lines are to the speeds before they are rounded; it decides what rounding hides
@@ -167,9 +166,9 @@ def mean_speed(spline: SpeedSpline, target: Target, motion: Motion, bounds: Boun
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
-    upper = Columns.of_dense(np.triu(quadratic))
+    upper = exact.Columns.of_dense(np.triu(quadratic))
     solver = clarabel.DefaultSolver(
-        upper, np.concatenate([-2.0 * linear, price]), Columns.of_dense(constraints), right, cones, settings
+        upper, np.concatenate([-2.0 * linear, price]), exact.Columns.of_dense(constraints), right, cones, settings
     )
     solution = solver.solve()
     if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):

@@ -13,9 +13,9 @@ from PIL import Image
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from benchmarks._paper_measure import PaperCase, Regressions
 from scenario_gen.method.evaluation import mean_feature
 from scenario_gen.numerics import Floats
-from scenario_gen.output.reproduce.measure import PaperCase, Regressions
 from scenario_gen.types import Road, WITH, WITHOUT
 
 VEHICLES = ("#2563eb", "#e2590c", "#0d9488", "#9333ea", "#c2185b", "#65780b")

@@ -9,8 +9,8 @@ import math
 
 import plotly.graph_objects as go
 
-from scenario_gen.output.reproduce.figures import figure_2, figure_3, figure_4, figure_5
-from scenario_gen.output.reproduce.measure import PaperCase
+from benchmarks._paper_figures import figure_2, figure_3, figure_4, figure_5
+from benchmarks._paper_measure import PaperCase
 from scenario_gen.types import UNIFORM, WITH, WITHOUT
 
 WAITS, OFF_ROAD = 0.5, 0.005

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from benchmarks._paper_chain import LENGTH, NOISE, place, rotation, sample, Sampled, SIGMA
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.evaluation import (
     Bootstrap,
@@ -21,7 +22,6 @@ from scenario_gen.method.evaluation import (
 from scenario_gen.method.sampling import Features, Observations, Regression
 from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.numerics import exact, Floats, Ints
-from scenario_gen.output.reproduce.chain import LENGTH, NOISE, place, rotation, sample, Sampled, SIGMA
 from scenario_gen.template import find_waits
 from scenario_gen.types import Encounter, Interval, Road, Route, Segmentation, UNIFORM, WITH, WITHOUT
 

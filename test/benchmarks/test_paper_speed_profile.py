@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, LinearConstraint, minimize
 
+from benchmarks._paper_speed_profile import CONSTANCY, SpeedBounds, SpeedProfile, SpeedProfileQP
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.speed_profile.knots import best_knot, speed_knots
-from scenario_gen.output.reproduce.speed_profile import CONSTANCY, SpeedBounds, SpeedProfile, SpeedProfileQP
 
 TIME = np.arange(201) * 0.1
 CLOCK = np.array([0.0, 6.0, 9.0, 14.0, 20.0])

@@ -1,26 +1,34 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""From logs to one page and one JSON file with the paper's figures, their claims and what is measured."""
+"""The paper's figures 2 to 5 on its own settings, each beside its claim and what we measure: one page and one JSON file.
+
+`--out` names their folder (out/paper), `--count` the scenarios of each case (50).
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 import json
 from pathlib import Path
+import sys
 from typing import Any
 
+from benchmarks._paper_chain import ROADS
+from benchmarks._paper_claims import Claim, claims_of
+from benchmarks._paper_measure import PaperCase, run_case
+from benchmarks._size import sized
+from benchmarks.row import Row
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.folders import Kind, replaced_folder, write_text
 from scenario_gen.base.parameters import flatten
-from scenario_gen.logs import read_log
+from scenario_gen.logs import bundled, CASES, read_log
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.output.report.html import render_page
-from scenario_gen.output.reproduce.chain import ROADS
-from scenario_gen.output.reproduce.claims import Claim, claims_of
-from scenario_gen.output.reproduce.measure import PaperCase, run_case
 from scenario_gen.output.results import provenance_of
 from scenario_gen.pipeline import PipelineConfig
 
-PAGE, FIGURES = "reproduce.html", "reproduce.json"
+SEED = 7
+PAGE, FIGURES = "paper.html", "paper.json"
+ASSETS = Path(__file__).parent / "assets"
 VERDICTS = {True: ", as claimed", False: ", not as claimed", None: ""}
 SETTINGS = (
     "a grid of 1000 × 1000 cells, straight lane and T-intersection, 200 sweeps of the sticky HDP-HMM on positions and speeds, "
@@ -29,7 +37,7 @@ SETTINGS = (
 
 
 def write_page(folder: Path, cases: Sequence[PaperCase], *, quality: Sequence[str], provenance: Mapping[str, str]) -> None:
-    """Write `reproduce.html` and `reproduce.json` to `folder`; the same input gives the same bytes."""
+    """Write `paper.html` and `paper.json` to `folder`; the same input gives the same bytes."""
     folder.mkdir(parents=True, exist_ok=True)
     claims = [claims_of(case) for case in cases]
     document = {
@@ -90,13 +98,20 @@ def _render(
     for drawing in drawings.values():
         drawing["layout"].pop("template", None)
     return render_page(
-        "reproduce.html.j2", ("reproduce.js",), drawings, cases=views, quality=quality, provenance=provenance, settings=SETTINGS
+        "paper.html.j2",
+        ("paper.js",),
+        drawings,
+        folder=ASSETS,
+        cases=views,
+        quality=quality,
+        provenance=provenance,
+        settings=SETTINGS,
     )
 
 
 def reproduce(
-    logs: Sequence[Sequence[Path]], out: Path, *, count: int, seed: int, say: Callable[[str], None] = lambda line: None
-) -> None:
+    logs: Sequence[Sequence[Path]], out: Path, *, count: int, seed: int, report: Callable[[str], None] = lambda line: None
+) -> list[PaperCase]:
     """Draw the paper's figures 2 to 5 for every encounter of `logs`, with what we measure for them, to one page and JSON.
 
     Args:
@@ -104,7 +119,7 @@ def reproduce(
         out: folder of the page.
         count: scenarios per encounter and arm (the paper: 50).
         seed: same seed, same bytes.
-        say: is told, line by line, what each encounter came to.
+        report: called with each line of what the encounters came to.
 
     Raises:
         InputError: a log cannot be read, or `out` holds something else.
@@ -114,16 +129,29 @@ def reproduce(
     files = [path for group in logs for path in group]
     with replaced_folder(out, REPRODUCED, files) as partial:
         found = [read_log(list(group), config.log) for group in logs]
-        cases = [run_case(encounter, count=count, seed=seed) for one in found for encounter in one.encounters]
+        cases = [run_case(encounter, count=count, seed=seed) for log in found for encounter in log.encounters]
         facts = provenance_of(files, seed, count, ROADS, config)
         own = {name: value for name, value in facts.items() if name not in flatten(config)}  # the paper's parameters are fixed
-        write_page(partial, cases, quality=[line for one in found for line in one.quality.lines()], provenance=own)
+        write_page(partial, cases, quality=[line for log in found for line in log.quality.lines()], provenance=own)
     for case in cases:
-        say(f"{case.encounter.name} on {case.road.name if case.road else 'no road'}")
+        report(f"{case.encounter.name} on {case.road.name if case.road else 'no road'}")
         for line in refusals(case):
-            say(f"  {line}")
+            report(f"  {line}")
         for claim in claims_of(case):
-            say(f"  figure {claim.number}{VERDICTS[claim.holds]}: {claim.measured}")
-    say(f"page: {out / PAGE}")
+            report(f"  figure {claim.number}{VERDICTS[claim.holds]}: {claim.measured}")
+    report(f"page: {out / PAGE}")
     if not any(case.arms for case in cases):
         raise RefusedError("no encounter could be placed on a road of the paper; the page says why")
+    return cases
+
+
+def run(out: str = "out/paper", count: int | None = None) -> list[Row]:
+    """Measure the bundled cases on the paper's settings, and write the page and its figures to `out`."""
+    count = count or sized(50, quick=2)
+    logs = [[bundled(case)] for case in CASES]
+    cases = reproduce(logs, Path(out), count=count, seed=SEED, report=lambda line: print(line, file=sys.stderr))
+    rows = []
+    for case in cases:
+        holds = [claim.holds for claim in claims_of(case) if claim.holds is not None]
+        rows.append(Row(f"claims of the paper that hold, {case.encounter.name}", float(sum(holds)), f"of {len(holds)}", "higher"))
+    return rows

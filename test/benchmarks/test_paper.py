@@ -7,21 +7,20 @@ import json
 import math
 from pathlib import Path
 import re
-import sys
 
 from evaluation_worlds import crossing
 import numpy as np
 import pytest
 
+from benchmarks._paper_chain import place, sample
+from benchmarks._paper_claims import claims_of
+from benchmarks._paper_measure import line_error, off_road, run_case
+from benchmarks.paper import refusals, reproduce, write_page
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import MARKER
-from scenario_gen.cli import commands as cli
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.segmentation import segment, SegmentationConfig
-from scenario_gen.output.reproduce import claims_of, refusals, reproduce, run_case, write_page
-from scenario_gen.output.reproduce.chain import place, sample
-from scenario_gen.output.reproduce.measure import line_error, off_road
 from scenario_gen.types.generation import UNIFORM, WITH, WITHOUT
 
 
@@ -69,13 +68,13 @@ def test_priors_are_compared_on_a_path_that_bends(case):
 def test_the_page_has_four_figures_with_claims_and_asks_for_nothing(case, tmp_path):
     write_page(tmp_path / "one", [case], quality=["7 rows <b>dropped</b>"], provenance={"seed": "7"})
     write_page(tmp_path / "two", [case], quality=["7 rows <b>dropped</b>"], provenance={"seed": "7"})
-    page = (tmp_path / "one" / "reproduce.html").read_text()
-    assert page == (tmp_path / "two" / "reproduce.html").read_text()
+    page = (tmp_path / "one" / "paper.html").read_text()
+    assert page == (tmp_path / "two" / "paper.html").read_text()
     assert [int(n) for n in re.findall(r"<h3>Figure (\d)</h3>", page)] == [2, 3, 4, 5]
     assert page.count("<b>The paper:</b>") == 4 and "rows <b>dropped" not in page
     own = "".join(part for part in re.split(r"(<script>.*?</script>)", page, flags=re.S) if len(part) < 1_000_000)
     assert "default-src 'none'" in own and "http" not in own.replace("http-equiv", "")
-    document = json.loads((tmp_path / "one" / "reproduce.json").read_text())
+    document = json.loads((tmp_path / "one" / "paper.json").read_text())
     figures = {figure["figure"]: figure for figure in document["cases"][0]["figures"]}
     assert figures[5]["values"]["e_speed with changepoints"] == pytest.approx(case.similarity[WITH]["e_speed"].value)
     assert figures[4]["holds"] is True
@@ -88,7 +87,7 @@ def test_what_fits_no_road_of_the_paper_says_so_on_the_page(tmp_path):
     assert [claim.number for claim in claims_of(case)] == [3], "the primitives can be shown all the same"
     write_page(tmp_path / "out", [case], quality=[], provenance={})
     assert "cannot be placed" in refusals(case)[0]
-    assert "cannot be placed" in (tmp_path / "out" / "reproduce.html").read_text()
+    assert "cannot be placed" in (tmp_path / "out" / "paper.html").read_text()
 
 
 def test_a_claim_that_fails_is_said_to(case):
@@ -108,15 +107,13 @@ def test_measures_by_hand(case):
     assert math.isfinite(case.stop_speed[UNIFORM])
 
 
-def test_the_command_writes_page_and_figures_and_spares_other_folders(tmp_path, monkeypatch, capsys):
+def test_it_writes_page_and_figures_and_spares_other_folders(tmp_path):
     out = tmp_path / "out"
-    monkeypatch.setattr(sys, "argv", ["scenario-gen", "reproduce", str(bundled("c")), "--count", "4", "--out", str(out)])
-    with pytest.raises(SystemExit) as end:
-        cli.main()
-    assert not end.value.code
-    said = capsys.readouterr().out
+    lines = []
+    reproduce([[bundled("c")]], out, count=4, seed=7, report=lines.append)
+    said = "\n".join(lines)
     assert "synthetic_c on straight" in said and "figure 5, as claimed" in said
-    assert sorted(path.name for path in out.iterdir()) == [MARKER, "reproduce.html", "reproduce.json"]
-    assert "log synthetic_c" in json.loads((out / "reproduce.json").read_text())["provenance"]
+    assert sorted(path.name for path in out.iterdir()) == [MARKER, "paper.html", "paper.json"]
+    assert "log synthetic_c" in json.loads((out / "paper.json").read_text())["provenance"]
     with pytest.raises(InputError, match="name another folder"):
         reproduce([[Path(bundled("c"))]], Path(bundled("c")), count=4, seed=1)

@@ -7,9 +7,10 @@ from browser_tab import DESKTOP, PHONE, Tab
 from evaluation_worlds import crossing
 import pytest
 
+from benchmarks._paper_measure import run_case
+from benchmarks.paper import write_page
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.output.reproduce import run_case, write_page
 
 FIGURES = 4
 
@@ -21,7 +22,7 @@ def page(tmp_path_factory):
     cases = [run_case(log.encounters[0], count=4, seed=7) for log in logs]
     long = "a_name_without_any_space_" * 6
     write_page(folder, cases, quality=[f"{long} is a line of quality"], provenance={"log": "a" * 64, long: "a value"})
-    return folder / "reproduce.html"
+    return folder / "paper.html"
 
 
 @pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
@@ -55,7 +56,7 @@ def test_what_is_wider_than_a_phone_scrolls_in_its_own_frame(browser, page):
 
 def test_a_refused_encounter_has_its_reason_on_the_page(browser, tmp_path):
     write_page(tmp_path, [run_case(crossing(), count=2, seed=1)], quality=[], provenance={})
-    tab = Tab(browser, tmp_path / "reproduce.html", PHONE)
+    tab = Tab(browser, tmp_path / "paper.html", PHONE)
     assert "cannot be placed" in tab.page.locator("main").inner_text()
     assert tab.troubles == []
     tab.page.close()

@@ -1,0 +1,308 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Junctions and roundabouts shaped to a template: arms where it comes and goes, lanes where it drives, as wide as it needs.
+
+Each arm has its dividing line and lanes where the recorded vehicles were, to the nearest lane; and every vehicle's way through,
+with the template's own curvature, is swept into the road, so there is room for it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.numerics import exact, Floats
+from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import angle_between, unit, unit_left
+from scenario_gen.roads.arms import RING_ROOM
+from scenario_gen.roads.builtin import junction_centre
+from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.shaped import fitting_width
+from scenario_gen.roads.sketch import ARM_COUNT, lane_ends, LANE_GAP, PlannedArm, ROOM, SHORTEST, Sketch, SLACK
+from scenario_gen.roads.ways import draw_ring_route, draw_route
+from scenario_gen.template import clean_tracks, sharpness_of, Track, turn_of
+from scenario_gen.types import Encounter, Road
+
+_RING = (13.0, 45.0)  # metres, smallest and largest radius of a roundabout's lane
+_RING_LATERAL, _RING_FASTEST = 3.0, 4.0  # m/s² at the template's fastest: as it is sized, and at most
+_SAME_ARM = np.radians(30.0)  # directions that differ by less are those of one arm
+_MERGED = np.radians(45.0)  # and by so much if the road has too few arms otherwise
+_PART = np.radians(75.0)  # a vehicle that is still turning may go on by so much to an arm
+_STEADY = np.radians(6.0)  # a path that turns by less near its end shows the arm's direction
+_THROUGH = np.radians(20.0)  # who turns by less goes straight through, on one line
+_SURE = 5.0  # metres of such a path from which on its direction is sure
+_MOST_BETWEEN = 4  # lanes left free between the two directions, at most
+_MOST_LANES = 8
+_WIDE_JUNCTION = 30.0  # metres from the middle to a corner between two arms that belongs to the junction
+_SWEPT = 0.6  # metres of room beside a footprint on its way through the junction
+
+
+@dataclass(frozen=True, eq=False)
+class _End:
+    """One end of a vehicle's path: where it comes from or goes to.
+
+    Attributes:
+        vehicle: its index.
+        inward: True for the start.
+        yaw: direction [rad] out of the junction.
+        at: (2,) where the steady part of the path begins, seen from the junction, in metres from its centre.
+        away: metres from the centre to the path's end, along `yaw`; negative if it is not reached.
+        steady: metres near the end on which the path hardly turns.
+        turning: how it goes on turning, seen along `yaw`: the sign of what an arm may differ; 0 for one that goes straight on.
+    """
+
+    vehicle: int
+    inward: bool
+    yaw: float
+    at: Floats
+    away: float
+    steady: float
+    turning: float
+
+    @property
+    def key(self) -> tuple[int, bool]:
+        """Its vehicle, and whether that comes in."""
+        return self.vehicle, self.inward
+
+
+@dataclass(eq=False)
+class _Direction:
+    """A direction [rad] in which an arm leads, and the ends of paths that lie on it."""
+
+    yaw: float
+    members: list[_End]
+
+    def reach(self, tracks: tuple[Track, ...]) -> float:
+        """How far [m] from the centre its members' footprints reach."""
+        return max([end.away + tracks[end.vehicle].vehicle.length / 2.0 for end in self.members], default=0.0)
+
+
+def draw_junction(name: str, tracks: tuple[Track, ...], config: RoadConfig) -> Road:
+    """Draw a junction whose arms are where the template comes and goes.
+
+    Args:
+        name: `t_intersection` or `four_way`.
+        tracks: the template's.
+        config: how it is drawn.
+
+    Raises:
+        RefusedError: the template needs more arms or lanes than the road has, or the grid would be too large.
+    """
+    directions = _directions(name, tracks)
+    longest = max(directions, key=lambda direction: max((end.away for end in direction.members), default=0.0))
+    turn = np.pi - longest.yaw  # the longest arm leads west
+    pose_of: dict[tuple[int, bool], Floats] = {}
+    arms: list[PlannedArm] = []
+    for direction in directions:
+        offset, lanes = _lanes(direction, config)
+        reach = config.arm_length or max(direction.reach(tracks) + ROOM + SLACK, SHORTEST)
+        yaw = direction.yaw + turn
+        most = [_most(lanes, inward=inward) + 1 for inward in (True, False)]
+        if max(most) > _MOST_LANES:
+            raise RefusedError(f"road {name} would need {max(most)} lanes in one direction; {_MOST_LANES} are drawn at most")
+        pose = np.array([*(reach * unit(yaw) + offset * unit(yaw + np.pi / 2.0)), yaw])
+        arms.append(PlannedArm(pose, *(max(count, config.lanes) for count in most)))
+        pose_of.update({key: arms[-1].lane(lane, config, inward=key[1]) for key, lane in lanes.items()})
+    sketch = Sketch()
+    _draw_arms(sketch, arms, config)
+    for i, track in enumerate(tracks):
+        if (i, True) in pose_of and (i, False) in pose_of and not track.still:
+            way = draw_route(pose_of[i, True], pose_of[i, False], lambda _: True, sharpness_of(track))
+            if way is not None:
+                _sweep(sketch, way, track.vehicle.length, track.vehicle.width)
+    return sketch.road(name, *lane_ends(arms, config), config)
+
+
+def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
+    """Draw a roundabout of one lane, as large as the template's speeds need, with arms where it comes and goes.
+
+    Raises:
+        RefusedError: the template drives too fast for it, side by side, or by more than four arms.
+    """
+    fastest, length, wide = 6.0, 5.0, 2.0
+    directions = [_Direction(k * np.pi / 2.0, []) for k in range(4)]
+    tracks: tuple[Track, ...] = ()
+    if encounter is not None:
+        tracks = clean_tracks(encounter)
+        config = fitting_width(tracks, config)
+        fastest = max(float(track.speed[track.present[0] : track.present[1] + 1].max()) for track in tracks)
+        length, wide = (max(getattr(track.vehicle, size) for track in tracks) for size in ("length", "width"))
+        directions = _directions(name, tracks)
+    radius = float(np.clip(np.square(fastest) / _RING_LATERAL, *_RING))
+    if fastest > np.sqrt(_RING_FASTEST * radius):
+        possible = float(np.sqrt(_RING_FASTEST * _RING[1]))
+        raise RefusedError(
+            f"road roundabout: the template drives up to {fastest:.1f} m/s, and the largest one ({_RING[1]:g} m) allows "
+            f"{possible:.1f} m/s; choose four_way or curve"
+        )
+    turn = np.pi - directions[0].yaw
+    sketch, arms, width = Sketch(), [], config.lane_width
+    for direction in directions:
+        most = max(_lanes(direction, config)[1].values(), default=0)
+        if most > 0 and len({end.inward for end in direction.members}) < 2:
+            raise RefusedError(f"road roundabout has one lane, and the template drives in {most + 1} beside each other")
+        reach = config.arm_length or max(direction.reach(tracks) + ROOM + 2.0 * SLACK, radius + SHORTEST)
+        yaw = direction.yaw + turn
+        arm = PlannedArm(np.array([*(reach * unit(yaw)), yaw]), 1, 1)
+        sketch.strip(Curve(np.array([[*(radius * unit(yaw)), yaw], arm.pose])), -width, width)
+        arms.append(arm)
+    around = unit(np.linspace(0.0, 2.0 * np.pi, 97))
+    half = width / 2.0 + RING_ROOM
+    sketch.drivable.append((radius + half) * around)
+    sketch.islands.append((radius - half) * around)
+    entries, exits = lane_ends(arms, config)
+    for entry in entries:
+        for leave in exits:
+            way = draw_ring_route(entry, leave, np.zeros(2), radius, lambda _: True)
+            if way is not None:
+                _sweep(sketch, way, length, wide)
+    return sketch.road(name, entries, exits, config)
+
+
+def _sweep(sketch: Sketch, way: Curve, length: float, width: float) -> None:
+    """Add a footprint's way through the junction, with room beside it."""
+    sketch.sweep(way.cut(length / 2.0, way.length - length / 2.0), length, width + 2.0 * _SWEPT)
+
+
+def _ends(i: int, track: Track, centre: Floats) -> list[_End]:
+    s = np.arange(0.0, max(track.travelled, 0.5) + 0.25, 0.5)
+    poses = track.curve.at(s) - np.array([*centre, 0.0])
+    found = []
+    turn = turn_of(track)
+    goes_on = 0.0 if abs(turn) < _THROUGH else float(np.sign(turn))
+    for inward in (True, False):
+        along = poses if inward else poses[::-1]
+        turning = np.flatnonzero(np.abs(along[:, 2] - along[0, 2]) > _STEADY)
+        nearest = int(np.argmin(np.square(along[:, :2]).sum(axis=1)))
+        last = min(int(turning[0]) if len(turning) else len(along) - 1, nearest)  # not beyond the junction
+        yaw = float(np.median(along[: last + 1, 2])) + (np.pi if inward else 0.0)
+        away = float((along[0, :2] * unit(yaw)).sum())
+        at = along[nearest if abs(turn) < _THROUGH else last, :2]
+        found.append(_End(i, inward, yaw, at, away, last * 0.5, goes_on * (-1.0 if inward else 1.0)))
+    if track.still:
+        return [max(found, key=lambda end: end.away)]  # it stands on the arm on which it is
+    return found
+
+
+def _directions(name: str, tracks: tuple[Track, ...]) -> list[_Direction]:
+    """Directions of the arms with their members, as many as the road has."""
+    count, centre = ARM_COUNT[name], junction_centre(tracks)
+    ends = [end for i, track in enumerate(tracks) for end in _ends(i, track, centre)]
+    found: list[_Direction] = []
+    reached = [end for end in ends if end.away > 0.0]
+    for end in sorted(reached, key=lambda end: (-min(end.steady, 20.0), end.vehicle, end.inward)):
+        nearest = _nearest(end, found)
+        if nearest is None:
+            found.append(_Direction(end.yaw, [end]))
+        else:
+            nearest.members.append(end)
+            nearest.yaw = _mean([m for m in nearest.members if m.steady >= _SURE] or nearest.members)
+    while len(found) > count:
+        pairs = [(abs(angle_between(a.yaw, b.yaw)), j, k) for j, a in enumerate(found) for k, b in enumerate(found[:j])]
+        apart, j, k = min(pairs)
+        if apart > _MERGED:
+            who = ", ".join(tracks[direction.members[0].vehicle].vehicle.id for direction in found)
+            raise RefusedError(
+                f"road {name} has {count} arms, and the template comes and goes by {len(found)} (one each: vehicles "
+                f"{who}); choose another road"
+            )
+        found[k].members += found[j].members
+        found[k].yaw = _mean(found[k].members)
+        del found[j]
+    for end in ends:
+        if end.away <= 0.0:  # not reached: any arm ahead will do
+            nearest = _nearest(end, found)
+            if nearest is not None:
+                nearest.members.append(end)
+            elif len(found) < count and not any(abs(angle_between(other.yaw, end.yaw)) < _MERGED for other in found):
+                found.append(_Direction(end.yaw, [end]))
+    while len(found) < count:
+        wanted = [direction.yaw + k * np.pi / 2.0 for direction in found for k in (2, 1, 3)]
+        free = [min(abs(angle_between(yaw, direction.yaw)) for direction in found) for yaw in wanted]
+        found.append(_Direction(wanted[int(np.argmax(np.round(np.minimum(free, np.pi / 2.0), 6)))], []))
+    return found
+
+
+def _nearest(end: _End, directions: list[_Direction]) -> _Direction | None:
+    """The direction that an end of a path belongs to; None if it has one of its own."""
+
+    def joins(direction: _Direction) -> bool:
+        off = angle_between(direction.yaw, end.yaw)
+        return abs(off) < _SAME_ARM or (end.steady < _SURE and off * end.turning > 0.0 and abs(off) < _PART)
+
+    return min(filter(joins, directions), key=lambda near: abs(angle_between(near.yaw, end.yaw)), default=None)
+
+
+def _mean(ends: list[_End]) -> float:
+    first = ends[0].yaw
+    weight = np.array([max(min(end.steady, 20.0), 0.5) for end in ends])
+    off = np.array([angle_between(end.yaw, first) for end in ends])
+    return first + float((weight * off).sum() / weight.sum())
+
+
+def _lanes(direction: _Direction, config: RoadConfig) -> tuple[float, dict[tuple[int, bool], int]]:
+    """How far left of the centre, looking outward, the arm's dividing line lies, and the lane of each member."""
+    keep = 1.0 if config.traffic_side == "right" else -1.0
+    sign = {True: keep, False: -keep}  # lanes in lie to the left of who looks outward
+    left, width = unit_left(direction.yaw), config.lane_width
+    offset = {end.key: float((end.at * left).sum()) for end in direction.members}
+    sure = [end.key for end in direction.members if end.away > 0.0 and end.steady >= _SURE / 2.0] or list(offset)
+    lanes: dict[tuple[int, bool], int] = {}
+    innermost = {}
+    for inward in (True, False):
+        own = sorted((sign[inward] * offset[key], key[0]) for key in sure if key[1] == inward)
+        lane = 0
+        group: list[float] = []
+        for aside, vehicle in own:
+            if group and aside - float(np.mean(group)) > LANE_GAP:
+                lane += max(1, round((aside - float(np.mean(group))) / width))
+                group = []
+            group.append(aside)
+            lanes[vehicle, inward] = lane
+        if own:
+            innermost[inward] = sign[inward] * own[0][0]
+    if len(innermost) == 2:
+        between = keep * (innermost[True] - innermost[False])
+        free = min(max(round(between / width) - 1, 0), _MOST_BETWEEN)
+        lanes = {key: lane + ((free + 1) // 2 if key[1] else free // 2) for key, lane in lanes.items()}
+    lines = [offset[key] - sign[key[1]] * (lanes[key] + 0.5) * width for key in sure]
+    middle = float(np.mean(lines)) if lines else 0.0
+    for key, aside in offset.items():  # who has not reached the junction's end takes the lane nearest to where it would
+        if key not in lanes:
+            nearest = round(sign[key[1]] * (aside - middle) / width - 0.5)
+            lanes[key] = min(max(nearest, 0), _most(lanes, inward=key[1]))
+    return middle, lanes
+
+
+def _most(lanes: dict[tuple[int, bool], int], *, inward: bool) -> int:
+    """The outermost lane in one direction."""
+    return max([lane for (_, own), lane in lanes.items() if own == inward], default=0)
+
+
+def _draw_arms(sketch: Sketch, arms: list[PlannedArm], config: RoadConfig) -> None:
+    """Strips from the middle outwards, the corners between neighbours, and the middle itself."""
+    width, keep_right = config.lane_width, config.traffic_side == "right"
+    inner = []
+    for arm in sorted(arms, key=lambda arm: arm.pose[2] % (2.0 * np.pi)):
+        out = np.array([*unit(arm.pose[2]), 0.0])
+        start = arm.pose - float((arm.pose * out).sum()) * out
+        lefts, rights = (arm.inward, arm.outward) if keep_right else (arm.outward, arm.inward)
+        sketch.strip(Curve(np.stack((start, arm.pose))), -rights * width, lefts * width)
+        inner.append((start, float(-rights * width), float(lefts * width)))
+    middle = []
+    for (pose, right, high), (other, low, _) in zip(inner, inner[1:] + inner[:1], strict=True):
+        one, two = pose[2], other[2]
+        a, b = pose[:2] + high * unit_left(one), other[:2] + low * unit_left(two)
+        middle += [a, pose[:2] + right * unit_left(one)]
+        turn = float((two - one) % (2.0 * np.pi))
+        if 0.05 < turn < np.radians(165.0):
+            gap = b - a
+            along = float(gap[0] * exact.sin(two) - gap[1] * exact.cos(two)) / exact.sin(turn)
+            corner = a + along * unit(one)
+            sketch.corner(corner, one, two, config.corner_radius)
+            if abs(along) < _WIDE_JUNCTION:
+                middle.append(corner)
+    hull = shapely.convex_hull(shapely.multipoints(middle))
+    sketch.drivable.append(np.asarray(shapely.get_coordinates(hull)[:-1]))
