@@ -100,7 +100,7 @@ class Namespace(RecordedScenarios):
     """What a bag holds in one namespace.
 
     Properties for people to look at (`statuses`, `segmentation`, `fit`, `entries`, …) leave out what is missing or damaged; what
-    a scenario is checked against or made of is an error then.
+    a scenario is checked against or generated from raises an error then.
     """
 
     # The template and the road of one scenario.

@@ -98,7 +98,7 @@ class BagWriter:
         self._channel(name)
 
     def _channel(self, name: str) -> int:
-        """Return the channel of a topic in the current file, made at its first use."""
+        """Return the channel of a topic in the current file, created at its first use."""
         if name not in self._channels:
             topic, (encoding, text) = self._topics[name]
             if topic.type not in self._schemas:
