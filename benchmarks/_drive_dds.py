@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks._messages_processes import environment, nodes
 from scenario_gen.bags.recordings.write import write_recording
-from scenario_gen.ros.plumbing.domain import free_domain
+from scenario_gen.base.ros_domain import free_domain
 from scenario_gen.types.generation import GenerationResult
 
 Result = TypeVar("Result")

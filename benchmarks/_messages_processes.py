@@ -17,7 +17,7 @@ import subprocess
 import sys
 import time
 
-from scenario_gen.ros.plumbing.domain import this_host_only
+from scenario_gen.base.ros_domain import this_host_only
 
 
 def environment(domain: int) -> dict[str, str]:
@@ -59,7 +59,7 @@ def nodes(folder: Path, domain: int, arguments: Mapping[str, Sequence[str]]) -> 
     ]
     (folder / "suite.json").write_text(json.dumps(specification), encoding="utf-8")
     process = subprocess.Popen(
-        [sys.executable, "-m", "scenario_gen.ros.plumbing.forked", str(folder / "suite.json")],
+        [sys.executable, "-m", "scenario_gen.ros.plumbing.start", "fork", str(folder / "suite.json")],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

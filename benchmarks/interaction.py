@@ -21,6 +21,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from benchmarks._interaction_measures import following, ghosts, pair_windows, yielding
 from benchmarks._naturalness_classifier import windows
 from benchmarks._naturalness_cuts import cuts, recorded
 from benchmarks._naturalness_motion import displacement, Signals
@@ -31,7 +32,6 @@ from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.attempt import Attempt
-from scenario_gen.method.evaluation.interaction import following, ghosts, pair_windows, yielding
 from scenario_gen.method.evaluation.measures import measure
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.arrays import Floats

@@ -23,9 +23,9 @@ from benchmarks.row import Row
 from msg_conventions.paths import encode_path
 from msg_conventions.scenarios import decode_scenario, encode_scenario
 from scenario_gen.bags.storage.bag import bag_topics
+from scenario_gen.base.ros_domain import free_domain, this_host_only
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.numerics.arrays import Floats
-from scenario_gen.ros.plumbing.domain import free_domain, this_host_only
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.scenario import Scenario
 

@@ -25,7 +25,7 @@ from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing import plan_routes, PlanningConfig
-from scenario_gen.method.routing.search.ompl.solve import PLANNERS, solve
+from scenario_gen.method.routing.search.ompl.solve import Options, PLANNERS, solve
 from scenario_gen.method.routing.search.planner import Budget, BudgetSpentError, path_length, plan_with_retry, Query
 from scenario_gen.method.routing.search.pose_planner import PoseRrtStarConnect
 from scenario_gen.method.routing.search.rrt_star_connect import PAPER, RrtStarConnect, RrtStarConnectConfig
@@ -79,7 +79,7 @@ def _ompl(
         return process_time() - started > seconds
 
     field = clearance_in_cells(road)
-    return solve(field, ends, 0.0, name, stop, step=step, simplify=not first, state_by_state=states).simplified
+    return solve(field, ends, 0.0, name, stop, Options(step, simplify=not first, state_by_state=states)).simplified
 
 
 def _field(road: Road) -> list[Row]:
@@ -200,7 +200,7 @@ def _growth_of_ompl(road: Road, ends: Floats) -> str:
         for iterations in (FEW, MORE):
             started = process_time()
             until = partial(lt, iterations)  # so many have been made
-            solve(clearance_in_cells(road), ends, 0.0, name, until, step=5.0, simplify=False)
+            solve(clearance_in_cells(road), ends, 0.0, name, until, Options(5.0, simplify=False))
             cost.append((process_time() - started) / iterations)
         told.append(f"{PLANNERS[name]} {cost[1] / cost[0] / (np.log(MORE) / np.log(FEW)):.2f}")
     return f"OMPL at {MORE:.0e} over {FEW:.0e}: {', '.join(told)}"

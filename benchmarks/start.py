@@ -21,7 +21,7 @@ from benchmarks._size import sized
 from benchmarks.messages import _Client, _done
 from benchmarks.row import Row
 from scenario_gen.bags.storage.bag import read_messages
-from scenario_gen.ros.plumbing.domain import free_domain, this_host_only
+from scenario_gen.base.ros_domain import free_domain, this_host_only
 
 NODES = ("evaluator", "gp_sampler", "planner", "segmenter", "road_server", "log_player")[sized(0, quick=5) :]
 LOAD = sized(16, quick=1)

@@ -11,7 +11,7 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from scenario_gen.ros.plumbing.launching import descriptions, read_arguments
+from scenario_gen.cli.launching import descriptions, read_arguments
 
 SHARE = Path(get_package_share_directory("scenario_gen"))
 NODES = ("recorder", "road_server", "segmenter", "planner", "gp_sampler", "evaluator", "log_player")  # who listens comes first

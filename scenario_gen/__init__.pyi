@@ -13,7 +13,7 @@ from scenario_gen.logs import LogConfig as LogConfig, read_log as read_log
 from scenario_gen.logs.read import LogResult as LogResult
 from scenario_gen.logs.synthetic import bundled as bundled
 from scenario_gen.method.config import PipelineConfig as PipelineConfig
-from scenario_gen.method.evaluation.evaluate import (
+from scenario_gen.method.evaluation import (
     evaluate as evaluate,
     evaluate_scenarios as evaluate_scenarios,
     EvaluationConfig as EvaluationConfig,

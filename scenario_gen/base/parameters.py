@@ -11,6 +11,7 @@ import warnings
 
 from scenario_gen.base.documents import parse_yaml, read_yaml, shown, WHOLE
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.registry import installed
 
 Config = TypeVar("Config")
 
@@ -23,6 +24,7 @@ def parameter(
     low: float | None = None,
     high: float | None = None,
     choices: tuple[str, ...] = (),
+    group: str = "",
     was: str = "",
 ) -> Any:
     """Declare one parameter of a frozen configuration dataclass; bounds are inclusive.
@@ -34,9 +36,10 @@ def parameter(
         low: least value, None for no bound.
         high: largest value, None for no bound.
         choices: the texts allowed, none for any.
+        group: of entry points, whose names are allowed beside `choices` (see `base.registry`).
         was: its name in the version before this one, which is still accepted, with a warning.
     """
-    meta = {"meaning": meaning, "unit": unit, "low": low, "high": high, "choices": choices, "was": was}
+    meta = {"meaning": meaning, "unit": unit, "low": low, "high": high, "choices": choices, "group": group, "was": was}
     return field(default=default, metadata=meta)
 
 
@@ -65,7 +68,9 @@ def check_value(name: str, entry: "Field[Any]", value: Any) -> None:
         raise InputError(f"parameter {name} must be of type {wanted.__name__}, not {type(value).__name__} ({shown(value)})")
     meta = entry.metadata
     if meta["choices"] and value not in meta["choices"]:
-        raise InputError(f"parameter {name} is {shown(value)!r}; choose one of {', '.join(meta['choices'])}")
+        plugins = installed(meta["group"]) if meta["group"] else {}
+        if value not in plugins:
+            raise InputError(f"parameter {name} is {shown(value)!r}; choose one of {', '.join((*meta['choices'], *plugins))}")
     if wanted in (int, float):
         if not math.isfinite(value):
             raise InputError(f"parameter {name} is {value}, not a number that can be reckoned with")

@@ -3,8 +3,9 @@
 
 """From logs to one folder of results: every encounter on every road."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 
 from scenario_gen.base.errors import InputError, RefusedError
@@ -23,24 +24,11 @@ OPTIONS = {
 """Parameters of nodes, as the nearest possible request names them, and the command line's options for them."""
 
 
-def generate_folder(
-    out: Path,
-    jobs: Sequence[tuple[Sequence[Path], Sequence[str]]],
-    config: PipelineConfig,
-    *,
-    count: int,
-    seed: int,
-    title: str = "",
-    encounters: Sequence[str] = (),
-    request: Request = Request(),
-    also_read: Iterable[Path] = (),
-    record: Callable[[Path, Sequence[GenerationResult]], None] | None = None,
-    progress: Callable[[], AbstractContextManager[Advance]] = lambda: nullcontext(lambda *_: None),
-) -> tuple[list[GenerationResult], list[str]]:
-    """Generate scenarios of all encounters of some logs; write bag, report and figures to `out`.
+@dataclass(frozen=True)
+class FolderRequest:
+    """What a folder of results is to hold.
 
-    Args:
-        out: the folder; an earlier result there is replaced.
+    Attributes:
         jobs: files that are read as one log, and the roads for its encounters.
         config: the parameters of every stage.
         count: scenarios per encounter and road.
@@ -48,7 +36,41 @@ def generate_folder(
         title: heading of the report; the logs' names by default.
         encounters: names of those to take; all by default.
         request: a vehicle to be left out, and start and end states.
-        also_read: what else is read, so that `out` may not hold it: maps, a parameter file.
+        also_read: what else is read, so that the folder may not hold it: maps, a parameter file.
+    """
+
+    jobs: Sequence[tuple[Sequence[Path], Sequence[str]]]
+    config: PipelineConfig
+    count: int
+    seed: int
+    title: str = ""
+    encounters: Sequence[str] = ()
+    request: Request = Request()
+    also_read: Sequence[Path] = ()
+
+    @property
+    def logs(self) -> list[Path]:
+        """All files that are read as logs."""
+        return [path for group, _ in self.jobs for path in group]
+
+    @property
+    def roads(self) -> list[str]:
+        """The roads of all jobs."""
+        return [road for _, names in self.jobs for road in names]
+
+
+def generate_folder(
+    out: Path,
+    wanted: FolderRequest,
+    *,
+    record: Callable[[Path, Sequence[GenerationResult]], None] | None = None,
+    progress: Callable[[], AbstractContextManager[Advance]] = lambda: nullcontext(lambda *_: None),
+) -> tuple[list[GenerationResult], list[str]]:
+    """Generate scenarios of all encounters of some logs; write bag, report and figures to `out`.
+
+    Args:
+        out: the folder; an earlier result there is replaced.
+        wanted: what it is to hold.
         record: writes the bag (its path and the cases are given) instead of this process.
         progress: a context that gives what is told how far each case is.
 
@@ -59,18 +81,17 @@ def generate_folder(
         InputError: a log cannot be read, an encounter is unknown, or `out` may not be replaced.
         RefusedError: nothing could be generated.
     """
-    logs = [path for group, _ in jobs for path in group]
-    roads = [road for _, names in jobs for road in names]
-    with replaced_folder(out, GENERATED, [*logs, *map(Path, roads), *also_read]) as folder:
-        found = [read_log(group, config.log) for group, _ in jobs]
+    logs, roads, config, count, seed = wanted.logs, wanted.roads, wanted.config, wanted.count, wanted.seed
+    with replaced_folder(out, GENERATED, [*logs, *map(Path, roads), *wanted.also_read]) as folder:
+        found = [read_log(group, config.log) for group, _ in wanted.jobs]
         pairs = [
             (encounter, road)
-            for log, (_, names) in zip(found, jobs, strict=True)
-            for encounter in chosen(log.encounters, encounters)
+            for log, (_, names) in zip(found, wanted.jobs, strict=True)
+            for encounter in chosen(log.encounters, wanted.encounters)
             for road in names
         ]
         with progress() as advance:
-            cases, refusals = generate_all(pairs, config, count=count, seed=seed, request=request, advance=advance)
+            cases, refusals = generate_all(pairs, config, count=count, seed=seed, request=wanted.request, advance=advance)
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
         if record is not None:
@@ -79,9 +100,9 @@ def generate_folder(
             folder,
             cases,
             seed=seed,
-            title=title or ", ".join(path.stem for path in logs),
+            title=wanted.title or ", ".join(path.stem for path in logs),
             quality=[*(line for log in found for line in log.quality.lines()), *refusals],
-            provenance=provenance_of(logs, seed, count, roads, config, request),
+            provenance=provenance_of(logs, seed, count, roads, config, wanted.request),
         )
     return cases, refusals
 

@@ -5,15 +5,17 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
 import typer
 
 from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.cli.options import assigned_all, say, takes
 
 if TYPE_CHECKING:
-    from scenario_gen.corpus.tasks import Told
+    from scenario_gen.corpus.tasks import Workers
 
 commands = typer.Typer()
 
@@ -22,20 +24,19 @@ SchedulerOption = Annotated[str, typer.Option(help="address of a Dask scheduler,
 
 
 @contextmanager
-def telling() -> Iterator["Told"]:
-    """Show how far it is, and how much time is left."""
+def workers_of(count: int, scheduler: str) -> Iterator["Workers"]:
+    """Give who does the tasks; show how far it is, and how much time is left."""
     from scenario_gen.base.terminal import status_line
+    from scenario_gen.corpus.tasks import Workers
 
     with status_line() as status:
-        yield lambda done, total, left: status(f"{done} of {total} tasks, {left}")
+        yield Workers(count, scheduler, lambda done, total, left: status(f"{done} of {total} tasks, {left}"))
 
 
-def lines(said: Sequence[str]) -> None:
+def lines(texts: Sequence[str]) -> None:
     """Print lines, letter by letter."""
-    from scenario_gen.base.terminal import Terminal
-
-    for line in said:
-        Terminal().print(line, soft_wrap=True)
+    for line in texts:
+        say(line)
 
 
 def conclude(failed: Sequence[str], out: Path) -> None:
@@ -59,15 +60,12 @@ def mine(
     ] = None,
 ) -> None:
     """Find the encounters in an archive of any size."""
-    from scenario_gen.base.parameters import assigned
     from scenario_gen.corpus.config import CorpusConfig
     from scenario_gen.corpus.mine import mine as mined
 
-    config = CorpusConfig()
-    for assignment in assignments or []:
-        config = assigned(config, assignment)
-    with telling() as told:
-        result = mined(archive, out, config, workers=workers, scheduler=scheduler, told=told)
+    config = assigned_all(CorpusConfig(), assignments)
+    with workers_of(workers, scheduler) as who:
+        result = mined(archive, out, config, workers=who)
     lines([*result.lines(), f"page: {out / 'encounters.html'}"])
     conclude(result.failed, out)
 
@@ -81,47 +79,47 @@ def synthetic_archive(
     ] = None,
 ) -> None:
     """Write a synthetic archive in the Safety Pilot's format, whose encounters are known."""
-    from scenario_gen.base.parameters import assigned
     from scenario_gen.corpus.synthetic import ArchiveConfig, read_planted, write_archive
 
-    config = ArchiveConfig()
-    for assignment in assignments or []:
-        config = assigned(config, assignment)
+    config = assigned_all(ArchiveConfig(), assignments)
     planted = read_planted(write_archive(out, config, seed))
     inside = sum(int(one.inside) for one in planted)
     lines([f"{out}: synthetic, {inside} encounters to be found, {len(planted) - inside} just outside of a threshold"])
 
 
-@commands.command()
-def batch(
-    corpus: Annotated[Path, typer.Argument(help="a corpus that `mine` wrote")],
-    roads: Annotated[list[str], typer.Option(help="as for `generate`; several separated by commas, or repeated")],
-    out: Annotated[Path, typer.Option(help="folder of tables and bags; an unfinished batch is gone on with")],
-    count: Annotated[int, typer.Option(min=1, help="scenarios per template and road")] = 50,
-    seed: Annotated[int, typer.Option(min=0, help="same seed, same scenarios")] = 0,
-    templates: Annotated[int, typer.Option(min=0, help="the first so many of the corpus; 0: all")] = 0,
-    workers: WorkersOption = 0,
-    scheduler: SchedulerOption = "",
+@dataclass(frozen=True)
+class Batch:
+    """The options of `batch`."""
+
+    corpus: Annotated[Path, typer.Argument(help="a corpus that `mine` wrote")]
+    roads: Annotated[list[str], typer.Option(help="as for `generate`; several separated by commas, or repeated")]
+    out: Annotated[Path, typer.Option(help="folder of tables and bags; an unfinished batch is gone on with")]
+    count: Annotated[int, typer.Option(min=1, help="scenarios per template and road")] = 50
+    seed: Annotated[int, typer.Option(min=0, help="same seed, same scenarios")] = 0
+    templates: Annotated[int, typer.Option(min=0, help="the first so many of the corpus; 0: all")] = 0
+    workers: WorkersOption = 0
+    scheduler: SchedulerOption = ""
     assignments: Annotated[
         list[str] | None, typer.Option("--set", help="a parameter of the pipeline, as name=value; repeatable")
-    ] = None,
-) -> None:
+    ] = None
+
+
+@commands.command()
+@takes(Batch)
+def batch(options: Batch) -> None:
     """Generate scenarios of all templates of a corpus on all roads."""
-    from scenario_gen.base.parameters import assigned
     from scenario_gen.corpus.batch import run_batch
     from scenario_gen.method.config import PipelineConfig
 
-    config = PipelineConfig()
-    for assignment in assignments or []:
-        config = assigned(config, assignment)
-    names = [name for text in roads for name in text.split(",") if name]
-    with telling() as told:
+    config = assigned_all(PipelineConfig(), options.assignments)
+    names = [name for text in options.roads for name in text.split(",") if name]
+    with workers_of(options.workers, options.scheduler) as who:
         result = run_batch(
-            corpus, names, out, config,
-            count=count, seed=seed, templates=templates, workers=workers, scheduler=scheduler, told=told,
+            options.corpus, names, options.out, config,
+            count=options.count, seed=options.seed, templates=options.templates, workers=who,
         )  # fmt: skip
     lines(result.lines())
-    conclude(result.failed, out)
+    conclude(result.failed, options.out)
 
 
 def needs_bag(bag: Path | None) -> None:
@@ -146,7 +144,6 @@ def find(
     """Find scenarios of a batch by what they are: kind, road, PET, time to collision, …."""
     from rich.table import Table
 
-    from scenario_gen.base.terminal import Terminal
     from scenario_gen.corpus import find as finding
 
     if report is not None:
@@ -160,7 +157,7 @@ def find(
                 for name in finding.COLUMNS
             )
         )
-    Terminal().print(table)
+    say(table, wrap=True)
     lines(finding.coverage_lines(found, batch))
     if again:
         for row in found.rows:
@@ -183,13 +180,10 @@ def library(
     assignments: Annotated[list[str] | None, typer.Option("--set", help="a parameter of the segmentation, as name=value")] = None,
 ) -> None:
     """Segment the encounters of a corpus together: primitives that they share, with frequencies, transitions and examples."""
-    from scenario_gen.base.parameters import assigned
     from scenario_gen.corpus.library import build, SHARED
 
-    config = SHARED
-    for assignment in assignments or []:
-        config = assigned(config, assignment)
-    with telling() as told:
-        built = build(corpus, config, most=most, seed=seed, workers=workers, scheduler=scheduler, told=told)
+    config = assigned_all(SHARED, assignments)
+    with workers_of(workers, scheduler) as who:
+        built = build(corpus, config, most=most, seed=seed, workers=who)
     lines(built.lines())
     conclude(built.failed, corpus / "library")

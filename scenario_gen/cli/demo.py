@@ -10,7 +10,7 @@ from pathlib import Path
 from scenario_gen.bags.recordings.read import read_recording, SCENARIOS
 from scenario_gen.bags.recordings.write import scenario_bytes
 from scenario_gen.base.errors import InputError, ScenarioGenError
-from scenario_gen.cli.batch import Advance, generate_folder
+from scenario_gen.cli.batch import Advance, FolderRequest, generate_folder
 from scenario_gen.logs import bundled
 from scenario_gen.output.results import namespaces
 from scenario_gen.pipeline import PipelineConfig
@@ -47,7 +47,7 @@ def run_demo(
     config = PipelineConfig()
     jobs = [((bundled(case),), (road,)) for case, road in ROADS.items()]
     record = recorder(config, count, seed, status) if ros else None
-    return generate_folder(out, jobs, config, count=count, seed=seed, title=TITLE, record=record, progress=progress)
+    return generate_folder(out, FolderRequest(jobs, config, count, seed, TITLE), record=record, progress=progress)
 
 
 def recorder(
@@ -59,7 +59,7 @@ def recorder(
         InputError: ROS 2 is not installed.
     """
     try:
-        from scenario_gen.ros.plumbing.run_suite import Job, run_suite
+        from scenario_gen.cli.suite import Job, run_suite
     except ImportError as error:
         raise InputError(f"ROS 2 is not in this environment ({error}); run `make install`, or leave --ros out") from error
 

@@ -31,7 +31,7 @@ from scenario_gen.base.folders.claim import alone
 from scenario_gen.base.folders.scratch import sweep_tree
 from scenario_gen.base.interrupts import ending
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
-from scenario_gen.corpus.tasks import arriving, check_out, spread, Told
+from scenario_gen.corpus.tasks import arriving, check_out, spread, Workers
 from scenario_gen.method.attempt import Attempt
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import at_period, criticality
@@ -92,9 +92,7 @@ def run_batch(
     count: int = 50,
     seed: int = 0,
     templates: int = 0,
-    workers: int = 1,
-    scheduler: str = "",
-    told: Told = lambda *_: None,
+    workers: Workers = Workers(),
 ) -> Batch:
     """Generate scenarios of all templates of a corpus on all roads.
 
@@ -106,9 +104,7 @@ def run_batch(
         count: scenarios of each template on each road.
         seed: of all; each case has its own seed, which follows from this one, its template's name and its road.
         templates: the first so many of the corpus; 0 takes all.
-        workers: processes; 0 takes one for each core.
-        scheduler: address of a Dask scheduler, instead.
-        told: how far it is.
+        workers: who does it.
 
     Raises:
         InputError: the corpus has no encounters, a road is none, or `out` is of something else.
@@ -134,7 +130,7 @@ def run_batch(
         "parameters": parameter_texts(config),
     }
     out.mkdir(parents=True, exist_ok=True)
-    with alone(out), ending(partial(sweep_tree, out)), spread(workers, scheduler, told) as go:
+    with alone(out), ending(partial(sweep_tree, out)), spread(workers) as go:
         _agree(out, document)
         sweep_tree(out)
         return summary(

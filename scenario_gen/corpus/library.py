@@ -27,8 +27,16 @@ from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, rows_of, tables_of
 from scenario_gen.corpus.kinds import Motion, space_time_gap
 from scenario_gen.corpus.page import sketch, write_page
-from scenario_gen.corpus.tasks import arriving, spread, Told
-from scenario_gen.method.segmentation import assign, build_library, DEFAULT, PrimitiveLibrary, SegmentationConfig, USUAL_R_HAT
+from scenario_gen.corpus.tasks import arriving, spread, Workers
+from scenario_gen.method.segmentation import (
+    assign,
+    Assignment,
+    build_library,
+    DEFAULT,
+    PrimitiveLibrary,
+    SegmentationConfig,
+    USUAL_R_HAT,
+)
 from scenario_gen.numerics import Ints
 from scenario_gen.template import reactions_of
 from scenario_gen.types import Encounter, FOLLOW, YIELD
@@ -117,9 +125,7 @@ def build(
     *,
     most: int = 1000,
     seed: int = 0,
-    workers: int = 1,
-    scheduler: str = "",
-    told: Told = lambda *_: None,
+    workers: Workers = Workers(),
 ) -> Built:
     """Fit a library to the encounters of a corpus, assign all of them, and write `library/` in it.
 
@@ -128,9 +134,7 @@ def build(
         config: of the segmentation.
         most: pairs to fit at most; a sample by the digest of their names, the same whatever else is in the corpus.
         seed: of the sampler; the fit is repeated with `seed` + 1, to say how far two seeds agree.
-        workers: processes; 0 takes one for each core.
-        scheduler: address of a Dask scheduler, instead.
-        told: how far it is.
+        workers: who does it.
 
     Raises:
         InputError: the corpus has no pairs, or its encounters have several sampling periods.
@@ -143,19 +147,11 @@ def build(
     if not sample:
         raise InputError(f"{corpus} holds no two vehicles that have to do with each other for {SHORTEST:g} s")
     library, assignments = build_library(sample, config, seed)
-    labels = np.concatenate(
-        [labels_of(one.segmentation.changepoints, one.primitives, pair) for one, pair in zip(assignments, sample, strict=True)]
-    )
-    other = build_library(sample, config, seed + 1)[1]
-    again = np.concatenate(
-        [labels_of(one.segmentation.changepoints, one.primitives, pair) for one, pair in zip(other, sample, strict=True)]
-    )
-    growth = [
-        (len(sample) // part, len(build_library(sample[: len(sample) // part], config, seed)[0].means))
-        for part in (8, 4, 2)
-        if len(sample) >= 4 * part
-    ]
-    with replaced_folder(corpus / "library", LIBRARY) as folder, spread(workers, scheduler, told) as go:
+    labels = _labels(assignments, sample)
+    again = _labels(build_library(sample, config, seed + 1)[1], sample)
+    smaller = [len(sample) // part for part in (8, 4, 2) if len(sample) >= 4 * part]
+    growth = [(count, len(build_library(sample[:count], config, seed)[0].means)) for count in smaller]
+    with replaced_folder(corpus / "library", LIBRARY) as folder, spread(workers) as go:
         library.save(folder / NAME)
         tasks = [AssignTask(table.stem, folder / NAME, table, folder / SEGMENTS / table.name, config) for table in tables]
         failed = go(assign_table, tasks)
@@ -183,6 +179,14 @@ def labels_of(points: Ints, primitives: Ints, pair: Encounter) -> Ints:
     """(T,) primitive of each sample, from the changepoints (K,) and the primitive (K + 1,) of each segment."""
     edges = np.array([0, *points, len(pair.time)])
     return np.repeat(np.asarray(primitives, dtype=np.int64), np.diff(edges))
+
+
+def _labels(assignments: Sequence[Assignment], pairs: Sequence[Encounter]) -> Ints:
+    """(T,) primitive of each sample of all pairs, one after the other."""
+    return np.concatenate([
+        labels_of(found.segmentation.changepoints, found.primitives, pair)
+        for found, pair in zip(assignments, pairs, strict=True)
+    ])  # fmt: skip
 
 
 def _labels_again(row: Mapping[str, Any], pair: Encounter) -> Ints:

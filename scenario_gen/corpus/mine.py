@@ -43,7 +43,7 @@ from scenario_gen.corpus.kinds import KINDS
 from scenario_gen.corpus.meetings import HourTask, overlap, search_hours
 from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
 from scenario_gen.corpus.page import sketch, write_page
-from scenario_gen.corpus.tasks import arriving, check_out, spread, Told
+from scenario_gen.corpus.tasks import arriving, check_out, spread, Workers
 from scenario_gen.logs import is_bag, is_commonroad, is_spmd, is_table
 from scenario_gen.template import reactions_of
 
@@ -102,9 +102,7 @@ def mine(
     out: Path,
     config: CorpusConfig = CorpusConfig(),
     *,
-    workers: int = 1,
-    scheduler: str = "",
-    told: Told = lambda *_: None,
+    workers: Workers = Workers(),
 ) -> Mined:
     """Find the encounters of an archive.
 
@@ -113,9 +111,7 @@ def mine(
             or files and bags. A folder of tables that holds no SPMD file and no other folder is one log, as for `read_log`.
         out: the corpus; an unfinished one of the same archive and parameters is gone on with.
         config: how.
-        workers: processes; 0 takes one for each core.
-        scheduler: address of a Dask scheduler, instead.
-        told: how far each stage is.
+        workers: who does it.
 
     Raises:
         InputError: there is nothing to read, or `out` is of another archive or other parameters.
@@ -124,7 +120,7 @@ def mine(
     messages, logs, others = inventory(archives)
     check_out(out, archives)
     out.mkdir(parents=True, exist_ok=True)
-    with alone(out), ending(partial(sweep_tree, out)), spread(workers, scheduler, told) as go:
+    with alone(out), ending(partial(sweep_tree, out)), spread(workers) as go:
         _agree(out, messages, logs, config)
         sweep_tree(out)
         log_tasks = [

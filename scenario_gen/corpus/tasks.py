@@ -9,6 +9,7 @@ distribution, nothing else: it holds no state that a killed run would lose.
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack, suppress
+from dataclasses import dataclass
 from functools import partial
 import logging
 import multiprocessing
@@ -68,15 +69,30 @@ def check_out(out: Path, read: Sequence[Path]) -> None:
             raise InputError(f"{out} lies in {source}, of which it would become a part; name a folder outside of it")
 
 
+@dataclass(frozen=True)
+class Workers:
+    """Who does the tasks of a command.
+
+    Attributes:
+        count: processes; 1 runs in this one, 0 takes one for each core.
+        scheduler: address of a Dask scheduler, instead of `count`.
+        told: called with how far it is.
+    """
+
+    count: int = 1
+    scheduler: str = ""
+    told: Told = lambda *_: None
+
+
 class Spread:
     """Runs a function on each of many tasks: in this process, in processes of this machine, or on a cluster.
 
     A cluster of this machine is started when the first task needs it, and serves until the end.
     """
 
-    def __init__(self, workers: int, scheduler: str, told: Told, stack: ExitStack) -> None:
-        self._workers = workers or os.cpu_count() or 1
-        self._scheduler, self._told, self._stack = scheduler, told, stack
+    def __init__(self, workers: Workers, stack: ExitStack) -> None:
+        self._workers = workers.count or os.cpu_count() or 1
+        self._scheduler, self._told, self._stack = workers.scheduler, workers.told, stack
         self._client: Any = None
 
     def __call__(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> list[str]:
@@ -114,16 +130,10 @@ class Spread:
 
 
 @contextmanager
-def spread(workers: int = 1, scheduler: str = "", told: Told = lambda *_: None) -> Iterator[Spread]:
-    """Give what runs tasks.
-
-    Args:
-        workers: processes; 1 runs in this one, 0 takes one for each core.
-        scheduler: address of a Dask scheduler, instead of `workers`.
-        told: how far it is.
-    """
+def spread(workers: Workers) -> Iterator[Spread]:
+    """Give what runs tasks."""
     with ExitStack() as stack:
-        yield Spread(workers, scheduler, told, stack)
+        yield Spread(workers, stack)
 
 
 def _guarded(function: Callable[[Any], Any], task: Any) -> str:

@@ -16,7 +16,9 @@ FORMATS = ("auto", "spmd", "table", "bag", "argoverse2", "interaction", "ind", "
 class LogConfig(Parameters):
     """How a log is read, cleaned and cut into encounters."""
 
-    format: str = parameter("auto", "source format; auto looks at the file's name and content", choices=FORMATS)
+    format: str = parameter(
+        "auto", "source format; auto looks at the file's name and content", choices=FORMATS, group="scenario_gen.logs"
+    )
     columns: str = parameter("", "columns of a table that its header does not name, e.g. vehicle=name,time=t_s,speed=v_kmh")
     topics: str = parameter("", "topics of a bag to read, separated by commas; empty reads all that can be used")
     vehicles: str = parameter("", "vehicles to keep, separated by commas; empty keeps all")

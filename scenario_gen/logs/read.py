@@ -3,8 +3,8 @@
 
 """From files to encounters: choose the reader, clean, smooth, group, cut."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from itertools import combinations
@@ -16,6 +16,7 @@ import numpy as np
 
 from scenario_gen.bags.storage.files import files_of
 from scenario_gen.base.errors import guarded, InputError, needs, reading
+from scenario_gen.base.registry import Registry
 from scenario_gen.logs.adapters.commonroad import is_commonroad
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.config import LogConfig, picked
@@ -269,56 +270,70 @@ def is_known(path: Path, name: str) -> bool:
     return recognised(path) == name
 
 
+Reader = Callable[[Sequence[Path], LogConfig], RawLog]
+
+
+def late(module: str, extra: tuple[str, ...] = (), **options: Any) -> Reader:
+    """Return the function `read` of a module of this room, which is loaded when it reads: libraries take up to a second.
+
+    Args:
+        module: in `scenario_gen.logs`.
+        extra: the extra that brings its libraries, and their names.
+        options: further arguments of its `read`.
+    """
+
+    def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
+        if extra:
+            needs(*extra)
+        log: RawLog = import_module(f"scenario_gen.logs.{module}").read(paths, config, **options)
+        return log
+
+    return read
+
+
 @dataclass(frozen=True)
-class Format:
+class LogFormat:
     """A format of logs.
 
     Attributes:
-        accepts: whether a path is of it.
-        module: of `scenario_gen.logs`, whose function `read` reads it; its libraries take up to a second to load.
-        options: further arguments of `read`.
-        needs: the extra of the libraries, and their names.
+        accepts: whether a file (or a bag's folder) is of this format, by its name and first bytes; it never fails on others.
+        read: returns the log in files of which each was accepted, or for which `format` names this format. It raises
+            InputError, naming file and row, where they cannot be read, and keeps `size_limit`, `row_limit` and `vehicle_limit`.
     """
 
     accepts: Callable[[Path], bool]
-    module: str
-    options: Mapping[str, Any] = field(default_factory=dict)
-    needs: tuple[str, ...] = ()
-
-    def read(self, paths: Sequence[Path], config: LogConfig) -> RawLog:
-        """Read one log.
-
-        Raises:
-            InputError: it cannot be read.
-            MissingExtraError: a library is not installed.
-        """
-        if self.needs:
-            needs(*self.needs)
-        log: RawLog = import_module(f"scenario_gen.logs.{self.module}").read(paths, config, **self.options)
-        return log
+    read: Reader
 
 
-FORMATS = {  # tried in this order: a table without a header is SPMD
-    "bag": Format(is_bag, "bag", needs=("bags", "lz4", "mcap", "rosbags", "zstandard")),
-    "commonroad": Format(is_commonroad, "adapters.commonroad"),
-    "spmd": Format(is_spmd, "tables", {"spmd": True}),
-    **{
-        name: Format(partial(is_known, name=name), "adapters.tracks", {"name": name})
-        for name in ("argoverse2", "interaction", "ind", "highd")
+FORMATS = Registry[LogFormat](
+    "scenario_gen.logs",
+    {  # tried in this order: a table without a header is SPMD
+        "bag": LogFormat(is_bag, late("bag", ("bags", "lz4", "mcap", "rosbags", "zstandard"))),
+        "commonroad": LogFormat(is_commonroad, late("adapters.commonroad")),
+        "spmd": LogFormat(is_spmd, late("tables", spmd=True)),
+        **{
+            name: LogFormat(partial(is_known, name=name), late("adapters.tracks", name=name))
+            for name in ("argoverse2", "interaction", "ind", "highd")
+        },
+        "table": LogFormat(is_table, late("tables")),
     },
-    "table": Format(is_table, "tables"),
-}
+    LogFormat,
+)
+"""The formats of logs by name; `config.FORMATS` repeats the names of the built-in ones."""
 
 
 def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
-    """Read one log from files or a folder with the first reader that accepts all of them.
+    """Read one log from files or a folder in the first format that accepts all of them; those of plugins come last.
 
     Raises:
         InputError: nothing is there, no reader accepts it, or the one that does cannot read it.
     """
     with guarded(str(paths[0]), OSError):  # no permission, a name too long, a file that goes away
         files = [file for path in paths for file in present(path)]
-        known = FORMATS.get(config.format) or next((f for f in FORMATS.values() if all(map(f.accepts, files))), None)
+        if config.format == "auto":
+            known = next((known for known in FORMATS.values() if all(map(known.accepts, files))), None)
+        else:
+            known = FORMATS[config.format]
     if known is None:
         raise InputError(
             f"{paths[0]} is none of the known logs: {', '.join(TABLES)} tables and SPMD files, "

@@ -8,7 +8,7 @@ was buffered is a `RawLog` too, which `encounters_of` reads as if it came from a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,30 +18,12 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import longest_bridge
 from scenario_gen.logs.raw import natural, Observations, RawLog, Rows, Segment
 from scenario_gen.logs.smoothing import speed_of_fixes
-from scenario_gen.numerics import Floats
-from scenario_gen.types import Vehicle
+from scenario_gen.types import Sample, Vehicle
 
 WINDOW_NS = 3_000_000_000  # of the past that is cleaned again for every sample: enough to distinguish a jump from a new place
 FAR_NS = 10_000_000_000  # a stamp this far from the newest one belongs to another time, or is wrong
 MOST = 100  # messages of one kind per vehicle and second that are kept
 EVERY = 2  # ticks that are sampled at once, after one cleaning
-
-
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """The vehicles that are there at one tick of the common clock.
-
-    Attributes:
-        stamp_ns: the tick, a whole multiple of the period.
-        vehicles: N >= 2, in the natural order of their ids.
-        position: (N, 2) metres east and north of the streams' origin.
-        speed: (N,) m/s.
-    """
-
-    stamp_ns: int
-    vehicles: tuple[Vehicle, ...]
-    position: Floats
-    speed: Floats
 
 
 class Streams:

@@ -19,6 +19,6 @@ from scenario_gen.numerics.arrays import (
 )
 
 __all__ = [
-    "Bools", "Floats", "Ints", "canonical_heading", "canonical_poses", "freeze", "frozen", "frozen_bools", "frozen_ints", "runs",
-    "sealed", "wrap_angle",
+    "Bools", "Floats", "Ints", "canonical_heading", "canonical_poses", "freeze", "frozen", "frozen_bools", "frozen_ints",
+    "runs", "sealed", "wrap_angle",
 ]  # fmt: skip

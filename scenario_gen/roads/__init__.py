@@ -4,7 +4,7 @@
 """Occupancy grids, their entries and exits, and the readers of map formats."""
 
 from scenario_gen.roads.arms import Arm, arms_of, reverse, ring_of, unused_arms
-from scenario_gen.roads.build import build_road, BUILT_IN, road_and_template
+from scenario_gen.roads.build import build_road, BUILT_IN, DrawRoad, road_and_template
 from scenario_gen.roads.builtin import draw, layout_for
 from scenario_gen.roads.clearance import (
     clearance_field,
@@ -29,9 +29,9 @@ from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn, fl
 from scenario_gen.types import Road
 
 __all__ = [
-    "BUILT_IN", "CONTACT", "Arm", "Course", "Road", "RoadConfig", "along_lanes", "arms_of", "bent_axis", "build_road",
-    "clearance_field", "clearance_in_cells", "common_component", "component_cells", "draw", "draw_ring_route", "draw_route",
-    "draw_u_turn", "drives_against", "flare_begins", "footprint_fits", "free_length", "laid", "layout_for", "line_between",
-    "nearest_pose_with_room", "own_ground", "placements", "read_obstacles", "relative", "reverse", "ring_of",
+    "BUILT_IN", "CONTACT", "Arm", "Course", "DrawRoad", "Road", "RoadConfig", "along_lanes", "arms_of", "bent_axis",
+    "build_road", "clearance_field", "clearance_in_cells", "common_component", "component_cells", "draw", "draw_ring_route",
+    "draw_route", "draw_u_turn", "drives_against", "flare_begins", "footprint_fits", "free_length", "laid", "layout_for",
+    "line_between", "nearest_pose_with_room", "own_ground", "placements", "read_obstacles", "relative", "reverse", "ring_of",
     "road_and_template", "segment_free", "segments_free", "to_cells", "to_metres", "unused_arms",
 ]  # fmt: skip

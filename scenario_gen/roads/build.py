@@ -3,13 +3,14 @@
 
 """One door to every road: built-in, drawn around the template, or read from a map."""
 
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError, reading, RefusedError
+from scenario_gen.base.registry import Registry
 from scenario_gen.roads.builtin import draw, draw_corridor, draw_paper, layout_for
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.junctions import draw_junction, draw_roundabout
@@ -25,7 +26,7 @@ def build_road(name_or_path: str, encounter: Encounter | None = None, config: Ro
     """Return the road `name_or_path`, with the obstacles of `config` drawn into it.
 
     Args:
-        name_or_path: one of `DRAWN`, or the path of a nav2 map_server YAML or of a vector map (.osm, .xodr, .xml), of which
+        name_or_path: one of `ROADS`, or the path of a nav2 map_server YAML or of a vector map (.osm, .xodr, .xml), of which
             `#box=x0,y0,x1,y1`, `#lanelet=ID` or `#junction=ID` chooses a part.
         encounter: the template, to which built-in roads are sized (None: plain sizes), and for which the best place on a vector
             map is searched; `corridor` cannot do without.
@@ -84,25 +85,40 @@ def _on_other_side(encounter: Encounter, road: Road) -> bool:
     return side not in ("", traffic_side(encounter) or "right")
 
 
-Drawer = Callable[[str, Encounter | None, RoadConfig], Road]
-"""Draws the road of a name for a template; None: in plain sizes."""
+class DrawRoad(Protocol):
+    """What a road's name stands for: draws the road, for a template if there is one."""
+
+    def __call__(self, name: str, encounter: Encounter | None, config: RoadConfig, /) -> Road:
+        """Return the road, without obstacles.
+
+        Args:
+            name: by which it was chosen, the name of the road.
+            encounter: the template, to which the road is sized; None: in plain sizes.
+            config: how roads are drawn; it should keep lane width, resolution and traffic side.
+
+        Raises:
+            InputError: it cannot be drawn without a template, or with these parameters.
+            RefusedError: it cannot be drawn for this template.
+        """
+        ...
 
 
 def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfig) -> Road:
     """The road without its obstacles."""
     if config.paper and name_or_path in BUILT_IN:
         return draw_paper(name_or_path, config)
-    if name_or_path in DRAWN:
-        return DRAWN[name_or_path](name_or_path, encounter, config)
     if is_vector_map(name_or_path):
         return vector_road(name_or_path, None if encounter is None else clean_tracks(encounter), config)
     path = Path(name_or_path)
-    if path.suffix.lower() not in (".yaml", ".yml"):
+    if path.suffix.lower() in (".yaml", ".yml"):
+        with reading(path):
+            return read_map(path, config)
+    if name_or_path not in ROADS:
+        names = ", ".join(ROADS.names())
         kinds = f"a map_server YAML file or a vector map ({', '.join(FORMATS)})"
         part = "; one part behind one # can be named of a vector map alone" if "#" in name_or_path else ""
-        raise InputError(f"road {shown(name_or_path, 200)!r} is neither one of {', '.join(DRAWN)} nor the path of {kinds}{part}")
-    with reading(path):
-        return read_map(path, config)
+        raise InputError(f"road {shown(name_or_path, 200)!r} is neither one of {names} nor the path of {kinds}{part}")
+    return ROADS[name_or_path](name_or_path, encounter, config)
 
 
 def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
@@ -125,11 +141,11 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
     return draw(name, layout_for(name, tracks, config), config)
 
 
-BUILT_IN: dict[str, Drawer] = {
+BUILT_IN: dict[str, DrawRoad] = {
     **dict.fromkeys(("straight", "curve", "t_intersection", "four_way"), draw_main_road),
     "merge": draw_merge,
     "roundabout": draw_roundabout,
 }
 """The built-in roads that need no template, by name."""
-DRAWN: dict[str, Drawer] = {**BUILT_IN, "corridor": draw_corridor}
+ROADS = Registry[DrawRoad]("scenario_gen.roads", {**BUILT_IN, "corridor": draw_corridor})
 """All roads that are drawn, by name."""

@@ -20,7 +20,7 @@ from scenario_gen.types import COARSEST, FARTHEST, FINEST, Road
 
 _MODES = ("trinary", "scale", "raw")
 _FORMATS = ("PPM", "PNG", "BMP", "JPEG")  # by Pillow's names; PPM is PGM, PBM and PPM
-_FORMATS_SAID = "PGM, PPM, PBM, PNG, BMP or JPEG"
+_FORMAT_NAMES = "PGM, PPM, PBM, PNG, BMP or JPEG"
 _BLOCK = 1 << 20  # pixels worked on at a time, so that a large map takes little more memory than its cells
 
 
@@ -36,7 +36,7 @@ def read_map(path: Path, config: RoadConfig) -> Road:
     content = read_yaml(path, f"map {path}")
     if not isinstance(content, dict):
         raise InputError(f"map {path}: expected keys image, resolution, origin, negate, occupied_thresh, free_thresh")
-    resolution = _number(path, content, "resolution", low=FINEST, high=COARSEST)
+    resolution = _number(path, content, "resolution", FINEST, COARSEST)
     origin = _origin(path, content)
     mode = content.get("mode", "trinary")
     if mode not in _MODES:
@@ -44,8 +44,8 @@ def read_map(path: Path, config: RoadConfig) -> Road:
     negate = content.get("negate", 0)
     if negate not in (0, 1):  # True and False too
         raise InputError(f"map {path}: key negate is {shown(negate)}; it must be 0 or 1")
-    occupied = _number(path, content, "occupied_thresh", low=0.0, high=1.0, default=0.65)
-    free = _number(path, content, "free_thresh", low=0.0, high=1.0, default=0.25)
+    occupied = _number(path, content, "occupied_thresh", 0.0, 1.0, default=0.65)
+    free = _number(path, content, "free_thresh", 0.0, 1.0, default=0.25)
     if free >= occupied:
         raise InputError(f"map {path}: key free_thresh ({free}) must be below occupied_thresh ({occupied})")
     image = _image_file(path, content.get("image"), config)
@@ -54,28 +54,25 @@ def read_map(path: Path, config: RoadConfig) -> Road:
         raise InputError(f"map {path}: no cell of {image.name} is free with free_thresh {free} and negate {negate}")
     resolution = float(np.float32(resolution))
     entries, exits = find_openings(drivable, resolution, origin, config)
-    return Road(
-        name=path.stem, drivable=drivable, resolution=resolution, origin=origin, entries=entries, exits=exits, frame_id="map"
-    )
+    return Road(path.stem, drivable, resolution, origin, entries, exits)
 
 
-def _number(
-    path: Path, content: dict[Any, Any], key: str, *, low: float, high: float = math.inf, default: float | None = None
-) -> float:
-    value = content.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _number(path: Path, content: dict[Any, Any], key: str, low: float, high: float, default: float | None = None) -> float:
+    value: Any = content.get(key, default)
+    if not _is_number(value):
         raise InputError(f"map {path}: key {key} is {shown(value)}; a number is needed")
     if not low <= value <= high:
-        raise InputError(
-            f"map {path}: key {key} is {value}; it must be at least {low:g}" + (f", at most {high:g}" if high < math.inf else "")
-        )
+        raise InputError(f"map {path}: key {key} is {value}; it must be at least {low:g}, at most {high:g}")
     return float(value)
 
 
 def _origin(path: Path, content: dict[Any, Any]) -> Floats:
     value = content.get("origin")
-    numbers = isinstance(value, list) and all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
-    if not isinstance(value, list) or len(value) not in (2, 3) or not numbers or not all(math.isfinite(v) for v in value):
+    if not (isinstance(value, list) and len(value) in (2, 3) and all(map(_is_number, value))):
         raise InputError(f"map {path}: key origin is {shown(value)}; a list of x, y and yaw is needed")
     if max(abs(v) for v in value) > FARTHEST:
         raise InputError(f"map {path}: key origin is {shown(value)}; at most {FARTHEST:g} m from the frame's origin are read")
@@ -115,7 +112,7 @@ def _free_cells(path: Path, image_path: Path, mode: str, negate: bool, free: flo
     where = f"map {path}: image {image_path.name} cannot be read"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Pillow's, of large or odd images: what is too large is refused here
-        with guarded(where, remedy=f"give {_FORMATS_SAID}"):
+        with guarded(where, remedy=f"give {_FORMAT_NAMES}"):
             opened = Image.open(image_path, formats=_FORMATS)
         with opened as image:
             width, height = image.size

@@ -19,7 +19,7 @@ from scenario_gen.corpus import batch as batches
 from scenario_gen.corpus.batch import LOST_CONFLICT, run_batch, seed_of, tokens_of
 from scenario_gen.corpus.encounters import rows_of
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
-from scenario_gen.corpus.tasks import spread
+from scenario_gen.corpus.tasks import spread, Workers
 from scenario_gen.method.fitting import LostConflictError
 
 pytestmark = pytest.mark.xdist_group("corpus")
@@ -95,7 +95,7 @@ def test_a_killed_run_with_two_processes_ends_with_the_same_bytes(batch, corpus,
             time.sleep(0.01)
         assert run.poll() is None, "it ended before it could be killed"
         os.killpg(run.pid, signal.SIGKILL)
-    made = run_batch(corpus[0], ROADS, out, count=3, seed=5, templates=4, workers=2)
+    made = run_batch(corpus[0], ROADS, out, count=3, seed=5, templates=4, workers=Workers(2))
     assert digests(out) == digests(batch[0]) and made.lines() == batch[1].lines()
 
 
@@ -165,7 +165,7 @@ def test_lost_encounters_are_counted_under_one_cause(corpus, tmp_path, monkeypat
         raise LostConflictError(f"road {attempt.road.name} has no place that keeps the encounter: vehicles 1 and 2 do not meet")
 
     monkeypatch.setattr(batches.Attempt, "run", lost)
-    made = run_batch(corpus[0], ROADS, tmp_path / "out", count=1, templates=2, workers=1)
+    made = run_batch(corpus[0], ROADS, tmp_path / "out", count=1, templates=2, workers=Workers(1))
     assert made.failures == {LOST_CONFLICT: 4} and not made.failed
     cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))
     assert {case["why"].split()[1] for case in cases} == set(ROADS)
@@ -179,7 +179,7 @@ def test_names_and_seeds():
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_task_that_is_refused_does_not_end_the_others(workers):
     told = []
-    with spread(workers, "", lambda *how: told.append(how)) as go:
+    with spread(Workers(workers, "", lambda *how: told.append(how))) as go:
         b, c = go(refuse, ["a", "b", "c"])
         assert b == "b: b is none" and c.startswith("c: KeyError at refusing.py:") and c.endswith(": KeyError 'c'")
     assert [done for done, *_ in told] == [1, 2, 3]
@@ -189,5 +189,5 @@ def test_a_cluster_that_runs_is_used():
     from distributed import LocalCluster
 
     alone = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
-    with LocalCluster(**alone) as cluster, spread(1, cluster.scheduler_address) as go:
+    with LocalCluster(**alone) as cluster, spread(Workers(1, cluster.scheduler_address)) as go:
         assert go(refuse, ["a", "b"]) == ["b: b is none"]

@@ -60,7 +60,7 @@ def test_it_drives_a_scenario_in_lock_step(tmp_path):
     from msg_conventions.diagnostics import decode_diagnostics
     from scenario_gen import generate, read_log
     from scenario_gen.bags.recordings.write import write_recording
-    from scenario_gen.ros.plumbing.domain import free_domain
+    from scenario_gen.base.ros_domain import free_domain
 
     (encounter,) = read_log(RESOURCES / "synthetic_c").encounters
     bag = write_recording(tmp_path / "bag", generate(encounter, "straight", count=1, seed=7))

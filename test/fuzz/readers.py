@@ -23,7 +23,7 @@ OF_TARGETS = {
     "reindex": ("bags/storage/reindex.py", "bags/storage/metadata.py"),
     "import_openscenario": ("output/exchange/importing.py", "output/exchange/xml.py"),
     "map": ("roads/nav2.py",),
-    "vector_map_osm": ("roads/vector/lanelet2.py", "base/markup.py"),
+    "vector_map_osm": ("roads/vector/read.py", "roads/vector/lanelet2.py", "base/markup.py"),
     "vector_map_xodr": ("roads/vector/opendrive.py",),
     "vector_map_xml": ("roads/vector/commonroad.py",),
     "parameters": ("base/parameters.py",),

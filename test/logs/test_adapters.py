@@ -11,7 +11,7 @@ from pyarrow import parquet
 import pytest
 
 from scenario_gen.base.errors import InputError, UnforeseenError
-from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs import config, LogConfig, read, read_log
 from scenario_gen.logs.adapters import tracks
 from scenario_gen.logs.adapters.formats import FORMATS
 
@@ -266,3 +266,8 @@ def test_a_broken_scenario_is_named_with_its_line(tmp_path):
         path.write_text(text.replace(old, new, 1))
         with pytest.raises(InputError, match=said):
             read_log(path)
+
+
+def test_the_parameter_format_offers_every_built_in_format():
+    assert set(config.FORMATS) == {"auto", *read.FORMATS.built_in}
+    assert read.FORMATS.group == LogConfig.__dataclass_fields__["format"].metadata["group"]

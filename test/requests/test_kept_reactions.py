@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from reaction_scenes import answering, crossing, lane_encounter, platoon, wander
 
+from benchmarks._interaction_measures import following, yielding
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.method.attempt import Attempt
-from scenario_gen.method.evaluation.interaction import following, yielding
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.review.validation import validate_bag

@@ -12,7 +12,7 @@ from suite_processes import Client
 
 @pytest.fixture(scope="module")
 def domain() -> Iterator[int]:
-    from scenario_gen.ros.plumbing.domain import free_domain
+    from scenario_gen.base.ros_domain import free_domain
 
     with free_domain() as number:
         yield number

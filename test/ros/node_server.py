@@ -3,7 +3,7 @@
 
 """Processes of nodes, forked from one that has loaded the libraries and the kernels, which takes each seconds of CPU otherwise.
 
-`start_nodes` stands for `subprocess.Popen([sys.executable, "-m", "scenario_gen.ros.plumbing.start", …])`, or `…forked`.
+`start_nodes` stands for `subprocess.Popen([sys.executable, "-m", "scenario_gen.ros.plumbing.start", …])`, or `…start", "fork"`.
 Tests of the start itself (signals while the libraries load, an empty cache, executables) start real executables instead.
 
 Nothing outlives the tests: whatever a process leaves behind ends with it, and all end with the server, which ends with the tests,
@@ -188,7 +188,7 @@ def _children() -> list[int]:
 
 def _become(module: str, arguments: list[str], folder: str, environment: dict[str, str], stdin: int, stdout: int) -> NoReturn:
     """Turn this process into what `python -m` would have made of it."""
-    from scenario_gen.ros.plumbing import forked, start
+    from scenario_gen.ros.plumbing import start
 
     code = 1
     try:
@@ -204,7 +204,7 @@ def _become(module: str, arguments: list[str], folder: str, environment: dict[st
             sys.argv = arguments[:]
             start.start(arguments[0])
         else:
-            forked.run(json.loads(Path(arguments[0]).read_text()))
+            start.fork(json.loads(Path(arguments[0]).read_text()))
         code = 0
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)

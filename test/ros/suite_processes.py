@@ -14,7 +14,7 @@ import time
 
 from node_server import start_nodes
 
-from scenario_gen.ros.plumbing.domain import this_host_only
+from scenario_gen.base.ros_domain import this_host_only
 
 ROOT = Path(__file__).resolve().parents[2]
 RESOURCES = ROOT / "scenario_gen" / "resources"

@@ -9,12 +9,12 @@ import pytest
 
 from scenario_gen.base.cancelling import cancellable, CancelledError, stop_if_cancelled
 from scenario_gen.base.errors import ScenarioGenError
+from scenario_gen.base.worker import Worker
 from scenario_gen.logs import read_log
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
-from scenario_gen.ros.plumbing.worker import Worker
 
 CASE = "scenario_gen/resources/synthetic_c"
 

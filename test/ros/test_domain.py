@@ -11,7 +11,7 @@ import tempfile
 
 import pytest
 
-from scenario_gen.ros.plumbing.domain import DOMAINS, free_domain, this_host_only
+from scenario_gen.base.ros_domain import DOMAINS, free_domain, this_host_only
 
 
 def test_two_runs_get_two_domains():

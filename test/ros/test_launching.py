@@ -18,8 +18,8 @@ import yaml
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
+from scenario_gen.cli.launching import ENTRIES, LIVE, OF_LAUNCH, OTHER_NAMES, ROADS
 from scenario_gen.roads import BUILT_IN
-from scenario_gen.ros.plumbing.launching import ENTRIES, LIVE, OF_LAUNCH, OTHER_NAMES, ROADS
 
 SUITE = ("road_server", "segmenter", "planner", "gp_sampler", "evaluator", "log_player")
 LOG = str(RESOURCES / "synthetic_c")
@@ -84,6 +84,13 @@ def test_the_nodes_that_are_started(tmp_path):
     file = tmp_path / "own.yaml"
     file.write_text(f"/**/recorder:\n  ros__parameters: {{bag: {tmp_path / 'bag'}}}\n")
     assert launched(log=LOG, params=str(file))[0].executable == "recorder"
+
+
+def test_a_road_of_an_installed_package_can_be_named(monkeypatch):
+    monkeypatch.setattr("scenario_gen.ros.plumbing.launching.installed", lambda group: {"plaza": group})
+    assert launched(log=LOG, road="plaza")
+    with pytest.raises(InputError, match=r"road:=nowhere: neither one of straight, .*, corridor, plaza nor a map_server"):
+        launched(log=LOG, road="nowhere")
 
 
 def test_arguments_are_declared_as_the_nodes_declare_them():
@@ -170,7 +177,7 @@ def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(domai
 
 def test_what_is_written_for_a_launch_is_removed_at_its_end(tmp_path):
     code = (
-        "import sys; from pathlib import Path; from scenario_gen.ros.plumbing.launching import read_arguments;"
+        "import sys; from pathlib import Path; from scenario_gen.cli.launching import read_arguments;"
         "print(read_arguments({'log': sys.argv[1], 'ego': '007'}).parameter_files(Path('suite.yaml'))[-1]);"
         "assert not any(name.split('.')[0] in ('numba', 'rclpy') for name in sys.modules)"
     )
@@ -184,7 +191,7 @@ def test_a_drive_is_launched_with_its_parameters(domain, client, tmp_path):
     """The values that launch_ros would write for `traffic`: each is one of its parameters, and takes effect."""
     from rcl_interfaces.srv import GetParameters
 
-    from scenario_gen.ros.plumbing.traffic_config import Config
+    from scenario_gen.ros.plumbing.driving import Config
 
     (only, *pictures) = launched("drive.launch.py", ego="2", policy="replay", lock_step="true", namespace="/a", rviz="true")
     assert (only.executable, only.namespace, [one.executable for one in pictures]) == ("traffic", "/a", ["rviz2"])

@@ -15,13 +15,14 @@ from msg_conventions.hashes import encode_hashes
 from msg_conventions.lanes import encode_lanes
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
+from scenario_gen.base.worker import Worker
+from scenario_gen.cli.default_yaml import default_yaml
+from scenario_gen.cli.suite import Job, parameters, SECTIONS
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.ros.nodes.road_server import road_of_url
-from scenario_gen.ros.plumbing.inputs import Inputs
-from scenario_gen.ros.plumbing.ros_parameters import default_yaml, descriptor, with_values
-from scenario_gen.ros.plumbing.run_suite import Job, parameters, SECTIONS
+from scenario_gen.ros.plumbing.ros_parameters import descriptor, with_values
+from scenario_gen.ros.plumbing.stage_node import Inputs
 from scenario_gen.ros.plumbing.start import node_class
-from scenario_gen.ros.plumbing.worker import Worker
 
 STAGE_NODES = ("segmenter", "planner", "gp_sampler", "log_player", "road_server", "evaluator")
 ROOT = Path(__file__).resolve().parents[2]
@@ -163,7 +164,7 @@ def test_default_yaml_holds_the_defaults():
     nested = yaml.safe_load(text)["/**"]["ros__parameters"]
     flat = {f"{head}.{name}": value for head, body in nested.items() for name, value in body.items()}
     assert flat == {name: value for name, (_, value) in flatten(PipelineConfig()).items()}
-    assert text == default_yaml(), "run: python -m scenario_gen.ros.plumbing.ros_parameters > config/default.yaml"
+    assert text == default_yaml(), "run: python -m scenario_gen.cli.default_yaml > config/default.yaml"
 
 
 def test_nodes_are_thin():

@@ -19,7 +19,7 @@ class Server:
         from rclpy.executors import SingleThreadedExecutor
         from std_srvs.srv import Trigger
 
-        from scenario_gen.ros.plumbing.services import ResponseRetry
+        from scenario_gen.ros.plumbing.process import ResponseRetry
 
         self.context = rclpy.Context()
         rclpy.init(context=self.context, domain_id=domain)
@@ -79,10 +79,10 @@ def test_a_caller_that_is_matched_late_gets_its_answer(server, client):
 
 
 def test_a_caller_that_is_never_matched_is_given_up_and_others_are_served_meanwhile(server, client, monkeypatch):
-    from scenario_gen.ros.plumbing import services
+    from scenario_gen.ros.plumbing import process
 
     now, said = [0.0], []
-    monkeypatch.setattr(services, "monotonic", lambda: now[0])
+    monkeypatch.setattr(process, "monotonic", lambda: now[0])
     monkeypatch.setattr(server.node.get_logger(), "warning", said.append)
     _, ask_unheard = _caller(client, reliable=True)
     for _ in range(3000):  # requests go unheard until the server is known, and this caller cannot see when that is
@@ -96,6 +96,6 @@ def test_a_caller_that_is_never_matched_is_given_up_and_others_are_served_meanwh
     before = server.attempts
     client.until(lambda: server.spun_until(lambda: server.attempts > before + 2), "more attempts")
     assert not said
-    now[0] = services.PATIENCE
+    now[0] = process.PATIENCE
     client.until(lambda: server.spun_until(lambda: bool(said)), "the end of patience")
     assert "its answer is dropped" in said[0]

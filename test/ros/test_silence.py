@@ -13,8 +13,8 @@ from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, 
 from msg_conventions.scenarios import digest
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.base.worker import MOST_WAITING, Worker
 from scenario_gen.logs import read_log
-from scenario_gen.ros.plumbing.worker import MOST_WAITING, Worker
 
 pytestmark = pytest.mark.dds
 OUTPUTS = ("/changepoints", "/posterior", "/rosout")

@@ -11,9 +11,9 @@ import pytest
 from suite_processes import Client, RESOURCES
 
 from msg_conventions.scenarios import digest, encode_scenario
+from scenario_gen.base.ros_domain import free_domain
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.ros.plumbing.domain import free_domain
 from scenario_gen.ros.plumbing.start import chosen, NODES
 
 # name -> namespace, domain (by number), log, road, seed, the signals that end it

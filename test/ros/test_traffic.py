@@ -25,7 +25,7 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.tracking import of_twist
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.ros.plumbing.ego_commands import FIRST_STAMP
+from scenario_gen.ros.plumbing.driving import FIRST_STAMP
 from scenario_gen.types.ego import with_witness
 from scenario_gen.types.names import token
 from scenario_gen.types.scenario import EgoSlot

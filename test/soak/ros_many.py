@@ -22,7 +22,7 @@ from figures import Figure
 from suite_processes import Client, Processes, RESOURCES
 
 from scenario_gen.bags.storage.bag import bag_topics
-from scenario_gen.ros.plumbing.domain import free_domain
+from scenario_gen.base.ros_domain import free_domain
 
 COUNT = int(os.environ.get("SCENARIO_GEN_SOAK_COUNT", "100000"))
 COMPOSED = max(1, COUNT // 10)

@@ -63,17 +63,17 @@ def compare(first: Sequence[Evaluation], second: Sequence[Evaluation], row: str 
     """
     others = {(evaluation.encounter, evaluation.road): evaluation for evaluation in second}
     found: list[Difference] = []
-    for one in first:
-        other = others.get((one.encounter, one.road))
+    for own in first:
+        other = others.get((own.encounter, own.road))
         if other is None:
             continue
-        mine, theirs = one.row(row), other.row(row)
+        mine, theirs = own.row(row), other.row(row)
         if mine is None or theirs is None:
-            raise InputError(f"{one.encounter} on {one.road} has no row {row!r} in both sets")
-        for metric in one.metrics:
+            raise InputError(f"{own.encounter} on {own.road} has no row {row!r} in both sets")
+        for metric in own.metrics:
             pair = mine.values.get(metric.id), theirs.values.get(metric.id)
             if any(pair):
-                found.append(Difference(one.encounter, one.road, metric, *pair, (one.changepoints, other.changepoints)))
+                found.append(Difference(own.encounter, own.road, metric, *pair, (own.changepoints, other.changepoints)))
     if not found:
         raise InputError("the two sets have no encounter on the same road in common")
     return tuple(found)

@@ -35,21 +35,21 @@ def coverage_of(encounter: Encounter, scenarios: Sequence[Scenario]) -> Coverage
     or, if nobody crosses, the least gap; most typical the one nearest to the medians of the set, each figure in units of its
     spread; most different the one farthest from the template.
     """
-    whole = [join_ego(one) for one in measured(scenarios)]
-    each = [figures_of(one) for one in whole]
-    rows = [_row(one, most_critical(figures)) for one, figures in zip(whole, each, strict=True)]
+    whole = [join_ego(scenario) for scenario in measured(scenarios)]
+    each = [figures_of(scenario) for scenario in whole]
+    rows = [_row(scenario, most_critical(figures)) for scenario, figures in zip(whole, each, strict=True)]
     template = _row(encounter, most_critical(figures_of(encounter)))
     spreads = {
         name: Spread(label, unit, tuple(row[name] for row in rows), template[name]) for name, (label, unit) in LABELS.items()
     }
     pairs: dict[str, Counter[int]] = {}
-    for one, figures in zip(whole, each, strict=True):
-        names = [manoeuvre_of(float(heading[-1] - heading[0])) for heading in one.heading]
+    for scenario, figures in zip(whole, each, strict=True):
+        names = [manoeuvre_of(float(heading[-1] - heading[0])) for heading in scenario.heading]
         for figure in figures:
             kind = " and ".join(sorted(names[n] for n in figure.pair))
             pairs.setdefault(kind, Counter())[_bin(figure.pet)] += 1
-    orders = Counter(one.facts["passing_order"] for one in whole if "passing_order" in one.facts)
-    index = tuple(one.index for one in whole)
+    orders = Counter(scenario.facts["passing_order"] for scenario in whole if "passing_order" in scenario.facts)
+    index = tuple(scenario.index for scenario in whole)
     return Coverage(
         index,
         spreads,
@@ -60,9 +60,9 @@ def coverage_of(encounter: Encounter, scenarios: Sequence[Scenario]) -> Coverage
     )
 
 
-def _row(one: Scenario | Encounter, figures: PairFigures | None) -> dict[str, float]:
-    there = one.there
-    row = dict.fromkeys(LABELS, math.nan) | {"speed": float(one.speed[there].mean())}
+def _row(motion: Scenario | Encounter, figures: PairFigures | None) -> dict[str, float]:
+    there = motion.there
+    row = dict.fromkeys(LABELS, math.nan) | {"speed": float(motion.speed[there].mean())}
     if figures is not None:
         row |= {name: getattr(figures, name) for name in LABELS if name != "speed"}
     return row

@@ -5,7 +5,8 @@
 
 Series are laid out (D, T): one row per channel, so that the inner loops run over contiguous time. D = 2 for position
 (Euclidean distance), 1 for speed, where Euclidean and Manhattan are both the absolute difference, and 1 for heading, whose
-difference is wrapped. A kernel is told by one number, `turn`: 0 Euclidean, infinite Manhattan, else a circle's circumference.
+difference is wrapped. A kernel takes the kind of distance as one number, `turn`: 0 is Euclidean, infinite Manhattan, any other a
+circle's circumference.
 """
 
 from dataclasses import dataclass

@@ -41,11 +41,11 @@ def footprint_distance(motion: Motion, a: int, b: int) -> Floats:
 
     Two convex shapes that do not overlap are nearest at a corner of one of them.
     """
-    one, two = motion.vehicles[a], motion.vehicles[b]
+    first, second = motion.vehicles[a], motion.vehicles[b]
     centre, heading = motion.position, motion.heading
     nearest = np.minimum(
-        _corner_distance(centre[a], heading[a], one, _corners(centre[b], heading[b], two)),
-        _corner_distance(centre[b], heading[b], two, _corners(centre[a], heading[a], one)),
+        _corner_distance(centre[a], heading[a], first, _corners(centre[b], heading[b], second)),
+        _corner_distance(centre[b], heading[b], second, _corners(centre[a], heading[a], first)),
     )
     offset, reach, _ = _separation(motion, a, b)
     overlap = (np.abs(offset) < reach).all(axis=0)
@@ -62,11 +62,11 @@ def time_to_collision(motion: Motion, a: int, b: int) -> Floats:
     """
     offset, reach, closing = _separation(motion, a, b)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        one, two = (-reach - offset) / closing, (reach - offset) / closing
+        enters, leaves = (-reach - offset) / closing, (reach - offset) / closing
     still = np.abs(closing) < STILL
     apart = np.abs(offset) >= reach
-    begin = np.where(still, np.where(apart, np.inf, -np.inf), np.minimum(one, two)).max(axis=0)
-    end = np.where(still, np.where(apart, -np.inf, np.inf), np.maximum(one, two)).min(axis=0)
+    begin = np.where(still, np.where(apart, np.inf, -np.inf), np.minimum(enters, leaves)).max(axis=0)
+    end = np.where(still, np.where(apart, -np.inf, np.inf), np.maximum(enters, leaves)).min(axis=0)
     return np.where((begin < end) & (end > 0.0), np.maximum(begin, 0.0), np.inf)
 
 

@@ -84,8 +84,8 @@ def figures_of(scenario: Scenario | Encounter) -> tuple[PairFigures, ...]:
 
 def most_critical(figures: Sequence[PairFigures]) -> PairFigures | None:
     """Return the figures of the pair with the least PET, or, where no pair crosses, with the least gap; None without pairs."""
-    crossing = [one for one in figures if not math.isnan(one.pet)]
-    return min(crossing, key=lambda one: one.pet) if crossing else min(figures, key=lambda one: one.gap, default=None)
+    crossing = [pair for pair in figures if not math.isnan(pair.pet)]
+    return min(crossing, key=lambda pair: pair.pet) if crossing else min(figures, key=lambda pair: pair.gap, default=None)
 
 
 def features(scenario: Scenario | Encounter) -> tuple[float, ...]:

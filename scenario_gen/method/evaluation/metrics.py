@@ -1,85 +1,278 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The catalogue of metrics: what each figure is called, its unit, and what it means."""
+"""The metrics: what each figure is called, its unit and meaning, and how it is computed of a set of scenarios."""
 
-from scenario_gen.method.evaluation.distributions import QUANTITIES
-from scenario_gen.types import Cause, Metric
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+import math
+
+import numpy as np
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.registry import Registry
+from scenario_gen.method.evaluation import diversity, similarity
+from scenario_gen.method.evaluation.bootstrap import wilson
+from scenario_gen.method.evaluation.criticality import criticality
+from scenario_gen.method.evaluation.distributions import compare, QUANTITIES, values_of
+from scenario_gen.method.evaluation.samples import Samples, Template
+from scenario_gen.numerics import Floats
+from scenario_gen.template import keeps
+from scenario_gen.types import Cause, Interval, Metric
 
 LIMIT_CAUSES = (Cause.SPEED, Cause.LONGITUDINAL_ACCELERATION, Cause.LATERAL_ACCELERATION, Cause.CURVATURE)
 """Causes that count as a violated limit."""
-
-_SIMILARITY, _REALISM, _CRITICAL, _VALID, _DIVERSITY = (
+TURNS = math.radians(10.0)
+"""Of a pair whose headings' differences spread by less, E for heading would measure noise; it has none."""
+HEADINGS = _SIMILARITY, _REALISM, _CRITICAL, _VALID, _DIVERSITY = (
     "Similarity to the template",
     "Distributions against the template",
     "Criticality",
     "Validity of the candidates",
     "Diversity",
 )
+Estimates = dict[str, Interval]
 
-METRICS: tuple[Metric, ...] = (
-    Metric(
-        "e_position", "E position", "", "lower", _SIMILARITY, "‖mean feature matrix − template's‖ / ‖template's‖, of positions"
-    ),
-    Metric("e_speed", "E speed", "", "lower", _SIMILARITY, "‖mean feature matrix − template's‖ / ‖template's‖, of speeds"),
-    Metric(
-        "e_heading",
-        "E heading",
-        "",
-        "lower",
-        _SIMILARITY,
-        "‖mean feature matrix − template's‖ / ‖template's‖, of headings; none where they hardly differ in the template",
-    ),
-    Metric("correlation_position", "correlation position", "", "higher", _SIMILARITY, "of the mean matrix with the template's"),
-    Metric("correlation_speed", "correlation speed", "", "higher", _SIMILARITY, "of the mean matrix with the template's"),
-    Metric("correlation_heading", "correlation heading", "", "higher", _SIMILARITY, "of the mean matrix with the template's"),
-    Metric(
-        "turn_kept",
-        "turn kept",
-        "%",
-        "higher",
-        _SIMILARITY,
-        "vehicles that do the template's manoeuvre and turn as far, within 25°, from start to end",
-    ),
-    *(
+
+def _nothing(_: Template) -> Mapping[str, float]:
+    return {}
+
+
+@dataclass(frozen=True)
+class MetricGroup:
+    """Metrics that are computed together.
+
+    Attributes:
+        metrics: what they are called; a heading (`group`) of their own stands below the others.
+        measure: returns the estimate of each by its id, of one or more scenarios; one that cannot be had is left out or NaN.
+        of_template: returns those that the recorded encounter has, too.
+    """
+
+    metrics: tuple[Metric, ...]
+    measure: Callable[[Samples], Mapping[str, Interval]]
+    of_template: Callable[[Template], Mapping[str, float]] = _nothing
+
+
+def rates(samples: Samples) -> Estimates:
+    """Return the shares of all candidates, by the first cause for which they were refused."""
+    counts, level = samples.counts, samples.template.config.level
+    if counts is None:
+        return {}
+    accepted = counts.candidates - sum(counts.refused.values())
+    return {
+        "acceptance": wilson(accepted, counts.candidates, level),
+        "collision_rate": wilson(*counts.share_of([Cause.OVERLAP]), level),
+        "off_road_rate": wilson(*counts.share_of([Cause.OFF_ROAD]), level),
+        "limit_rate": wilson(*counts.share_of(LIMIT_CAUSES), level),
+    }
+
+
+VALIDITY = MetricGroup(
+    (
+        Metric("acceptance", "accepted", "%", "higher", _VALID, "share of candidates that the checker accepted"),
+        Metric("collision_rate", "overlap", "%", "lower", _VALID, "share of candidates refused because footprints overlap"),
         Metric(
-            f"js_{q.id}", f"JS {q.label}", "bit", "lower", _REALISM, f"Jensen–Shannon divergence, bins of {q.bin_width} {q.unit}"
-        )
-        for q in QUANTITIES
+            "off_road_rate", "off road", "%", "lower", _VALID, "share of candidates refused because a footprint leaves the road"
+        ),
+        Metric(
+            "limit_rate",
+            "limit violated",
+            "%",
+            "lower",
+            _VALID,
+            "share of candidates refused for speed, acceleration or curvature",
+        ),
     ),
-    *(
-        Metric(f"wasserstein_{q.id}", f"W {q.label}", q.unit, "lower", _REALISM, "Wasserstein distance of the values")
-        for q in QUANTITIES
-    ),
-    Metric("min_distance", "min distance", "m", "", _CRITICAL, "least distance of two footprints, mean over samples"),
-    Metric("min_ttc", "min TTC", "s", "", _CRITICAL, "least time to collision at constant velocity, capped, mean over samples"),
-    Metric("pet", "PET", "s", "", _CRITICAL, "from the first vehicle's exit of the shared area to the second's entry, mean"),
-    Metric(
-        "order_kept",
-        "passing order kept",
-        "%",
-        "higher",
-        _CRITICAL,
-        "conflicts of the template in which the same vehicle goes first",
-    ),
-    Metric("conflicts", "conflicts", "", "", _CRITICAL, "conflicts of the template, and how many of them a sample has, mean"),
-    Metric(
-        "vanished_conflicts",
-        "conflicts vanished",
-        "",
-        "lower",
-        _CRITICAL,
-        "conflicts of the template that a sample does not have, mean; the passing order is of the others",
-    ),
-    Metric("acceptance", "accepted", "%", "higher", _VALID, "share of candidates that the checker accepted"),
-    Metric("collision_rate", "overlap", "%", "lower", _VALID, "share of candidates refused because footprints overlap"),
-    Metric("off_road_rate", "off road", "%", "lower", _VALID, "share of candidates refused because a footprint leaves the road"),
-    Metric(
-        "limit_rate", "limit violated", "%", "lower", _VALID, "share of candidates refused for speed, acceleration or curvature"
-    ),
-    Metric("diversity", "diversity", "m", "", _DIVERSITY, "mean displacement between two samples"),
-    Metric(
-        "coverage", "coverage", "%", "higher", _DIVERSITY, "share of the template's values in histogram bins that the set visits"
-    ),
-    Metric("min_ade", "min ADE", "m", "lower", _DIVERSITY, "mean displacement of the nearest sample to the fitted template"),
+    rates,
 )
+
+
+def _similarity(samples: Samples) -> Estimates:
+    """E and the correlation: Euclidean distance for position, Manhattan for speed, as in the paper; wrapped for heading.
+
+    Where nobody turns there is nothing of headings.
+    """
+    compared = {
+        "position": [pair.similarity(0, "euclidean") for pair in samples.pairs],
+        "speed": [pair.similarity(1, "manhattan") for pair in samples.pairs],
+        "heading": [pair.similarity(2, "angle", TURNS) for pair in samples.pairs],
+    }
+    if not any(pair.template[2] for pair in compared["heading"]):
+        del compared["heading"]
+    interval = samples.bootstrap.interval
+    return {
+        **{f"e_{what}": interval(partial(similarity.mean_error, of)) for what, of in compared.items()},
+        **{f"correlation_{what}": interval(partial(similarity.mean_correlation, of)) for what, of in compared.items()},
+        "turn_kept": samples.bootstrap.mean(_turn_kept(samples)),
+    }
+
+
+def _turn_kept(samples: Samples) -> Floats:
+    """Share (S,) of vehicles that turn from start to end as the template's do."""
+    turns = samples.template.motion.heading[:, -1] - samples.template.motion.heading[:, 0]
+    kept = [[keeps(a, b) for a, b in zip(turns, m.heading[:, -1] - m.heading[:, 0], strict=True)] for m in samples.motions]
+    return np.array([np.mean(row) for row in kept])
+
+
+_E = "‖mean feature matrix − template's‖ / ‖template's‖, of"
+SIMILARITY = MetricGroup(
+    (
+        Metric("e_position", "E position", "", "lower", _SIMILARITY, f"{_E} positions"),
+        Metric("e_speed", "E speed", "", "lower", _SIMILARITY, f"{_E} speeds"),
+        Metric(
+            "e_heading", "E heading", "", "lower", _SIMILARITY, f"{_E} headings; none where they hardly differ in the template"
+        ),
+        *(
+            Metric(
+                f"correlation_{what}", f"correlation {what}", "", "higher", _SIMILARITY, "of the mean matrix with the template's"
+            )
+            for what in ("position", "speed", "heading")
+        ),
+        Metric(
+            "turn_kept",
+            "turn kept",
+            "%",
+            "higher",
+            _SIMILARITY,
+            "vehicles that do the template's manoeuvre and turn as far, within 25°, from start to end",
+        ),
+    ),
+    _similarity,
+)
+
+
+def _distributions(samples: Samples) -> Estimates:
+    """Compare the values of each quantity; the coverage, which stands under diversity, is counted in the same bins."""
+    values = [values_of(motion) for motion in samples.periodic]
+    bootstrap, template = samples.bootstrap, samples.template.values
+    units, drawn = [np.flatnonzero(bootstrap.unit == k) for k in range(bootstrap.unit.max() + 1)], bootstrap.of_units()
+    result: Estimates = {}
+    covered = []
+    for quantity in QUANTITIES:
+        pooled = [np.concatenate([values[k][quantity.id] for k in unit]) for unit in units]
+        compared = compare(quantity, template[quantity.id], pooled)
+        result[f"js_{quantity.id}"] = drawn.interval(compared.jensen_shannon)
+        near = drawn.interval(compared.wasserstein_near)
+        exact = compared.wasserstein
+        result[f"wasserstein_{quantity.id}"] = Interval(
+            exact, float(np.minimum(exact, near.low)), float(np.maximum(exact, near.high))
+        )
+        if template[quantity.id].size:
+            covered.append(compared)
+    return result | {"coverage": drawn.interval(lambda weights: np.mean([c.coverage(weights) for c in covered], axis=0))}
+
+
+_JS, _W = "Jensen–Shannon divergence, bins of", "Wasserstein distance of the values"
+DISTRIBUTIONS = MetricGroup(
+    (
+        *(Metric(f"js_{q.id}", f"JS {q.label}", "bit", "lower", _REALISM, f"{_JS} {q.bin_width} {q.unit}") for q in QUANTITIES),
+        *(Metric(f"wasserstein_{q.id}", f"W {q.label}", q.unit, "lower", _REALISM, _W) for q in QUANTITIES),
+    ),
+    _distributions,
+)
+
+
+def _criticality(samples: Samples) -> Estimates:
+    template, mean = samples.template.critical, samples.bootstrap.mean
+    found = [criticality(motion, samples.template.config.ttc_horizon) for motion in samples.periodic]
+    vanished = np.array([float(critical.vanished_of(template)) for critical in found])
+    return {
+        "min_distance": mean(np.array([critical.min_distance for critical in found])),
+        "min_ttc": mean(np.array([critical.min_ttc for critical in found])),
+        "pet": mean(np.array([critical.pet for critical in found])),
+        "order_kept": mean(np.array([critical.keeps_order_of(template) for critical in found])),
+        "conflicts": mean(len(template.order) - vanished),
+        "vanished_conflicts": mean(vanished),
+    }
+
+
+def _criticality_of(template: Template) -> Mapping[str, float]:
+    own = template.critical
+    return {"min_distance": own.min_distance, "min_ttc": own.min_ttc, "pet": own.pet, "conflicts": float(len(own.order))}
+
+
+CRITICALITY = MetricGroup(
+    (
+        Metric("min_distance", "min distance", "m", "", _CRITICAL, "least distance of two footprints, mean over samples"),
+        Metric(
+            "min_ttc", "min TTC", "s", "", _CRITICAL, "least time to collision at constant velocity, capped, mean over samples"
+        ),
+        Metric("pet", "PET", "s", "", _CRITICAL, "from the first vehicle's exit of the shared area to the second's entry, mean"),
+        Metric(
+            "order_kept",
+            "passing order kept",
+            "%",
+            "higher",
+            _CRITICAL,
+            "conflicts of the template in which the same vehicle goes first",
+        ),
+        Metric("conflicts", "conflicts", "", "", _CRITICAL, "conflicts of the template, and how many of them a sample has, mean"),
+        Metric(
+            "vanished_conflicts",
+            "conflicts vanished",
+            "",
+            "lower",
+            _CRITICAL,
+            "conflicts of the template that a sample does not have, mean; the passing order is of the others",
+        ),
+    ),
+    _criticality,
+    _criticality_of,
+)
+
+
+def _diversity(samples: Samples) -> Estimates:
+    position = np.stack([motion.position for motion in samples.motions])
+    table, interval = diversity.displacements(position, samples.there), samples.bootstrap.interval
+    result = {"diversity": interval(partial(diversity.diversity, table))}
+    if samples.template.fitted is not None:
+        error = diversity.displacement_to(position, samples.template.fitted.position, samples.there)
+        result["min_ade"] = interval(partial(diversity.weighted_min, error))
+    return result
+
+
+DIVERSITY = MetricGroup(
+    (
+        Metric("diversity", "diversity", "m", "", _DIVERSITY, "mean displacement between two samples"),
+        Metric(
+            "coverage",
+            "coverage",
+            "%",
+            "higher",
+            _DIVERSITY,
+            "share of the template's values in histogram bins that the set visits",
+        ),
+        Metric("min_ade", "min ADE", "m", "lower", _DIVERSITY, "mean displacement of the nearest sample to the fitted template"),
+    ),
+    _diversity,
+)
+
+METRICS = Registry[MetricGroup](
+    "scenario_gen.metrics",
+    {
+        "validity": VALIDITY,
+        "similarity": SIMILARITY,
+        "distributions": DISTRIBUTIONS,
+        "criticality": CRITICALITY,
+        "diversity": DIVERSITY,
+    },
+    MetricGroup,
+)
+"""All groups of metrics, in the order in which they are computed; those of installed packages are in every evaluation."""
+
+
+def catalogue() -> tuple[Metric, ...]:
+    """Return all metrics in the order in which they are shown, by heading.
+
+    Raises:
+        InputError: two metrics have one id, or a plugin cannot be loaded.
+    """
+    metrics = [metric for group in METRICS.values() for metric in group.metrics]
+    for k, metric in enumerate(metrics):
+        if metric.id in {other.id for other in metrics[:k]}:
+            raise InputError(
+                f"plugins: the metric {metric.id!r} is declared twice; {METRICS.group} are {', '.join(METRICS.names())}"
+            )
+    headings = [*HEADINGS, *(metric.group for metric in metrics)]
+    return tuple(sorted(metrics, key=lambda metric: headings.index(metric.group)))

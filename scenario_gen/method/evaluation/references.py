@@ -19,19 +19,14 @@ def with_changepoints_at(segmentation: Segmentation, changepoints: Ints, what: s
     """Return a segmentation of the same encounter with changepoints (K,), every segment a primitive of its own."""
     labels = np.zeros(len(segmentation.labels), dtype=np.int64)
     labels[changepoints] = 1
-    told = tuple(f"{what} {k + 1}" for k in range(len(changepoints) + 1))
-    return replace(segmentation, labels=np.cumsum(labels), changepoints=changepoints, descriptions=told)
+    names = tuple(f"{what} {k + 1}" for k in range(len(changepoints) + 1))
+    return replace(segmentation, labels=np.cumsum(labels), changepoints=changepoints, descriptions=names)
 
 
 def without_changepoints(segmentation: Segmentation) -> Segmentation:
     """Return the ablation of paper V-B: the same encounter as one primitive."""
-    none = np.zeros(0, dtype=np.int64)
-    return replace(
-        segmentation,
-        labels=np.zeros_like(segmentation.labels),
-        changepoints=none,
-        descriptions=("the whole encounter as one primitive",),
-    )
+    whole = with_changepoints_at(segmentation, np.zeros(0, dtype=np.int64), "")
+    return replace(whole, descriptions=("the whole encounter as one primitive",))
 
 
 def uniform_changepoints(segmentation: Segmentation) -> Segmentation:

@@ -27,3 +27,7 @@ class FittingConfig(Parameters):
     max_move: float = parameter(3.0, "farthest that an anchor or a path may be moved", unit="m", low=0.0, high=100.0)
     clearance: float = parameter(0.5, "gap kept between the footprints of fitted vehicles", unit="m", low=0.0, high=5.0)
     margin: float = parameter(0.3, "room beside a footprint that the placement looks for", unit="m", low=0.0, high=5.0)
+
+    def accepts(self, scale: float) -> bool:
+        """Return whether a scale s of eq 9 is near enough to one."""
+        return self.scale_low <= scale <= self.scale_high

@@ -11,7 +11,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.kept import find_losses
 from scenario_gen.method.fitting.placement import Placement
-from scenario_gen.numerics import Bools, Floats, frozen_ints, Ints
+from scenario_gen.numerics import Bools, Floats, frozen_ints, Ints, runs
 from scenario_gen.roads import nearest_pose_with_room
 from scenario_gen.template import clean_tracks, Track, turn_of
 from scenario_gen.types import BoundaryStates, Encounter, Fit, FittedVehicle, Road, Segmentation
@@ -57,17 +57,9 @@ def finish(
                 f"vehicle {track.vehicle.id} would be moved by {moved.max():.2f} m in all, to be clear of others and on road "
                 f"{road.name}; accepted is {config.max_move:g} m"
             )
-        fitted.append(
-            FittedVehicle(
-                anchors=anchors,
-                moved=moved,
-                stands=stands,
-                scale=float(placement.scale[i]),
-                manoeuvre=placement.manoeuvre[i],
-                turned=(turn_of(tracks[i]), turn_of(track)),
-                path=_path(track),
-            )
-        )
+        turned = turn_of(tracks[i]), turn_of(track)
+        scale = float(placement.scale[i])
+        fitted.append(FittedVehicle(anchors, moved, stands, scale, placement.manoeuvre[i], turned, _path(track)))
         ends = encounter.speed[i, [0, last]] * placement.scale[i]
         ends = np.where(ends < STAND_SPEED, 0.0, ends)
         if given is not None:
@@ -103,16 +95,8 @@ def _stands(track: Track, index: Ints) -> Bools:
 def _snapped(track: Track, index: Ints, stands: Bools) -> Floats:
     """(K + 2,) progress at the anchors; the two ends of a dwell are one place, and start and end stay where they are."""
     progress = track.progress[index].copy()
-    k = 0
-    while k < len(stands):
-        if not stands[k]:
-            k += 1
-            continue
-        stop = k
-        while stop < len(stands) and stands[stop]:
-            stop += 1
-        progress[k : stop + 1] = progress[stop] if stop == len(stands) and k > 0 else progress[k]
-        k = stop
+    for first, last in runs(stands):
+        progress[first : last + 1] = progress[last] if last == len(stands) and first > 0 else progress[first]
     return progress
 
 

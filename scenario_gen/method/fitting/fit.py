@@ -10,7 +10,6 @@ import math
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.method.fitting.asked import refuse_impossible, refuse_misfits
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.finish import finish
 from scenario_gen.method.fitting.given import place_given, place_in_own_frame
@@ -18,6 +17,7 @@ from scenario_gen.method.fitting.junction import has_lanes, place_at_junction
 from scenario_gen.method.fitting.kept import refuse_lost_conflicts
 from scenario_gen.method.fitting.lanes import place_along_lanes
 from scenario_gen.method.fitting.placement import Placement
+from scenario_gen.method.fitting.requested import refuse_impossible, refuse_misfits
 from scenario_gen.method.fitting.search import place_by_search
 from scenario_gen.method.fitting.vector import place_on_lanes
 from scenario_gen.numerics import Floats

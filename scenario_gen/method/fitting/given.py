@@ -4,16 +4,17 @@
 """Start and goal given: by the template's own frame, or by the user (eqs 7-9, put right)."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.finish import STAND_SPEED
-from scenario_gen.method.fitting.placement import check_scale, max_repair, Placement, share_with_room
+from scenario_gen.method.fitting.placement import check_scale, has_room, max_repair, Placement, rotated, share_with_room
 from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.roads import draw_route, footprint_fits
+from scenario_gen.roads import draw_route
 from scenario_gen.template import clean_tracks, own_paths, Track
 from scenario_gen.types import Encounter, Road
 
@@ -30,15 +31,8 @@ def place_in_own_frame(encounter: Encounter, road: Road, config: FittingConfig) 
     separation = own_paths(encounter)
     shares = [float(share_with_room(road, track)) for track in separation.tracks]
     max_repair([t for t, share in zip(separation.tracks, shares, strict=True) if share < 1.0], road, config.max_move)
-    n = len(separation.tracks)
-    placement = Placement(
-        tracks=separation.tracks,
-        scale=frozen(np.ones(n)),
-        manoeuvre=tuple("wait" if track.still else "own path" for track in separation.tracks),
-        moved=separation.moved,
-        notes=(f"placed on road {road.name} in the template's own frame", *separation.notes),
-        at_home=True,
-    )
+    notes = (f"placed on road {road.name} in the template's own frame", *separation.notes)
+    placement = replace(Placement.of(separation.tracks, 1.0, notes, "own path"), moved=separation.moved, at_home=True)
     return placement, float(np.mean(shares))
 
 
@@ -77,23 +71,18 @@ def place_given(
     ends = states if base is None else np.where(wanted[..., None], states, _ends_of(base, encounter))
     given = np.where(np.any(wanted, axis=1, keepdims=True)[..., None], ends, np.nan)
     joint = _joint_similarity(tracks, ends)
-    placed, scales, manoeuvres, moves, notes = [], [], [], [], []
+    rows, notes = [], []
     for n, track in enumerate(tracks):
         if base is not None and not wanted[n].any():
-            placed.append(base.tracks[n])
-            scales.append(float(base.scale[n]))
-            manoeuvres.append(base.manoeuvre[n])
-            moves.append(float(base.moved[n]))
+            rows.append((base.tracks[n], base.scale[n], base.manoeuvre[n], base.moved[n]))
             continue
-        moved, scale, how = _place(track, ends[n], joint, road, config)
-        placed.append(moved)
-        scales.append(scale)
-        manoeuvres.append("wait" if track.still else _name(moved))
-        moves.append(0.0)
+        placed, scale, how = _place(track, ends[n], joint, road, config)
+        rows.append((placed, scale, "wait" if track.still else _name(placed), 0.0))
         which = "start and goal" if wanted[n].all() else "start" if wanted[n, 0] else "goal"
         notes.append(f"vehicle {track.vehicle.id}: {which} as given, {how}")
+    on_road, scales, manoeuvres, moves = zip(*rows, strict=True)
     sentences = (*(() if base is None else base.notes), *notes)
-    return Placement(tuple(placed), frozen(scales), tuple(manoeuvres), frozen(moves), sentences), given
+    return Placement(on_road, frozen(scales), manoeuvres, frozen(moves), sentences), given
 
 
 def _ends_of(base: Placement, encounter: Encounter) -> Floats:
@@ -147,14 +136,11 @@ def _place(track: Track, ends: Floats, joint: tuple[float, float], road: Road, c
         ahead = start[:3] + np.array([exact.cos(start[2]), exact.sin(start[2]), 0.0])
         return replace(track, curve=Curve(np.array([start[:3], ahead]))), 1.0, "a wait"
 
-    def fits(poses: Floats) -> bool:
-        return bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all())
-
     template_turn = float(track.curve.points[-1, 2] - track.curve.points[0, 2])
-    route = draw_route(start[:3], goal[:3], fits)
+    route = draw_route(start[:3], goal[:3], partial(has_room, road, vehicle))
     if route is not None and abs(float(route.points[-1, 2] - route.points[0, 2]) - template_turn) < _TURN:
         scale = route.length / track.travelled
-        if config.scale_low <= scale <= config.scale_high:
+        if config.accepts(scale):
             placed = replace(track, curve=route.cut(0.0, route.length, 0.25), progress=frozen(scale * track.progress))
             return placed, scale, f"along a drawn route (s = {scale:.2f})"
     u = (track.poses[-1] - track.poses[0])[:2]
@@ -164,11 +150,8 @@ def _place(track: Track, ends: Floats, joint: tuple[float, float], road: Road, c
         turn = float(exact.arctan2(u[0] * v[1] - u[1] * v[0], exact.matmul(u, v)))  # eq 8a
         scale, how = float(exact.hypot(*v) / exact.hypot(*u)), "similarity"
     check_scale(scale, f"vehicle {vehicle.id} (template chord {exact.hypot(*u):.1f} m, asked {exact.hypot(*v):.1f} m)", config)
-    cos, sin = exact.cos(turn), exact.sin(turn)
     points = track.curve.points.copy()
-    points[:, :2] = (
-        exact.matmul(scale * (points[:, :2] - points[0, :2]), np.array([[cos, sin], [-sin, cos]])) + start[:2]
-    )  # eqs 8b, 9
+    points[:, :2] = rotated(scale * (points[:, :2] - points[0, :2]), turn) + start[:2]  # eqs 8b, 9
     share = track.curve.station / track.curve.length
     points[:, :2] += share[:, None] * (goal[:2] - points[-1, :2])  # zero but for short chords
     curve = Curve.through(points[:, :2])

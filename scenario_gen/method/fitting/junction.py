@@ -10,19 +10,21 @@ vehicles, not with that of assignments. Then the best assignments are solved for
 the template: headings and relative positions at sampled instants, turns, crossings.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
+from scenario_gen.method.fitting.junction_solver import Choice, FAR, HEADING, OWN_SLACK, Solver, Way, WHOLE_TURN
 from scenario_gen.method.fitting.kept import count_lost, find_unused, refuse_lost_turns
-from scenario_gen.method.fitting.placement import check_scale, Equation, equations, find_relations, Placement, Relation, separated
+from scenario_gen.method.fitting.placement import check_scale, has_room, Placement, separated
+from scenario_gen.method.fitting.relations import find_relations, Relation
 from scenario_gen.numerics import exact, Floats, frozen, Ints, wrap_angle
-from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.kernels import F2, F3, kernel, OUTI2
-from scenario_gen.roads import draw_ring_route, draw_route, draw_u_turn, footprint_fits, relative, ring_of
+from scenario_gen.roads import draw_ring_route, draw_route, draw_u_turn, relative, ring_of
 from scenario_gen.template import in_words, manoeuvre_of, MOST_CHANGE, sharpness_of, Track, turn_of
 from scenario_gen.types import Road, Vehicle
 
@@ -37,46 +39,12 @@ _SWAPS = 3
 _OTHERS = 2  # other ways per vehicle that are tried in the best one
 _LATERAL_ONLY = 1e-3  # weight of staying where one is, where nothing else says so
 _LANE_CHANGE = 8.0  # m² for a way that changes lanes on a straight arm, so that none is taken without need
-_INSTANTS = 15
 _SCALES = (1.0, 0.95, 1.05, 0.9, 1.1, 0.85, 1.15, 0.8, 1.2, 1.25)
-_MOST_LOST = 0.2  # share of the relations; what is lost is said
-_LOST = 400.0  # cost [m²] of a relation that the routes do not have
-_FAR = 20.0  # metres: a mismatch of position counts no more than this
-_HEADING = 100.0  # m² per unit of 1 − cos
-_OWN_TURN = 40.0  # m² per rad²: how much more or less a vehicle turns than in the template
-_WHOLE_TURN = 15.0  # the same for the whole way, driven or not
-_ARM = 30.0  # m² per rad²: how differently two vehicles' entries are turned from each other
-_OWN_SLACK = np.radians(15.0)  # a road's corner may turn by this much more or less, beyond the limit below
-_OFF = 50.0  # cost per metre beyond the road's end
-_TURNS = np.radians(15.0)  # more is a turn that has its place on the way
-_TURN_WEIGHT = 2.0  # of that place, where the place of a crossing has 1
+_MOST_LOST = 0.2  # share of the relations; what is lost is reported
 _TURN_TOLERANCE = MOST_CHANGE
 _HEADING_LIMIT = np.radians(50.0)  # a fitted vehicle may be turned from the template (after the rigid motion) by this on average
 _SHARPNESS_STEP = 0.25  # of the logarithm of a curvature: vehicles that differ by less share their ways
 _APEXES = np.arange(0.2, 0.81, 0.05)  # places along a road at which a U-turn is tried
-
-
-@dataclass(frozen=True, eq=False)
-class _Way:
-    """A route that a vehicle could take."""
-
-    entry: int
-    leave: int
-    curve: Curve
-    turn: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Choice:
-    """Ways for the vehicles assigned so far, with the arc lengths A at which they start."""
-
-    ways: dict[int, _Way]
-    start: dict[int, float]
-    cost: float
-    lost: int
-    beyond: float
-    turned: float
-    relations: int = 0
 
 
 def place_at_junction(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> Placement:
@@ -89,14 +57,12 @@ def place_at_junction(tracks: tuple[Track, ...], road: Road, config: FittingConf
     for track, own in zip(tracks, ways, strict=True):
         if not own:
             raise RefusedError(
-                f"vehicle {track.vehicle.id} {_said(track)}: road {road.name} has no way for that "
+                f"vehicle {track.vehicle.id} {_turn_in_words(track)}: road {road.name} has no way for that "
                 f"({len(road.entries)} entries, {len(road.exits)} exits)"
             )
     relations = find_relations(tracks)
     reasons = []
-    for scale in _SCALES:
-        if not config.scale_low <= scale <= config.scale_high:
-            continue
+    for scale in filter(config.accepts, _SCALES):
         best: tuple[int, Placement] | None = None
         for choice in _search(tracks, ways, relations, scale)[:_PLACED]:
             reason = _misfit_reason(choice, scale)
@@ -125,11 +91,11 @@ def has_lanes(road: Road) -> bool:
     return len(road.entries) > 0 and {way.entry for way in ways} == set(range(len(road.entries)))
 
 
-def _said(track: Track) -> str:
+def _turn_in_words(track: Track) -> str:
     return "makes a U-turn" if track.makes_u_turn else in_words(turn_of(track))
 
 
-def _misfit_reason(choice: _Choice, scale: float) -> str:
+def _misfit_reason(choice: Choice, scale: float) -> str:
     """What is wrong with an assignment, "" if nothing is."""
     if choice.lost > _MOST_LOST * choice.relations:
         return f"the best assignment loses {choice.lost} of the template's {choice.relations} crossings or shared lanes"
@@ -140,9 +106,9 @@ def _misfit_reason(choice: _Choice, scale: float) -> str:
     return ""
 
 
-def _ways(tracks: tuple[Track, ...], road: Road) -> list[list[_Way]]:
+def _ways(tracks: tuple[Track, ...], road: Road) -> list[list[Way]]:
     """The drawn routes that suit each vehicle's turning; vehicles of about one size and sharpness share theirs."""
-    drawn: dict[tuple[float, float, float, bool], list[_Way]] = {}
+    drawn: dict[tuple[float, float, float, bool], list[Way]] = {}
     found = []
     for track in tracks:
         sharpness = float(exact.exp(round(float(exact.log(sharpness_of(track))) / _SHARPNESS_STEP) * _SHARPNESS_STEP))
@@ -155,27 +121,25 @@ def _ways(tracks: tuple[Track, ...], road: Road) -> list[list[_Way]]:
     return found
 
 
-def _all_ways(vehicle: Vehicle, road: Road, *, u_turns: bool, sharpness: float | None = None) -> list[_Way]:
-    def fits(poses: Floats) -> bool:
-        return bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all())
-
-    everything: list[_Way] = []
+def _all_ways(vehicle: Vehicle, road: Road, *, u_turns: bool, sharpness: float | None = None) -> list[Way]:
+    fits = partial(has_room, road, vehicle)
+    everything: list[Way] = []
     ring = ring_of(road)
     for e, entry in enumerate(road.entries):
         for x, leave in enumerate(road.exits):
             curve = draw_ring_route(entry, leave, *ring, fits) if ring else draw_route(entry, leave, fits, sharpness)
             if curve is not None:
-                everything.append(_Way(e, x, curve, float(curve.points[-1, 2] - curve.points[0, 2])))
+                everything.append(Way(e, x, curve, float(curve.points[-1, 2] - curve.points[0, 2])))
             elif u_turns:
                 reach = max(float(exact.hypot(*(other[:2] - entry[:2]))) for other in road.exits)
                 for apex in _APEXES * reach:
                     curve = draw_u_turn(entry, leave, float(apex), fits)
                     if curve is not None:
-                        everything.append(_Way(e, x, curve, float(curve.points[-1, 2] - curve.points[0, 2])))
+                        everything.append(Way(e, x, curve, float(curve.points[-1, 2] - curve.points[0, 2])))
     return everything
 
 
-def _suits(track: Track, way: _Way) -> bool:
+def _suits(track: Track, way: Way) -> bool:
     """A vehicle may have driven only part of a turn, but not more than the way turns, nor to the other side."""
     turn = turn_of(track)
     if track.makes_u_turn or abs(way.turn) > np.radians(150.0):
@@ -184,13 +148,13 @@ def _suits(track: Track, way: _Way) -> bool:
     return bool(low <= turn <= high)
 
 
-def _search(tracks: tuple[Track, ...], ways: list[list[_Way]], relations: tuple[Relation, ...], scale: float) -> list[_Choice]:
+def _search(tracks: tuple[Track, ...], ways: list[list[Way]], relations: tuple[Relation, ...], scale: float) -> list[Choice]:
     """Assignments, solved, the best first."""
-    solver = _Solver(tracks, relations, scale)
+    solver = Solver(tracks, relations, scale)
     laid = _Laying(tracks, ways, scale).best(solver)
-    found: dict[tuple[int, ...], _Choice] = {}
+    found: dict[tuple[int, ...], Choice] = {}
 
-    def solved(chosen: tuple[int, ...]) -> _Choice:
+    def solved(chosen: tuple[int, ...]) -> Choice:
         if chosen not in found:
             stop_if_cancelled()
             found[chosen] = solver.solve({i: ways[i][k] for i, k in enumerate(chosen)})
@@ -210,7 +174,7 @@ def _search(tracks: tuple[Track, ...], ways: list[list[_Way]], relations: tuple[
 class _Laying:
     """The template as one piece on the road: which way is nearest to whom."""
 
-    def __init__(self, tracks: tuple[Track, ...], ways: list[list[_Way]], scale: float) -> None:
+    def __init__(self, tracks: tuple[Track, ...], ways: list[list[Way]], scale: float) -> None:
         self.tracks, self.ways, self.scale = tracks, ways, scale
         moments = np.unique(np.linspace(0, len(tracks[0].progress) - 1, _MOMENTS).astype(np.int64))
         self.poses = [track.poses[moments] for track in tracks]
@@ -227,9 +191,9 @@ class _Laying:
             turn = turn_of(track)
             shift = np.array([abs(relative(way.curve.points[0], way.curve.points[-1, :2])[1]) > 1.0 for way in own])
             turns = np.array([way.turn for way in own])
-            self.extra.append(_WHOLE_TURN * np.square(turns - turn) + _LANE_CHANGE * (shift & (np.abs(turns) < _OWN_SLACK)))
+            self.extra.append(WHOLE_TURN * np.square(turns - turn) + _LANE_CHANGE * (shift & (np.abs(turns) < OWN_SLACK)))
 
-    def best(self, solver: "_Solver") -> list[tuple[tuple[int, ...], list[list[int]]]]:
+    def best(self, solver: Solver) -> list[tuple[tuple[int, ...], list[list[int]]]]:
         """The best assignments: each the index of everybody's way, and for everybody the other ways in their order."""
         seeds = sorted(
             (i for i, track in enumerate(self.tracks) if not track.still or len(self.tracks) == 1),
@@ -239,7 +203,8 @@ class _Laying:
         for i in seeds:
             for way in self.ways[i]:
                 start = solver.start_by_turn(i, way.curve)
-                motions.append(self._from(solver.align({i: way}, {i: start}, [i])))
+                rigid = solver.align({i: way}, {i: start}, [i])
+                motions.append(np.array([*rigid.of(self.middle[None])[0], rigid.yaw]))  # where the middle goes, and the rotation
         rated = sorted(((self._rated(motion)[0], k) for k, motion in enumerate(motions)), key=lambda r: (round(r[0], 6), r[1]))
         found: dict[tuple[int, ...], tuple[float, list[list[int]]]] = {}
         for _, k in rated[:_LAID]:
@@ -254,11 +219,6 @@ class _Laying:
                 found[chosen] = cost, others
         order = sorted(found, key=lambda chosen: (round(found[chosen][0], 6), chosen))
         return [(chosen, found[chosen][1]) for chosen in order[:_SOLVED]]
-
-    def _from(self, aligned: tuple[Floats, Floats, float]) -> Floats:
-        """(3,) where the template's middle goes, and the rotation."""
-        matrix, shift, yaw = aligned
-        return np.array([*(exact.matmul(self.middle[None], matrix.T)[0] + shift), yaw])
 
     def _rated(self, motion: Floats) -> tuple[float, list[tuple[Floats, Floats, Floats]]]:
         """The cost of a motion [m²]; for each vehicle the cost of its ways (W,), how far it is beside them and where (W, K)."""
@@ -275,7 +235,7 @@ class _Laying:
             aside = off[..., 1] * near[..., 3] - off[..., 0] * near[..., 4]
             miss = np.square(aside) + np.square(np.maximum(np.abs(along) - spacing[:, None], 0.0))
             turned = 1.0 - exact.cos(poses[:, 2] + motion[2] - near[..., 2])
-            costs = (np.minimum(miss, _FAR * _FAR) + _HEADING * turned).mean(axis=1) + extra
+            costs = (np.minimum(miss, FAR * FAR) + HEADING * turned).mean(axis=1) + extra
             total += float(costs.min())
             nearest.append((costs, aside, near))
         return total / len(self.poses), nearest
@@ -292,9 +252,9 @@ class _Laying:
             rows.append(np.column_stack((normal, (normal * lever).sum(axis=1))))
             values.append(-aside[w])
             turn = np.zeros((len(poses), 3))
-            turn[:, 2] = np.sqrt(_HEADING / 2.0)
+            turn[:, 2] = np.sqrt(HEADING / 2.0)
             rows.append(turn)
-            values.append(np.sqrt(_HEADING / 2.0) * wrap_angle(near[w, :, 2] - poses[:, 2] - motion[2]))
+            values.append(np.sqrt(HEADING / 2.0) * wrap_angle(near[w, :, 2] - poses[:, 2] - motion[2]))
         rows.append(_LATERAL_ONLY * np.eye(3))
         values.append(np.zeros(3))
         return motion + exact.lstsq(np.concatenate(rows), np.concatenate(values))
@@ -319,144 +279,10 @@ def _nearest(points: Floats, samples: Floats, which: Ints) -> None:
                     least, which[w, k] = square, s
 
 
-class _Solver:
-    """Distances along given ways, and how well the result resembles the template."""
-
-    def __init__(self, tracks: tuple[Track, ...], relations: tuple[Relation, ...], scale: float) -> None:
-        self.tracks, self.relations, self.scale = tracks, relations, scale
-        instants = np.unique(np.linspace(0, len(tracks[0].progress) - 1, _INSTANTS).astype(np.int64))
-        self.poses = np.stack([track.poses[instants] for track in tracks])
-        self.driven = scale * np.stack([track.progress[instants] for track in tracks])
-        self.cache: dict[tuple[int, int, int], tuple[Equation, ...] | None] = {}
-        self.by_turn: dict[tuple[int, int], float] = {}
-
-    def solve(self, ways: dict[int, _Way]) -> _Choice:
-        members = sorted(ways)
-        system: list[Equation] = []
-        lost = 0
-        for k, relation in enumerate(self.relations):
-            if relation.a in ways and relation.b in ways:
-                found = self._equations(k, relation, ways[relation.a], ways[relation.b])
-                lost += found is None
-                system.extend(found or ())
-        for i in members:  # who turns does so where the way turns
-            if abs(self._turn(i)) > _TURNS and abs(ways[i].turn) > _TURNS:
-                key = (i, id(ways[i]))
-                if key not in self.by_turn:
-                    self.by_turn[key] = self.start_by_turn(i, ways[i].curve)
-                system.append(Equation(((i, 1.0),), self.by_turn[key], _TURN_WEIGHT))
-        start = _least_squares(members, system)
-        if not start:  # nobody is tied down: who turns most is placed by its turn, the others beside it
-            i = max(members, key=lambda i: (abs(self._turn(i)), self.driven[i, -1], -i))
-            start[i] = self.start_by_turn(i, ways[i].curve)
-        rotation, shift, yaw = self.align(ways, start, members)
-        untied = [i for i in members if i not in start]
-        for i in untied:  # who has no equation is placed by its relative position
-            target = exact.matmul(self.poses[i][::3, :2], rotation.T) + shift
-            station, _ = ways[i].curve.project(target)
-            start[i] = float(np.median(station - self.driven[i][::3]))
-        if untied:
-            rotation, shift, yaw = self.align(ways, start, members)
-        return self._checked(ways, start, members, lost, rotation, shift, yaw)
-
-    def _equations(self, k: int, relation: Relation, one: _Way, two: _Way) -> tuple[Equation, ...] | None:
-        key = (k, id(one), id(two))
-        if key not in self.cache:
-            self.cache[key] = equations(relation, one.curve, two.curve, self.scale)
-        return self.cache[key]
-
-    def _turn(self, i: int) -> float:
-        return float(self.poses[i][-1, 2] - self.poses[i][0, 2])
-
-    def start_by_turn(self, i: int, curve: Curve) -> float:
-        """The start on a way that makes the vehicle turn where the way turns; on a straight one, its middle."""
-        most = max(curve.length - float(self.driven[i, -1]), 0.0)
-        if max(abs(self._turn(i)), abs(float(curve.points[-1, 2] - curve.points[0, 2]))) < _TURNS:
-            return most / 2.0
-        starts = np.linspace(0.0, most, int(np.ceil(most)) + 1)
-        off = curve.at((starts[:, None] + self.driven[i]).ravel())[:, 2].reshape(len(starts), -1) - self.poses[i][:, 2]
-        alike = exact.hypot(
-            exact.cos(off).mean(axis=1), exact.sin(off).mean(axis=1)
-        )  # 1 where way and template differ by one rotation throughout
-        best = starts[alike >= alike.max() - 1e-3]
-        return float(best[np.argmin(np.abs(best - most / 2.0))])
-
-    def align(self, ways: dict[int, _Way], start: dict[int, float], members: list[int]) -> tuple[Floats, Floats, float]:
-        """The rigid motion (Umeyama 1991, det R = +1, scale fixed) from the template to the vehicles placed so far."""
-        known = [i for i in members if i in start]
-        source = np.concatenate([self.poses[i] for i in known])
-        target = np.concatenate([ways[i].curve.at(start[i] + self.driven[i]) for i in known])
-        a, b = self.scale * source[:, :2], target[:, :2]
-        ca, cb = a.mean(axis=0), b.mean(axis=0)
-        u, v = a - ca, b - cb
-        sine = float((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum()) + 10.0 * float(exact.sin(target[:, 2] - source[:, 2]).sum())
-        cosine = float((u * v).sum()) + 10.0 * float(exact.cos(target[:, 2] - source[:, 2]).sum())
-        yaw = float(exact.arctan2(sine, cosine))
-        rotation = _rotation(yaw)
-        return self.scale * rotation, cb - exact.matmul(rotation, ca), yaw
-
-    def _checked(
-        self,
-        ways: dict[int, _Way],
-        start: dict[int, float],
-        members: list[int],
-        lost: int,
-        rotation: Floats,
-        shift: Floats,
-        yaw: float,
-    ) -> _Choice:
-        cost, beyond, turned = _LOST * lost, 0.0, 0.0
-        came = [float(ways[i].curve.points[0, 2] - self.poses[i][0, 2]) for i in members]
-        for k in range(1, len(members)):
-            apart = wrap_angle(np.array([came[k] - other for other in came[:k]]))
-            cost += _ARM * float((np.square(apart)).sum()) / len(members)
-        for i in members:
-            curve = ways[i].curve
-            fitted = curve.at(start[i] + self.driven[i])
-            miss = exact.hypot(*(fitted[:, :2] - exact.matmul(self.poses[i][:, :2], rotation.T) - shift).T)
-            off = np.abs(wrap_angle(fitted[:, 2] - self.poses[i][:, 2] - yaw))
-            own = float((fitted[-1, 2] - fitted[0, 2]) - (self.poses[i][-1, 2] - self.poses[i][0, 2]))
-            whole = float(ways[i].turn - (self.poses[i][-1, 2] - self.poses[i][0, 2]))
-            alike = np.mean(np.square(np.minimum(miss, _FAR))) + _HEADING * np.mean(1.0 - exact.cos(off))
-            alike += _OWN_TURN * np.square(own) + _WHOLE_TURN * np.square(whole)
-            cost += float(alike) / len(members)
-            turned = max(turned, float(off.mean()), abs(own) - _OWN_SLACK)
-            half = self.tracks[i].vehicle.length / 2.0 + 0.5
-            short = max(half - start[i], start[i] + float(self.driven[i][-1]) + half - curve.length, 0.0)
-            beyond = max(beyond, short)
-            cost += _OFF * short
-        return _Choice(ways, start, cost, lost, beyond, turned, len(self.relations))
-
-
-def _rotation(yaw: float) -> Floats:
-    return np.array([[exact.cos(yaw), -exact.sin(yaw)], [exact.sin(yaw), exact.cos(yaw)]])
-
-
-def _least_squares(members: list[int], system: list[Equation]) -> dict[int, float]:
-    """A for the vehicles that equations tie to the road (those tied only to each other are left out)."""
-    absolute = {term[0] for e in system if len(e.terms) == 1 for term in e.terms}
-    while True:  # who shares a lane with one that is tied down is tied down too
-        more = {i for e in system if len(e.terms) == 2 and any(t[0] in absolute for t in e.terms) for i, _ in e.terms}
-        if more <= absolute:
-            break
-        absolute |= more
-    tied = [i for i in members if i in absolute]
-    used = [e for e in system if all(i in absolute for i, _ in e.terms)]
-    if not tied:
-        return {}
-    matrix, value = np.zeros((len(used), len(tied))), np.zeros(len(used))
-    for row, equation in enumerate(used):
-        for i, factor in equation.terms:
-            matrix[row, tied.index(i)] = equation.weight * factor
-        value[row] = equation.weight * equation.value
-    solution = exact.lstsq(matrix, value)
-    return {i: float(a) for i, a in zip(tied, solution, strict=True)}
-
-
 def _placed(
-    tracks: tuple[Track, ...], road: Road, choice: _Choice, scale: float, relations: tuple[Relation, ...], config: FittingConfig
+    tracks: tuple[Track, ...], road: Road, choice: Choice, scale: float, relations: tuple[Relation, ...], config: FittingConfig
 ) -> Placement:
-    placed, manoeuvres = [], []
+    placed = []
     notes = [f"scaled by {scale:g} to fit the road"] if scale != 1.0 else []
     for i, track in enumerate(tracks):
         way, begin = choice.ways[i], choice.start[i]
@@ -464,17 +290,15 @@ def _placed(
         curve = way.curve.cut(begin, max(end, begin + 1.0), 0.25)
         progress = scale * track.progress * (curve.length / max(end - begin, 1.0))
         placed.append(replace(track, curve=curve, progress=frozen(np.minimum(progress, curve.length))))
-        manoeuvres.append("wait" if track.still else manoeuvre_of(turn_of(placed[-1])))
         notes.append(
             f"vehicle {track.vehicle.id} takes entry {way.entry} and exit {way.leave} ({in_words(way.turn)}), "
-            f"{begin:.1f} m to {end:.1f} m of {way.curve.length:.1f} m; {_said(track)} in the template"
+            f"{begin:.1f} m to {end:.1f} m of {way.curve.length:.1f} m; {_turn_in_words(track)} in the template"
         )
     for r in relations:
         a, b = tracks[r.a].vehicle.id, tracks[r.b].vehicle.id
         notes.append(f"vehicle {a} {r.kind.value} vehicle {b}, as in the template")
     notes.append(f"assignment chosen at a cost of {choice.cost:.1f} m²")
     refuse_lost_turns(tracks, tuple(placed), road.name)
-    n = len(tracks)
+    placement = Placement.of(tuple(placed), scale, notes, (manoeuvre_of(turn_of(track)) for track in placed))
     unused = find_unused(road, [way.curve.points[k] for way in choice.ways.values() for k in (0, -1)])
-    placement = Placement(tuple(placed), frozen(np.full(n, scale)), tuple(manoeuvres), frozen(np.zeros(n)), tuple(notes), unused)
-    return separated(placement, config, sideways=0.0, own=tracks)
+    return separated(replace(placement, unused=unused), config, sideways=0.0, own=tracks)

@@ -29,15 +29,16 @@ class LostConflictError(RefusedError):
 
 
 def refuse_lost_conflicts(lost: Iterable[Loss], road: str) -> None:
-    """Refuse a fit on which vehicles whose paths cross or merge in the template do not meet; who follows whom is only said.
+    """Refuse a fit on which vehicles whose paths cross or merge in the template do not meet; who follows whom is only reported.
 
     Raises:
         LostConflictError: one is; it names the vehicles, and how it can be had all the same.
     """
-    gone = [loss.said for loss in lost if loss.kind == CONFLICT]
-    if gone:
+    lost_here = [loss.said for loss in lost if loss.kind == CONFLICT]
+    if lost_here:
+        said = "; ".join(lost_here)
         raise LostConflictError(
-            f"road {road} has no place that keeps the encounter: {'; '.join(gone)}; fitting.allow=lost_conflict takes it as it is"
+            f"road {road} has no place that keeps the encounter: {said}; fitting.allow=lost_conflict takes it as it is"
         )
 
 
@@ -65,8 +66,8 @@ def _otherwise(turn: float) -> str:
 def count_lost(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> int:
     """How many of the template's conflicts a placement has not, or in another order, each counted twice, and new ones."""
     before, after = (_meetings(some) for some in (tracks, placed))
-    gone = [pair for pair, conflict in before.items() if pair not in after or after[pair].first != conflict.first]
-    return 2 * len(gone) + len(after.keys() - before.keys())
+    changed = [pair for pair, conflict in before.items() if pair not in after or after[pair].first != conflict.first]
+    return 2 * len(changed) + len(after.keys() - before.keys())
 
 
 @lru_cache(maxsize=2)  # of one template many places are looked at
@@ -87,14 +88,8 @@ def find_unused(road: Road, used: Iterable[Floats]) -> tuple[Loss, ...]:
     arms, unused = len(arms_of(road)), len(unused_arms(road, used))
     if not unused:
         return ()
-    verb = "is" if unused == 1 else "are"
-    return (
-        Loss(
-            "arm",
-            (),
-            f"{unused} of the {arms} arms of road {road.name} {verb} not used: nobody in the template comes or goes there",
-        ),
-    )
+    used_by_nobody = f"{'is' if unused == 1 else 'are'} not used: nobody in the template comes or goes there"
+    return (Loss("arm", (), f"{unused} of the {arms} arms of road {road.name} {used_by_nobody}"),)
 
 
 def find_losses(encounter: Encounter, tracks: tuple[Track, ...], placement: Placement) -> tuple[Loss, ...]:
@@ -162,14 +157,9 @@ def _lost_neighbours(encounter: Encounter, own: Floats, poses: Floats) -> list[L
             kept = float((_side(poses[i], poses[j], reach, _LANES_DIFFER)[there] == side).mean())
             if kept < _ENOUGH:
                 a, b = encounter.vehicles[i].id, encounter.vehicles[j].id
-                lost.append(
-                    Loss(
-                        "beside",
-                        (a, b),
-                        f"vehicle {b} is to the {word} of {a} for {seconds:.1f} s in the template, "
-                        f"for {kept * seconds:.1f} s of these on this road",
-                    )
-                )
+                here = f"for {kept * seconds:.1f} s of these on this road"
+                in_template = f"vehicle {b} is to the {word} of {a} for {seconds:.1f} s in the template"
+                lost.append(Loss("beside", (a, b), f"{in_template}, {here}"))
     return lost
 
 

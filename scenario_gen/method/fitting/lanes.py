@@ -91,14 +91,12 @@ def _on_axis(tracks: tuple[Track, ...], frenet: FrenetTracks, axis: _Axis, road:
         for track in placed:
             if share_with_room(road, track) < 1.0:
                 raise RefusedError(f"vehicle {track.vehicle.id} has no room everywhere on the bent way through road {road.name}")
-    manoeuvres = tuple("wait" if track.still else manoeuvre_of(turn_of(track)) for track in placed)
     notes = tuple(_note(track, i, frenet) for i, track in enumerate(tracks))
     if scale != 1.0:
         notes = (f"scaled by {scale:.3f} to fit the road's length", *notes)
-    ends = [axis.line.points[k] for k in (0, -1)]
-    unused = find_unused(road, ends)
-    placement = Placement(placed, frozen(np.full(len(tracks), scale)), manoeuvres, frozen(np.zeros(len(tracks))), notes, unused)
-    return separated(placement, config, sideways=0.0, own=tracks)
+    placement = Placement.of(placed, scale, notes, (manoeuvre_of(turn_of(track)) for track in placed))
+    unused = find_unused(road, [axis.line.points[k] for k in (0, -1)])
+    return separated(replace(placement, unused=unused), config, sideways=0.0, own=tracks)
 
 
 def _note(track: Track, i: int, frenet: FrenetTracks) -> str:

@@ -1,22 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A placement of a template on a road, its scale, and whether it keeps who comes from which side."""
+"""A placement of a template on a road: its motion there, its scale, and whether all have room."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.numerics import exact, Floats, wrap_angle
-from scenario_gen.numerics.curve import crossings, Curve
+from scenario_gen.numerics import exact, Floats, frozen
 from scenario_gen.roads import footprint_fits, nearest_pose_with_room
-from scenario_gen.template import path_crossing, separate, smallest_gaps, Track
-from scenario_gen.types import Loss, Road
+from scenario_gen.template import separate, smallest_gaps, Track
+from scenario_gen.types import Loss, Road, Vehicle
 
+SCALES = (1.0, 0.9, 1.1, 0.8, 1.2)  # that are tried, the best first
+_LOOKED = 12.0  # metres within which a pose with room is looked for, to say how far it is
 _LEAST_CLEARANCE = 0.1  # metres between fitted footprints, where the template's own are as near
 _RELUCTANTLY = 0.1  # how readily a vehicle leaves the middle of its lane, where setting it forward or back does not do
 
@@ -43,13 +43,27 @@ class Placement:
     unused: tuple[Loss, ...] = ()
     at_home: bool = False
 
+    @classmethod
+    def of(cls, tracks: tuple[Track, ...], scale: float, notes: Iterable[str], manoeuvres: Iterable[str] | str) -> "Placement":
+        """Return the placement of tracks that all have one scale, none of them shifted; one that stands throughout waits.
+
+        Args:
+            tracks: on the road.
+            scale: s of eq 9.
+            notes: what was decided, in sentences.
+            manoeuvres: what each vehicle does if it does not wait, or what all do.
+        """
+        names = [manoeuvres] * len(tracks) if isinstance(manoeuvres, str) else manoeuvres
+        waits = tuple("wait" if track.still else name for track, name in zip(tracks, names, strict=True))
+        return cls(tracks, frozen(np.full(len(tracks), scale)), waits, frozen(np.zeros(len(tracks))), tuple(notes))
+
 
 def check_scale(scale: float, what: str, config: FittingConfig) -> None:
     """Raise RefusedError if a scale is too far from one.
 
     Source: s of eq 9.
     """
-    if not config.scale_low <= scale <= config.scale_high:
+    if not config.accepts(scale):
         raise RefusedError(
             f"{what} would need scale {scale:.2f}; accepted is {config.scale_low:g} to {config.scale_high:g} "
             f"(scale shrinks gaps but not cars)"
@@ -83,6 +97,17 @@ def separated(placement: Placement, config: FittingConfig, *, sideways: float, o
         moved=placement.moved + separation.moved,
         notes=(*placement.notes, *separation.notes),
     )
+
+
+def rotated(points: Floats, yaw: float) -> Floats:
+    """Turn points (M, 2) [m] about the origin by `yaw` [rad]."""
+    cos, sin = exact.cos(yaw), exact.sin(yaw)
+    return exact.matmul(points, np.array([[cos, sin], [-sin, cos]]))
+
+
+def has_room(road: Road, vehicle: Vehicle, poses: Floats) -> bool:
+    """Whether a vehicle's footprint has room at all poses (M, 3)."""
+    return bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all())
 
 
 def share_with_room(road: Road, track: Track, every: int = 5) -> Floats:
@@ -127,106 +152,3 @@ def max_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:
         )
         raise RefusedError(f"on road {road.name} {'; '.join(astray)}; at most {max_move:g} m is bridged; {remedy}")
     return farthest
-
-
-_LOOKED = 12.0  # metres within which a pose with room is looked for, to say how far it is
-_SAME_LANE = 1.75  # metres
-_SAME_WAY = np.radians(30.0)
-_ANGLE = np.radians(15.0)
-
-
-class Kind(Enum):
-    """How two paths relate."""
-
-    CROSSING = "crosses"
-    SHARED_START = "shares its entry lane with"
-    SHARED_END = "shares its exit lane with"
-
-
-@dataclass(frozen=True)
-class Relation:
-    """Vehicles `a` and `b` (indices): at `at_a` and `at_b` metres of their paths they are at the same place."""
-
-    kind: Kind
-    a: int
-    b: int
-    at_a: float
-    at_b: float
-
-
-@dataclass(frozen=True, eq=False)
-class Equation:
-    """coefficients · A = value, with a weight."""
-
-    terms: tuple[tuple[int, float], ...]
-    value: float
-    weight: float
-
-
-def find_relations(tracks: tuple[Track, ...]) -> tuple[Relation, ...]:
-    """One relation for each pair that shares a lane or crosses."""
-    found = []
-    for a in range(len(tracks)):
-        for b in range(a + 1, len(tracks)):
-            relation = _relation(a, tracks[a], b, tracks[b])
-            if relation is not None:
-                found.append(relation)
-    return tuple(found)
-
-
-def _relation(a: int, one: Track, b: int, two: Track) -> Relation | None:
-    for first, second, x, y in ((a, b, one, two), (b, a, two, one)):  # does x start on y's path?
-        at = _on_path(x.curve.at(0.0), y, beyond=0.0)
-        if at is not None:
-            return Relation(Kind.SHARED_START, first, second, 0.0, at)
-    crossing = path_crossing(one, two)
-    if crossing is not None:
-        return Relation(Kind.CROSSING, a, b, crossing.first, crossing.second)
-    for first, second, x, y in ((a, b, one, two), (b, a, two, one)):  # does x end on y's path?
-        at = _on_path(x.curve.at(x.travelled), y, beyond=0.0)
-        if at is not None and not x.still:
-            return Relation(Kind.SHARED_END, first, second, x.travelled, at)
-    return None
-
-
-def _on_path(pose: Floats, track: Track, beyond: float) -> float | None:
-    station, offset = track.curve.project(pose[None, :2])
-    s = float(station[0])
-    turned = abs(float(wrap_angle(np.asarray(track.curve.at(s)[2] - pose[2]))))
-    on = abs(float(offset[0])) < _SAME_LANE and turned < _SAME_WAY and -beyond <= s <= track.travelled + beyond
-    return s if on else None
-
-
-def equations(relation: Relation, one: Curve, two: Curve, scale: float) -> tuple[Equation, ...] | None:
-    """The relation on two routes as equations, or None if these routes do not have it."""
-    a, b, la, lb = relation.a, relation.b, scale * relation.at_a, scale * relation.at_b
-    if relation.kind is Kind.SHARED_START:
-        if float(exact.hypot(*(one.points[0, :2] - two.points[0, :2]))) > 0.5:
-            return None
-        return (Equation(((a, 1.0), (b, -1.0)), lb - la, 2.0),)
-    if relation.kind is Kind.SHARED_END:
-        if float(exact.hypot(*(one.points[-1, :2] - two.points[-1, :2]))) > 0.5:
-            return None
-        if float(exact.hypot(*(one.points[0, :2] - two.points[0, :2]))) <= 0.5:  # they come from different lanes
-            return None
-        return (Equation(((a, 1.0), (b, -1.0)), (one.length - la) - (two.length - lb), 1.0),)
-    found = crossings(one, two, _ANGLE)
-    if len(found) == 0:
-        found = _merging(one, two)
-    if len(found) == 0:
-        return None
-    at_a, at_b = found[len(found) // 2]
-    return (Equation(((a, 1.0),), float(at_a) - la, 1.0), Equation(((b, 1.0),), float(at_b) - lb, 1.0))
-
-
-def _merging(one: Curve, two: Curve) -> Floats:
-    """(1, 2) stations from which on two routes run in one lane, as in a roundabout; (0, 2) if they never do so."""
-    s = np.arange(0.0, one.length, 1.0)
-    poses = one.at(s)
-    station, offset = two.project(poses[:, :2])
-    same = (np.abs(offset) < 1.0) & (np.abs(wrap_angle(two.at(station)[:, 2] - poses[:, 2])) < _SAME_WAY)
-    same &= (station > 0.0) & (station < two.length)
-    if not same.any() or same[0]:
-        return np.zeros((0, 2))
-    first = int(np.argmax(same))
-    return np.array([[s[first], station[first]]])

@@ -16,8 +16,8 @@ import numpy as np
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.method.fitting.placement import max_repair, Placement, separated, share_with_room
-from scenario_gen.numerics import exact, Floats, frozen
+from scenario_gen.method.fitting.placement import max_repair, Placement, rotated, SCALES, separated, share_with_room
+from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import clearance_field
 from scenario_gen.template import Track
@@ -25,7 +25,6 @@ from scenario_gen.types import Road
 
 _CELL = 1.0  # metres of the coarse search
 _TURNS = 72
-_SCALES = (1.0, 0.9, 1.1, 0.8, 1.2)
 _KEPT = 10  # coarse placements that are refined
 _SPACING = 1.5  # metres between the path's sampled discs
 _MOSTLY = 0.8  # share of footprints with room below which a placement is no good
@@ -50,14 +49,12 @@ def place_by_search(tracks: tuple[Track, ...], road: Road, config: FittingConfig
         RefusedError: no placement gives (almost) all footprints room.
     """
     discs, centre = _discs(tracks)
-    need = max(t.vehicle.width for t in tracks) / 2.0 + config.margin
+    required = max(t.vehicle.width for t in tracks) / 2.0 + config.margin
     best: tuple[float, Placement] | None = None
     reason = f"the template ({np.ptp(discs, axis=0).max():.0f} m) is larger than the map"
-    for scale in _SCALES:
-        if not config.scale_low <= scale <= config.scale_high:
-            continue
-        found = sorted(_coarse(discs, road, need, scale), key=_order)[:_KEPT]
-        for motion in sorted((_refined(discs, road, need, motion) for motion in found), key=_order):
+    for scale in filter(config.accepts, SCALES):
+        found = sorted(_coarse(discs, road, required, scale), key=_order)[:_KEPT]
+        for motion in sorted((_refined(discs, road, required, motion) for motion in found), key=_order):
             stop_if_cancelled()
             try:
                 placement, share, farthest = _tried(tracks, centre, motion, road, config)
@@ -75,30 +72,20 @@ def place_by_search(tracks: tuple[Track, ...], road: Road, config: FittingConfig
     return best[1]
 
 
-def _order(motion: "_Motion") -> tuple[float, float, tuple[float, float]]:
+def _order(motion: _Motion) -> tuple[float, float, tuple[float, float]]:
     return motion.cost, motion.yaw, motion.at
 
 
 def _tried(
-    tracks: tuple[Track, ...], centre: Floats, motion: "_Motion", road: Road, config: FittingConfig
+    tracks: tuple[Track, ...], centre: Floats, motion: _Motion, road: Road, config: FittingConfig
 ) -> tuple[Placement, float, float]:
     """The placement of one similarity, the share of its footprints that have room, the farthest repair [m]."""
-    moved = _moved(tracks, centre, motion)
-    n = len(tracks)
-    placement = separated(
-        Placement(
-            tracks=moved,
-            scale=frozen(np.full(n, motion.scale)),
-            manoeuvre=tuple("wait" if t.still else "own path" for t in tracks),
-            moved=frozen(np.zeros(n)),
-            notes=(
-                f"placed on road {road.name} as one piece: turned by {np.degrees(motion.yaw) % 360.0:.0f}°, scale "
-                f"{motion.scale:g}, its centre at x {motion.at[0]:.1f}, y {motion.at[1]:.1f}",
-            ),
-        ),
-        config,
-        sideways=1.0,
+    note = (
+        f"placed on road {road.name} as one piece: turned by {np.degrees(motion.yaw) % 360.0:.0f}°, scale "
+        f"{motion.scale:g}, its centre at x {motion.at[0]:.1f}, y {motion.at[1]:.1f}"
     )
+    as_laid = Placement.of(_moved(tracks, centre, motion), motion.scale, [note], "own path")
+    placement = separated(as_laid, config, sideways=1.0)
     share = float(min(share_with_room(road, track) for track in placement.tracks))
     return placement, share, max_repair(placement.tracks, road, config.max_move)
 
@@ -115,24 +102,24 @@ def _discs(tracks: tuple[Track, ...]) -> tuple[Floats, Floats]:
     return everything - centre, centre
 
 
-def _penalty(clearance: Floats, need: float) -> Floats:
+def _penalty(clearance: Floats, required: float) -> Floats:
     """Missing clearance squared; a little of it also for room that would be nice to have."""
     return np.asarray(
-        np.square(np.maximum(need - clearance, 0.0)) / np.square(need)
-        + 0.02 * np.square(np.maximum(need + _COMFORT - clearance, 0.0)) / np.square(need)
+        np.square(np.maximum(required - clearance, 0.0)) / np.square(required)
+        + 0.02 * np.square(np.maximum(required + _COMFORT - clearance, 0.0)) / np.square(required)
     )
 
 
-def _coarse(discs: Floats, road: Road, need: float, scale: float) -> list[_Motion]:
+def _coarse(discs: Floats, road: Road, required: float, scale: float) -> list[_Motion]:
     """The best translation of each rotation."""
     every = max(round(_CELL / road.resolution), 1)
     cell = every * road.resolution
-    field = _penalty(clearance_field(road)[every // 2 :: every, every // 2 :: every], need)
-    field = field - float(_penalty(np.zeros(1), need)[0])  # outside the map counts as blocked: make that the zero of the sum
+    field = _penalty(clearance_field(road)[every // 2 :: every, every // 2 :: every], required)
+    field = field - float(_penalty(np.zeros(1), required)[0])  # outside the map counts as blocked: make that the zero of the sum
     whole = np.fft.rfft2(np.round(field * _WHOLE))
     best = []
     for yaw in np.arange(_TURNS) * 2.0 * np.pi / _TURNS:
-        points = scale * _turned(discs, float(yaw))
+        points = scale * rotated(discs, float(yaw))
         index = np.floor(points / cell + 0.5).astype(np.int64)
         low, size = index.min(axis=0), np.ptp(index, axis=0) + 1
         if size[0] > field.shape[1] or size[1] > field.shape[0]:
@@ -150,21 +137,16 @@ def _coarse(discs: Floats, road: Road, need: float, scale: float) -> list[_Motio
     return best
 
 
-def _turned(points: Floats, yaw: float) -> Floats:
-    cos, sin = exact.cos(yaw), exact.sin(yaw)
-    return np.asarray(exact.matmul(points, np.array([[cos, sin], [-sin, cos]])))
-
-
-def _fine_cost(discs: Floats, road: Road, need: float, scale: float, state: Floats) -> float:
-    points = scale * _turned(discs, float(state[2])) + state[:2]
+def _fine_cost(discs: Floats, road: Road, required: float, scale: float, state: Floats) -> float:
+    points = scale * rotated(discs, float(state[2])) + state[:2]
     row, column, inside = road.cells(points)
-    return float(_penalty(np.where(inside, clearance_field(road)[row, column], 0.0), need).mean())
+    return float(_penalty(np.where(inside, clearance_field(road)[row, column], 0.0), required).mean())
 
 
-def _refined(discs: Floats, road: Road, need: float, motion: _Motion) -> _Motion:
+def _refined(discs: Floats, road: Road, required: float, motion: _Motion) -> _Motion:
     """Pattern search over place and rotation (Hooke & Jeeves 1961)."""
     state = np.array([*motion.at, motion.yaw])
-    cost = _fine_cost(discs, road, need, motion.scale, state)
+    cost = _fine_cost(discs, road, required, motion.scale, state)
     step = np.array([1.0, 1.0, np.radians(3.0)])
     while step[0] > 0.05:
         improved = False
@@ -172,7 +154,7 @@ def _refined(discs: Floats, road: Road, need: float, motion: _Motion) -> _Motion
             for sign in (1.0, -1.0):
                 trial = state.copy()
                 trial[k] += sign * step[k]
-                tried = _fine_cost(discs, road, need, motion.scale, trial)
+                tried = _fine_cost(discs, road, required, motion.scale, trial)
                 if tried < cost - 1e-12:
                     state, cost, improved = trial, tried, True
                     break
@@ -185,7 +167,7 @@ def _moved(tracks: tuple[Track, ...], centre: Floats, motion: _Motion) -> tuple[
     moved = []
     for track in tracks:
         points = track.curve.points.copy()
-        points[:, :2] = motion.scale * _turned(points[:, :2] - centre, motion.yaw) + motion.at
+        points[:, :2] = motion.scale * rotated(points[:, :2] - centre, motion.yaw) + motion.at
         points[:, 2] += motion.yaw
         moved.append(replace(track, curve=Curve(points), progress=frozen(motion.scale * track.progress)))
     return tuple(moved)

@@ -10,13 +10,11 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.kept import keeps_conflicts
-from scenario_gen.method.fitting.placement import max_repair, Placement, separated
-from scenario_gen.numerics import frozen
+from scenario_gen.method.fitting.placement import max_repair, Placement, SCALES, separated
 from scenario_gen.roads import Course, laid, placements
 from scenario_gen.template import Track
 from scenario_gen.types import LaneNetwork, Road
 
-_SCALES = (1.0, 0.9, 1.1, 0.8, 1.2)
 _TRIED, _MORE = 12, 40  # placements that are looked at cell by cell; of those that lose a conflict, more
 
 
@@ -32,21 +30,14 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
     if network is None:
         raise RefusedError(f"road {road.name} has no lanes")
     reason, second = "", None
-    scales = [scale for scale in _SCALES if config.scale_low <= scale <= config.scale_high]
+    scales = list(filter(config.accepts, SCALES))
     for tried, (one, scale) in enumerate(placements(network, tracks, scales=scales)):
         if tried >= (_TRIED if second is None else _MORE):
             break
-        n = len(tracks)
         notes = [*network.notes, *(_note(c, t, network) for c, t in zip(one.courses, tracks, strict=True))]
         if scale != 1.0:
             notes.append(f"scaled by {scale:g} to fit the lanes")
-        placement = Placement(
-            tracks=laid(one, tracks, scale),
-            scale=frozen(np.full(n, scale)),
-            manoeuvre=tuple("wait" if t.still else _manoeuvre(c) for c, t in zip(one.courses, tracks, strict=True)),
-            moved=frozen(np.zeros(n)),
-            notes=tuple(notes),
-        )
+        placement = Placement.of(laid(one, tracks, scale), scale, notes, map(_manoeuvre, one.courses))
         try:
             placement = separated(placement, config, sideways=0.0)
             max_repair(placement.tracks, road, config.max_move)

@@ -3,12 +3,21 @@
 
 """Planning: RRT*-Connect between fitted anchors, and routes that can be driven."""
 
-from scenario_gen.method.routing.config import PlanningConfig
+from scenario_gen.method.routing.config import MakePlanner, PlanningConfig
 from scenario_gen.method.routing.plan import deviations, make_planner, plan_routes
-from scenario_gen.method.routing.search.planner import plan_with_retry, Query
+from scenario_gen.method.routing.search.planner import (
+    Budget,
+    BudgetSpentError,
+    check_query,
+    Plan,
+    plan_with_retry,
+    Planner,
+    Query,
+)
 from scenario_gen.method.routing.search.rrt_star_connect import PAPER
 from scenario_gen.types import Route
 
 __all__ = [
-    "PAPER", "PlanningConfig", "Query", "Route", "deviations", "make_planner", "plan_routes", "plan_with_retry",
+    "PAPER", "Budget", "BudgetSpentError", "MakePlanner", "Plan", "Planner", "PlanningConfig", "Query", "Route", "check_query",
+    "deviations", "make_planner", "plan_routes", "plan_with_retry",
 ]  # fmt: skip

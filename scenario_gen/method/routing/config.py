@@ -4,22 +4,46 @@
 """Settings of the planning stage."""
 
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Protocol
 
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.method.routing.search.ompl.planners import OmplConfig
+from scenario_gen.base.registry import Registry
+from scenario_gen.method.routing.search.ompl.planners import OmplConfig, OmplPlanner
+from scenario_gen.method.routing.search.planner import Planner
 from scenario_gen.method.routing.search.pose_planner import PoseSearchConfig
-from scenario_gen.method.routing.search.rrt_star_connect import RrtStarConnectConfig
+from scenario_gen.method.routing.search.rrt_star_connect import RrtStarConnect, RrtStarConnectConfig
+
+
+class MakePlanner(Protocol):
+    """What the parameter `planner` names: makes a `Planner` from all parameters of planning."""
+
+    def __call__(self, config: "PlanningConfig", /) -> Planner:
+        """Return a planner with its own part of the parameters."""
+        ...
+
+
+def _rrt_star_connect(config: "PlanningConfig") -> Planner:
+    return RrtStarConnect(config.rrt_star_connect)
+
+
+def _ompl(name: str, config: "PlanningConfig") -> Planner:
+    return OmplPlanner(name, config.ompl)
+
+
+_OF_OMPL = ("ompl_rrt_connect", "ompl_rrt_star", "ompl_informed_rrt_star", "ompl_bit_star")
+PLANNERS = Registry[MakePlanner](
+    "scenario_gen.planners",
+    {"rrt_star_connect": _rrt_star_connect, **{name: partial(_ompl, name) for name in _OF_OMPL}},
+)
+"""The geometric planners by name."""
 
 
 @dataclass(frozen=True)
 class PlanningConfig(Parameters):
     """How routes are planned."""
 
-    planner: str = parameter(
-        "rrt_star_connect",
-        "geometric planner",
-        choices=("rrt_star_connect", "ompl_rrt_connect", "ompl_rrt_star", "ompl_informed_rrt_star", "ompl_bit_star"),
-    )
+    planner: str = parameter("rrt_star_connect", "geometric planner", choices=tuple(PLANNERS.built_in), group=PLANNERS.group)
     iterations: int = parameter(1000, "iterations of the planner between two anchors", low=1, high=10_000_000)
     margin: float = parameter(0.3, "room to keep beside the footprint where the road has it", unit="m", low=0.0, high=5.0)
     drivable: bool = parameter(True, "smooth routes that can be driven; false: the planner's bare polylines")

@@ -11,7 +11,7 @@ import numpy as np
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.method.routing.config import PlanningConfig
+from scenario_gen.method.routing.config import PLANNERS, PlanningConfig
 from scenario_gen.method.routing.connections import candidates, direct
 from scenario_gen.method.routing.distance import distances_to_line, farthest
 from scenario_gen.method.routing.search.planner import (  # fmt: skip
@@ -24,7 +24,6 @@ from scenario_gen.method.routing.search.planner import (  # fmt: skip
     Query,
 )
 from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect, Wishes
-from scenario_gen.method.routing.search.rrt_star_connect import RrtStarConnect
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.smooth import Curve, Guess, monotone_matching, smooth, Targets
 from scenario_gen.numerics import Bools, exact, Floats, wrap_angle
@@ -123,11 +122,7 @@ def deviations(route: Route, fitted: FittedVehicle) -> Floats:
 
 def make_planner(config: PlanningConfig) -> Planner:
     """The geometric planner that `config` names."""
-    if config.planner == "rrt_star_connect":
-        return RrtStarConnect(config.rrt_star_connect)
-    from scenario_gen.method.routing.search.ompl.planners import OmplPlanner
-
-    return OmplPlanner(config.planner, config.ompl)
+    return PLANNERS[config.planner](config)
 
 
 def _route(task: _Task) -> Route:

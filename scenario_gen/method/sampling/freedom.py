@@ -259,8 +259,7 @@ def seconds_onward(state: Floats, ahead: float, sign: float) -> Floats:
 def freedom_of(
     vehicle: Vehicle,
     arc: Floats,
-    nominal: Clock,
-    rests: Sequence[tuple[float, float]],
+    clock: OwnClock,
     freed: Floats,
     asked: Bools,
     ahead: Floats,
@@ -272,8 +271,7 @@ def freedom_of(
     Args:
         vehicle: itself.
         arc: (G,) arc lengths [m] of its route's nodes.
-        nominal: the clock without deviation.
-        rests: when it stands [s], on the template's clock.
+        clock: how its clock leaves the shared one.
         freed: (2, 2) metres and m/s by which its start and end may differ from what is given.
         asked: (2,) whether start and end states are asked of any vehicle.
         ahead: (2,) metres of free road straight on before its route and behind it.
@@ -288,7 +286,7 @@ def freedom_of(
     sizes = np.array([size for size in CATALOGUE if size[0] - vehicle.length <= max(_GROWS * gap, 0.0)]).reshape(-1, 2)
     other_size = config.sizes == "catalogue" and _CARS[0] <= vehicle.length <= _CARS[1] and not still
     return Freedom(
-        OwnClock.of(nominal, rests, (bool(asked[0]), bool(asked[1])), config),
+        clock,
         place if len(arc) > 1 else np.zeros(1),
         config.place_sigma,
         np.where(freed[:, 1] > 0.0, config.end_speed_sigma, 0.0),

@@ -19,7 +19,7 @@ from scenario_gen.method.sampling.deviations import (
     ROOM_SIGMAS,
     Steering,
 )
-from scenario_gen.method.sampling.freedom import FADES, Freedom, freedom_of, MOST_ONWARD
+from scenario_gen.method.sampling.freedom import FADES, Freedom, freedom_of, MOST_ONWARD, OwnClock
 from scenario_gen.method.sampling.model import CandidateModel
 from scenario_gen.method.sampling.pace import clock_of, slowed_clock, template_grid
 from scenario_gen.method.sampling.path import BasePath, MIN_NODES, NODE_SPACING
@@ -242,7 +242,8 @@ def _freedom(
     """What preset `wide` frees of a vehicle, that came so near [m] to others in the template."""
     fastest = drive.speed[[0, -1]] + config.freedom * config.end_speed_sigma + 2.0 * config.max_acceleration * FADES
     ahead = road_ahead(drive.path, drive.vehicle, road, MOST_ONWARD * fastest)
-    return freedom_of(drive.vehicle, drive.path.arc, nominal, drive.rests, freed, tied, ahead, gap, config)
+    clock = OwnClock.of(nominal, drive.rests, (bool(tied[0]), bool(tied[1])), config)
+    return freedom_of(drive.vehicle, drive.path.arc, clock, freed, tied, ahead, gap, config)
 
 
 def _slowed(drives: Sequence[_Drive], grid: Floats, config: SamplingConfig) -> tuple[Clock, list[str]]:

@@ -5,16 +5,12 @@
 
 from collections import deque
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scenario_gen.method.segmentation.online import Changepoint, OnlineConfig, OnlineSegmenter
 from scenario_gen.method.segmentation.trends import course
-from scenario_gen.types import LiveChangepoints
-
-if TYPE_CHECKING:  # logs bring pandas and shapely, which a segmentation does not need
-    from scenario_gen.logs import Sample
+from scenario_gen.types import LiveChangepoints, Sample
 
 
 class LiveSegmenter:
@@ -28,7 +24,7 @@ class LiveSegmenter:
         self._online: OnlineSegmenter | None = None
         self._start_ns = 0
 
-    def push(self, sample: "Sample") -> LiveChangepoints | None:
+    def push(self, sample: Sample) -> LiveChangepoints | None:
         """Take the next sample and return the changepoints it confirms, if any."""
         last = self._past[-1] if self._past else None
         if self._online is None or last is None or not self._follows(last, sample):
@@ -39,7 +35,7 @@ class LiveSegmenter:
         found = self._online.push(sample.position, sample.speed)
         return self._states(found) if found else None
 
-    def _follows(self, last: "Sample", sample: "Sample") -> bool:
+    def _follows(self, last: Sample, sample: Sample) -> bool:
         return sample.stamp_ns == last.stamp_ns + self._dt_ns and sample.vehicles == last.vehicles
 
     def _states(self, found: Sequence[Changepoint]) -> LiveChangepoints:

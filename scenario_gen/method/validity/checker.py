@@ -4,6 +4,7 @@
 """The checker: proves a scenario valid at every instant, or says what is wrong with it, when and by how much."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -33,48 +34,44 @@ from scenario_gen.types import (
 )
 
 
+@dataclass(eq=False, repr=False)
 class Checker:
     """Checks scenarios against a road, the states asked for, a template's conflicts and waits, and limits.
 
     Proven at every instant of the motion that `Scenario` defines, not on a grid of instants: footprints do not overlap,
     and each lies inside drivable cells. What cannot be proven at `limits.time_resolution` is refused. The other
     guarantees are listed in docs/validity.md. Any of road, asked, conflicts and waits may be None: those checks are
-    left out, and `not_applicable` names them.
+    left out, and `not_applicable` names them. One checker serves many scenarios of one request.
+
+    Attributes:
+        road: the road they drive on.
+        asked: start and end states, one per vehicle.
+        conflicts: the template's conflicts, whose order must be kept, unless `first` says otherwise.
+        waits: the template's waits; in every scenario the vehicle stands, or moves slowly, as often, one after the other.
+        limits: the limits; the default ones if None.
+        first: who must go first at each of the conflicts, by index, None for anyone (`orders_asked`); a conflict whose order is
+            not the template's must be there.
+        reactions: of the template, which every scenario keeps.
+        ends: (N, 2) whether each vehicle is there at the template's first and last instant, as it then must be at the
+            scenario's; None if that is not known.
     """
 
-    def __init__(
-        self,
-        road: Road | None,
-        asked: BoundaryStates | None,
-        conflicts: Sequence[Conflict] | None,
-        waits: Sequence[Wait] | None,
-        limits: Limits | None = None,
-        first: Sequence[int | None] | None = None,
-        reactions: Sequence[Reaction] = (),
-        ends: Bools | None = None,
-    ) -> None:
-        """Prepare for many scenarios of one request.
+    road: Road | None
+    asked: BoundaryStates | None
+    conflicts: Sequence[Conflict] | None
+    waits: Sequence[Wait] | None
+    limits: Limits | None = None
+    first: Sequence[int | None] | None = None
+    reactions: Sequence[Reaction] = ()
+    ends: Bools | None = None
 
-        Args:
-            road: the road they drive on.
-            asked: start and end states, one per vehicle.
-            conflicts: the template's conflicts, whose order must be kept, unless `first` says otherwise.
-            waits: the template's waits; in every scenario the vehicle stands, or creeps, as often, one after the other.
-            limits: the limits; the default ones if None.
-            first: who must go first at each of them, by index, None for anyone (`orders_asked`); a conflict whose order is
-                not the template's must be there.
-            reactions: of the template, which every scenario keeps.
-            ends: (N, 2) whether each vehicle is there at the template's first and last instant, as it then must be at the
-                scenario's; None if that is not known.
-        """
-        self.ends = ends
-        self._first = tuple(conflict.first for conflict in conflicts or ()) if first is None else tuple(first)
-        self.road, self.asked, self.conflicts, self.waits = road, asked, conflicts, waits
-        self.limits, self.reactions = limits or Limits(), tuple(reactions)
-        self._limits = np.array([getattr(self.limits, name) for name in dynamics.LIMITS])
-        if road is not None:
-            self._clearance, self._blocked = clearance_in_cells(road), inside.blocked_before(road.drivable)
-            self._grid = np.array((*road.origin, road.resolution))
+    def __post_init__(self) -> None:
+        self._first = tuple(conflict.first for conflict in self.conflicts or ()) if self.first is None else tuple(self.first)
+        self._limits = self.limits or Limits()
+        self._dynamics_limits = np.array([getattr(self._limits, name) for name in dynamics.LIMITS])
+        if self.road is not None:
+            self._clearance, self._blocked = clearance_in_cells(self.road), inside.blocked_before(self.road.drivable)
+            self._grid = np.array((*self.road.origin, self.road.resolution))
 
     @classmethod
     def of_template(
@@ -188,15 +185,15 @@ class Checker:
     def _boundary_states(self, scenario: Scenario) -> Iterator[Violation]:
         if self.asked is None:
             return
-        limits = self.limits
-        freed = self.asked.freed.tolist()
+        limits = self._limits
+        relaxed = self.asked.freed.tolist()
         for name, k, asked in (("start", 0, self.asked.start), ("end", -1, self.asked.end)):  # too few numbers for arrays
             # a vehicle's row is held outside of its presence: its first or last value is that at its own first or last instant
             ends = zip(scenario.position[:, k].tolist(), scenario.speed[:, k].tolist(), asked.tolist(), strict=True)
             for i, ((x, y), speed, (x_asked, y_asked, _, speed_asked)) in enumerate(ends):
                 distance, difference = exact.hypot(x - x_asked, y - y_asked), abs(speed - speed_asked)
                 far, off = self._within_a_step(scenario, i, k)
-                free, faster = freed[i][k]
+                free, faster = relaxed[i][k]
                 far, off = far + free + limits.position_tolerance, off + faster + limits.speed_tolerance
                 if not (distance <= far + 1e-9 and difference <= off + 1e-9):  # NaN is not near
                     bounds = f" (free are {free:.3f} m and {faster:.3f} m/s)" if free or faster else ""
@@ -220,14 +217,14 @@ class Checker:
         names = ("position", "heading", "speed", "acceleration")
         for rows, at in spans(scenario):
             position, heading, speed, acceleration = (np.ascontiguousarray(getattr(scenario, name)[rows, at]) for name in names)
-            dynamics.worst_excess(scenario.time[at], position, heading, speed, acceleration, self._limits, out[rows])
+            dynamics.worst_excess(scenario.time[at], position, heading, speed, acceleration, self._dynamics_limits, out[rows])
         for i, row in zip(*(index.tolist() for index in np.nonzero(~(out[..., 0] <= 0.0))), strict=True):  # NaN, too
             _, value, limit, time = out[i, row].tolist()
             cause, sentence = dynamics.MESSAGES[dynamics.Check(row)]
             yield Violation(cause, time, (i,), f"vehicle {i}: {sentence.format(value=value, limit=limit)}")
 
     def _overlaps(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
-        n, limits = len(half), self.limits
+        n, limits = len(half), self._limits
         out = np.full((n * (n - 1) // 2, 3), np.nan)  # NaN is no proof: a pair that nothing looks at is refused
         bounds = (limits.clearance, limits.time_resolution)
         if scenario.all_present:
@@ -252,8 +249,8 @@ class Checker:
 
     def _contacts_of_those_there(self, scenario: Scenario, half: Floats, out: Floats) -> None:
         """Fill `out` as `first_contacts` does, of vehicles that come and go; each is there a little longer than it is shown."""
-        time, bounds = scenario.time, (self.limits.clearance, self.limits.time_resolution)
-        position, heading, speed, present = driven_on(scenario, self.limits.presence_margin)
+        time, bounds = scenario.time, (self._limits.clearance, self._limits.time_resolution)
+        position, heading, speed, present = driven_on(scenario, self._limits.presence_margin)
         control = np.empty((len(half), len(time) - 1, 4, 2))
         control_points(time, position, heading, speed, control)
         for k, (a, b) in enumerate(combinations(range(len(half)), 2)):
@@ -273,7 +270,7 @@ class Checker:
         first, last = scenario.time[scenario.present[list(pair)]].T
         if np.isnan(time) or ((time >= first) & (time <= last)).all():
             return ""
-        return f"; who comes or goes is there for {self.limits.presence_margin:g} s more than it is shown"
+        return f"; who comes or goes is there for {self._limits.presence_margin:g} s more than it is shown"
 
     def _exits(self, scenario: Scenario, control: Floats, half: Floats) -> Iterator[Violation]:
         if self.road is None:
@@ -288,7 +285,7 @@ class Checker:
                 self._clearance,
                 self._blocked,
                 self._grid,
-                self.limits.time_resolution,
+                self._limits.time_resolution,
                 out[rows],
             )
         for i, (status, time) in enumerate(out.tolist()):
@@ -331,7 +328,7 @@ class Checker:
 
     def _reactions(self, scenario: Scenario, conflicts: Sequence[Conflict | None]) -> Iterator[Violation]:
         """Yielders that leave too early or too late, followers that are too near or too far, in the scenario with `conflicts`."""
-        limits = self.limits
+        limits = self._limits
         met = {(c.second, c.first): c for c in conflicts if c is not None}
         for edge in self.reactions:
             who, whom = scenario.vehicles[edge.who].id, scenario.vehicles[edge.whom].id
@@ -363,16 +360,19 @@ class Checker:
         for i in sorted({wait.vehicle for wait in waits}):
             asked = [wait for wait in waits if wait.vehicle == i]
             throughout = [tuple(scenario.present[i].tolist())]
-            if self._never_moves(i, asked[0].start, scenario) and self._slow(scenario, i, self.limits.stand_speed) != throughout:
+            if self._never_moves(i, asked[0].start, scenario) and self._slow(scenario, i, self._limits.stand_speed) != throughout:
                 k = int(np.argmax(scenario.speed[i]))
                 message = f"vehicle {i}: waits throughout in the template, but reaches {scenario.speed[i, k]:.3f} m/s"
                 yield Violation(Cause.STOP_NOT_KEPT, float(scenario.time[k]), (i,), message)
                 continue
             standing = [wait for wait in asked if not wait.creeps]
-            for wanted, limit, verb in ((standing, self.limits.stand_speed, "stands"), (asked, self.limits.creep_speed, "waits")):
+            for wanted, limit, verb in (
+                (standing, self._limits.stand_speed, "stands"),
+                (asked, self._limits.creep_speed, "waits"),
+            ):
                 # a stand serves as many consecutive waits as it is long: the template's may be parted by a short twitch
                 lengths = [float(scenario.time[b] - scenario.time[a]) for a, b in self._slow(scenario, i, limit)]
-                served = sum(int((length + 1e-9) / self.limits.stand_duration) for length in lengths)
+                served = sum(int((length + 1e-9) / self._limits.stand_duration) for length in lengths)
                 if served < len(wanted):
                     message = (
                         f"vehicle {i}: {verb} {len(wanted)} time(s) in the template; is below {limit:g} m/s for "
@@ -394,7 +394,7 @@ class Checker:
         if self.asked is None or begins > float(scenario.time[scenario.present[i, 0]]):
             return False
         off = self.asked.end[i, :2] - self.asked.start[i, :2]
-        return bool(exact.hypot(off[0], off[1]) <= self.limits.position_tolerance)
+        return bool(exact.hypot(off[0], off[1]) <= self._limits.position_tolerance)
 
 
 def spans(scenario: Scenario) -> list[tuple[slice, slice]]:

@@ -96,42 +96,25 @@ class Check(IntEnum):
     PATH_LATERAL = 10
 
 
+_ALONG, _ASIDE = Cause.LONGITUDINAL_ACCELERATION, Cause.LATERAL_ACCELERATION
 MESSAGES: dict[Check, tuple[Cause, str]] = {
     Check.NEGATIVE_SPEED: (Cause.SPEED, "speed falls to {value:.3f} m/s, below zero"),
     Check.MAX_SPEED: (Cause.SPEED, "speed reaches {value:.3f} m/s, above the limit of {limit:.3f} m/s"),
-    Check.ACCELERATION: (
-        Cause.LONGITUDINAL_ACCELERATION,
-        "acceleration reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²",
-    ),
-    Check.DECELERATION: (
-        Cause.LONGITUDINAL_ACCELERATION,
-        "braking reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²",
-    ),
+    Check.ACCELERATION: (_ALONG, "acceleration reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²"),
+    Check.DECELERATION: (_ALONG, "braking reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²"),
     Check.SPEED_CHANGE: (
-        Cause.LONGITUDINAL_ACCELERATION,
+        _ALONG,
         "speed changes at a rate {value:.3f} m/s² outside the published accelerations; {limit:.3f} m/s² are tolerated",
     ),
-    Check.LATERAL: (
-        Cause.LATERAL_ACCELERATION,
-        "lateral acceleration reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²",
-    ),
+    Check.LATERAL: (_ASIDE, "lateral acceleration reaches {value:.3f} m/s², above the limit of {limit:.3f} m/s²"),
     Check.CURVATURE: (Cause.CURVATURE, "curvature reaches {value:.3f} 1/m, above the limit of {limit:.3f} 1/m"),
-    Check.DISPLACEMENT: (
-        Cause.SPEED,
-        "position advances {value:.3f} m/s off the published speed; {limit:.3f} m/s are tolerated",
-    ),
+    Check.DISPLACEMENT: (Cause.SPEED, "position advances {value:.3f} m/s off the published speed; {limit:.3f} m/s are tolerated"),
     Check.SLIP: (
         Cause.CURVATURE,
         "slides sideways at {value:.3f} m/s against the published heading; {limit:.3f} m/s are tolerated",
     ),
-    Check.PATH_LONGITUDINAL: (
-        Cause.LONGITUDINAL_ACCELERATION,
-        "positions speed up or brake at {value:.3f} m/s²; {limit:.3f} m/s² are allowed",
-    ),
-    Check.PATH_LATERAL: (
-        Cause.LATERAL_ACCELERATION,
-        "positions accelerate sideways at {value:.3f} m/s²; {limit:.3f} m/s² are allowed",
-    ),
+    Check.PATH_LONGITUDINAL: (_ALONG, "positions speed up or brake at {value:.3f} m/s²; {limit:.3f} m/s² are allowed"),
+    Check.PATH_LATERAL: (_ASIDE, "positions accelerate sideways at {value:.3f} m/s²; {limit:.3f} m/s² are allowed"),
 }
 
 
@@ -140,6 +123,25 @@ def _note(out: Floats, row: int, excess: float, value: float, limit: float, time
     """Keep the worst excess of one check of one vehicle."""
     if excess > out[row, 0]:
         out[row, 0], out[row, 1], out[row, 2], out[row, 3] = excess, value, limit, time
+
+
+@kernel(inline=True)
+def _in_body(yaw: float, x: float, y: float) -> tuple[float, float]:
+    """Components ahead and to the left of a vector (x, y) for a heading [rad]."""
+    c, s = exact.cos(yaw), exact.sin(yaw)
+    return c * x + s * y, c * y - s * x
+
+
+@kernel(inline=True)
+def _of_path(time: Floats, position: Floats, k: int, yaw: float) -> tuple[float, float]:
+    """Acceleration [m/s²] ahead and to the left at instant k of the positions (T, 2) alone.
+
+    Their second difference is a mean of the acceleration over the two steps around k.
+    """
+    before, after, half = time[k] - time[k - 1], time[k + 1] - time[k], 0.5 * (time[k + 1] - time[k - 1])
+    x = ((position[k + 1, 0] - position[k, 0]) / after - (position[k, 0] - position[k - 1, 0]) / before) / half
+    y = ((position[k + 1, 1] - position[k, 1]) / after - (position[k, 1] - position[k - 1, 1]) / before) / half
+    return _in_body(yaw, x, y)
 
 
 @kernel(F1, F3, F2, F2, F2, F1, OUT3)
@@ -172,16 +174,9 @@ def worst_excess(
             if k == t - 1:
                 break
             h, w, b = time[k + 1] - now, speed[i, k + 1], acceleration[i, k + 1]
-            if k > 0:  # the second difference of the positions, a mean of the acceleration over the two steps around k
-                before, half = now - time[k - 1], 0.5 * (time[k + 1] - time[k - 1])
-                ax = (
-                    (position[i, k + 1, 0] - position[i, k, 0]) / h - (position[i, k, 0] - position[i, k - 1, 0]) / before
-                ) / half
-                ay = (
-                    (position[i, k + 1, 1] - position[i, k, 1]) / h - (position[i, k, 1] - position[i, k - 1, 1]) / before
-                ) / half
-                c, s = exact.cos(heading[i, k]), exact.sin(heading[i, k])
-                ahead, aside = c * ax + s * ay, abs(c * ay - s * ax)
+            if k > 0:
+                ahead, left = _of_path(time, position[i], k, heading[i, k])
+                aside = abs(left)
                 _note(out[i], 9, ahead - speeding - tolerance, ahead, speeding + tolerance, now)
                 _note(out[i], 9, -ahead - braking - tolerance, -ahead, braking + tolerance, now)
                 _note(out[i], 10, aside - lateral - tolerance, aside, lateral + tolerance, now)
@@ -197,18 +192,12 @@ def worst_excess(
             if turn > min(TURN_ROUNDING, TURN_DRIFT * h + 1e-8) + curvature * moved:  # headings are rounded to 1 nrad
                 bend = turn / moved
                 _note(out[i], 6, bend - curvature, bend, curvature, now)
-            c0, s0, c1, s1 = (
-                exact.cos(heading[i, k]),
-                exact.sin(heading[i, k]),
-                exact.cos(heading[i, k + 1]),
-                exact.sin(heading[i, k + 1]),
-            )
-            vx, vy, wx, wy = v * c0, v * s0, w * c1, w * s1
+            vx, vy = v * exact.cos(heading[i, k]), v * exact.sin(heading[i, k])
+            wx, wy = w * exact.cos(heading[i, k + 1]), w * exact.sin(heading[i, k + 1])
             # mean velocity of the displacement against that of the published speeds and headings, in the body's axes
             ex, ey = dx / h - 0.5 * (vx + wx), dy / h - 0.5 * (vy + wy)
-            c, s = exact.cos(0.5 * (heading[i, k] + heading[i, k + 1])), exact.sin(0.5 * (heading[i, k] + heading[i, k + 1]))
-            allowed = slip + share * fast
-            ahead, aside = abs(c * ex + s * ey), abs(c * ey - s * ex)
+            ahead, left = _in_body(0.5 * (heading[i, k] + heading[i, k + 1]), ex, ey)
+            allowed, ahead, aside = slip + share * fast, abs(ahead), abs(left)
             _note(out[i], 7, ahead - allowed, ahead, allowed, now)
             _note(out[i], 8, aside - allowed, aside, allowed, now)
             # speed of the cubic: its derivative's middle control point is 3 displacement / h - v - w

@@ -2,3 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """Scenarios for other software: CommonRoad, OpenSCENARIO with OpenDRIVE, and Autoware; and their trajectories back as a log."""
+
+from scenario_gen.output.exchange.cases import Case, Exported
+from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.export import export_bag, ExportFormat, Written
+
+__all__ = ["Case", "ExportConfig", "ExportFormat", "Exported", "Written", "export_bag"]

@@ -14,6 +14,7 @@ from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.folders import Kind, replaced_folder, write_text
+from scenario_gen.base.registry import Registry
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
 from scenario_gen.output.exchange.commonroad import benchmark_id, write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
@@ -32,6 +33,33 @@ class Export:
     notes: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Written:
+    """Names of the files of one scenario, in the folder of the export, and what is to be said of it."""
+
+    names: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+
+def _nothing_shared(_: Case) -> Mapping[str, bytes]:
+    return {}
+
+
+@dataclass(frozen=True)
+class ExportFormat:
+    """A format of other software. The same case must give the same bytes.
+
+    Attributes:
+        write: writes one scenario of a case into the folder; it raises RefusedError for what the format cannot hold.
+        shared: files that all scenarios of a case have in common, by name.
+        own_lanes: whether the lanes of a vector map are written; if not, ones derived from the scenarios are in their place.
+    """
+
+    write: Callable[[Path, Case, Exported, ExportConfig], Written]
+    shared: Callable[[Case], Mapping[str, bytes]] = _nothing_shared
+    own_lanes: bool = False
+
+
 def export_bag(
     bag: Path,
     out: Path,
@@ -47,7 +75,7 @@ def export_bag(
     Args:
         bag: of this suite's conventions.
         out: the folder; an earlier export there is replaced.
-        target: one of `TARGETS`.
+        target: a name in `EXPORTS`.
         export: ego, lanes, time windows.
         config: what is read of the bag at most.
         namespace: only this one.
@@ -57,23 +85,24 @@ def export_bag(
         InputError: the bag cannot be read, or not what is asked for of it; `out` may not be replaced.
         RefusedError: no scenario can be written in that format.
     """
+    to = EXPORTS[target]
     cases = read_cases(bag, export, config, namespace=namespace, indices=indices)
     notes: list[str] = []
     entries: list[dict[str, object]] = []
     with replaced_folder(out, EXPORTED, [bag]) as folder:
         for case in cases:
             about = f"case {case.number}, {case.road_name}{f' in {case.namespace}' if case.namespace else ''}"
-            notes.append(f"{about}: {len(case.scenarios)} scenarios; {_origin(case, target)}")
-            for name, data in SHARED[target](case).items():
+            notes.append(f"{about}: {len(case.scenarios)} scenarios; {_origin(case, to)}")
+            for name, data in to.shared(case).items():
                 _write(folder, name, data)
             for one in case.scenarios:
                 try:
-                    said = TARGETS[target](folder, case, one, export)
+                    said = to.write(folder, case, one, export)
                 except RefusedError as error:
                     notes.append(f"{about}: left out: {error}")
                     continue
                 notes += [f"{about}, scenario {one.index}: {sentence}" for sentence in said.notes]
-                entries.append(_entry(case, one, said.names, target))
+                entries.append(_entry(case, one, said.names, to))
         if not entries:
             raise RefusedError("nothing could be exported:\n" + "\n".join(notes))
         digests = {str(p.relative_to(folder)): _digest(p) for p in sorted(folder.rglob("*")) if p.is_file()}
@@ -82,21 +111,13 @@ def export_bag(
     return Export(len(entries), tuple(notes))
 
 
-@dataclass(frozen=True)
-class _Written:
-    """Names of the files of one scenario, and what is to be said of it."""
-
-    names: tuple[str, ...]
-    notes: tuple[str, ...] = ()
+def _has_own_lanes(case: Case, to: ExportFormat) -> bool:
+    """Say whether the lanes of a vector map are written."""
+    return to.own_lanes and bool(case.lane_map.network)
 
 
-def _has_own_lanes(case: Case, target: str) -> bool:
-    """Say whether the lanes of a vector map are written; OpenDRIVE has derived ones in their place."""
-    return target == "commonroad" and bool(case.lane_map.network)
-
-
-def _origin(case: Case, target: str) -> str:
-    return case.lane_map.network_origin if _has_own_lanes(case, target) else case.lane_map.origin
+def _origin(case: Case, to: ExportFormat) -> str:
+    return case.lane_map.network_origin if _has_own_lanes(case, to) else case.lane_map.origin
 
 
 def _digest(path: Path) -> str:
@@ -107,13 +128,13 @@ def _write(folder: Path, name: str, data: bytes) -> None:
     (folder / name).write_bytes(data)
 
 
-def _entry(case: Case, one: Exported, names: tuple[str, ...], target: str) -> dict[str, object]:
+def _entry(case: Case, one: Exported, names: tuple[str, ...], to: ExportFormat) -> dict[str, object]:
     """Return what the manifest says of a scenario; obstacles and entities of a file are in the order of `vehicles`."""
     return {
         "files": list(names),
         "namespace": case.namespace,
         "road": case.road_name,
-        "lanes": "derived" if case.lane_map.derived and not _has_own_lanes(case, target) else "true",
+        "lanes": "derived" if case.lane_map.derived and not _has_own_lanes(case, to) else "true",
         "index": one.index,
         "seed": one.seed,
         "sha256": one.sha256,
@@ -122,48 +143,42 @@ def _entry(case: Case, one: Exported, names: tuple[str, ...], target: str) -> di
     }
 
 
-def _to_commonroad(folder: Path, case: Case, one: Exported, export: ExportConfig) -> _Written:
+def _to_commonroad(folder: Path, case: Case, one: Exported, export: ExportConfig) -> Written:
     data, notes = write_commonroad(case, one, export)
     name = f"{benchmark_id(case, one)}.xml"
     _write(folder, name, data)
-    return _Written((name,), notes)
+    return Written((name,), notes)
 
 
 def _road_file(case: Case) -> str:
     return f"case_{case.number}.xodr"
 
 
-def _to_openscenario(folder: Path, case: Case, one: Exported, export: ExportConfig) -> _Written:
+def _to_openscenario(folder: Path, case: Case, one: Exported, export: ExportConfig) -> Written:
     name = f"case_{case.number}_{one.index}.xosc"
     _write(folder, name, write_openscenario(case, one, _road_file(case), export))
-    return _Written((name, _road_file(case)))
+    return Written((name, _road_file(case)))
 
 
-def _to_autoware(folder: Path, case: Case, one: Exported, _: ExportConfig) -> _Written:
+def _to_autoware(folder: Path, case: Case, one: Exported, _: ExportConfig) -> Written:
     name = f"case_{case.number}_{one.index}"
     with BagWriter(folder / name) as bag:
         add_autoware(bag, one.others, one.ego, case.start_ns)
     notes = () if one.ego is not None else ("there is no ego, so no /localization/kinematic_state; name one with --ego",)
-    return _Written((name,), notes)
-
-
-def _nothing_shared(_: Case) -> Mapping[str, bytes]:
-    return {}
+    return Written((name,), notes)
 
 
 def _roads(case: Case) -> Mapping[str, bytes]:
     return {_road_file(case): write_opendrive(case.lane_map, case.road_name, case.start_ns)}
 
 
-TARGETS: dict[str, Callable[[Path, Case, Exported, ExportConfig], _Written]] = {
-    "commonroad": _to_commonroad,
-    "openscenario": _to_openscenario,
-    "autoware": _to_autoware,
-}
-"""How one scenario is written, by format."""
-SHARED: dict[str, Callable[[Case], Mapping[str, bytes]]] = {
-    "commonroad": _nothing_shared,
-    "openscenario": _roads,
-    "autoware": _nothing_shared,
-}
-"""What all scenarios of a case have in common, by format: files by name."""
+EXPORTS = Registry[ExportFormat](
+    "scenario_gen.exports",
+    {
+        "commonroad": ExportFormat(_to_commonroad, own_lanes=True),
+        "openscenario": ExportFormat(_to_openscenario, _roads),
+        "autoware": ExportFormat(_to_autoware),
+    },
+    ExportFormat,
+)
+"""The formats by name."""

@@ -15,10 +15,8 @@ from msg_conventions.lanes import TOPIC as LANES
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.method.sampling import Cancelled
-from scenario_gen.ros.plumbing.base import StageNode
-from scenario_gen.ros.plumbing.inputs import Inputs
-from scenario_gen.ros.plumbing.sampling_answer import Answer, answer_request, Config
-from scenario_gen.ros.plumbing.sampling_requests import OpenRequest, OpenRequests
+from scenario_gen.ros.plumbing.sampling_answer import Answer, answer_request, Config, OpenRequest, OpenRequests
+from scenario_gen.ros.plumbing.stage_node import Inputs, StageNode
 from scenario_gen.ros.plumbing.topics import unacknowledged
 from scenario_gen.types import tokens
 

@@ -23,7 +23,7 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs import latitude_longitude, LogConfig, read_log
-from scenario_gen.ros.plumbing.base import StageNode
+from scenario_gen.ros.plumbing.stage_node import StageNode
 from scenario_gen.types import Encounter, tokens
 
 HEAD_START = 1.0  # seconds in which listeners find the streams, which are not latched

@@ -34,8 +34,7 @@ from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.routing import make_planner, plan_routes, plan_with_retry, PlanningConfig, Query
 from scenario_gen.numerics import exact, Floats
-from scenario_gen.ros.plumbing.base import REQUESTS, StageNode
-from scenario_gen.ros.plumbing.inputs import Inputs
+from scenario_gen.ros.plumbing.stage_node import Inputs, REQUESTS, StageNode
 from scenario_gen.types import Road, tokens
 
 EXPLAINED = 20  # newest plans whose lack is explained

@@ -6,7 +6,7 @@
 Each topic is offered with the quality of service it was recorded with, or as `qos_overrides./topic.publisher.reliability` and the
 like say. With an offset, what latched topics had said before it is published first. With `clock`, the bag's time is published on
 /clock, so that nodes with `use_sim_time` follow it, in place of the bag's own /clock. A motion of the bag, its tracks or one of
-its scenarios, is published sample by sample as the frames of its vehicles (frames.py). When all is played and acknowledged the
+its scenarios, is published sample by sample as the frames of its vehicles (`Frames`). When all is played and acknowledged the
 player ends, unless it is to `loop`, or to `stay` for who comes late to latched topics.
 """
 
@@ -23,6 +23,7 @@ import threading
 from time import monotonic
 from typing import Any
 
+import numpy as np
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
@@ -33,14 +34,96 @@ from std_srvs.srv import Trigger
 
 from msg_conventions.cdr import CdrWriter
 from msg_conventions.diagnostics import Level
+from msg_conventions.frames import decode_frames, encode_frames
+from msg_conventions.pictures import encode_footprint
+from msg_conventions.topics import vehicle_topic
+from msg_conventions.tracks import FRAME
+from scenario_gen.bags.recordings.motion import find_motion, Motion
 from scenario_gen.bags.storage.bag import bag_topics, BagMessage, read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
-from scenario_gen.ros.plumbing.frames import find_motion, Frames, Instant
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
-from scenario_gen.ros.plumbing.topics import message_class, Pace, publish, qos, unacknowledged
+from scenario_gen.ros.plumbing.topics import (
+    create_publisher,
+    create_subscription,
+    message_class,
+    Pace,
+    publish,
+    qos,
+    unacknowledged,
+)
+from scenario_gen.types import tokens
+
+MAP = "map"
+OWN = 100  # transforms of ours that may be underway
+
+
+@dataclass(frozen=True)
+class Instant:
+    """Sample `k` of a motion, at a time of the bag: what is to be published there depends on the clock then."""
+
+    k: int
+    stamp_ns: int
+
+
+class Frames:
+    """Publishes one motion, unless another publisher publishes the same frames: then who has published less of them gives in."""
+
+    def __init__(self, node: Node, motion: Motion) -> None:
+        self._node, self._motion = node, motion
+        names = tokens(vehicle.id for vehicle in motion.trajectory.vehicles)
+        self._children = tuple(f"vehicle_{name}" for name in names)
+        space = motion.topic.rpartition("/tracks")[0] or motion.topic.rpartition("/scenarios")[0]
+        self._tf, tie, *self._footprints = (
+            create_publisher(node, topic)
+            for topic in ("/tf", "/tf_static", *(f"{space}/{vehicle_topic(n, 'footprint')}" for n in names))
+        )
+        self.publishers = (self._tf, tie, *self._footprints)
+        self._own: deque[bytes] = deque(maxlen=OWN)
+        self._published = 0
+        self._given_in = False
+        create_subscription(node, "/tf", self._yield_to_others)
+        # The suite's maps and tracks have no place on the earth in common but where a map is the template's own.
+        publish(node, tie, encode_frames(np.zeros((1, 3)), [FRAME], MAP, 0))
+
+    def instants(self) -> Iterator[Instant]:
+        """Yield the samples, each at its time of the bag."""
+        for k, time_ns in enumerate(self._motion.trajectory.time_ns.tolist()):
+            yield Instant(k, self._motion.begin_ns + time_ns)
+
+    def publish(self, instant: Instant, stamp_ns: int) -> None:
+        """Publish one sample's frames, and the footprints in them."""
+        if self._given_in:
+            return
+        motion = self._motion.trajectory
+        here = np.ones(len(self._children), dtype=bool) if motion.there is None else motion.there[:, instant.k]
+        poses = np.column_stack((motion.position[:, instant.k], motion.heading[:, instant.k]))[here]
+        children = [child for child, there in zip(self._children, here, strict=True) if there]
+        data = encode_frames(poses, children, motion.frame_id, stamp_ns)
+        self._own.append(data)
+        self._published += 1
+        publish(self._node, self._tf, data)
+        for publisher, vehicle, frame, there in zip(self._footprints, motion.vehicles, self._children, here, strict=True):
+            if there:
+                publish(self._node, publisher, encode_footprint(vehicle, stamp_ns, frame))
+
+    def _yield_to_others(self, data: bytes, info: dict[str, Any]) -> None:
+        """Give in to whoever publishes one of these frames and has published more on /tf."""
+        if self._given_in or data in self._own:
+            return
+        try:
+            others = {child for _, _, child, _ in decode_frames(data)} & set(self._children)
+        except InputError:
+            return
+        if others and info["publication_sequence_number"] >= self._published:
+            self._given_in = True
+            self._node.get_logger().error(
+                f"another publisher of /tf publishes {', '.join(sorted(others))}: this player publishes no frames any more; "
+                "play one motion at a time in a ROS domain, or set the parameter frames to ''"
+            )
+
 
 STREAMED = BagConfig(most_bytes=2**62)  # a message is published and forgotten, so a bag may be of any size
 PATIENCE = 5.0  # seconds in which listeners have to take the last messages

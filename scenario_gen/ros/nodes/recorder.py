@@ -25,12 +25,12 @@ from rclpy.time import Time
 from std_srvs.srv import Trigger
 
 from msg_conventions.diagnostics import Level
+from scenario_gen.bags.recordings.losses import Losses, remedy
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import BagWriter, Split
 from scenario_gen.base.errors import InputError, of_system
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
-from scenario_gen.ros.plumbing.losses import Losses, remedy
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
 from scenario_gen.ros.plumbing.topics import adapted_quality, message_class, qos
 

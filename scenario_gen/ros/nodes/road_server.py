@@ -29,7 +29,7 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.roads import build_road, RoadConfig
-from scenario_gen.ros.plumbing.base import REQUESTS, StageNode
+from scenario_gen.ros.plumbing.stage_node import REQUESTS, StageNode
 
 
 @dataclass(frozen=True)

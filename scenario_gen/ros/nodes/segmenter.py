@@ -23,10 +23,11 @@ from msg_conventions.diagnostics import Level
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.logs import encounters_of, LogConfig, RawLog, Sample
+from scenario_gen.logs import encounters_of, LogConfig, RawLog
 from scenario_gen.method.segmentation import LiveSegmenter, OnlineConfig, segment, SegmentationConfig
-from scenario_gen.ros.plumbing.base import StageNode
 from scenario_gen.ros.plumbing.live import LiveConfig, LiveStreams
+from scenario_gen.ros.plumbing.stage_node import StageNode
+from scenario_gen.types import Sample
 
 
 @dataclass(frozen=True)

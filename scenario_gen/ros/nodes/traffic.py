@@ -38,11 +38,18 @@ from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import Outcome, read_trials, Trial, trial_of
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
-from scenario_gen.ros.plumbing.ego_commands import FIRST_STAMP, Heard, INPUTS, stamp_of, understood, unusable
+from scenario_gen.ros.plumbing.driving import (
+    Config,
+    encode_verdict,
+    FIRST_STAMP,
+    Heard,
+    INPUTS,
+    stamp_of,
+    surroundings,
+    understood,
+)
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
 from scenario_gen.ros.plumbing.topics import create_publisher, create_subscription, publish
-from scenario_gen.ros.plumbing.traffic_config import Config
-from scenario_gen.ros.plumbing.traffic_messages import encode_verdict, surroundings
 from scenario_gen.types import Road, tokens
 
 OUTPUTS = ("/clock", "/tf", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
@@ -128,15 +135,10 @@ class Traffic(Node):  # type: ignore[misc]
                 road = self._roads.get(entry.map_hash or "")
                 name = f"{entry.request} {entry.index}"
                 self._trials.append(trial_of(name, scenario, entry, road, self.config.ego, f"scenario {name}"))
-            if self._idle and len(self._trials) > self._at:
+            if self._loop is None and len(self._trials) > self._at:
                 self._load(self._at)
         except ScenarioGenError as error:
             self._say(Level.ERROR, str(error), topic)
-
-    @property
-    def _idle(self) -> bool:
-        """Whether nothing is driven."""
-        return self._loop is None
 
     def _load(self, number: int) -> None:
         """Begin a scenario.
@@ -167,10 +169,7 @@ class Traffic(Node):  # type: ignore[misc]
         """Take a command; whatever is wrong with it, the node lives on."""
         if self._loop is None:
             return
-        try:
-            heard = understood(topic, data, self._loop, self._children[self._loop.ego], self._states[-1].step)
-        except ScenarioGenError as error:
-            heard = unusable(topic, self._states[-1].step, str(error))
+        heard = understood(topic, data, self._loop, self._children[self._loop.ego], self._states[-1].step)
         if heard.fault:
             self._say(Level.WARN, heard.fault, "ego")
         self._heard = heard

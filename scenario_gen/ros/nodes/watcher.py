@@ -6,7 +6,7 @@
 from rclpy.node import Node
 
 from msg_conventions.diagnostics import decode_diagnostics, Level
-from scenario_gen.ros.plumbing.forked import say
+from scenario_gen.ros.plumbing.start import say
 from scenario_gen.ros.plumbing.topics import create_subscription
 
 MILESTONES = ("tracks", "map", "changepoints", "fit")

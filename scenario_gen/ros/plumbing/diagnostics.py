@@ -20,8 +20,8 @@ from rclpy.node import Node
 
 from msg_conventions.diagnostics import encode_diagnostics, Level, of_template, Status
 from scenario_gen.base.errors import printable, ScenarioGenError
+from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.ros.plumbing.topics import create_publisher, publish
-from scenario_gen.ros.plumbing.worker import stop_if_abandoned
 
 PERIOD = 1.0  # seconds of real time between two regular messages; what waits is published after half of it at most
 HOLD = 3.0  # seconds for which a finding is shown at least

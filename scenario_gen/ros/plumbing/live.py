@@ -15,10 +15,10 @@ from msg_conventions.streams import decode_fix, decode_speed
 from msg_conventions.topics import FIX_TYPE, TWIST_TYPE, vehicle_topic
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.logs import LogConfig, RawLog, Sample, Streams
+from scenario_gen.logs import LogConfig, RawLog, Streams
 from scenario_gen.ros.plumbing.topics import adapted_quality
 from scenario_gen.template import MOST_VEHICLES
-from scenario_gen.types import token
+from scenario_gen.types import Sample, token
 
 LOOK = 0.2  # seconds between two looks for new streams, and for silence
 TYPES = {"fix": FIX_TYPE, "speed": TWIST_TYPE}

@@ -3,8 +3,6 @@
 
 """ROS parameters from the configuration dataclasses: same names, types, ranges and meanings as on the command line.
 
-`python -m scenario_gen.ros.plumbing.ros_parameters > config/default.yaml` writes the defaults of all stages.
-
 The tools of ROS guess a value's type from its text, each by rules of its own: `-p ego:=21202` is an integer, and `param load`
 makes a text of the 1e-06 that `param dump` wrote. The declaration says what was meant, so values are brought to its type.
 """
@@ -27,13 +25,6 @@ from scenario_gen.base.parameters import current_name, flatten, former_name, upd
 Config = TypeVar("Config")
 INT64 = 2**63 - 1
 USAGE = "usage: {name} [--namespace NAME]... [--ros-args -p PARAMETER:=VALUE ...]"
-DEFAULTS = """\
-# Every parameter of the stages with its default, for the nodes (in any namespace) and for `scenario-gen --params`.
-# A node takes those it declares and leaves the others alone.
-# Written by: python -m scenario_gen.ros.plumbing.ros_parameters > config/default.yaml
-/**:
-  ros__parameters:
-"""
 STATES = ("starts", "goals")  # `1: 10.5 -1.75` would be a mapping to `param load`, so it is kept as `1:10.5 -1.75`
 
 
@@ -177,25 +168,5 @@ def help_of(name: str, nodes: Sequence[Any]) -> str:
     return "\n".join(lines)
 
 
-def default_yaml() -> str:
-    """Return the text of config/default.yaml, as YAML 1.1 reads it back: a real number always has a point."""
-    from scenario_gen.method.config import PipelineConfig  # loads the stages, which a node does without
-
-    lines, stage = [], ""
-    for name, (entry, value) in flatten(PipelineConfig()).items():
-        head, _, rest = name.partition(".")
-        if head != stage:
-            lines.append(f"    {head}:")
-            stage = head
-        text = json.dumps(value)
-        text = re.sub(r"^(-?\d+)(e[+-]?\d+)$", r"\1.0\2", text) if isinstance(value, float) else text
-        lines += [f"      # {entry.metadata['meaning']}{_unit(entry)}", f"      {rest}: {text}"]
-    return DEFAULTS + "\n".join(lines) + "\n"
-
-
 def _unit(entry: "Field[Any]") -> str:
     return f" [{entry.metadata['unit']}]" if entry.metadata["unit"] else ""
-
-
-if __name__ == "__main__":
-    print(default_yaml(), end="")

@@ -1,11 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One request as gp_sampler answers it: a template's messages and the caller's values in, scenarios and a summary out."""
+"""The sampler's requests: who waits, how far the one at work is, its services, and how one request is answered.
 
-from collections.abc import Callable, Mapping
+`~/generate`, `~/cancel_request` for one of the requests, `~/cancel` for all. A template's messages and the caller's values come
+in, scenarios and a summary go out.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import count
+import re
+import threading
+from time import monotonic
+from typing import Any
 
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
+
+from msg_conventions.diagnostics import Level
 from msg_conventions.ego import ego_messages, WITNESS
 from msg_conventions.hashes import template_hashes
 from msg_conventions.pictures import encode_footprint, scenario_markers
@@ -14,12 +28,15 @@ from msg_conventions.scenarios import encode_scenario, messages_of
 from msg_conventions.topics import vehicle_topic
 from scenario_gen.bags.recordings.provenance import parameter_texts, versions
 from scenario_gen.bags.recordings.template import decode_template
+from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.parameters import parameter
 from scenario_gen.method.evaluation import MEASURES
 from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import Callbacks, sample_scenarios, SamplingConfig
 from scenario_gen.method.validity import Limits
+from scenario_gen.ros.plumbing.ros_parameters import values_of_call
+from scenario_gen.ros.plumbing.stage_node import REQUESTS
 from scenario_gen.types import BoundaryStates, EgoSlot, Encounter, GenerationResult, Request, Scenario, ScenarioSet, tokens
 
 Answer = tuple[GenerationResult, RequestSummary]  # what a request came to; its scenarios are published by then
@@ -147,3 +164,178 @@ def answer_request(
     summary = request_summary(result, request, node, config.seed, provenance, cancelled=stopped, reactions=made.reacting)
     out.close(result, summary)
     return made, summary
+
+
+SHOWN = 20  # waiting requests that are named
+SILENCE = 10.0  # seconds after which a line on the terminal says how far a request is, though it is hardly farther
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
+
+
+@dataclass
+class OpenRequest:
+    """One request: its name, the job that does it, and how far it is."""
+
+    name: str
+    job: str
+    wanted: int
+    began: float | None = None
+    accepted: int = 0
+    candidates: int = 0
+    stamp_ns: int = 0
+    logged: tuple[int, float] = field(default=(0, 0.0))  # tenths and time of the last line on the terminal
+
+    def progress(self, accepted: int, candidates: int, stamp_ns: int) -> None:
+        """Take in how far it is."""
+        self.accepted, self.candidates, self.stamp_ns = accepted, candidates, stamp_ns
+
+    def seconds(self) -> float:
+        """For how long it has been at work."""
+        return 0.0 if self.began is None else monotonic() - self.began
+
+    def values(self) -> dict[str, str]:
+        """What /diagnostics reports of it."""
+        return {
+            "request": self.name,
+            "requested": str(self.wanted),
+            "accepted": str(self.accepted),
+            "candidates": str(self.candidates),
+            "seconds": f"{self.seconds():.1f}",
+        }
+
+
+class OpenRequests:
+    """The open requests of a sampler, which its statuses `progress` and `generate` report, and its services."""
+
+    def __init__(self, node: Any) -> None:
+        """Offer the services. `node`: the sampler; it generates, and says what is missing for that."""
+        self._node = node
+        self._open: dict[str, OpenRequest] = {}
+        self._numbers = count(1)
+        self._lock = threading.Lock()
+        node.create_service(SetParametersAtomically, "~/generate", self._generate, qos_profile=REQUESTS)
+        node.serve(SetParametersAtomically, "~/cancel_request", self._cancel_request)
+        node.serve(Trigger, "~/cancel", self._cancel_all)
+
+    def add(self, asked: str = "", job: str = "", wanted: int = 0) -> OpenRequest:
+        """Open a request; without a name of its own, or a job's, it has the next number.
+
+        Raises:
+            InputError: the name is none, or that of an open request.
+        """
+        with self._lock:
+            if asked and not NAME.fullmatch(asked):
+                raise InputError(f"request is {asked!r}; a letter and up to 63 letters, digits, `_`, `-` or `.` are a name")
+            if asked in self._open:
+                raise InputError(f"request {asked!r} is open already; give another name, or wait for its answer")
+            name = asked or str(next(self._numbers))
+            self._open[name] = OpenRequest(name, job or f"request {name}", wanted)
+            return self._open[name]
+
+    def begin(self, request: OpenRequest) -> None:
+        """Its turn has come."""
+        request.began = monotonic()
+        request.logged = (0, request.began)
+        self.report()
+
+    def end(self, request: OpenRequest, level: Level, message: str, **more: str) -> None:
+        """It is done, cancelled or refused; `more` is reported on /diagnostics beside how far it came."""
+        with self._lock:
+            self._open.pop(request.name, None)
+        self._node.status(level, f"request {request.name}: {message}", "generate", request.stamp_ns, **request.values(), **more)
+        self._node.diagnostics.resolve("generate")
+        self.report()
+
+    def cancel(self, name: str) -> str:
+        """Cancel one of them; return what to answer.
+
+        Raises:
+            InputError: none has that name.
+        """
+        with self._lock:
+            request, known = self._open.get(name), ", ".join(list(self._open)[:SHOWN])
+        if request is None or not self._node.cancel(request.job):
+            raise InputError(f"no request {name!r} is open; open: {known or 'none'}")
+        return f"request {name} is cancelled, {request.accepted} of {request.wanted} scenarios were found"
+
+    def report(self) -> None:
+        """Report on /diagnostics how far the request at work is, and on the terminal, if it is a good deal farther."""
+        with self._lock:
+            running = next((request for request in self._open.values() if request.began is not None), None)
+            waiting = [request for request in self._open.values() if request.began is None]
+        if running is None:
+            self._node.diagnostics.status(Level.OK, "no request is at work", "progress", {}, log=False)
+            return
+        values = running.values() | {"waiting": str(len(waiting))}
+        values |= {f"waiting.{request.name}": f"{request.wanted} scenarios" for request in waiting[:SHOWN]}
+        found = f"{running.accepted} of {running.wanted} scenarios from {running.candidates} candidates"
+        message = f"request {running.name}: {found}, {running.seconds():.0f} s"
+        tenths, now = 10 * running.accepted // max(running.wanted, 1), monotonic()
+        farther = now - running.logged[1] >= 1.0 and running.logged[0] < tenths < 10
+        log = farther or now - running.logged[1] >= SILENCE
+        if log:
+            running.logged = (tenths, now)
+        self._node.diagnostics.status(Level.OK, message, "progress", values, running.stamp_ns, log=log)
+
+    async def _generate(
+        self, request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
+    ) -> SetParametersAtomically.Response:
+        """Generate with the caller's parameters; the answer comes when the set is done."""
+        node = self._node
+        try:
+            asked, name = _named(request.parameters)
+            opened = self.add(name)
+        except ScenarioGenError as error:
+            node.diagnostics.failed("generate", error)
+            node.diagnostics.resolve("generate")
+            response.result.reason = str(error)
+            return response
+        try:
+            config, messages = self._inputs_of_call(asked)
+            opened.wanted = config.count
+        except ScenarioGenError as error:
+            self.end(opened, Level.ERROR, str(error), error=type(error).__name__)
+            response.result.reason = f"request {opened.name}: {error}"
+            return response
+
+        def job(cancelled: Callable[[], bool]) -> tuple[bool, str]:
+            try:
+                made: Answer | None = node.generate(messages, opened, config, cancelled)
+            except ScenarioGenError as error:  # which has been reported
+                return False, str(error)
+            if made is None:
+                return False, node.given_up(messages, lambda: True)
+            return bool(made[0].generated.scenarios), made[1].status.message
+
+        answer = await node.result_of(opened.job, job, lambda error: (False, f"{type(error).__name__}: {error}"))
+        response.result.successful, reason = answer
+        response.result.reason = f"request {opened.name}: {reason}"
+        return response
+
+    def _inputs_of_call(self, asked: Sequence[Any]) -> tuple[Any, Mapping[str, bytes]]:
+        if not self._node.active:
+            raise RefusedError("the node is not active; activate it first")
+        config = values_of_call(self._node.config, asked)
+        if missing := self._node.missing(config):
+            raise RefusedError(f"nothing to generate from yet: waiting for {', '.join(missing)}")
+        return config, self._node.messages()
+
+    def _cancel_request(
+        self, request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
+    ) -> SetParametersAtomically.Response:
+        try:
+            response.result.reason = self.cancel(_named(request.parameters)[1])
+            response.result.successful = True
+        except ScenarioGenError as error:
+            response.result.reason = str(error)
+        return response
+
+    def _cancel_all(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        names = self._node.cancel()
+        response.success, response.message = bool(names), f"cancelled: {', '.join(names)}" if names else "nothing is running"
+        return response
+
+
+def _named(parameters: Sequence[Any]) -> tuple[list[Any], str]:
+    """Return a caller's parameters but `request`, and what that is, "" if there is none; the tools of ROS make 7 of '7'."""
+    names = [Parameter.from_parameter_msg(parameter).value for parameter in parameters if parameter.name == "request"]
+    return [parameter for parameter in parameters if parameter.name != "request"], str(names[0]) if names else ""

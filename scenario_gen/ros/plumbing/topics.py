@@ -25,7 +25,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from msg_conventions.topics import topic_entry
 from scenario_gen.base.errors import InputError
-from scenario_gen.ros.plumbing.worker import stop_if_abandoned
+from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.types import Quality
 
 DEPTH = 1000  # messages that a subscription holds at least

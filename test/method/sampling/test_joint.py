@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from reaction_scenes import answering, crossing, lane_encounter, wander
 
+from benchmarks._interaction_measures import following, yielding
 from scenario_gen.method.attempt import Attempt
-from scenario_gen.method.evaluation.interaction import following, yielding
 from scenario_gen.method.sampling import kept_reactions, Plan, plan_of, regenerate, SamplingConfig
 from scenario_gen.method.sampling.candidates import Scale
 from scenario_gen.method.sampling.joint import advance, lateness, Mixing

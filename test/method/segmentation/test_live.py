@@ -8,8 +8,8 @@ import pytest
 
 from msg_conventions import trajectory
 from msg_conventions.changepoints import encode_live_changepoints
-from scenario_gen.logs import Sample
 from scenario_gen.method.segmentation import LiveSegmenter, OnlineSegmenter
+from scenario_gen.types import Sample
 from scenario_gen.types.encounter import Vehicle
 
 TICK = 100_000_000

@@ -28,7 +28,7 @@ FORBIDDEN = {"np": set(NUMPY.split()), "math": set(MATH.split())}
 COUNTS = {  # sum() of whole numbers
     "scenario_gen/output/review/evaluation.py",
     "scenario_gen/bags/storage/reindex.py",
-    "scenario_gen/method/evaluation/evaluate.py",
+    "scenario_gen/method/evaluation/metrics.py",
     "scenario_gen/output/report/page.py",
     "scenario_gen/types/evaluation.py",
     "scenario_gen/output/report/summary.py",

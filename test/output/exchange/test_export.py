@@ -17,7 +17,7 @@ from scenario_gen.cli.commands import app
 from scenario_gen.logs import read_log
 from scenario_gen.output.exchange.cases import read_cases
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.export import export_bag, MANIFEST, TARGETS
+from scenario_gen.output.exchange.export import export_bag, EXPORTS, MANIFEST
 from scenario_gen.output.exchange.importing import import_file
 
 
@@ -25,7 +25,7 @@ def bytes_of(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("target", EXPORTS.built_in)
 def test_the_same_bag_gives_the_same_bytes(small_bag, tmp_path, target):
     for name in ("one", "two"):
         made = export_bag(small_bag, tmp_path / name, target)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.method.routing.search.ompl.solve import solve
+from scenario_gen.method.routing.search.ompl.solve import Options, solve
 from scenario_gen.roads import segment_free
 
 segment_free(np.full((2, 2), 0.5), 0.5, 0.5, 0.5, 0.5, 0.0)  # load the kernel here, not in every child
@@ -23,7 +23,7 @@ def search(answer: Any, request: tuple[Any, ...], iterations: int | None, second
     def stop(calls: int) -> bool:
         return (iterations is not None and calls > iterations) or (seconds is not None and process_time() - started > seconds)
 
-    found = solve(clearance, ends, radius, name, stop, step=config.step or None, seed=seed, simplify=config.simplify)
+    found = solve(clearance, ends, radius, name, stop, Options(config.step or None, config.simplify), seed)
     answer.send((found.simplified, found.checks, process_time() - started))
     answer.close()
     os._exit(0)  # OMPL's destructors are among the things that crash

@@ -35,17 +35,29 @@ class Answer:
     checks: int
 
 
+@dataclass(frozen=True)
+class Options:
+    """How OMPL searches.
+
+    Attributes:
+        step: longest edge [cells]; None: OMPL's own choice.
+        simplify: also run OMPL's path simplifier.
+        state_by_state: check edges by a Python callback per state, a cell apart, instead of exactly.
+    """
+
+    step: float | None = None
+    simplify: bool = True
+    state_by_state: bool = False
+
+
 def solve(
     clearance: Floats,
     ends: Floats,
     radius: float,
     planner: str,
     stop: Callable[[int], bool],
-    *,
-    step: float | None = None,
+    options: Options = Options(),
     seed: int | None = None,
-    simplify: bool = True,
-    state_by_state: bool = False,
 ) -> Answer:
     """Let one of OMPL's planners search for a path.
 
@@ -55,55 +67,24 @@ def solve(
         radius: disc radius [cells].
         planner: a name of PLANNERS.
         stop: called with the number of calls so far (about one per iteration); True ends the search.
-        step: longest edge [cells]; None: OMPL's own choice.
+        options: how it searches.
         seed: of OMPL's random numbers; only the first search of a process can set it.
-        simplify: also run OMPL's path simplifier.
-        state_by_state: check edges by a Python callback per state, a cell apart, instead of exactly.
     """
     util.setLogLevel(util.LOG_NONE)
     if seed is not None:
         util.RNG.setSeed(seed % (2**31 - 1) + 1)
-    height, width = clearance.shape
-    space = base.RealVectorStateSpace(2)
-    bounds = base.RealVectorBounds(2)
-    for axis, extent in enumerate((width, height)):
-        bounds.setLow(axis, 0.0)
-        bounds.setHigh(axis, float(extent))
-    space.setBounds(bounds)
-    information = base.SpaceInformation(space)
-
-    def valid(state: Any) -> bool:
-        x, y = state[0], state[1]
-        return bool(segment_free(clearance, x, y, x, y, radius))
-
-    class Edges(base.MotionValidator):  # type: ignore[misc]
-        """The exact edge check."""
-
-        def checkMotion(self, a: Any, b: Any, *_: Any) -> bool:  # noqa: N802 - OMPL's name
-            return bool(segment_free(clearance, a[0], a[1], b[0], b[1], radius))
-
-    def in_free_cell(state: Any) -> bool:
-        return bool(clearance[min(int(state[1]), height - 1), min(int(state[0]), width - 1)] > radius)
-
-    edges = Edges(information)
-    if state_by_state:
-        information.setStateValidityChecker(in_free_cell)
-        information.setStateValidityCheckingResolution(1.0 / space.getMaximumExtent())
-    else:
-        information.setStateValidityChecker(valid)
-        information.setMotionValidator(edges)
-    information.setup()
+    information = _space(clearance, radius, state_by_state=options.state_by_state)
     problem = base.ProblemDefinition(information)
     states = []
     for end in ends:
-        state = space.allocState()
+        state = information.getStateSpace().allocState()
         state[0], state[1] = float(end[0]), float(end[1])
         states.append(state)
     problem.setStartAndGoalStates(*states)
     problem.setOptimizationObjective(base.PathLengthOptimizationObjective(information))
     search = getattr(geometric, PLANNERS[planner])(information)
-    if step is not None:
-        search.setRange(step)
+    if options.step is not None:
+        search.setRange(options.step)
     search.setProblemDefinition(problem)
     search.setup()
     calls = 0
@@ -118,9 +99,43 @@ def solve(
         return Answer(np.empty((0, 2)), np.empty((0, 2)), calls)
     path = problem.getSolutionPath()
     bare = _vertices(path)
-    if simplify:
+    if options.simplify:
         geometric.PathSimplifier(information).simplifyMax(path)
     return Answer(bare, _vertices(path), calls)
+
+
+def _space(clearance: Floats, radius: float, *, state_by_state: bool) -> Any:
+    """The plane of the grid, with the check of states and edges."""
+    height, width = clearance.shape
+    space = base.RealVectorStateSpace(2)
+    bounds = base.RealVectorBounds(2)
+    for axis, extent in enumerate((width, height)):
+        bounds.setLow(axis, 0.0)
+        bounds.setHigh(axis, float(extent))
+    space.setBounds(bounds)
+    information = base.SpaceInformation(space)
+
+    class Edges(base.MotionValidator):  # type: ignore[misc]
+        """The exact edge check."""
+
+        def checkMotion(self, a: Any, b: Any, *_: Any) -> bool:  # noqa: N802 - OMPL's name
+            return bool(segment_free(clearance, a[0], a[1], b[0], b[1], radius))
+
+    def is_free(state: Any) -> bool:
+        x, y = state[0], state[1]
+        return bool(segment_free(clearance, x, y, x, y, radius))
+
+    def is_in_free_cell(state: Any) -> bool:
+        return bool(clearance[min(int(state[1]), height - 1), min(int(state[0]), width - 1)] > radius)
+
+    if state_by_state:
+        information.setStateValidityChecker(is_in_free_cell)
+        information.setStateValidityCheckingResolution(1.0 / space.getMaximumExtent())
+    else:
+        information.setStateValidityChecker(is_free)
+        information.setMotionValidator(Edges(information))
+    information.setup()
+    return information
 
 
 def _vertices(path: Any) -> Floats:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is wrong with asked start and end states by themselves: speed, room on the road, room beside each other."""
+"""What is wrong with requested start and end states by themselves: speed, room on the road, room beside each other."""
 
 from itertools import combinations
 

@@ -22,8 +22,8 @@ import yaml
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.interrupts import ending
 from scenario_gen.base.parameters import flatten
+from scenario_gen.base.ros_domain import free_domain, this_host_only
 from scenario_gen.pipeline import PipelineConfig
-from scenario_gen.ros.plumbing.domain import free_domain, this_host_only
 
 NODES = ("recorder", "watcher", "gp_sampler", "planner", "segmenter", "road_server", "log_player")
 # who must have spoken before the next one can: topic -> node
@@ -152,7 +152,7 @@ def _run(
         "RCUTILS_COLORIZED_OUTPUT": "0",
     }
     suite = subprocess.Popen(
-        [sys.executable, "-m", "scenario_gen.ros.plumbing.forked", str(scratch / "suite.json")],
+        [sys.executable, "-m", "scenario_gen.ros.plumbing.start", "fork", str(scratch / "suite.json")],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=(scratch / "suite.log").open("w"),

@@ -1,25 +1,125 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What traffic says of a drive, as messages: where everyone is, and the verdict."""
+"""What traffic and a planner under test tell each other: parameters of the node, commands to the ego, messages of a drive."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 import json
 
 import numpy as np
 
 from msg_conventions import driving
-from msg_conventions.autoware import encode_kinematic_state, encode_predicted_objects, HORIZON_NS, OBJECTS, STEP_NS
+from msg_conventions.autoware import EGO, encode_kinematic_state, encode_predicted_objects, HORIZON_NS, OBJECTS, STEP_NS
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.frames import encode_frames
-from msg_conventions.odometry import encode_odometry
+from msg_conventions.odometry import decode_odometry, encode_odometry
 from msg_conventions.pictures import vehicle_markers
 from msg_conventions.topics import vehicle_topic
+from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.local_map import local_map
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
+from scenario_gen.closed_loop.tracking import of_twist, Track
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.numerics import Floats
-from scenario_gen.ros.plumbing.ego_commands import stamp_of
+
+
+@dataclass(frozen=True)
+class Config(Parameters):
+    """The node's parameters; those of a drive are called drive.step, drive.policy and so on."""
+
+    bag: str = parameter("", "bag with scenarios; empty: they come live from `scenarios`, its `info` and `map`")
+    ego: str = parameter("", "id of the vehicle in whose place the ego drives; empty: the scenario's own ego slot, or its first")
+    index: int = parameter(0, "number of the first scenario, from 0, in the order of the bag", low=0)
+    rate: float = parameter(1.0, "how many times as fast as real time", low=0.01, high=1000.0)
+    lock_step: bool = parameter(False, "go one step for each call of ~/step, and not by a clock")
+    wait_for_ego: bool = parameter(True, "begin a drive with the ego's first command; else it brakes until one comes")
+    silence: float = parameter(0.5, "a command older than this is no command, and the ego brakes", unit="s", low=0.01)
+    patience: float = parameter(5.0, "in lock-step, wait so long for a command, in real time", unit="s", low=0.01)
+    follow_on: bool = parameter(True, "go on with the next scenario when one is over")
+    autoware: bool = parameter(
+        False, f"publish {OBJECTS} and {EGO}, too, as Autoware's planners take them; needs autoware_perception_msgs"
+    )
+    results: str = parameter("", "folder for drives.json and junit.xml, written anew after each drive; empty: none")
+    drive: ClosedLoopConfig = field(default_factory=ClosedLoopConfig)
+
+
+INPUTS = ("ego/cmd_vel", "ego/cmd_vel_stamped", "ego/trajectory", "ego/path", "ego/odom")
+WAYS = ("ego/trajectory", "ego/path")  # their times say for when they are; they may be old
+FIRST_STAMP = 1_000_000_000  # ns of a drive's clock at its start: a time of 0 means that none is known
+
+
+@dataclass(frozen=True, eq=False)
+class Heard:
+    """A command: which step of the drive was the last when it came, its stamp [ns, 0: none], and what it gives at an instant."""
+
+    topic: str
+    step: int
+    stamp_ns: int
+    ask: Callable[[State], Command | Pose | None]
+    fault: str = ""
+
+    def fault_at(self, state: State, period: float, silence: float) -> str:
+        """Return why it does not count now, "" if it does: its fault, or that it is older than `silence` [s].
+
+        Args:
+            state: the drive's last state.
+            period: seconds of a step.
+            silence: seconds after which a command is none.
+        """
+        if self.fault or self.topic in WAYS:
+            return self.fault
+        old = (state.step - self.step) * period
+        if self.stamp_ns:
+            old = max(old, stamp_of(state) * 1e-9 - self.stamp_ns * 1e-9)
+        return f"{self.topic}: the last command is {old:.1f} s old" if old > silence else ""
+
+
+def stamp_of(state: State) -> int:
+    """Return a state's time on the drive's clock [ns]."""
+    return FIRST_STAMP + round(state.time * 1e9)
+
+
+def understood(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -> Heard:
+    """Return what a message asks; one that is damaged, or in another frame, asks nothing and has a fault.
+
+    Args:
+        topic: one of `INPUTS`.
+        data: its CDR bytes.
+        loop: the drive.
+        child: the ego's own frame.
+        step: the drive's last step.
+    """
+    try:
+        return _decoded(topic, data, loop, child, step)
+    except ScenarioGenError as error:
+        return Heard(topic, step, 0, lambda _: None, str(error))
+
+
+def _decoded(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -> Heard:
+    period, frame, own = loop.config.step, loop.scenario.frame_id, (child, "base_link", "")
+    if topic.startswith("ego/cmd_vel"):
+        stamp, said, speed, rate = driving.decode_twist(data, topic, stamped=topic.endswith("stamped"))
+        if said not in own and said != frame:
+            raise InputError(f"{topic}: frame {said!r} is not the ego's; {', '.join(map(repr, own[:2]))} are")
+        return Heard(topic, step, stamp, lambda state: of_twist(state.ego, speed, rate, period))
+    if topic in WAYS:
+        decode = driving.decode_trajectory if topic == "ego/trajectory" else driving.decode_timed_path
+        way = decode(data, topic)
+        stamp, said = 0, way.frame_id
+        track = Track.of((way.time_ns - FIRST_STAMP) * 1e-9, way.poses)
+        asked: Callable[[State], Command | Pose | None] = lambda state: track.command(state.ego, state.time, period)  # noqa: E731
+    else:
+        stamp, said, _, state = decode_odometry(data, topic)
+        pose = Pose(*state[:4].tolist())
+        asked = lambda _: pose  # noqa: E731
+    if said != frame:
+        raise InputError(f"{topic}: frame {said!r} is not that of the scenario, {frame!r}")
+    return Heard(topic, step, stamp, asked)
+
 
 GRID_EVERY = 0.2  # seconds of the drive between two local maps
 

@@ -21,6 +21,7 @@ import yaml
 from scenario_gen.base.documents import parse_yaml, read_yaml, shown
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters, updated
+from scenario_gen.base.registry import installed
 
 LIVE = "live"
 ROADS = ("straight", "curve", "t_intersection", "four_way", "merge", "roundabout", "corridor")
@@ -153,8 +154,9 @@ def _check_places(launch: Launch) -> None:
     if log and not Path(str(log)).exists():
         raise InputError(f"log:={shown(log)}: there is no such file or folder")
     road = launch.value("road_name")
-    if road and road not in ROADS and not (str(road).endswith((".yaml", ".yml")) and Path(str(road)).is_file()):
-        raise InputError(f"road:={shown(road)}: neither one of {', '.join(ROADS)} nor a map_server YAML file that is there")
+    roads = (*ROADS, *installed("scenario_gen.roads")) if road not in ROADS else ROADS
+    if road and road not in roads and not (str(road).endswith((".yaml", ".yml")) and Path(str(road)).is_file()):
+        raise InputError(f"road:={shown(road)}: neither one of {', '.join(roads)} nor a map_server YAML file that is there")
     if launch.records and launch.arguments.composed and launch.arguments.respawn:
         raise InputError("respawn:=true: a composed suite does not start again where its bag is; leave out bag or composed")
     if (bag := launch.value("bag")) and Path(str(bag)).exists():

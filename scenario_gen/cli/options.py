@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the commands share: options, how a command takes a class of them, the configuration, and what is printed."""
+
+from collections.abc import Callable
+from dataclasses import fields, MISSING
+import inspect
+from pathlib import Path
+from typing import Annotated, Any, get_type_hints, TYPE_CHECKING, TypeVar
+
+import typer
+
+if TYPE_CHECKING:
+    from scenario_gen.pipeline import PipelineConfig
+
+Options = TypeVar("Options")
+Config = TypeVar("Config")
+SetOption = Annotated[
+    list[str] | None, typer.Option("--set", help="one parameter, as name=value; `scenario-gen parameters` lists them")
+]
+ParametersOption = Annotated[Path | None, typer.Option("--params", help="a parameter file, e.g. config/default.yaml")]
+
+
+def takes(options: type[Options]) -> Callable[[Callable[[Options], None]], Callable[..., None]]:
+    """Let typer give a command its options as one frozen dataclass, whose fields are annotated as typer's parameters are."""
+
+    def of(command: Callable[[Options], None]) -> Callable[..., None]:
+        def parsed(**values: Any) -> None:
+            command(options(**values))
+
+        hints = get_type_hints(options, include_extras=True)
+        parsed.__name__, parsed.__doc__, parsed.__annotations__ = command.__name__, command.__doc__, hints
+        parsed.__signature__ = inspect.Signature([  # type: ignore[attr-defined]
+            inspect.Parameter(
+                entry.name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=inspect.Parameter.empty if entry.default is MISSING else entry.default,
+                annotation=hints[entry.name],
+            )
+            for entry in fields(options)  # type: ignore[arg-type]
+        ])  # fmt: skip
+        return parsed
+
+    return of
+
+
+def say(*what: Any, sep: str = " ", wrap: bool = False) -> None:
+    """Print to standard output: texts letter by letter, and what rich can draw; `wrap` breaks lines at the terminal's width."""
+    from scenario_gen.base.terminal import Terminal
+
+    Terminal().print(*what, sep=sep, soft_wrap=not wrap)
+
+
+def assigned_all(config: Config, assignments: list[str] | None) -> Config:
+    """Return a configuration with each `name=value` in it.
+
+    Raises:
+        InputError: a name is unknown or a value does not suit; the message names it.
+    """
+    from scenario_gen.base.parameters import assigned
+
+    for assignment in assignments or []:
+        config = assigned(config, assignment)
+    return config
+
+
+def configured(file: Path | None, assignments: list[str] | None) -> "PipelineConfig":
+    """Return the pipeline's configuration: defaults, then the file, then each `name=value`.
+
+    Raises:
+        InputError: the file cannot be read, a name is unknown or a value does not suit; the message names it.
+    """
+    from scenario_gen.base.parameters import loaded
+    from scenario_gen.pipeline import PipelineConfig
+
+    return assigned_all(PipelineConfig() if file is None else loaded(PipelineConfig(), file), assignments)
+
+
+def remind(bag: Path) -> None:
+    """Say what is missing of a bag that is read all the same."""
+    from scenario_gen.bags.storage.files import remarks
+
+    for remark in remarks(bag):
+        say(remark)

@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What metrics are taken of: the scenarios of a set beside their template, brought to common clocks once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+
+from scenario_gen.method.evaluation.bootstrap import Bootstrap
+from scenario_gen.method.evaluation.config import EvaluationConfig
+from scenario_gen.method.evaluation.criticality import Criticality, criticality
+from scenario_gen.method.evaluation.distributions import values_of
+from scenario_gen.method.evaluation.dtw import Distance
+from scenario_gen.method.evaluation.motion import at_common, at_count, at_period, Motion, of_vehicles, stacked
+from scenario_gen.method.evaluation.similarity import pair_similarity, PairSimilarity
+from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.types import CheckCounts, Encounter, Scenario
+
+
+@dataclass(frozen=True, eq=False)
+class Template:
+    """The recorded encounter, which every set is measured against, with the vehicles that all sets have.
+
+    Attributes:
+        encounter: as recorded.
+        ids: of the vehicles that are measured.
+        steps: T, number of even instants.
+        replayed: the fitted template, if there is one.
+        config: how to measure.
+        seed: of the bootstrap.
+    """
+
+    encounter: Encounter
+    ids: tuple[str, ...]
+    steps: int
+    replayed: Scenario | None
+    config: EvaluationConfig
+    seed: int
+
+    def even(self, source: Encounter | Scenario) -> Motion:
+        """Return the motion of these vehicles at T instants spread evenly over the duration."""
+        return chosen(at_count(source, self.steps), self.ids)
+
+    def periodic(self, source: Encounter | Scenario) -> Motion:
+        """Return the motion of these vehicles on the clock of distributions and criticality (`period`)."""
+        return chosen(at_period(source, self.config.period), self.ids)
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The encounter at the even instants."""
+        return self.even(self.encounter)
+
+    @cached_property
+    def fitted(self) -> Motion | None:
+        """The fitted template at the even instants."""
+        return self.even(self.replayed) if self.replayed else None
+
+    @cached_property
+    def values(self) -> dict[str, Floats]:
+        """(n,) values of the encounter by quantity, in the units of `QUANTITIES` (m, s, rad)."""
+        return values_of(self.periodic(self.encounter))
+
+    @cached_property
+    def critical(self) -> Criticality:
+        """The encounter's criticality."""
+        return criticality(self.periodic(self.encounter), self.config.ttc_horizon)
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """The scenarios of a set that are measured, beside their template.
+
+    Attributes:
+        scenarios: S of them.
+        counts: the checker's account of all candidates of the set, if there is one.
+        template: what they were generated from.
+    """
+
+    scenarios: Sequence[Scenario]
+    counts: CheckCounts | None
+    template: Template
+
+    @cached_property
+    def motions(self) -> tuple[Motion, ...]:
+        """S motions at the template's even instants."""
+        return tuple(map(self.template.even, self.scenarios))
+
+    @cached_property
+    def periodic(self) -> tuple[Motion, ...]:
+        """S motions on the clock of distributions and criticality."""
+        return tuple(map(self.template.periodic, self.scenarios))
+
+    @cached_property
+    def there(self) -> Bools:
+        """(N, T) vehicles and even instants that the template and all samples have."""
+        there = [self.template.motion.there, *(motion.there for motion in self.motions)]
+        return np.asarray(np.logical_and.reduce(there))
+
+    @cached_property
+    def bootstrap(self) -> Bootstrap:
+        """What turns a figure of each sample, or a statistic of weights, into an estimate with its interval."""
+        config = self.template.config
+        return Bootstrap.draw(antithetic_pairs(self.scenarios), config.resamples, config.level, self.template.seed)
+
+    @cached_property
+    def pairs(self) -> tuple["VehiclePair", ...]:
+        """The pairs of vehicles that are there together, for COMMON s, in the template and in all samples."""
+        template, steps = self.template.motion, self.template.steps
+        throughout = all(motion.always for motion in (template, *self.motions))
+        whole = stacked(self.motions)
+        found = []
+        for a, b in combinations(range(len(template.vehicles)), 2):
+            if throughout:
+                rows = [a, b]
+                own = template.position[rows], template.speed[rows], template.heading[rows]
+                found.append(VehiclePair(own, tuple(values[:, rows] for values in whole)))
+                continue
+            names = template.vehicles[a].id, template.vehicles[b].id
+            sources: list[Encounter | Scenario] = [self.template.encounter, *self.scenarios]
+            common = [motion for source in sources if (motion := at_common(source, names, steps)) is not None]
+            if len(common) == len(sources):
+                own = common[0].position, common[0].speed, common[0].heading
+                found.append(VehiclePair(own, stacked(common[1:])))
+        return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class VehiclePair:
+    """Two vehicles while both are there, in the template and in S samples, at the same number of instants T.
+
+    `template` holds positions (2, T, 2) [m], speeds (2, T) [m/s] and headings (2, T) [rad], `samples` the same of S.
+    """
+
+    template: tuple[Floats, ...]
+    samples: tuple[Floats, ...]
+
+    def similarity(self, k: int, distance: Distance, least: float = 0.0) -> PairSimilarity:
+        """Compare one of the three, as `pair_similarity` does."""
+        target, series = self.template[k], self.samples[k]
+        if target.ndim == 2:
+            target, series = target[..., None], series[..., None]
+        target, series = np.moveaxis(target, -1, -2), np.moveaxis(series, -1, -2)
+        return pair_similarity((target[0], target[1]), (series[:, 0], series[:, 1]), distance, least)
+
+
+def chosen(motion: Motion, ids: Sequence[str]) -> Motion:
+    """Return the motion of the vehicles with these ids, in their order."""
+    own = [vehicle.id for vehicle in motion.vehicles]
+    return of_vehicles(motion, [own.index(known) for known in ids])
+
+
+def antithetic_pairs(scenarios: Sequence[Scenario]) -> Ints:
+    """Return the number (S,) of each scenario's antithetic pair.
+
+    The sampler draws candidates 2k and 2k + 1 of a seed as mirror images.
+    Scenarios that share a number were not numbered by the sampler; each is a pair of its own.
+    """
+    numbers = [(scenario.seed, scenario.index) for scenario in scenarios]
+    if len(set(numbers)) < len(numbers):
+        return np.arange(len(numbers))
+    pairs: dict[tuple[int, int], int] = {}
+    return np.array([pairs.setdefault((seed, index // 2), len(pairs)) for seed, index in numbers], dtype=np.int64)

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The example package adds a road, a log format, a planner, a metric and an export format, to the command and to the library."""
+
+import json
+import os
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from scenario_gen import read_log
+from scenario_gen.logs import bundled
+
+ROOT = Path(__file__).resolve().parents[2]
+PLUGIN = ROOT / "examples" / "plugin"
+
+
+@pytest.fixture(scope="module")
+def python(tmp_path_factory):
+    """Run Python with the example package installed, in a folder that holds a log of its format."""
+    work = tmp_path_factory.mktemp("plugin")
+    shutil.copytree(PLUGIN, work / "source")
+    offline = ("--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check")
+    target = ("--target", str(work / "installed"), str(work / "source"))
+    subprocess.run([sys.executable, "-m", "pip", "install", "-q", *offline, *target], check=True)
+    encounter = read_log(bundled("a")).encounters[0]
+    with (work / "log.jsonl").open("w") as file:
+        for n, vehicle in enumerate(encounter.vehicles):
+            for t, (x, y), yaw in zip(encounter.time, encounter.position[n], encounter.heading[n], strict=True):
+                print(json.dumps({"vehicle": vehicle.id, "t": t, "x": x, "y": y, "heading": yaw}), file=file)
+    path = os.pathsep.join([str(work / "installed"), str(ROOT), os.environ.get("PYTHONPATH", "")])
+
+    def run(*arguments):
+        found = subprocess.run(
+            [sys.executable, *arguments],
+            cwd=work,
+            env=os.environ | {"PYTHONPATH": path},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert found.returncode == 0, found.stdout + found.stderr
+        return found.stdout
+
+    run.folder = work
+    return run
+
+
+def test_the_command_takes_all_by_name(python):
+    options = ("--road", "skew_crossing", "--count", "2", "--out", "out", "--set", "planning.planner=one_corner")
+    said = python("-m", "scenario_gen", "generate", "log.jsonl", *options, "--set", "log.format=json_lines")
+    assert "log on skew_crossing" in said
+    (evaluation,) = json.loads((python.folder / "out" / "evaluation.json").read_text())["cases"]
+    assert evaluation["metrics"][-1]["id"] == "mean_speed" and evaluation["road"] == "skew_crossing"
+    rows = {row["name"]: row["values"]["mean_speed"] for row in evaluation["rows"]}
+    assert rows["template"]["value"] > 1.0 and rows["with changepoints"]["value"] > 0.5 * rows["template"]["value"]
+
+    python("-m", "scenario_gen", "export", "out/bag", "--to", "csv", "--out", "tables")
+    manifest = json.loads((python.folder / "tables" / "export.json").read_text())
+    names = [name for entry in manifest["scenarios"] for name in entry["files"]]
+    assert manifest["format"] == "csv" and names == ["case_1_0.csv", "case_1_1.csv"]
+    lines = (python.folder / "tables" / names[0]).read_text().splitlines()
+    assert lines[0] == "time,vehicle,x,y,heading,speed" and len(lines) > 100
+
+
+USE = """
+from pathlib import Path
+from scenario_gen import build_road, evaluate_scenarios, fit_template, plan_routes, PlanningConfig, read_log, segment
+from scenario_gen.method.evaluation import replay
+
+(encounter,) = read_log("log.jsonl").encounters  # its format is found by its name
+road = build_road("skew_crossing", encounter)
+fit = fit_template(encounter, segment(encounter), road)
+config = PlanningConfig(planner="one_corner", drivable=False)
+routes = plan_routes(road, fit, config, seed=1)
+assert [len(route.points) > 1 for route in routes] == [not fitted.stands.all() for fitted in fit.fitted]
+evaluation = evaluate_scenarios(encounter, {"oracle": [replay(encounter, fit)]})
+assert abs(evaluation.value("oracle", "mean_speed") / evaluation.value("template", "mean_speed") - 1.0) < 0.1
+assert "| **Speed** |" in evaluation.to_markdown()
+"""
+
+
+def test_the_library_takes_all_by_name(python):
+    python("-c", USE)
+
+
+def test_the_package_is_small():
+    lines = [line for path in PLUGIN.rglob("*") if path.suffix in (".py", ".toml") for line in path.read_text().splitlines()]
+    assert len(lines) < 150
