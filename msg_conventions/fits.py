@@ -101,8 +101,8 @@ def decode_losses(values: Mapping[str, str]) -> tuple[Loss, ...]:
     for key, text in values.items():
         if key.startswith("lost."):
             with guarded(f"fit: {key} is damaged"):
-                kind, vehicles, said = json.loads(text)
-                found.append(Loss(str(kind), tuple(str(vehicle) for vehicle in vehicles), str(said)))
+                kind, vehicles, sentence = json.loads(text)
+                found.append(Loss(str(kind), tuple(str(vehicle) for vehicle in vehicles), str(sentence)))
     return tuple(found)
 
 

@@ -23,7 +23,7 @@ TEMPLATE_HASH, MAP_HASH = "template_hash", "map_hash"
 def hash_of(topic: str, data: bytes) -> str:
     """Return the first 12 hexadecimal digits of the SHA-256 of a message's CDR bytes; of a map's without its two stamps.
 
-    So the same geometry has the same hash, whatever template it was made for.
+    So the same geometry has the same hash, whatever its template.
     """
     if topic == lanes.TOPIC:
         data = data[: len(data) - (len(data) - lanes.TAIL) % 4]  # without the padding of DDS

@@ -6,7 +6,7 @@
 Map: 0 free, 100 occupied, 99 occupied by an obstacle on the road, -1 unknown; a cell is drivable if it is
 known and below 65 (nav2's occupied threshold).
 `info.origin` is the lower-left corner of cell (0, 0), not rotated; row 0 is the lowest y. Entries head into the road, exits out
-of it. Stamp: that of the template the road was made for, or 0 for one that suits any. QoS: reliable, transient_local, depth 1.
+of it. Stamp: that of the template of the road, or 0 if it suits any. QoS: reliable, transient_local, depth 1.
 The road's name is not in the messages: nothing is computed from it.
 """
 

@@ -106,12 +106,12 @@ class ScenarioEntry:
 
     @property
     def template_hash(self) -> str | None:
-        """Hash of the `tracks` that it was made from (hashes.py); None before version 0.2."""
+        """Hash of its template, the `tracks` (hashes.py); None before version 0.2."""
         return self.status.values.get(TEMPLATE_HASH)
 
     @property
     def map_hash(self) -> str | None:
-        """Hash of the `map` that it was made for, likewise."""
+        """Hash of its `map`, likewise."""
         return self.status.values.get(MAP_HASH)
 
     def asked(self, what: str = INFO, *, witness: bool = False) -> BoundaryStates | None:

@@ -8,7 +8,7 @@ Frame: `header.frame_id`. `header.stamp`: the template's first sample; what deri
 `points[k].time_from_start`: time since `header.stamp`. `points[k].transforms[i]`: pose of the footprint's centre,
 z = 0 (`ABSENT` where the vehicle is not there: far below the ground; x, y and yaw are then those of its first or last instant),
 yaw as a quaternion. `velocities[i].linear.x`: speed along the heading, m/s. `accelerations[i].linear.x`: likewise,
-m/s². All other components are zero; nothing is NaN. In `scenarios` nobody is ever absent: see scenarios.py.
+m/s². All other components are zero; nothing is NaN. In `scenarios` no vehicle is ever absent: see scenarios.py.
 """
 
 from collections.abc import Sequence

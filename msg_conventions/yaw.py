@@ -34,7 +34,7 @@ def check_quaternions(quaternions: Floats, what: str) -> None:
     """Refuse quaternions (..., 4) that are no rotation; lengths near 1 are left to rounding.
 
     Raises:
-        InputError: naming `what`, one is shorter than a half (all zeros, as a rule, for nobody set it), or far too long.
+        InputError: naming `what`, one is shorter than a half (as a rule all zeros, because it was not set), or far too long.
     """
     squared = np.square(np.clip(quaternions, -2.0 * LARGEST, 2.0 * LARGEST)).sum(axis=-1)
     wrong = (squared < SHORTEST * SHORTEST) | (np.abs(quaternions) > LARGEST).any(axis=-1)

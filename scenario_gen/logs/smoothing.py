@@ -238,7 +238,7 @@ def layout(ticks: Floats, stands: Bools, speed: Floats, raw: Floats, seconds: Fl
         stands: (T,) whether it stands there.
         speed: (T,) measured [m/s].
         raw: (T,) of the fixes [m/s].
-        seconds: (F,) when it is asked for.
+        seconds: (F,) stamps of the fixes.
     """
     rate = np.where(stands, 0.0, np.where(np.abs(speed - raw) > DOUBTED, raw, speed))
     driven = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(ticks))])

@@ -6,7 +6,7 @@
 The one reader of the conventions' topics, whoever recorded them: evaluation, validation and regeneration use it.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -100,8 +100,13 @@ class Namespace(RecordedScenarios):
     """What a bag holds in one namespace.
 
     Properties for people to look at (`statuses`, `segmentation`, `fit`, `entries`, …) leave out what is missing or damaged; what
-    a scenario is checked against or made of is an error then.
+    a scenario is checked against or generated from raises an error then.
     """
+
+    def __init__(self, path: Path, name: str, messages: Mapping[str, Sequence[BagMessage]], shared: Sequence[bytes]) -> None:
+        """Take the bag's path, the namespace's name, its messages by topic, and /diagnostics of all namespaces."""
+        super().__init__(path, name, messages)
+        self._shared = shared
 
     # The template and the road of one scenario.
 

@@ -25,9 +25,9 @@ SCENARIOS = "scenarios"
 class RecordedScenarios:
     """The messages of one namespace of a bag, and the requests and scenarios among them."""
 
-    def __init__(self, path: Path, name: str, messages: Mapping[str, Sequence[BagMessage]], shared: Sequence[bytes]) -> None:
-        """Take the bag's path, the namespace's name, its messages by topic, and /diagnostics of all namespaces."""
-        self.path, self.name, self._recorded, self._shared = path, name, messages, shared
+    def __init__(self, path: Path, name: str, messages: Mapping[str, Sequence[BagMessage]]) -> None:
+        """Take the bag's path, the namespace's name and its messages by topic."""
+        self.path, self.name, self._recorded = path, name, messages
 
     @cached_property
     def messages(self) -> Mapping[str, Sequence[BagMessage]]:

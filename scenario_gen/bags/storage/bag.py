@@ -48,16 +48,13 @@ class BagMessage:
     stamp_ns: int
 
 
+@dataclass(frozen=True)
 class StoredBag:
-    """An open bag."""
+    """An open bag: its files, how they are compressed ("" or as rosbag2 calls it), and the bounds of reading them."""
 
-    def __init__(
-        self, path: Path, files: list[tuple[Path, McapFile | SqliteFile]], compression: str, allowance: Allowance
-    ) -> None:
-        self._path = path
-        self._files = files
-        self._compression = compression
-        self._allowance = allowance
+    files: list[tuple[Path, McapFile | SqliteFile]]
+    compression: str
+    allowance: Allowance
 
     def topics(self) -> tuple[BagTopic, ...]:
         """Return the topics, sorted by name; of one that is in several files the first one's, with the messages of all.
@@ -66,7 +63,7 @@ class StoredBag:
             InputError: a file is damaged.
         """
         found: dict[str, BagTopic] = {}
-        for file, storage in self._files:
+        for file, storage in self.files:
             for stored in _topics(file, storage).values():
                 _check_type(stored, file)
                 topic = found.get(stored.name) or BagTopic(stored.name, stored.type, quality_of(stored.qos), 0)
@@ -79,8 +76,8 @@ class StoredBag:
         Raises:
             InputError: a file is damaged, or there are more messages than the bounds allow.
         """
-        for message in heapq.merge(*(self._of_file(*entry, wanted) for entry in self._files), key=lambda m: m.stamp_ns):
-            self._allowance.hold(len(message.data))
+        for message in heapq.merge(*(self._of_file(*entry, wanted) for entry in self.files), key=lambda m: m.stamp_ns):
+            self.allowance.hold(len(message.data))
             yield message
 
     def _of_file(self, file: Path, storage: McapFile | SqliteFile, wanted: Callable[[str, str], bool]) -> Iterator[BagMessage]:
@@ -98,14 +95,14 @@ class StoredBag:
 
     def _whole(self, data: bytes, file: Path) -> bytes:
         """Return a message, decompressed where the bag compresses each by itself."""
-        if self._compression != "message":
+        if self.compression != "message":
             return data
-        most = self._allowance.config.most_chunk_bytes
+        most = self.allowance.config.most_chunk_bytes
         with guarded(f"{file}: a message cannot be decompressed"):
             whole = bytes(zstandard.ZstdDecompressor().stream_reader(io.BytesIO(data)).read(most + 1))
         if len(whole) > most:
             raise InputError(f"{file}: a message decompresses to more than bag.most_chunk_bytes ({most})")
-        self._allowance.unpack(len(whole))
+        self.allowance.unpack(len(whole))
         return whole
 
 
@@ -179,7 +176,7 @@ def open_bag(
             with _place(file):
                 stream = stack.enter_context(real.open("rb"))
                 files.append((file, open_mcap(stream, real.stat().st_size, allowance)))
-        yield StoredBag(path, files, found.compression, allowance)
+        yield StoredBag(files, found.compression, allowance)
 
 
 def _unpacked(file: Path, stack: ExitStack, allowance: Allowance) -> Path:

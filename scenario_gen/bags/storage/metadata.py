@@ -164,7 +164,7 @@ def _is_whole(profile: Any) -> bool:
 
 @lru_cache(maxsize=256)
 def quality_of(text: str) -> Quality:
-    """Return the quality that the first of the profiles offers: volatile, depth 10 where the text says none."""
+    """Return the quality that the first of the profiles offers: volatile, depth 10 where there is none."""
     for profile in profiles(text)[:1]:
         reliable = str(profile["reliability"]).lower() not in ("best_effort", "2")  # a number, as rosbag2 wrote before Jazzy
         return Quality(max(1, profile["depth"]), reliable, str(profile["durability"]).lower() in ("transient_local", "1"))

@@ -219,7 +219,7 @@ def decompress(data: bytes, head: ChunkHead, allowance: Allowance) -> bytes:
     """Return the records of a chunk, of the size that its head announces and no more.
 
     Raises:
-        DamagedError: it is too large, cannot be decompressed, or has another size or checksum than its head says.
+        DamagedError: it is too large, cannot be decompressed, or has not the size or checksum in its head.
         InputError: the bag as a whole is too large.
     """
     most, offset = allowance.config.most_chunk_bytes, head.records.start
@@ -253,7 +253,7 @@ def _unpacked(data: bytes, compression: str, most: int) -> bytes:
 
 
 def read_contents(raw: bytes, offset: int, allowance: Allowance) -> Contents:
-    """Find the records of a chunk; where one is damaged, the reading ends there and `damage` says so.
+    """Find the records of a chunk; where one is damaged, the reading ends there and `damage` is set.
 
     Args:
         raw: the decompressed chunk.

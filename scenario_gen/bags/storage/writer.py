@@ -98,7 +98,7 @@ class BagWriter:
         self._channel(name)
 
     def _channel(self, name: str) -> int:
-        """Return the channel of a topic in the current file, made at its first use."""
+        """Return the channel of a topic in the current file, created at its first use."""
         if name not in self._channels:
             topic, (encoding, text) = self._topics[name]
             if topic.type not in self._schemas:
@@ -116,20 +116,13 @@ class BagWriter:
         """
         if stamp_ns < 0:
             raise InputError(f"{name}: stamp {stamp_ns} ns is before 1970; an MCAP file cannot hold it")
-        try:
-            self._write(name, data, stamp_ns)
-        except OSError:  # part of a record may be written
-            self._broken = True
-            raise
-
-    def _write(self, name: str, data: bytes, stamp_ns: int) -> None:
-        full = self._split.bytes and self._bytes >= self._split.bytes
-        long = self._split.seconds and self._file.count and stamp_ns - self._file.start_ns >= self._split.seconds * 1e9
-        if full or long:
-            self._close_file()
-            self._open()
-        topic, _ = self._topics[name]
-        with naming(self.folder / self._file.path):
+        with self._writing():
+            full = self._split.bytes and self._bytes >= self._split.bytes
+            long = self._split.seconds and self._file.count and stamp_ns - self._file.start_ns >= self._split.seconds * 1e9
+            if full or long:
+                self._close_file()
+                self._open()
+            topic, _ = self._topics[name]
             channel = self._channel(name)
             self._writer.add_message(channel, log_time=stamp_ns, data=data, publish_time=stamp_ns, sequence=topic.count)
             self._stream.flush()  # a full chunk, which the writer has just written
@@ -137,6 +130,16 @@ class BagWriter:
         self._bytes += len(data)
         topic.count += 1
         self.held = True
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Name the current file in errors; after one, part of a record may be written, and nothing more is."""
+        try:
+            yield
+        except OSError as error:
+            error.filename = str(self.folder / self._file.path)
+            self._broken = True
+            raise
 
     def let_go(self) -> None:
         """Write the current chunk, if there is one, so that a killed process does not lose it.
@@ -146,13 +149,9 @@ class BagWriter:
         """
         if self._broken or not self.held:
             return
-        try:
-            with naming(self.folder / self._file.path):
-                self._writer._Writer__finalize_chunk()  # mcap has no public name for it
-                self._stream.flush()
-        except OSError:
-            self._broken = True
-            raise
+        with self._writing():
+            self._writer._Writer__finalize_chunk()  # mcap has no public name for it
+            self._stream.flush()
         self.held = False
 
     def close(self) -> None:

@@ -199,7 +199,7 @@ def _finish(dead: Claim) -> None:
         if is_gone(dead.place):
             dead.old.rename(dead.place)
         elif dead.new.exists():
-            return  # somebody has put something else there since
+            return  # another file has come there since
     if dead.new.exists() and is_marked(dead.new) and objection(dead.new, None):
         return
     _remove(dead.folder)
