@@ -87,7 +87,7 @@ def test_the_nodes_that_are_started(tmp_path):
 
 
 def test_a_road_of_an_installed_package_can_be_named(monkeypatch):
-    monkeypatch.setattr("scenario_gen.ros.plumbing.launching.installed", lambda group: {"plaza": group})
+    monkeypatch.setattr("scenario_gen.cli.launching.installed", lambda group: {"plaza": group})
     assert launched(log=LOG, road="plaza")
     with pytest.raises(InputError, match=r"road:=nowhere: neither one of straight, .*, corridor, plaza nor a map_server"):
         launched(log=LOG, road="nowhere")
