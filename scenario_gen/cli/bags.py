@@ -13,7 +13,7 @@ from scenario_gen.base.errors import InputError, printable
 from scenario_gen.cli.options import configured, ParametersOption, remind, say, SetOption
 
 if TYPE_CHECKING:
-    from scenario_gen.closed_loop.command import OverDds
+    from scenario_gen.closed_loop.command import RunTrials
 
 commands = typer.Typer()
 
@@ -101,7 +101,7 @@ def drive(
     from rich.table import Table
 
     from scenario_gen.base.terminal import progress_bars
-    from scenario_gen.closed_loop.command import drive_bag
+    from scenario_gen.closed_loop.command import drive_bag, in_processes
 
     remind(bag)
     with progress_bars() as advance:
@@ -110,11 +110,10 @@ def drive(
             planner,
             ego=ego,
             count=count,
-            workers=workers,
             out=out,
             assignments=assignments or [],
             progress=lambda done, total: advance(planner, done, total),
-            over_dds=_over_dds() if ros else None,
+            run=_over_dds() if ros else in_processes(workers),
         )
     table = Table("drives", planner)
     for name, rate in result.found.items():
@@ -129,7 +128,7 @@ def drive(
         raise typer.Exit(1)
 
 
-def _over_dds() -> "OverDds":
+def _over_dds() -> "RunTrials":
     """Return what drives over DDS.
 
     Raises:

@@ -14,7 +14,8 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.results import DRIVEN, JSON, JUNIT, PAGE, write_drives
 from scenario_gen.closed_loop.trials import Bars, broken_bars, Outcome, Rate, rates, read_trials, run_trials, Trial
 
-OverDds = Callable[[Sequence[Trial], str, ClosedLoopConfig, Callable[[int, int], None]], list[Outcome]]
+Progress = Callable[[int, int], None]  # of drives done, of how many
+RunTrials = Callable[[Sequence[Trial], str, ClosedLoopConfig, Progress], list[Outcome]]
 WORST = 5  # drives that the terminal names
 
 
@@ -36,30 +37,33 @@ class DriveResult:
     written: Sequence[Path]
 
 
+def in_processes(workers: int = 0) -> RunTrials:
+    """Return what drives trials in so many processes; 0: one for each core."""
+    return lambda trials, planner, config, progress: run_trials(trials, planner, config, workers or os.cpu_count() or 1, progress)
+
+
 def drive_bag(
     bag: Path,
     planner: str,
     *,
     ego: str = "",
     count: int = 0,
-    workers: int = 0,
     out: Path,
     assignments: Sequence[str] = (),
-    progress: Callable[[int, int], None] = lambda *_: None,
-    over_dds: OverDds | None = None,
+    progress: Progress = lambda *_: None,
+    run: RunTrials | None = None,
 ) -> DriveResult:
     """Drive a planner through the scenarios of a bag and write what it came to.
 
     Args:
         bag: of this suite.
-        planner: MODULE:CLASS; with `over_dds` the command that starts its node.
+        planner: MODULE:CLASS; over DDS the command that starts its node.
         ego: id of the vehicle in whose place it drives.
         count: scenarios at most; 0: all.
-        workers: processes; 0: one for each core.
         out: folder of the results.
         assignments: parameters as name=value; those of a drive without prefix, those of the bars as bars.name.
-        progress: told how many are done of how many.
-        over_dds: drives them over DDS, one after the other, instead of in this process.
+        progress: called with how many are done of how many.
+        run: drives them; `in_processes()` if None, or over DDS, one after the other.
 
     Raises:
         InputError: bag, planner, folder or a parameter is wrong; the message names it.
@@ -69,10 +73,7 @@ def drive_bag(
         config = assigned(config, assignment if assignment.startswith(("bars.", "drive.")) else f"drive.{assignment}")
     trials = read_trials(bag, ego, count)
     with replaced_folder(out, DRIVEN, [bag]) as folder:  # before there is work that might not be kept
-        if over_dds is not None:
-            outcomes = over_dds(trials, planner, config.drive, progress)
-        else:
-            outcomes = run_trials(trials, planner, config.drive, workers or os.cpu_count() or 1, progress)
+        outcomes = (run or in_processes())(trials, planner, config.drive, progress)
         found = rates(outcomes)
         broken = broken_bars(found, config.bars)
         write_drives(folder, outcomes, trials, planner, config.drive, broken)

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
-from scenario_gen.closed_loop.command import drive_bag
+from scenario_gen.closed_loop.command import drive_bag, in_processes
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.results import as_junit
 from scenario_gen.closed_loop.trials import find_planner, read_trials
@@ -102,13 +102,13 @@ class Nowhere(Still):
 )
 def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, workers, said):
     with pytest.raises(InputError, match=said):
-        drive_bag(bag, f"{__name__}:{planner}", count=2, workers=workers, out=tmp_path / "out")
+        drive_bag(bag, f"{__name__}:{planner}", count=2, run=in_processes(workers), out=tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("planner", ["Forks", "Nowhere"])
 def test_a_planner_that_forks_or_leaves_every_road_is_judged_once(bag, tmp_path, planner):
-    result = drive_bag(bag, f"{__name__}:{planner}", count=1, workers=1, out=tmp_path / "out")
+    result = drive_bag(bag, f"{__name__}:{planner}", count=1, run=in_processes(1), out=tmp_path / "out")
     (drive,) = json.loads(result.written[0].read_text())["drives"]
     assert drive["faults"] > 0 and not drive["passed"]
 
@@ -129,7 +129,7 @@ def test_a_module_that_ends_the_process_is_no_planner(tmp_path, monkeypatch):
 def test_a_folder_of_somebodys_own_is_refused_before_anything_is_driven(bag, tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(InputError, match=r"holds mine\.txt"):
-        drive_bag(bag, f"{__name__}:NeverMade", workers=1, out=tmp_path)
+        drive_bag(bag, f"{__name__}:NeverMade", run=in_processes(1), out=tmp_path)
 
 
 def test_an_ego_that_is_not_there_is_named(bag):
