@@ -44,7 +44,7 @@ setup(
     maintainer_email="scenario_gen@users.noreply.github.com",
     python_requires=">=3.11,<3.14",
     packages=find_packages(include=["scenario_gen*", "msg_conventions*"]),
-    package_data={NAME: ["py.typed", "*.pyi", "resources/*", "resources/**/*", "output/report/assets/*", "base/*.xml"]},
+    package_data={NAME: ["py.typed", "*.pyi", "resources/*", "resources/**/*", "output/report/assets/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

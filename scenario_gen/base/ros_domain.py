@@ -76,6 +76,6 @@ def this_host_only(environment: Mapping[str, str] = os.environ) -> dict[str, str
     """
     if not environment.get("RMW_IMPLEMENTATION", "rmw_fastrtps").startswith("rmw_fastrtps"):
         return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    profile = str(Path(__file__).with_name("loopback.xml"))
+    profile = str(Path(__file__).resolve().parents[1] / "resources" / "loopback.xml")
     names = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # of Jazzy's Fast DDS, and of the next
     return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT", **dict.fromkeys(names, profile)}  # all is left to the profile

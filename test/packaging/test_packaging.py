@@ -137,7 +137,7 @@ def test_colcon_builds_what_ros2_run_needs(colcon):
     assert {str(path.relative_to(ROOT)) for path in shared} <= {str(p.relative_to(share)) for p in share.rglob("*")}
     (packages,) = prefix.glob("lib/python3*/site-packages")
     assert (packages / "scenario_gen" / "resources" / "synthetic_a").is_dir()
-    assert (packages / "scenario_gen" / "ros" / "plumbing" / "loopback.xml").is_file()
+    assert (packages / "scenario_gen" / "resources" / "loopback.xml").is_file()
     ran = subprocess.run(
         [sys.executable, prefix / "lib" / "scenario_gen" / "scenario-gen", "parameters"],
         cwd=base,
