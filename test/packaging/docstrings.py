@@ -37,6 +37,7 @@ WITHOUT_UNITS = (  # mathematics of any quantity
 NOT_REPORTED = {"NotImplementedError", "AssertionError", "StopIteration", "KeyboardInterrupt", "SystemExit"}
 NO_UNIT = "no unit"
 Function = ast.FunctionDef | ast.AsyncFunctionDef
+UNDOCUMENTED = ("overload", "override", "app.command", "commands.command")  # or their docstring is the help of a command
 
 
 def lacking(path: Path) -> Iterator[tuple[int, str, str]]:
@@ -54,7 +55,7 @@ def lacking(path: Path) -> Iterator[tuple[int, str, str]]:
 def _lacking_in(node: ast.stmt, owner: str) -> Iterator[tuple[int, str, str]]:
     if not isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) or node.name.startswith("_"):
         return
-    if any(ast.unparse(decorator).startswith(("overload", "override", "app.command", "commands.command")) for decorator in node.decorator_list):
+    if any(ast.unparse(decorator).startswith(UNDOCUMENTED) for decorator in node.decorator_list):
         return
     name = owner + node.name
     text = ast.get_docstring(node) or ""
