@@ -66,7 +66,7 @@ def validate(
             say(table, wrap=True)
         if one.unaccounted:
             say(f"  {one.unaccounted} unaccounted: {NO_ENTRY}")
-        for sentence in (*(f"{said}: kept by {count}" for said, count in one.proven.items()), *one.missing):
+        for sentence in (*(f"{message}: kept by {count}" for message, count in one.proven.items()), *one.missing):
             say(f"  {sentence}")
         for sentence, count in one.left_out.items():
             say(f"  not applicable to {count}: {sentence}")
@@ -172,8 +172,8 @@ def export_scenarios(
             config = assigned(config, option)
     remind(bag)
     folder = out or bag.resolve().with_name(f"{bag.resolve().name}_{to}")
-    made = export_bag(bag, folder, to, config, bag_config, namespace=namespace, indices=index or ())
-    say("\n".join((*made.notes, f"{made.scenarios} scenarios: {folder}")))
+    result = export_bag(bag, folder, to, config, bag_config, namespace=namespace, indices=index or ())
+    say("\n".join((*result.notes, f"{result.scenarios} scenarios: {folder}")))
 
 
 @commands.command("import")
@@ -185,9 +185,9 @@ def import_scenario(
     from scenario_gen.output.exchange.importing import import_file
 
     target = out or file.with_suffix(".csv")
-    made = import_file(file, target)
-    rows = sum(len(track.rows) for track in made.tracks)
-    say("\n".join((*made.notes, f"{len(made.tracks)} vehicles, {rows} rows: {target}")))
+    result = import_file(file, target)
+    rows = sum(len(track.rows) for track in result.tracks)
+    say("\n".join((*result.notes, f"{len(result.tracks)} vehicles, {rows} rows: {target}")))
 
 
 @commands.command("reindex")
@@ -201,8 +201,8 @@ def save_bag(
     from scenario_gen.bags.storage.reindex import reindex
 
     target = out or bag.resolve().with_name(f"{bag.resolve().name}_reindexed")
-    made = reindex(bag, target, configured(parameter_file, assignments).bag)
-    for line in (f"{made.messages} messages: {target}", *made.lines()):
+    result = reindex(bag, target, configured(parameter_file, assignments).bag)
+    for line in (f"{result.messages} messages: {target}", *result.lines()):
         say(line)
 
 

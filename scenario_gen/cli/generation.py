@@ -124,10 +124,10 @@ def regenerate(
 
     remind(bag)
     config = configured(parameter_file, assignments).bag
-    made = regenerate_scenario(bag, index, namespace=namespace, request=request, log=log, config=config)
-    say(f"scenario {index}: the same {len(made.data)} bytes, sha256 {made.sha256}")
+    result = regenerate_scenario(bag, index, namespace=namespace, request=request, log=log, config=config)
+    say(f"scenario {index}: the same {len(result.data)} bytes, sha256 {result.sha256}")
     if out is not None:
-        say(f"bag: {write_regenerated(made, out, [bag, *([log] if log else ())])}")
+        say(f"bag: {write_regenerated(result, out, [bag, *([log] if log else ())])}")
 
 
 @commands.command()

@@ -62,8 +62,8 @@ def as_junit(outcomes: Sequence[Outcome], planner: str) -> str:
         if not verdict.passed:
             kind = "collision" if verdict.collision else "off_road" if not math.isnan(verdict.off_road) else "goal"
             ElementTree.SubElement(case, "failure", type=kind, message=verdict.sentence())
-        said = ElementTree.SubElement(case, "system-out")
-        said.text = json.dumps(verdict.document(), ensure_ascii=False)
+        message = ElementTree.SubElement(case, "system-out")
+        message.text = json.dumps(verdict.document(), ensure_ascii=False)
     ElementTree.indent(suite)
     for element in suite.iter():  # XML has no form for control characters
         element.attrib.update({name: printable(value) for name, value in element.attrib.items()})

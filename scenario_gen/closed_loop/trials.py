@@ -250,10 +250,10 @@ def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
 
 def broken_bars(found: dict[str, Rate], bars: Bars) -> list[str]:
     """Return a sentence for each bar that was not kept."""
-    said = []
+    messages = []
     for name, wanted in asdict(bars).items():
         value = found[name].share.value
         if (value < wanted) if name == "goals" else (value > wanted):
             side = "at least" if name == "goals" else "at most"
-            said.append(f"{name}: {100 * value:.1f} %; {side} {100 * wanted:.1f} % is asked")
-    return said
+            messages.append(f"{name}: {100 * value:.1f} %; {side} {100 * wanted:.1f} % is asked")
+    return messages

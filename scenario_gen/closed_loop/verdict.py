@@ -97,23 +97,23 @@ class DriveVerdict:
 
     def sentence(self) -> str:
         """Say in words what it came to."""
-        said = []
+        messages = []
         if (hit := self.collision) is not None:
             words = {
                 Runner.EGO: f"the ego ran into {hit.vehicle}",
                 Runner.OTHER: f"{hit.vehicle} ran into the ego",
                 Runner.BOTH: f"the ego and {hit.vehicle} ran into each other",
             }
-            said.append(f"{words[hit.ran]} at {hit.time:.2f} s and {hit.speed:.1f} m/s")
+            messages.append(f"{words[hit.ran]} at {hit.time:.2f} s and {hit.speed:.1f} m/s")
         if not math.isnan(self.off_road):
-            said.append(f"left the road at {self.off_road:.2f} s")
+            messages.append(f"left the road at {self.off_road:.2f} s")
         if math.isnan(self.goal):
-            said.append(f"did not reach its goal, {100.0 * self.progress:.0f} % of the way")
-        elif not said:
-            said.append(f"reached its goal at {self.goal:.1f} s")
+            messages.append(f"did not reach its goal, {100.0 * self.progress:.0f} % of the way")
+        elif not messages:
+            messages.append(f"reached its goal at {self.goal:.1f} s")
         if self.faults:
-            said.append(f"{self.faults} faulty command(s)")
-        return "; ".join(said)
+            messages.append(f"{self.faults} faulty command(s)")
+        return "; ".join(messages)
 
     def document(self) -> dict[str, Any]:
         """Return it as JSON's types; null for what there is not."""

@@ -77,10 +77,12 @@ class Batch:
 
     def lines(self) -> list[str]:
         """Return the summary for people."""
-        said = [f"{self.scenarios} of {self.wanted} scenarios of {self.cases} cases (template and road)"]
-        said += [f"{count} cases without any: {why}" for why, count in sorted(self.failures.items(), key=lambda one: -one[1])]
-        said += [f"{count} candidates refused: {cause}" for cause, count in sorted(self.refused.items(), key=lambda one: -one[1])]
-        return said + self.failed
+        messages = [f"{self.scenarios} of {self.wanted} scenarios of {self.cases} cases (template and road)"]
+        messages += [f"{count} cases without any: {why}" for why, count in sorted(self.failures.items(), key=lambda one: -one[1])]
+        messages += [
+            f"{count} candidates refused: {cause}" for cause, count in sorted(self.refused.items(), key=lambda one: -one[1])
+        ]
+        return messages + self.failed
 
 
 def run_batch(
@@ -198,16 +200,16 @@ def make_part(task: PartTask) -> None:
     """
     if task.place("cases").exists():
         return
-    cases, made = [], dict[str, GenerationResult]()
+    cases, results = [], dict[str, GenerationResult]()
     for k, (table, row) in enumerate(task.templates):
         case, result = _case(_row(table, row), table, f"/case_{k}", task)
         cases.append(case)
         if result is not None and len(result.generated.scenarios):
-            made[f"/case_{k}"] = result
-    scenarios = [row for name, result in made.items() for row in _scenario_rows(name, result, cases, task)]
-    if made:
+            results[f"/case_{k}"] = result
+    scenarios = [row for name, result in results.items() for row in _scenario_rows(name, result, cases, task)]
+    if results:
         with arriving(task.place("bags", "")) as part, BagWriter(part) as bag:
-            add_results(bag, made)
+            add_results(bag, results)
     _write(task.place("scenarios"), scenarios, SCENARIO_COLUMNS)
     _write(task.place("cases"), cases, CASE_COLUMNS)
 
@@ -229,12 +231,12 @@ def _case(row: Mapping[str, Any], table: Path, namespace: str, task: PartTask) -
         encounter = encounter_of(row, table)
         road, encounter = road_and_template(task.road, encounter, task.config.road)
         segmentation = segment(encounter, task.config.segmentation, seed)
-        made = Attempt(encounter, segmentation, road, task.config, count=task.count, seed=seed).run()
+        result = Attempt(encounter, segmentation, road, task.config, count=task.count, seed=seed).run()
     except (RefusedError, InputError) as error:
-        said = LOST_CONFLICT if isinstance(error, LostConflictError) else str(error).partition(":")[0]
-        cause = said if isinstance(error, RefusedError) else "input"
+        message = LOST_CONFLICT if isinstance(error, LostConflictError) else str(error).partition(":")[0]
+        cause = message if isinstance(error, RefusedError) else "input"
         return case | {"cause": _cause(cause), "why": str(error)}, None
-    generated = made.generated
+    generated = result.generated
     facts = {"template": row["name"], "roads": task.road, "seed": str(seed), "count": str(task.count)}
     provenance = facts | versions() | parameter_texts(task.config)
     found = case | {
@@ -244,7 +246,9 @@ def _case(row: Mapping[str, Any], table: Path, namespace: str, task: PartTask) -
         "changepoints": len(segmentation.changepoints),
         "cause": "" if len(generated.scenarios) else "no valid candidate",
     }
-    return found, GenerationResult(encounter, segmentation, road, made.fit, made.routes, generated, seed, provenance=provenance)
+    return found, GenerationResult(
+        encounter, segmentation, road, result.fit, result.routes, generated, seed, provenance=provenance
+    )
 
 
 def _cause(text: str) -> str:

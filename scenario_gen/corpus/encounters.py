@@ -109,10 +109,10 @@ def read_one_log(task: LogTask) -> None:
     """
     if task.target.exists():
         return
-    made = read_log(list(task.paths), task.config.log)
+    result = read_log(list(task.paths), task.config.log)
     source = ", ".join(path.name for path in task.paths)
-    rows = [row_of(encounter, source, task.config) for encounter in made.encounters]
-    write_encounters(task.target, rows, {"refused": [], "quality": list(made.quality.lines())})
+    rows = [row_of(encounter, source, task.config) for encounter in result.encounters]
+    write_encounters(task.target, rows, {"refused": [], "quality": list(result.quality.lines())})
 
 
 def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str, Any]:

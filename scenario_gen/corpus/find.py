@@ -77,12 +77,12 @@ def coverage_lines(hits: Hits, batch: Path) -> list[str]:
         sorted({path.name.partition("=")[2] for path in (batch / "cases").iterdir()}),
     )
     cells = {(kind, road, pet): count for kind, road, pet, count in hits.coverage}
-    said = [f"coverage: {len(cells)} of {len(kinds) * len(roads) * len(classes)} cells of kind × road × PET hold a scenario"]
+    messages = [f"coverage: {len(cells)} of {len(kinds) * len(roads) * len(classes)} cells of kind × road × PET hold a scenario"]
     for kind in kinds:
         for road in roads:
             counts = ", ".join(f"{pet}: {cells.get((kind, road, pet), 0)}" for pet in classes)
-            said.append(f"  {kind} on {road}: PET {counts}")
-    return said
+            messages.append(f"  {kind} on {road}: PET {counts}")
+    return messages
 
 
 def bag_of(batch: Path, row: Mapping[str, Any]) -> Path:
@@ -96,10 +96,10 @@ def make_again(batch: Path, row: Mapping[str, Any]) -> Regenerated:
     Raises:
         ScenarioGenError: it comes out differently; the message names what differs.
     """
-    made = regenerate_scenario(bag_of(batch, row), row["index"], namespace=row["namespace"])
-    if made.sha256 != row["sha256"]:
+    result = regenerate_scenario(bag_of(batch, row), row["index"], namespace=row["namespace"])
+    if result.sha256 != row["sha256"]:
         raise ScenarioGenError(f"{bag_of(batch, row)}: scenario {row['index']} of {row['namespace']} is not that of the table")
-    return made
+    return result
 
 
 def export_hits(batch: Path, rows: Sequence[Mapping[str, Any]], folder: Path) -> Path:

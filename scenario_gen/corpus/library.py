@@ -79,17 +79,17 @@ class Built:
 
     def lines(self) -> list[str]:
         """Return the summary for people."""
-        said = [
+        messages = [
             f"{self.primitives} primitives, fitted to {self.fitted} pairs; {self.segments} segments in all {self.assigned} pairs",
             f"convergence: split R̂ at most {self.r_hat:.3f}; two seeds agree to {self.seeds:.2f} (adjusted Rand)",
             f"pairs assigned agree with the fit to {self.agreement:.2f} (adjusted Rand)",
             "primitives by pairs fitted: " + ", ".join(f"{found} of {count}" for count, found in self.growth),
         ]
         if self.r_hat > USUAL_R_HAT:
-            said.append("R̂ is above 1.1: the chains have not mixed; rely on what two seeds agree on, or raise sampler.sweeps")
+            messages.append("R̂ is above 1.1: the chains have not mixed; rely on what two seeds agree on, or raise sampler.sweeps")
         if 0 < self.limit <= self.primitives:
-            said.append(f"all {self.limit} states are in use: raise sampler.states")
-        return [*said, *self.failed]
+            messages.append(f"all {self.limit} states are in use: raise sampler.states")
+        return [*messages, *self.failed]
 
 
 def pair_encounters(encounter: Encounter, interaction: float) -> Iterator[Encounter]:
@@ -259,7 +259,7 @@ def _write_page(
         lines = [
             f"{count} segments, {100.0 * seconds[k] / total:.1f} % of the time, {seconds[k] * dt / count:.1f} s each",
             "in " + ", ".join(f"{n} × {kind}" for kind, n in kinds[k].most_common(4)),
-            "; ".join(f"{said} in {n} of them" for said, n in reactions[k].most_common()),
+            "; ".join(f"{message} in {n} of them" for message, n in reactions[k].most_common()),
             "followed by " + (", ".join(f"{to} ({n} ×)" for n, to in after) or "nothing"),
             *(f"{name}, {begin * dt:.1f} to {end * dt:.1f} s" for name, (begin, end) in examples[k]),
         ]

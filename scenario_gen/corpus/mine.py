@@ -86,15 +86,15 @@ class Mined:
     def lines(self) -> list[str]:
         """Return the summary for people."""
         kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(self.kinds.items()))
-        said = [f"{self.encounters} encounters: {kinds or 'none'}"]
-        said += [f"{count} × {cause}" for cause, count in sorted(self.account.items())]
+        messages = [f"{self.encounters} encounters: {kinds or 'none'}"]
+        messages += [f"{count} × {cause}" for cause, count in sorted(self.account.items())]
         for file, causes in list(self.files.items())[:MOST_SHOWN]:
-            said.append(f"{file}: " + ", ".join(f"{n} × {cause}" for cause, n in causes.items()))
-        said += [f"encounter {one['name']} is left out: {one['why']}" for one in self.refused[:MOST_SHOWN]]
+            messages.append(f"{file}: " + ", ".join(f"{n} × {cause}" for cause, n in causes.items()))
+        messages += [f"encounter {one['name']} is left out: {one['why']}" for one in self.refused[:MOST_SHOWN]]
         for what, ones in (("files", self.files), ("encounters left out", self.refused)):
             if len(ones) > MOST_SHOWN:
-                said.append(f"… and {len(ones) - MOST_SHOWN} more {what}")
-        return [*said, *self.notes, *self.failed]
+                messages.append(f"… and {len(ones) - MOST_SHOWN} more {what}")
+        return [*messages, *self.notes, *self.failed]
 
 
 def mine(
@@ -133,10 +133,10 @@ def mine(
             lost = go(parse_range, [task for task in ranged if not task.target.exists()])
             lost = lost or go(search_hours, hour_tasks(ranged, out, config))  # of all ranges, for an hour is done only once
             failed += lost or go(clean_found, clean_tasks(out, config))
-        made = summary(out, config, failed, others)
+        result = summary(out, config, failed, others)
         with arriving(out / PAGE) as part:
-            _write_gallery(part, out, made)
-        return made
+            _write_gallery(part, out, result)
+        return result
 
 
 def _write_gallery(path: Path, out: Path, made: Mined) -> None:
@@ -332,12 +332,12 @@ def summary(out: Path, config: CorpusConfig, failed: list[str], others: Sequence
     total: Counter[str] = Counter()
     for causes in files.values():
         total.update(causes)
-    told = {file: {cause: n for cause, n in causes.items() if n and cause != "rows"} for file, causes in files.items()}
+    reports = {file: {cause: n for cause, n in causes.items() if n and cause != "rows"} for file, causes in files.items()}
     return Mined(
         encounters=sum(int(count) for count in kinds.values()),
         kinds=dict(kinds),
         account={cause: count for cause, count in total.items() if count},
-        files={file: causes for file, causes in told.items() if causes},
+        files={file: causes for file, causes in reports.items() if causes},
         refused=[one for account in accounts for one in account.get("refused", ())],
         failed=failed,
         notes=notes + [line for account in accounts for line in account.get("quality", ())],

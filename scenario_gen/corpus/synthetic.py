@@ -166,29 +166,29 @@ def plan(config: ArchiveConfig, seed: int) -> tuple[Drives, list[Planted]]:
     Raises:
         InputError: the encounters alone take more than the rows.
     """
-    made = _Plan(np.random.default_rng([seed, 0]))
+    result = _Plan(np.random.default_rng([seed, 0]))
     wide = int(np.ceil(np.sqrt(config.encounters + config.outside)))
     for k in range(config.encounters + config.outside):
         inside = k < config.encounters
         nth = k // 2 if inside else k - config.encounters
         threshold = THRESHOLDS[nth % len(THRESHOLDS)] if k % 2 or not inside else ""
-        when = made.between(60.0, 3600.0 * config.hours - 60.0)
+        when = result.between(60.0, 3600.0 * config.hours - 60.0)
         if k % 7 == 0 and config.hours >= 2.0:  # across the full hour, where tasks meet
-            when = 3600.0 * (1 + k % int(config.hours - 1)) + made.between(-3.0, 3.0)
-        place = ((k % wide) * TILE, (k // wide + 1) * TILE, made.between(-3.1, 3.1), when)
+            when = 3600.0 * (1 + k % int(config.hours - 1)) + result.between(-3.0, 3.0)
+        place = ((k % wide) * TILE, (k // wide + 1) * TILE, result.between(-3.1, 3.1), when)
         kind = KINDS[k % len(KINDS)]
         if threshold:
-            kind, drives = _at_threshold(made, threshold, inside=inside)
+            kind, drives = _at_threshold(result, threshold, inside=inside)
         else:
-            drives = _OF_KIND[kind](made)
-        devices = made.add(place, drives)
-        made.planted.append(Planted(kind, tuple(devices), when, threshold, inside))
-    used = sum(int(10.0 * row["lasts"]) for row in made.rows)
-    shared = [row for row in made.rows if made.random.random() < config.repeated_ids]
-    _lone(made, config, config.rows / (1.0 - config.loss) / (1.0 + config.duplicates) - used, shared)
+            drives = _OF_KIND[kind](result)
+        devices = result.add(place, drives)
+        result.planted.append(Planted(kind, tuple(devices), when, threshold, inside))
+    used = sum(int(10.0 * row["lasts"]) for row in result.rows)
+    shared = [row for row in result.rows if result.random.random() < config.repeated_ids]
+    _lone(result, config, config.rows / (1.0 - config.loss) / (1.0 + config.duplicates) - used, shared)
     names = Drives.__dataclass_fields__
-    columns = {name: np.array([row[name] for row in made.rows], dtype=np.float64) for name in names}
-    return Drives(columns.pop("device").astype(np.int64), **columns), made.planted
+    columns = {name: np.array([row[name] for row in result.rows], dtype=np.float64) for name in names}
+    return Drives(columns.pop("device").astype(np.int64), **columns), result.planted
 
 
 def _lone(made: _Plan, config: ArchiveConfig, rows: float, shared: list[dict[str, float]]) -> None:

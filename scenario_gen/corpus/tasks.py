@@ -106,8 +106,8 @@ class Spread:
             A sentence for each task that failed; the others are done.
         """
         begun, failed = time.monotonic(), []
-        for done, said in enumerate(self._outcomes(function, tasks), start=1):
-            failed += [said] if said else []
+        for done, message in enumerate(self._outcomes(function, tasks), start=1):
+            failed += [message] if message else []
             left = (time.monotonic() - begun) / done * (len(tasks) - done)
             self._told(done, len(tasks), f"{left:.0f} s left" if left < 600.0 else f"{left / 60.0:.0f} min left")
         return sorted(failed)

@@ -280,10 +280,10 @@ class _Search:
         """The route of line, arc and line from the vehicle's start to its goal, where there is one."""
         ends = []
         for end in ENDS:
-            asked = request.states(end).get(name)
-            if asked is None and not self.base:
+            requested = request.states(end).get(name)
+            if requested is None and not self.base:
                 return None
-            ends.append(self.base[end][n, :3] if asked is None else np.array(asked[:3]))
+            ends.append(self.base[end][n, :3] if requested is None else np.array(requested[:3]))
         vehicle, road = self.encounter.vehicles[n], self.road
         return draw_route(ends[0], ends[1], lambda poses: bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all()))
 
@@ -303,14 +303,14 @@ class _Search:
         for stretch in _STRETCHES:
             if stretch > self.config.sampling.max_stretch and self.possible(request, stretch):
                 before = self.encounter.duration
-                said = f"sampling.max_stretch:={stretch:g} (up to {before * (1.0 + stretch):.1f} s instead of {before:.1f} s)"
+                message = f"sampling.max_stretch:={stretch:g} (up to {before * (1.0 + stretch):.1f} s instead of {before:.1f} s)"
                 other = "" if request == self.asked else f" with {self._difference(request)}"
-                return Suggestion(request, said + other, stretch)
+                return Suggestion(request, message + other, stretch)
         return None
 
     def _difference(self, request: Request) -> str:
         """What differs from what was asked, as parameters to be set, and by how much."""
-        said = []
+        messages = []
         for end in ENDS:
             before, after = self.asked.states(end), request.states(end)
             changes = []
@@ -323,5 +323,5 @@ class _Search:
                 if a[3:] != b[3:]:
                     changes.append(f"vehicle {name} {b[3] - a[3]:+.2f} m/s")
             if changes:
-                said.append(f"{end}:='{getattr(request, end)}' ({', '.join(changes)})")
-        return " and ".join(said)
+                messages.append(f"{end}:='{getattr(request, end)}' ({', '.join(changes)})")
+        return " and ".join(messages)

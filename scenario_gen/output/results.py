@@ -59,8 +59,8 @@ def write_results(
 def _figures(case: GenerationResult) -> dict[str, Any]:
     """Return a case's E beside what it is compared with, who reacts to whom, its evaluation, and what the stages did."""
     vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
-    said = {"similarity": case.similarity(), "reactions": case.reacting}
-    figures: dict[str, Any] = {**said, **json.loads(case.evaluation.to_json()), "adaptations": list(case.generated.adaptations)}
+    figures: dict[str, Any] = {"similarity": case.similarity(), "reactions": case.reacting}
+    figures |= json.loads(case.evaluation.to_json()) | {"adaptations": list(case.generated.adaptations)}
     fit = {} if case.fit is None else case.fit.figures()
     coverage = {} if case.coverage is None else case.coverage.document()
     reached = {} if case.generated.reached is None else case.generated.reached.figures()
@@ -87,8 +87,8 @@ def as_table(cases: Sequence[GenerationResult]) -> str:
 
 
 def _reactions(case: GenerationResult) -> str:
-    said = case.reacting["sentences"]
-    return "\n".join(["Who reacts to whom in the template:", "", *(f"- {as_markdown(line)}" for line in said)]) if said else ""
+    sentences = [f"- {as_markdown(line)}" for line in case.reacting["sentences"]]
+    return "\n".join(["Who reacts to whom in the template:", "", *sentences]) if sentences else ""
 
 
 def _is_generated(folder: Path) -> bool:

@@ -47,10 +47,10 @@ class Numbers:
     def summary(self) -> str:
         """Say what was not recorded; "" if all was."""
         lost = self.by_dds if self.several else max(self.lost, self.by_dds)
-        said = [f"{lost} lost"] if lost else []
+        messages = [f"{lost} lost"] if lost else []
         if self.late and not self.several:
-            said.append(f"{self.late} not recorded: {LATE}")
-        return ", ".join(said)
+            messages.append(f"{self.late} not recorded: {LATE}")
+        return ", ".join(messages)
 
 
 class Losses:
@@ -91,16 +91,16 @@ class Losses:
 
     def summary(self, *, ended: bool = False) -> Mapping[str, str]:
         """Say by topic what is not recorded; at the end of the recording also of requests that are not closed."""
-        said = {topic: text for topic, numbers in self._numbers.items() if (text := numbers.summary())}
+        messages = {topic: text for topic, numbers in self._numbers.items() if (text := numbers.summary())}
         for space, requests in self._requests.items():
             requests.settle()
             if ended or monotonic() - self._news > SETTLED:
                 topic = f"{space}scenarios"
                 for request in requests.incomplete(closed=not ended):
-                    said[topic] = "; ".join(filter(None, (said.get(topic), request.sentence())))
-                if topic in said and said.get(f"{topic}/info", "").endswith(LATE):
-                    said[topic] += f"; the recording {LATE}"
-        return said
+                    messages[topic] = "; ".join(filter(None, (messages.get(topic), request.sentence())))
+                if topic in messages and messages.get(f"{topic}/info", "").endswith(LATE):
+                    messages[topic] += f"; the recording {LATE}"
+        return messages
 
 
 def remedy(losses: str) -> str:

@@ -66,9 +66,9 @@ def finish(
             ends = np.where(wanted, given[i, :, 3], ends)
         ends = np.where(track.still, 0.0, ends)
         states.append(np.column_stack((anchors[[0, -1]], ends)))
-    asked = BoundaryStates(start=np.stack([s[0] for s in states]), end=np.stack([s[1] for s in states]))
+    requested = BoundaryStates(start=np.stack([s[0] for s in states]), end=np.stack([s[1] for s in states]))
     lost = (*find_losses(encounter, tracks, placement), *placement.unused)
-    return Fit(encounter.vehicles, tuple(fitted), index, asked, tuple(notes), lost)
+    return Fit(encounter.vehicles, tuple(fitted), index, requested, tuple(notes), lost)
 
 
 def _path(track: Track) -> Floats:

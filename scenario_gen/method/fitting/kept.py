@@ -36,9 +36,9 @@ def refuse_lost_conflicts(lost: Iterable[Loss], road: str) -> None:
     """
     lost_here = [loss.said for loss in lost if loss.kind == CONFLICT]
     if lost_here:
-        said = "; ".join(lost_here)
+        message = "; ".join(lost_here)
         raise LostConflictError(
-            f"road {road} has no place that keeps the encounter: {said}; fitting.allow=lost_conflict takes it as it is"
+            f"road {road} has no place that keeps the encounter: {message}; fitting.allow=lost_conflict takes it as it is"
         )
 
 

@@ -43,12 +43,12 @@ def refuse_misfits(fit: Fit, starts: Floats, goals: Floats) -> None:
         RefusedError: two footprints overlap at the start or the end, or a vehicle that stands there is asked to drive.
     """
     for name, rows, states, first in (("starts", starts, fit.asked.start, True), ("goals", goals, fit.asked.end, False)):
-        asked = ~np.isnan(rows[:, 0])
+        requested = ~np.isnan(rows[:, 0])
         for (i, a), (j, b) in combinations(enumerate(fit.vehicles), 2):
             gap = float(footprint_gap(a, states[[i], :3], b, states[[j], :3])[0][0])
-            if gap <= 0.0 and (asked[i] or asked[j]):
+            if gap <= 0.0 and (requested[i] or requested[j]):
                 raise RefusedError(f"at the {NAMES[name]} that is asked vehicles {a.id} and {b.id} overlap by {-gap:.2f} m")
-        for i in np.flatnonzero(asked).tolist():
+        for i in np.flatnonzero(requested).tolist():
             stands = fit.fitted[i].stands
             if rows[i, 3] > STAND and stands[0 if first else -1]:
                 when = "throughout" if stands.all() else "there"

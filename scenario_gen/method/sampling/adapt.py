@@ -100,8 +100,8 @@ def label_of(encounter: Encounter, request: Request, aim: Aim | None, reactions:
             facts |= {f"target.{t.label}": f"{v:.6g}" for t, v in zip(aim.targets, aim.values(whole), strict=True)}
         if request.order == "keep":
             return facts
-        said = [_order(encounter, own, whole) for own in conflicts]
-        return facts | {"order": request.order, "passing_order": "; ".join(said) or "nobody meets anybody"}
+        messages = [_order(encounter, own, whole) for own in conflicts]
+        return facts | {"order": request.order, "passing_order": "; ".join(messages) or "nobody meets anybody"}
 
     return label
 

@@ -218,12 +218,12 @@ class Batch:
         """The candidates on the published grid; None where infeasible."""
         time = np.round(np.arange(max(int(self.count.max()), 2)) * DT, 9)
         out = self.states(time, np.maximum(self.count, 0).tolist())
-        made: list[Scenario | None] = []
+        results: list[Scenario | None] = []
         for s, (ok, count) in enumerate(zip(self.feasible.tolist(), self.count.tolist(), strict=True)):
             if not ok:
-                made.append(None)
+                results.append(None)
                 continue
             t, (x, y, yaw, speed, acceleration) = time[:count], np.moveaxis(out[:, s, :count], -1, 0)
             position, vehicles = np.stack([x, y], axis=-1), tuple(one.vehicles[s] for one in self.drawn)
-            made.append(Scenario(vehicles, t, position, yaw, speed, acceleration, seed, index[s], frame_id, self.present[s]))
-        return made
+            results.append(Scenario(vehicles, t, position, yaw, speed, acceleration, seed, index[s], frame_id, self.present[s]))
+        return results

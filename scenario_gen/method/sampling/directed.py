@@ -298,7 +298,7 @@ def estimated(weights: Floats, candidates: int) -> tuple[float, float, float]:
 
 def reachable(aim: Aim, seen_all: Seen) -> str:
     """Say which range of each target the valid candidates had, or, where none of these has the figure, all of them."""
-    said = []
+    messages = []
     for k, target in enumerate(aim.targets):
         seen = np.sort([row[k] for row in seen_all.values if math.isfinite(row[k])])
         if not len(seen):
@@ -308,13 +308,13 @@ def reachable(aim: Aim, seen_all: Seen) -> str:
                 if every
                 else "nor any other"
             )
-            said.append(f"{target.label}: no valid candidate has this figure, {those}")
+            messages.append(f"{target.label}: no valid candidate has this figure, {those}")
             continue
         low, high = seen[int(0.05 * (len(seen) - 1))], seen[int(0.95 * (len(seen) - 1))]
         unit = UNITS[target.name]
-        said.append(
+        messages.append(
             f"{target.label} from {low:.2f} to {high:.2f} {unit} (5 % to 95 % of {len(seen)} valid candidates seen; "
             f"all: {seen[0]:.2f} to {seen[-1]:.2f} {unit})"
         )
     causes = ", ".join(f"{number} × {cause.value}" for cause, number in seen_all.refused.most_common(3))
-    return "; ".join(said) + (f"; of {seen_all.checked} checked were refused: {causes}" if causes else "") + aim.note
+    return "; ".join(messages) + (f"; of {seen_all.checked} checked were refused: {causes}" if causes else "") + aim.note

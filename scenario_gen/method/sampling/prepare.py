@@ -186,12 +186,12 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
     Raises:
         InputError: routes, segmentation and encounter disagree in their numbers.
     """
-    encounter, road, routes, asked = plan.encounter, plan.road, plan.routes, plan.asked
+    encounter, road, routes, requested = plan.encounter, plan.road, plan.routes, plan.asked
     times = encounter.time[np.concatenate([[0], plan.segmentation.changepoints, [encounter.speed.shape[1] - 1]]).astype(np.int64)]
     if len(routes) != len(encounter.vehicles) or any(len(route.anchor) != len(times) for route in routes):
         raise InputError(f"{len(routes)} routes do not suit {len(encounter.vehicles)} vehicles with {len(times)} anchors each")
     waits = [standing_part(encounter, wait) for wait in plan.waits]
-    drives = [_drive(n, encounter, times, routes[n], asked, waits, config) for n in range(len(encounter.vehicles))]
+    drives = [_drive(n, encounter, times, routes[n], requested, waits, config) for n in range(len(encounter.vehicles))]
     clock, sentences = _slowed(drives, template_grid(encounter), config)
     left = (1.0 + config.max_stretch) * float(times[-1]) / float(clock.time[-1])
     best: tuple[float, float, list[_Mean]] | None = None
@@ -216,9 +216,9 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
     warp = TimeWarp(clock_of(clock.grid, stretch * clock.rate), config, least_shares(clock.grid, waits))
     vehicles = [_model(d, road, *mean, config, sentences) for d, mean in zip(drives, found, strict=True)]
     if config.variety == "wide":
-        tied, gaps = (asked.freed[..., 0] == 0.0).any(axis=0), least_gaps(encounter).tolist()
+        tied, gaps = (requested.freed[..., 0] == 0.0).any(axis=0), least_gaps(encounter).tolist()
         vehicles = [
-            replace(v, freedom=_freedom(drive, v, warp.nominal, asked.freed[n], tied, road, gaps[n], config))
+            replace(v, freedom=_freedom(drive, v, warp.nominal, requested.freed[n], tied, road, gaps[n], config))
             for n, (v, drive) in enumerate(zip(vehicles, drives, strict=True))
         ]
     reactions = kept_reactions(encounter, config, order)

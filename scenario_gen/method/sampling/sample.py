@@ -205,14 +205,14 @@ class _Loop:
         """
         aim = self.aim
         assert aim is not None
-        made = adapted(self.sampler, self.judge, aim, self.callbacks.cancelled)
-        self.sampler = made.sampler
+        result = adapted(self.sampler, self.judge, aim, self.callbacks.cancelled)
+        self.sampler = result.sampler
         weights: list[float] = []
-        if made.seen.hits() and not self.callbacks.cancelled():
-            level = self.sampler.base if made.sampler.proposal is None else DIRECTED
+        if result.seen.hits() and not self.callbacks.cancelled():
+            level = self.sampler.base if result.sampler.proposal is None else DIRECTED
             blocks = self._blocks(level)
-            if made.sampler.proposal is None:
-                self._take_pilot(made.pilot)
+            if result.sampler.proposal is None:
+                self._take_pilot(result.pilot)
                 blocks = itertools.islice(blocks, STAGE // BLOCK, None)
                 weights = [1.0] * len(self.index)
             while not self._done(budget) and (self.index or self.candidates < HOPELESS):
@@ -223,17 +223,17 @@ class _Loop:
         share, low, high = estimated(np.array(weights), self.candidates)
         if self.candidates:
             directed = self.sampler.proposal is not None
-            self.reached = Reached(aim.targets, made.stages, made.candidates, share, low, high, directed)
+            self.reached = Reached(aim.targets, result.stages, result.candidates, share, low, high, directed)
             self.adaptations.append(self.reached.sentence())
             if self.sampler.base:
                 self._describe(self.sampler.base, 2)
         if len(self.index) < self.count and not self.callbacks.cancelled():
-            said = f"target {'; '.join(map(str, aim.targets))}: "
-            drawn = f"{made.candidates} candidates of {1 + made.stages} stage(s) and {self.candidates} more"
-            said += f"{len(self.index)} found in {drawn}; reachable: {reachable(aim, made.seen)}"
+            message = f"target {'; '.join(map(str, aim.targets))}: "
+            drawn = f"{result.candidates} candidates of {1 + result.stages} stage(s) and {self.candidates} more"
+            message += f"{len(self.index)} found in {drawn}; reachable: {reachable(aim, result.seen)}"
             if not self.index:
-                raise TargetError(said)
-            self.adaptations.append(said)
+                raise TargetError(message)
+            self.adaptations.append(message)
 
     def _take_pilot(self, pilot: Sequence[tuple[int, Scenario | None, Cause | None]]) -> None:
         """Take the candidates of a level that were drawn and checked already."""

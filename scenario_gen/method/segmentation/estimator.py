@@ -152,9 +152,9 @@ class StickyHDPHMM:
         self.dof_ = posterior.dof or np.inf
         self.r_hat_ = dict(zip(TRACE, posterior.r_hat.tolist(), strict=True))
         self.ess_ = dict(zip(TRACE, posterior.ess.tolist(), strict=True))
-        asked = config.r_hat if config.r_hat > 1.0 else USUAL_R_HAT
-        self.converged_ = max(self.r_hat_.values()) <= asked
-        for concern in self._concerns(x, visible, asked):
+        requested = config.r_hat if config.r_hat > 1.0 else USUAL_R_HAT
+        self.converged_ = max(self.r_hat_.values()) <= requested
+        for concern in self._concerns(x, visible, requested):
             warnings.warn(concern, SegmentationWarning, stacklevel=2)
         return self
 

@@ -141,7 +141,7 @@ class Checker:
             *self._wrong_ways(scenario),
             *self._waits(scenario),
         ]
-        found = [conflict_of(scenario, asked.first, asked.second) for asked in self.conflicts or ()]
+        found = [conflict_of(scenario, requested.first, requested.second) for requested in self.conflicts or ()]
         wrong, present, absent = self._passing_orders(scenario, found)
         return Verdict((*violations, *wrong, *self._reactions(scenario, found)), present, absent)
 
@@ -187,9 +187,9 @@ class Checker:
             return
         limits = self._limits
         relaxed = self.asked.freed.tolist()
-        for name, k, asked in (("start", 0, self.asked.start), ("end", -1, self.asked.end)):  # too few numbers for arrays
+        for name, k, requested in (("start", 0, self.asked.start), ("end", -1, self.asked.end)):  # too few numbers for arrays
             # a vehicle's row is held outside of its presence: its first or last value is that at its own first or last instant
-            ends = zip(scenario.position[:, k].tolist(), scenario.speed[:, k].tolist(), asked.tolist(), strict=True)
+            ends = zip(scenario.position[:, k].tolist(), scenario.speed[:, k].tolist(), requested.tolist(), strict=True)
             for i, ((x, y), speed, (x_asked, y_asked, _, speed_asked)) in enumerate(ends):
                 distance, difference = exact.hypot(x - x_asked, y - y_asked), abs(speed - speed_asked)
                 far, off = self._within_a_step(scenario, i, k)
@@ -310,10 +310,10 @@ class Checker:
     def _passing_orders(self, scenario: Scenario, conflicts: Sequence[Conflict | None]) -> tuple[list[Violation], int, int]:
         """Violations, and how many of the template's conflicts are present and absent in the scenario, which has `conflicts`."""
         wrong, present = [], 0
-        for asked, first, found in zip(self.conflicts or (), self._first, conflicts, strict=True):
-            a, b = sorted((asked.first, asked.second))
+        for requested, first, found in zip(self.conflicts or (), self._first, conflicts, strict=True):
+            a, b = sorted((requested.first, requested.second))
             present += found is not None
-            swapped = first == asked.second
+            swapped = first == requested.second
             wanted = "asked is that" if swapped else "in the template"
             if found is not None and first is not None and found.first != first:
                 message = (
@@ -358,17 +358,20 @@ class Checker:
     def _waits(self, scenario: Scenario) -> Iterator[Violation]:
         waits = self.waits or ()
         for i in sorted({wait.vehicle for wait in waits}):
-            asked = [wait for wait in waits if wait.vehicle == i]
+            requested = [wait for wait in waits if wait.vehicle == i]
             throughout = [tuple(scenario.present[i].tolist())]
-            if self._never_moves(i, asked[0].start, scenario) and self._slow(scenario, i, self._limits.stand_speed) != throughout:
+            if (
+                self._never_moves(i, requested[0].start, scenario)
+                and self._slow(scenario, i, self._limits.stand_speed) != throughout
+            ):
                 k = int(np.argmax(scenario.speed[i]))
                 message = f"vehicle {i}: waits throughout in the template, but reaches {scenario.speed[i, k]:.3f} m/s"
                 yield Violation(Cause.STOP_NOT_KEPT, float(scenario.time[k]), (i,), message)
                 continue
-            standing = [wait for wait in asked if not wait.creeps]
+            standing = [wait for wait in requested if not wait.creeps]
             for wanted, limit, verb in (
                 (standing, self._limits.stand_speed, "stands"),
-                (asked, self._limits.creep_speed, "waits"),
+                (requested, self._limits.creep_speed, "waits"),
             ):
                 # a stand serves as many consecutive waits as it is long: the template's may be parted by a short twitch
                 lengths = [float(scenario.time[b] - scenario.time[a]) for a, b in self._slow(scenario, i, limit)]

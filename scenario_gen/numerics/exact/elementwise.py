@@ -118,8 +118,8 @@ class Elementwise:
             keep(self._loop)
             self._loop.compile()
             kinds = [np.dtype(float).num] * (self._arguments + 1)
-            made = (self.__name__, self.__doc__, [self._loop.address], [kinds], self._arguments, 1, [None], [self._loop])
-            self._ufunc = _internal.fromfunc(*made, _internal.PyUFunc_None)
+            results = (self.__name__, self.__doc__, [self._loop.address], [kinds], self._arguments, 1, [None], [self._loop])
+            self._ufunc = _internal.fromfunc(*results, _internal.PyUFunc_None)
 
     def __call__(self, *values: Any) -> Any:
         """Apply it to numbers or arrays."""

@@ -92,9 +92,9 @@ def write_commonroad(case: Case, one: Exported, export: ExportConfig = ExportCon
 def _even(scenario: Scenario, export: ExportConfig) -> tuple[Scenario, tuple[str, ...]]:
     if even_step(scenario) is not None:
         return scenario, ()
-    made = at_even_steps(scenario, export.step)
-    lost = float(scenario.time[-1] - made.time[-1])
-    return made, (f"its uneven instants were resampled at {export.step:g} s; its last {lost:.3f} s are left out",)
+    result = at_even_steps(scenario, export.step)
+    lost = float(scenario.time[-1] - result.time[-1])
+    return result, (f"its uneven instants were resampled at {export.step:g} s; its last {lost:.3f} s are left out",)
 
 
 def _points(parent: Element, tag: str, points: Floats) -> None:

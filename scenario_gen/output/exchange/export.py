@@ -97,12 +97,12 @@ def export_bag(
                 _write(folder, name, data)
             for one in case.scenarios:
                 try:
-                    said = to.write(folder, case, one, export)
+                    message = to.write(folder, case, one, export)
                 except RefusedError as error:
                     notes.append(f"{about}: left out: {error}")
                     continue
-                notes += [f"{about}, scenario {one.index}: {sentence}" for sentence in said.notes]
-                entries.append(_entry(case, one, said.names, to))
+                notes += [f"{about}, scenario {one.index}: {sentence}" for sentence in message.notes]
+                entries.append(_entry(case, one, message.names, to))
         if not entries:
             raise RefusedError("nothing could be exported:\n" + "\n".join(notes))
         digests = {str(p.relative_to(folder)): _digest(p) for p in sorted(folder.rglob("*")) if p.is_file()}

@@ -58,14 +58,14 @@ def read_scenario_file(path: Path) -> Imported:
         root = read_xml(path)
         place = Place(path, root, root.tag)
         if root.tag == "commonRoad":
-            made = _commonroad(place)
+            result = _commonroad(place)
         elif root.tag == "OpenSCENARIO":
-            made = _openscenario(place)
+            result = _openscenario(place)
         else:
             raise InputError(f"{path}: its root is {root.tag[:40]!r}; commonRoad and OpenSCENARIO are read")
-    if not made.tracks:
-        raise InputError(f"{path}: no vehicle with a trajectory in it" + "".join(f"; {note}" for note in made.notes))
-    return made
+    if not result.tracks:
+        raise InputError(f"{path}: no vehicle with a trajectory in it" + "".join(f"; {note}" for note in result.notes))
+    return result
 
 
 def import_file(path: Path, out: Path) -> Imported:
@@ -74,9 +74,9 @@ def import_file(path: Path, out: Path) -> Imported:
     Raises:
         InputError: as of `read_scenario_file`; `out` is there already, or cannot be written.
     """
-    made = read_scenario_file(path)
+    result = read_scenario_file(path)
     lines = [HEADER]
-    for track in made.tracks:
+    for track in result.tracks:
         size = f"{number(track.length)},{number(track.width)}"
         lines += [f"{track.vehicle},{','.join(map(number, row))},{size}" for row in track.rows.tolist()]
     try:
@@ -86,7 +86,7 @@ def import_file(path: Path, out: Path) -> Imported:
         raise InputError(f"{out} exists already; name another file with --out, or remove it") from None
     except OSError as error:
         raise of_system(error, out) from error
-    return made
+    return result
 
 
 def _commonroad(root: Place) -> Imported:
@@ -118,8 +118,8 @@ def _commonroad(root: Place) -> Imported:
 def _state(state: Place, step: float) -> tuple[float, ...]:
     """Return time [s], x, y [m], speed [m/s], NaN if it is not said, and heading [rad] of a state."""
     point = state.child("position/point")
-    said = state.element.find("velocity") is not None
-    speed = state.value("velocity/exact") if said else float("nan")
+    message = state.element.find("velocity") is not None
+    speed = state.value("velocity/exact") if message else float("nan")
     heading = state.value("orientation/exact")
     return state.value("time/exact") * step, point.value("x"), point.value("y"), speed, heading
 
@@ -178,16 +178,16 @@ def _followed(follow: Place, name: str, box: Place, speed: float | None, speeds:
         rows.append((time, world.attribute("x"), world.attribute("y"), float("nan"), world.attribute("h", 0.0)))
     if len(rows) < 2:
         raise follow.error(f"its polyline has {len(rows)} vertices; at least 2 are needed")
-    made = np.array(rows)
-    made[:, 4] = np.unwrap(made[:, 4])
+    result = np.array(rows)
+    result[:, 4] = np.unwrap(result[:, 4])
     center, size = box.child("Center"), box.child("Dimensions")
     x, y = center.attribute("x"), center.attribute("y")
-    cos, sin = exact.cos(made[:, 4]), exact.sin(made[:, 4])
-    made[:, 1] += x * cos - y * sin
-    made[:, 2] += x * sin + y * cos
-    if speeds is not None and len(speeds) == len(made):
-        made[:, 3] = speeds
-    return _track(follow, name, (size.attribute("length"), size.attribute("width")), made, speed)
+    cos, sin = exact.cos(result[:, 4]), exact.sin(result[:, 4])
+    result[:, 1] += x * cos - y * sin
+    result[:, 2] += x * sin + y * cos
+    if speeds is not None and len(speeds) == len(result):
+        result[:, 3] = speeds
+    return _track(follow, name, (size.attribute("length"), size.attribute("width")), result, speed)
 
 
 def _track(place: Place, vehicle: str, size: tuple[float, float], rows: Floats, speed: float | None) -> Track:

@@ -226,11 +226,11 @@ def network_lanes(network: LaneNetwork) -> tuple[Lane, ...]:
 
 def _overlapping(edges: Floats) -> Floats:
     """Return edges (2, M, 2) [m] that reach `OVERLAP` farther at both ends: else roundings would be gaps between lanes."""
-    made = edges.copy()
+    result = edges.copy()
     for end, next_to in ((0, 1), (-1, -2)):
-        step = made[:, end] - made[:, next_to]
-        made[:, end] += OVERLAP * step / exact.hypot(step[:, 0], step[:, 1])[:, None]
-    return made
+        step = result[:, end] - result[:, next_to]
+        result[:, end] += OVERLAP * step / exact.hypot(step[:, 0], step[:, 1])[:, None]
+    return result
 
 
 def joined(lane_map: LaneMap, joint: Joint) -> tuple[Place, Place, Place]:

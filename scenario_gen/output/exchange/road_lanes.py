@@ -45,10 +45,10 @@ def lane_map_of(
             found = true_lanes(road, candidate, tracks, config, scenarios, run_out)
             if found is not None:
                 return found
-    made = derived_lanes(scenarios, road, config.lane_width, run_out)
+    result = derived_lanes(scenarios, road, config.lane_width, run_out)
     if road is None or road.lanes is None:
-        return made
-    return with_network(made, road.lanes, scenarios, road, config.lane_width)
+        return result
+    return with_network(result, road.lanes, scenarios, road, config.lane_width)
 
 
 def true_lanes(
@@ -62,7 +62,7 @@ def true_lanes(
     if not np.array_equal(drawn.drivable, road.drivable) or not np.array_equal(drawn.origin, road.origin):
         return None
     axis = None if tracks is None else bent_axis(name, clean_tracks(tracks), config)
-    made = drawn_lanes(drawn, axis, config.traffic_side, scenarios, run_out)
-    if made is None:
+    result = drawn_lanes(drawn, axis, config.traffic_side, scenarios, run_out)
+    if result is None:
         return None
-    return with_all_vehicles(replace(made, origin=f"the true lanes of {name}"), scenarios, road, config.lane_width)
+    return with_all_vehicles(replace(result, origin=f"the true lanes of {name}"), scenarios, road, config.lane_width)

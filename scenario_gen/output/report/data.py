@@ -24,7 +24,7 @@ MOTION_PERIOD, MAX_MOTION_FRAMES, MAX_MOTION_SAMPLES = 0.1, 400, 12
 def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
     """Return all that one case draws, ready for JSON; at most `samples` scenarios of each arm."""
     sets = {"with": case.generated, "without": case.references.get(WITHOUT), "uniform": case.references.get(UNIFORM)}
-    arms = {name: tuple(made.scenarios[:samples]) for name, made in sets.items() if made is not None}
+    arms = {name: tuple(result.scenarios[:samples]) for name, result in sets.items() if result is not None}
     covered = case.coverage
     if covered is not None:  # the scenarios that stand out are always drawn
         shown = {one.index for one in arms["with"]}

@@ -89,7 +89,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "title": case.title,
         "without": case.references.get(WITHOUT),
         "refused": [case.refusals.get(name, "") for name in (WITHOUT, UNIFORM)],
-        "arms": [(name, made, _causes(made)) for name, made in arms if made is not None],
+        "arms": [(name, result, _causes(result)) for name, result in arms if result is not None],
         "rows": [*evaluation.rows[1:], evaluation.rows[0]],
         "metrics": evaluation.metrics,
         "ego": case.generated.ego.vehicle.id if case.generated.ego else "",
@@ -99,7 +99,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "errors": {key: _errors(case, key) for key in ERRORS},
         "best": {key: case.best(key) for key in ERRORS},
         "reactions": case.reacting,
-        "not_kept": [said for said in case.generated.adaptations if said.startswith(NOT_KEPT)],
+        "not_kept": [message for message in case.generated.adaptations if message.startswith(NOT_KEPT)],
         "outdone": case.similarity()["said"],
         "segments": [
             {"from": bounds[k], "to": bounds[k + 1], "label": int(case.segmentation.labels[start]), "text": text}
@@ -119,7 +119,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
             }
             for v, f, r in vehicles
         ],
-        "remarks": [said for v, r in zip(case.encounter.vehicles, case.routes, strict=False) for said in r.remarks(v.id)],
+        "remarks": [message for v, r in zip(case.encounter.vehicles, case.routes, strict=False) for message in r.remarks(v.id)],
         "lost": [loss.said for loss in case.fit.lost] if case.fit else [],
         "planned": routes_in_words(case.routes),
     }
@@ -157,7 +157,7 @@ def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     sets = [view["case"].generated for view in views]
     return {
         "published": sum(view["case"].published for view in views),
-        "requested": sum(made.requested for made in sets),
-        "candidates": sum(made.candidates for made in sets),
+        "requested": sum(result.requested for result in sets),
+        "candidates": sum(result.candidates for result in sets),
         "better": better,
     }

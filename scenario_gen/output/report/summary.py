@@ -49,29 +49,29 @@ def summary(cases: Sequence[GenerationResult]) -> RenderableType:
 
 def _case(case: GenerationResult) -> list[Text]:
     """The name of a case, its figures, and what is to be said of its segmentation."""
-    made, found = case.generated, case.evaluation.row(WITH)
+    result, found = case.generated, case.evaluation.row(WITH)
     order = formatted(found.values.get("order_kept"), "%", bounds=False) if found else "–"
     title = Text(printable(case.title), style="bold")
     title.append(f"  {len(case.encounter.vehicles)} vehicles, {case.encounter.duration:.1f} s", style="dim")
-    complete = len(made.scenarios) >= made.requested
-    measured = f" (of {found.samples:,}, evenly spaced)" if found and found.samples < len(made.scenarios) else ""
+    complete = len(result.scenarios) >= result.requested
+    measured = f" (of {found.samples:,}, evenly spaced)" if found and found.samples < len(result.scenarios) else ""
     figures = Text.assemble(
         "  ",
-        (f"{len(made.scenarios)}/{made.requested} valid", "green" if complete else "red"),
-        f" of {made.candidates}  K {len(case.segmentation.changepoints)}"
+        (f"{len(result.scenarios)}/{result.requested} valid", "green" if complete else "red"),
+        f" of {result.candidates}  K {len(case.segmentation.changepoints)}"
         f"  order {order if order == '–' else order + ' %'}{measured}",
     )
     kept = [] if found is None else _not_kept(found.values)
     remark = case.segmentation.remark(case.encounter.duration)
     lost = [f"lost on this road: {loss.said}" for loss in case.fit.lost] if case.fit else []
     vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
-    routes = [said for vehicle, route in vehicles for said in route.remarks(vehicle.id)]
+    routes = [message for vehicle, route in vehicles for message in route.remarks(vehicle.id)]
     planned = routes_in_words(case.routes)
     if planned:
         figures.append(f"  routes: {planned}")
     similar = [_errors(case, metric) for metric in ERRORS if found and metric in found.values]
     kept += case.similarity()["said"]
-    kept += [said for said in made.adaptations if said.startswith(NOT_KEPT)]
+    kept += [message for message in result.adaptations if message.startswith(NOT_KEPT)]
     reactions = case.reacting["sentences"]
     return [
         title,
@@ -87,10 +87,10 @@ def _not_kept(values: Mapping[str, Interval]) -> list[str]:
     turns, vanished, conflicts = (
         values.get(key, Interval(math.nan)).value for key in ("turn_kept", "vanished_conflicts", "conflicts")
     )
-    said = [f"{100.0 * (1.0 - turns):.3g} % of the vehicles turn otherwise than in the template"] if turns < 1.0 else []
+    message = [f"{100.0 * (1.0 - turns):.3g} % of the vehicles turn otherwise than in the template"] if turns < 1.0 else []
     if vanished > 0.0:
-        said.append(f"{vanished:.3g} of the template's {vanished + conflicts:.0f} conflict(s) vanish, mean over samples")
-    return said
+        message.append(f"{vanished:.3g} of the template's {vanished + conflicts:.0f} conflict(s) vanish, mean over samples")
+    return message
 
 
 def _errors(case: GenerationResult, metric: str) -> Text:

@@ -116,9 +116,9 @@ def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Lim
 
 def _left_out(namespace: Namespace) -> tuple[str, ...]:
     """Say what the bag has not, and what follows from it; and what its requests say they came to."""
-    said = ["all scenarios of the bag are shown and measured, valid or not; start and end states were not asked"]
+    messages = ["all scenarios of the bag are shown and measured, valid or not; start and end states were not asked"]
     if "map" not in namespace.messages:
-        said.append("the bag has no map: whether vehicles leave the road was not checked")
+        messages.append("the bag has no map: whether vehicles leave the road was not checked")
     if "changepoints" not in namespace.messages:
-        said.append("the bag has no changepoints: the template counts as one primitive, and its waits were not asked")
-    return (*said, *(summary.sentence() for summary in namespace.summaries))
+        messages.append("the bag has no changepoints: the template counts as one primitive, and its waits were not asked")
+    return (*messages, *(summary.sentence() for summary in namespace.summaries))

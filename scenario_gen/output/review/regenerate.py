@@ -79,23 +79,23 @@ def regenerate_scenario(
 def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
     """Make the scenario that was found; `what` names bag and request in messages."""
     values, seed, index = found.summary.values, found.entry.seed, found.entry.index
-    asked = Request(**{entry.name: values.get(entry.name, str(entry.default)) for entry in fields(Request)})
+    requested = Request(**{entry.name: values.get(entry.name, str(entry.default)) for entry in fields(Request)})
     template = found.template(what)
     encounter, segmentation, routes, (road, fit) = template.encounter, template.segmentation, template.routes, template.placed()
     if log is not None:
         encounter, segmentation = _from_log(log, encounter, found.summary, seed, what)
     sampling = read_parameters(SamplingConfig(), values, "sampling.", what)
-    if asked.moves or log is not None:  # what the bag has on `fit` need not be this request's
+    if requested.moves or log is not None:  # what the bag has on `fit` need not be this request's
         fitting = read_parameters(FittingConfig(), values, "fitting.", what)
         planning = read_parameters(PlanningConfig(), values, "planning.", what)
-        fit = fit_template(encounter, segmentation, road, fitting, request=asked, max_speed=sampling.max_speed)
+        fit = fit_template(encounter, segmentation, road, fitting, request=requested, max_speed=sampling.max_speed)
         routes = plan_routes(road, fit, planning, seed)
-    plan = plan_of(GenerationResult(encounter, segmentation, road, fit, routes, seed=seed), sampling, asked)
+    plan = plan_of(GenerationResult(encounter, segmentation, road, fit, routes, seed=seed), sampling, requested)
     check = None
-    if asked.target or asked.order == "swap":  # a proposal is found again with them
+    if requested.target or requested.order == "swap":  # a proposal is found again with them
         limits = read_parameters(Limits(), values, "limits.", what)
-        check = checker_of(plan, sampling, limits, asked).check
-    scenario = regenerate(plan, sampling, seed=seed, index=index, request=asked, check=check, measures=MEASURES)
+        check = checker_of(plan, sampling, limits, requested).check
+    scenario = regenerate(plan, sampling, seed=seed, index=index, request=requested, check=check, measures=MEASURES)
     data, sha256 = (b"", "") if scenario is None else scenario_bytes(scenario, encounter)
     witness = None if scenario is None else scenario.witness
     own = "" if witness is None else scenario_bytes(witness, encounter)[1]

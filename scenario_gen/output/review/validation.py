@@ -119,7 +119,7 @@ def validate_bag(path: Path, limits: Limits | None = None, config: BagConfig = B
 def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
     namespace.check_infos()
     result = Validation(namespace.name, missing=namespace.missing)
-    said = () if namespace.entries else (f"sha256: there is no entry on {INFO}",)
+    message = () if namespace.entries else (f"sha256: there is no entry on {INFO}",)
     references: dict[tuple[object, ...], Reference] = {}
     checkers: dict[tuple[object, ...], Checker] = {}
     for k, sha256 in enumerate(namespace.hashes):
@@ -129,11 +129,11 @@ def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
         elif k in namespace.unknown:
             result.unaccounted += 1
         entry = namespace.entry(k) or entry
-        silent = said
+        silent = message
         if entry is not None and namespace.without_witness(entry):
             if namespace.strange_witnesses:
                 wrong.append((ALTERED, f"the ego's witness is not what was published for index {entry.index}"))
-            silent = (*said, NO_WITNESS)
+            silent = (*message, NO_WITNESS)
         try:
             stamp, scenario = namespace.scenario(k)
         except InputError as error:

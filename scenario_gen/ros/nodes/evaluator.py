@@ -94,9 +94,9 @@ class Evaluator(StageNode):
 
     def _forget(self, request: str) -> None:
         """Give up a request, and say what of it has not come."""
-        said = self._requests.open[request].sentence()
+        message = self._requests.open[request].sentence()
         self._requests.forget(request)
-        self.status(Level.WARN, f"{said}; it is not evaluated; see keep and wait", "requests", request=request)
+        self.status(Level.WARN, f"{message}; it is not evaluated; see keep and wait", "requests", request=request)
 
     def _report_missing(self) -> None:
         """Say what has not come of closed requests, once all is quiet."""

@@ -99,13 +99,13 @@ class GpSampler(StageNode):
             self._requests.begin(request)
             node, send = self.get_fully_qualified_name(), partial(self.outputs.send_paced, stop=stop)
             with self.outputs.paced(self.OUTPUTS[:2], config.patience, partial(self._report_pace, request.name)):
-                made, summary = answer_request(messages, config, request.name, node, request.progress, stop, send)
+                result, summary = answer_request(messages, config, request.name, node, request.progress, stop, send)
             words = summary.status.message
             if summary.cancelled:
                 words = f"{self.given_up(messages, cancelled)}: {words}"
                 return None
             level = summary.status.level
-            return made, summary
+            return result, summary
         except Exception as error:
             if not stop():
                 level, words, more = Level.ERROR, str(error), {"error": type(error).__name__}

@@ -89,13 +89,13 @@ class Planner(StageNode):
         routes = plan_routes(road, fit, config.planning, config.seed)
         stop_if_cancelled()
         anchors = anchor_stamps(encounter, segmentation.changepoints)
-        made = {
+        results = {
             vehicle_topic(name, "route"): encode_route(route, anchors, road.frame_id)
             for name, route in zip(tokens(vehicle.id for vehicle in encounter.vehicles), routes, strict=True)
         }
-        made["fit"] = encode_fit(encounter, fit, road.frame_id)
-        made["fit/info"] = encode_hashes("fit", messages | made, encounter.start_ns)
-        for topic, data in made.items():
+        results["fit"] = encode_fit(encounter, fit, road.frame_id)
+        results["fit/info"] = encode_hashes("fit", messages | results, encounter.start_ns)
+        for topic, data in results.items():
             self.outputs.send(topic, data)
         self.get_logger().info(f"planned {len(routes)} routes through {len(anchors)} anchors")
         statuses = fit_statuses(fit, self.get_fully_qualified_name(), template_hashes(messages), routes)

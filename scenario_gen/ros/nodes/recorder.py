@@ -177,7 +177,7 @@ class Recorder(Node):  # type: ignore[misc]
             self.diagnostics.status(Level.OK, str(self._bag.folder), "recorded", counts, log=False)
             lost = self._losses.summary()
             if lost:
-                message = "; ".join(f"{topic}: {said}" for topic, said in lost.items())
+                message = "; ".join(f"{topic}: {text}" for topic, text in lost.items())
                 self.diagnostics.status(Level.WARN, f"{message}; {remedy(message)}", "losses", lost, log=False)
             self._warn(lost)
 
@@ -185,11 +185,11 @@ class Recorder(Node):  # type: ignore[misc]
         """Say on the terminal what is new of what is not recorded."""
         for topic in lost:
             if lost[topic] != self._warned.get(topic):
-                said = f"{topic}: {lost[topic]}; {remedy(lost[topic])}"
+                message = f"{topic}: {lost[topic]}; {remedy(lost[topic])}"
                 if self.context.ok():
-                    self.get_logger().warning(said)
+                    self.get_logger().warning(message)
                 else:  # ended by a signal; /rosout is gone
-                    print(f"[WARN] [{self.get_name()}]: {said}", file=sys.stderr, flush=True)
+                    print(f"[WARN] [{self.get_name()}]: {message}", file=sys.stderr, flush=True)
         self._warned = dict(lost)
 
     def _let_go(self) -> None:

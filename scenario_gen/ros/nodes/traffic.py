@@ -205,8 +205,8 @@ class Traffic(Node):  # type: ignore[misc]
         return self._heard is None and (self.config.wait_for_ego or self.config.lock_step)
 
     def _advance(self, loop: ClosedLoop) -> None:
-        asked, note = self._command(self._states[-1])
-        self._states.append(loop.step(self._states[-1], asked, note))
+        requested, note = self._command(self._states[-1])
+        self._states.append(loop.step(self._states[-1], requested, note))
         if fault := self._states[-1].fault:
             self._say(Level.WARN, fault, "ego")
         self._tell()

@@ -102,23 +102,23 @@ def understood(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int)
 def _decoded(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -> Heard:
     period, frame, own = loop.config.step, loop.scenario.frame_id, (child, "base_link", "")
     if topic.startswith("ego/cmd_vel"):
-        stamp, said, speed, rate = driving.decode_twist(data, topic, stamped=topic.endswith("stamped"))
-        if said not in own and said != frame:
-            raise InputError(f"{topic}: frame {said!r} is not the ego's; {', '.join(map(repr, own[:2]))} are")
+        stamp, message, speed, rate = driving.decode_twist(data, topic, stamped=topic.endswith("stamped"))
+        if message not in own and message != frame:
+            raise InputError(f"{topic}: frame {message!r} is not the ego's; {', '.join(map(repr, own[:2]))} are")
         return Heard(topic, step, stamp, lambda state: of_twist(state.ego, speed, rate, period))
     if topic in WAYS:
         decode = driving.decode_trajectory if topic == "ego/trajectory" else driving.decode_timed_path
         way = decode(data, topic)
-        stamp, said = 0, way.frame_id
+        stamp, message = 0, way.frame_id
         track = Track.of((way.time_ns - FIRST_STAMP) * 1e-9, way.poses)
-        asked: Callable[[State], Command | Pose | None] = lambda state: track.command(state.ego, state.time, period)  # noqa: E731
+        requested: Callable[[State], Command | Pose | None] = lambda state: track.command(state.ego, state.time, period)  # noqa: E731
     else:
-        stamp, said, _, state = decode_odometry(data, topic)
+        stamp, message, _, state = decode_odometry(data, topic)
         pose = Pose(*state[:4].tolist())
-        asked = lambda _: pose  # noqa: E731
-    if said != frame:
-        raise InputError(f"{topic}: frame {said!r} is not that of the scenario, {frame!r}")
-    return Heard(topic, step, stamp, asked)
+        requested = lambda _: pose  # noqa: E731
+    if message != frame:
+        raise InputError(f"{topic}: frame {message!r} is not that of the scenario, {frame!r}")
+    return Heard(topic, step, stamp, requested)
 
 
 GRID_EVERY = 0.2  # seconds of the drive between two local maps

@@ -181,17 +181,17 @@ class _Preparation:
 
 def _spin(executor: SingleThreadedExecutor, nodes: Sequence[Any]) -> int:
     """Start the nodes, once their kernels are there, and spin them; return the exit code."""
-    asked = threading.Event()
+    requested = threading.Event()
 
     def end() -> None:
-        if not asked.is_set():
+        if not requested.is_set():
             _leave_within(max(getattr(node, "ENDING", ENDING) for node in nodes))
-        asked.set()
+        requested.set()
         executor.create_task(lambda: None)  # so that it looks up
 
     def start() -> None:
         for node in nodes:
-            if not asked.is_set():
+            if not requested.is_set():
                 node.autostart()
 
     end_orderly(end)
@@ -200,7 +200,7 @@ def _spin(executor: SingleThreadedExecutor, nodes: Sequence[Any]) -> int:
         _Preparation(executor, with_kernels, start)
     else:
         start()
-    while not asked.is_set() and rclpy.ok() and not all(getattr(node, "done", False) for node in nodes):
+    while not requested.is_set() and rclpy.ok() and not all(getattr(node, "done", False) for node in nodes):
         executor.spin_once()
     return max(getattr(node, "exit_code", 0) for node in nodes)
 

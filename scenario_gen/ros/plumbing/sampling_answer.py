@@ -152,18 +152,18 @@ def answer_request(
         stages = PipelineConfig(fitting=config.fitting, planning=config.planning, sampling=config.sampling, limits=config.limits)
         attempt = Attempt(encounter, segmentation, road, stages, config, config.count, config.seed)
         with nearest_if_impossible(attempt, cancelled):
-            made = attempt.run(callbacks)
+            outcome = attempt.run(callbacks)
     else:
-        made = sample_scenarios(
+        outcome = sample_scenarios(
             replace(template, seed=config.seed), config.sampling, config.limits, config,
             count=config.count, callbacks=callbacks, measures=MEASURES,
         )  # fmt: skip
-    result = made.generated
+    result = outcome.generated
     provenance = parameter_texts(config) | versions() | hashes
     stopped = cancelled() and len(result.scenarios) < result.requested
-    summary = request_summary(result, request, node, config.seed, provenance, cancelled=stopped, reactions=made.reacting)
+    summary = request_summary(result, request, node, config.seed, provenance, cancelled=stopped, reactions=outcome.reacting)
     out.close(result, summary)
-    return made, summary
+    return outcome, summary
 
 
 SHOWN = 20  # waiting requests that are named
@@ -282,7 +282,7 @@ class OpenRequests:
         """Generate with the caller's parameters; the answer comes when the set is done."""
         node = self._node
         try:
-            asked, name = _named(request.parameters)
+            requested, name = _named(request.parameters)
             opened = self.add(name)
         except ScenarioGenError as error:
             node.diagnostics.failed("generate", error)
@@ -290,7 +290,7 @@ class OpenRequests:
             response.result.reason = str(error)
             return response
         try:
-            config, messages = self._inputs_of_call(asked)
+            config, messages = self._inputs_of_call(requested)
             opened.wanted = config.count
         except ScenarioGenError as error:
             self.end(opened, Level.ERROR, str(error), error=type(error).__name__)
@@ -299,12 +299,12 @@ class OpenRequests:
 
         def job(cancelled: Callable[[], bool]) -> tuple[bool, str]:
             try:
-                made: Answer | None = node.generate(messages, opened, config, cancelled)
+                result: Answer | None = node.generate(messages, opened, config, cancelled)
             except ScenarioGenError as error:  # which has been reported
                 return False, str(error)
-            if made is None:
+            if result is None:
                 return False, node.given_up(messages, lambda: True)
-            return bool(made[0].generated.scenarios), made[1].status.message
+            return bool(result[0].generated.scenarios), result[1].status.message
 
         answer = await node.result_of(opened.job, job, lambda error: (False, f"{type(error).__name__}: {error}"))
         response.result.successful, reason = answer

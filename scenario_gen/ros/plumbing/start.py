@@ -127,9 +127,9 @@ def fork(specification: list[dict[str, Any]]) -> None:
     for number in signals:
         signal.signal(number, lambda number, _: os._exit(128 + number))  # there is nobody to be ended yet
     _load([entry["node"] for entry in specification])
-    asked: list[bool] = []
+    requested: list[bool] = []
     for number in signals:
-        signal.signal(number, lambda *_: asked.append(True))
+        signal.signal(number, lambda *_: requested.append(True))
     children: dict[int, str] = {}
     for entry in specification:
         pid = os.fork()
@@ -137,7 +137,7 @@ def fork(specification: list[dict[str, Any]]) -> None:
             _become(entry["node"], entry["arguments"], entry["log"])
         children[pid] = entry["node"]
         say(event="started", node=entry["node"], pid=pid)
-    while not asked and children:
+    while not requested and children:
         readable, _, _ = select.select([0], [], [], 0.1)
         if readable and not os.read(0, 1):
             break

@@ -273,8 +273,8 @@ def let_others_take(executor: Executor | None, stop: Callable[[], bool]) -> None
 def unacknowledged(node: Node, topic: str, count: int) -> str:
     """Say in a sentence what `Pace` reported: that a topic's subscribers are not waited for any more, or what they may lack."""
     name = node.resolve_topic_name(topic)
-    said = f"a subscriber of {name} acknowledges nothing; it is not waited for any more"
+    message = f"a subscriber of {name} acknowledges nothing; it is not waited for any more"
     if count:
-        said = f"{count} messages of {name} were published without acknowledgement, a subscriber may lack them"
+        message = f"{count} messages of {name} were published without acknowledgement, a subscriber may lack them"
     who = ", ".join(sorted({one.node_name for one in node.get_subscriptions_info_by_topic(name)})) or "none any more"
-    return f"{said} (subscribers: {who}); see which one hangs, or raise patience; who joins anew gets the last 1000"
+    return f"{message} (subscribers: {who}); see which one hangs, or raise patience; who joins anew gets the last 1000"
