@@ -39,7 +39,7 @@ FOLDS, RATIO, FEW = 5, 2, 4000
 
 
 @dataclass(frozen=True)
-class Told:
+class Progress:
     """The answer: mean area under the curve over folds, its error, and by how much it falls when a feature is shuffled."""
 
     area: float
@@ -108,7 +108,7 @@ def of_sets(name: str, template: Signals, samples: Sequence[Signals], rng: np.ra
     return Windows(name, recorded, generated[np.sort(rng.choice(len(generated), kept, replace=False))])
 
 
-def told_apart(sets: Sequence[Windows], series: Sequence[str], *, importances: bool = False) -> Told | None:
+def told_apart(sets: Sequence[Windows], series: Sequence[str], *, importances: bool = False) -> Progress | None:
     """Train and test; None where there are fewer encounters than folds, or scikit-learn is not installed."""
     try:
         from sklearn.ensemble import HistGradientBoostingClassifier
@@ -142,7 +142,7 @@ def told_apart(sets: Sequence[Windows], series: Sequence[str], *, importances: b
                 shuffled = data[test].copy()
                 shuffled[:, k] = rng.permutation(shuffled[:, k])
                 falls[FEATURES[column]].append(areas[-1] - area(shuffled))
-    return Told(
+    return Progress(
         float(np.mean(areas)),
         float(np.std(areas) / np.sqrt(len(areas))),
         {name: float(np.mean(values)) for name, values in falls.items() if values},

@@ -141,8 +141,8 @@ class Recheck:
         one = self.limits
         for k, asked in ((0, self.asked.start), (-1, self.asked.end)):
             driven, gained = _unseen(s, k)
-            far = (np.linalg.norm(s.position[:, k] - asked[:, :2], axis=1) - self.asked.freed[:, k, 0] - driven).max()
-            other = (np.abs(s.speed[:, k] - asked[:, 3]) - self.asked.freed[:, k, 1] - gained).max()
+            far = (np.linalg.norm(s.position[:, k] - asked[:, :2], axis=1) - self.asked.relaxed[:, k, 0] - driven).max()
+            other = (np.abs(s.speed[:, k] - asked[:, 3]) - self.asked.relaxed[:, k, 1] - gained).max()
             if far > one.position_tolerance or other > one.speed_tolerance:
                 account.add("boundary_state", f"{far:.3f} m, {other:.3f} m/s in scenario {s.index}")
         h, slack = np.diff(s.time), 1e-5

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._naturalness_classifier import GROUPS, of_sets, Told, told_apart, Windows
+from benchmarks._naturalness_classifier import GROUPS, of_sets, Progress, told_apart, Windows
 from benchmarks._naturalness_cuts import Cut, cuts, recorded
 from benchmarks._naturalness_generate import Job, Made, made_by
 from benchmarks._naturalness_motion import displacement, keeps_turn, roughness, Signals
@@ -260,7 +260,7 @@ def _classifier(group: Sequence[Case], kind: str) -> list[Row]:
     return rows
 
 
-def _explained(told: Told) -> str:
+def _explained(told: Progress) -> str:
     return f"± {told.error:.3f}; given away by {told.giveaways() or 'nothing alone'}"
 
 

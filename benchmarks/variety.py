@@ -31,7 +31,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.method.evaluation.measures import features, measure, MEASURES
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
-from scenario_gen.method.sampling import draw_scenarios, freed_states, Plan, SamplingConfig
+from scenario_gen.method.sampling import draw_scenarios, Plan, relaxed_states, SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
@@ -80,7 +80,7 @@ class Case:
     ) -> tuple[ScenarioSet, float]:
         """Sample; return the set and the CPU seconds that it took."""
         encounter, segmentation, road, routes = self.given
-        asked = freed_states(self.states, encounter, config, request)
+        asked = relaxed_states(self.states, encounter, config, request)
         begun = process_time()
         check = Checker.of_template(encounter, road, asked, self.waits, None, request.order).check
         plan = Plan(encounter, segmentation, road, routes, asked, self.waits)

@@ -295,7 +295,7 @@ def scenario_entry(
         **({} if scenario.witness is None else {EGO_WITNESS: digest(encode_scenario(scenario.witness, stamp_of(data, INFO)))}),
         "asked_start": json.dumps(asked.start[rows].tolist()),
         "asked_end": json.dumps(asked.end[rows].tolist()),
-        **({FREED: json.dumps(asked.freed[rows].tolist())} if asked.freed[rows].any() else {}),
+        **({FREED: json.dumps(asked.relaxed[rows].tolist())} if asked.relaxed[rows].any() else {}),
     }
     status = Status(f"{node}: scenario", Level.OK, f"scenario {scenario.index} of request {request}", values)
     return ScenarioEntry(request, scenario.index, scenario.seed, sha256, status)

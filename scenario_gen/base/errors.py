@@ -77,7 +77,7 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
 
 
-def tell(error: ScenarioGenError | OSError) -> int:
+def print_error(error: ScenarioGenError | OSError) -> int:
     """Print the error on standard error; return the exit code."""
     own = of_system(error) if isinstance(error, OSError) else error
     print(f"error: {presentable(str(own))}", file=sys.stderr)

@@ -26,7 +26,7 @@ from scenario_gen.base.folders import naming, scratch, sync
 from scenario_gen.base.interrupts import ending, starting
 
 Task = TypeVar("Task")
-Told = Callable[[int, int, str], None]
+Progress = Callable[[int, int, str], None]
 """Told how many tasks are done, of how many, and how much time is left, in words."""
 WORKERS = {  # their environment: one thread each; Dask's own has them return every freed array to the system, a fifth of all CPU
     **dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
@@ -81,7 +81,7 @@ class Workers:
 
     count: int = 1
     scheduler: str = ""
-    told: Told = lambda *_: None
+    told: Progress = lambda *_: None
 
 
 class Spread:

@@ -25,12 +25,12 @@ LOCK = "compiling.lock"
 NAME = 128  # bytes of a kernel's name in the queue
 LOOK = 0.5  # seconds between two looks at what is there
 Entry = tuple[Any, Any]
-Told = Callable[[int, int, float], None]  # kernels that are there, kernels that are needed, seconds
+Progress = Callable[[int, int, float], None]  # kernels that are there, kernels that are needed, seconds
 
 _workers: list["subprocess.Popen[bytes]"] = []
 
 
-def make_ready(report: Told = lambda *_: None) -> int:
+def make_ready(report: Progress = lambda *_: None) -> int:
     """Load every kernel of the modules that have been imported; compile what is not there; return their number.
 
     Several processes may do so at once: one has the rest compiled, the others wait for what they need. Where no folder can be

@@ -24,14 +24,48 @@ from scenario_gen.roads.obstacles import read_obstacles
 from scenario_gen.roads.shaped import bent_axis
 from scenario_gen.roads.vector.ground import along_lanes, drives_against, own_ground
 from scenario_gen.roads.vector.match import Course
-from scenario_gen.roads.vector.place import laid, placements
+from scenario_gen.roads.vector.place import placements, tracks_on
 from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn, flare_begins, line_between, relative
 from scenario_gen.types import Road
 
 __all__ = [
-    "BUILT_IN", "CONTACT", "Arm", "Course", "DrawRoad", "Road", "RoadConfig", "along_lanes", "arms_of", "bent_axis",
-    "build_road", "clearance_field", "clearance_in_cells", "common_component", "component_cells", "draw", "draw_ring_route",
-    "draw_route", "draw_u_turn", "drives_against", "flare_begins", "footprint_fits", "free_length", "laid", "layout_for",
-    "line_between", "nearest_pose_with_room", "own_ground", "placements", "read_obstacles", "relative", "reverse", "ring_of",
-    "road_and_template", "segment_free", "segments_free", "to_cells", "to_metres", "unused_arms",
+    "BUILT_IN",
+    "CONTACT",
+    "Arm",
+    "Course",
+    "DrawRoad",
+    "Road",
+    "RoadConfig",
+    "along_lanes",
+    "arms_of",
+    "bent_axis",
+    "build_road",
+    "clearance_field",
+    "clearance_in_cells",
+    "common_component",
+    "component_cells",
+    "draw",
+    "draw_ring_route",
+    "draw_route",
+    "draw_u_turn",
+    "drives_against",
+    "flare_begins",
+    "footprint_fits",
+    "free_length",
+    "layout_for",
+    "line_between",
+    "nearest_pose_with_room",
+    "own_ground",
+    "placements",
+    "read_obstacles",
+    "relative",
+    "reverse",
+    "ring_of",
+    "road_and_template",
+    "segment_free",
+    "segments_free",
+    "to_cells",
+    "to_metres",
+    "tracks_on",
+    "unused_arms",
 ]  # fmt: skip

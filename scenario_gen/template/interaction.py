@@ -42,13 +42,13 @@ FOLLOWING_LENGTHS = 3.0  # a shared path longer than this many vehicle lengths i
 class Wait:
     """Vehicle `vehicle` waits from `start` to `end` [s]: smoothed speed below 0.5 m/s for at least 1 s.
 
-    It `creeps` if it does not stand (at most 0.1 m/s) for 1 s of that.
+    It `moves_slowly` if it does not stand (at most 0.1 m/s) for 1 s of that.
     """
 
     vehicle: int
     start: float
     end: float
-    creeps: bool = False
+    moves_slowly: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
     smooth = exact.moving_mean(encounter.speed, width)  # outside of its presence a speed is held
     time = encounter.time
     return tuple(
-        Wait(vehicle, float(time[a]), float(time[b - 1]), _creeps(encounter.speed[vehicle, a:b], time[a:b]))
+        Wait(vehicle, float(time[a]), float(time[b - 1]), _moves_slowly(encounter.speed[vehicle, a:b], time[a:b]))
         for vehicle, (speed, there) in enumerate(zip(smooth, encounter.there, strict=True))
         for a, b in runs((speed < WAIT_SPEED) & there)
         if time[b - 1] - time[a] >= WAIT_DURATION - 1e-9
@@ -99,7 +99,7 @@ def waits_to_keep(encounter: Encounter, segmentation: Segmentation) -> tuple[Wai
     return find_waits(encounter) if segmentation.changepoints.size else ()
 
 
-def _creeps(speed: Floats, time: Floats) -> bool:
+def _moves_slowly(speed: Floats, time: Floats) -> bool:
     """Whether the vehicle does not stand for long enough between the first and the last sample in which it does."""
     stands = time[speed <= STAND_SPEED]
     return len(stands) == 0 or bool(stands[-1] - stands[0] < WAIT_DURATION - 1e-9)
@@ -126,7 +126,7 @@ def find_conflicts(
     return tuple(conflict for conflict in found if conflict is not None)
 
 
-def orders_asked(conflicts: Sequence[Conflict], order: str) -> tuple[int | None, ...]:
+def required_orders(conflicts: Sequence[Conflict], order: str) -> tuple[int | None, ...]:
     """Return who must go first at each of the template's conflicts, by vehicle index; None where anyone may.
 
     Args:

@@ -85,11 +85,11 @@ class BoundaryStates:
 
     start: Floats
     end: Floats
-    freed: Floats = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    relaxed: Floats = field(default_factory=lambda: np.zeros((0, 2, 2)))
 
     def __post_init__(self) -> None:
-        freed = self.freed if len(self.freed) else np.zeros((len(self.start), 2, 2))
-        freeze(self, freed=frozen(freed), start=canonical_poses(self.start), end=canonical_poses(self.end))
+        relaxed = self.relaxed if len(self.relaxed) else np.zeros((len(self.start), 2, 2))
+        freeze(self, relaxed=frozen(relaxed), start=canonical_poses(self.start), end=canonical_poses(self.end))
 
 
 class Cause(StrEnum):

@@ -110,7 +110,10 @@ def test_waits_are_slow_for_at_least_a_second():
     speed[0, 20:40] = 0.0
     speed[0, 60:66] = 0.0  # half a second
     speed[1] = 0.2
-    assert find_waits(encounter(speed)) == (Wait(0, pytest.approx(2.2), pytest.approx(3.7)), Wait(1, 0.0, 10.0, creeps=True))
+    assert find_waits(encounter(speed)) == (
+        Wait(0, pytest.approx(2.2), pytest.approx(3.7)),
+        Wait(1, 0.0, 10.0, moves_slowly=True),
+    )
 
 
 def test_a_wait_creeps_if_it_does_not_stand_for_a_second():
@@ -119,7 +122,7 @@ def test_a_wait_creeps_if_it_does_not_stand_for_a_second():
     speed[0, 30:39] = 0.0  # 0.8 s
     speed[1, 20:60] = 0.3
     speed[1, 30:41] = 0.05  # 1.0 s
-    assert [wait.creeps for wait in find_waits(encounter(speed))] == [True, False]
+    assert [wait.moves_slowly for wait in find_waits(encounter(speed))] == [True, False]
 
 
 def test_one_noisy_sample_does_not_end_a_wait():

@@ -151,7 +151,7 @@ def _suits(track: Track, way: Way) -> bool:
 def _search(tracks: tuple[Track, ...], ways: list[list[Way]], relations: tuple[Relation, ...], scale: float) -> list[Choice]:
     """Assignments, solved, the best first."""
     solver = Solver(tracks, relations, scale)
-    laid = _Laying(tracks, ways, scale).best(solver)
+    tracks_on = _Laying(tracks, ways, scale).best(solver)
     found: dict[tuple[int, ...], Choice] = {}
 
     def solved(chosen: tuple[int, ...]) -> Choice:
@@ -160,8 +160,8 @@ def _search(tracks: tuple[Track, ...], ways: list[list[Way]], relations: tuple[R
             found[chosen] = solver.solve({i: ways[i][k] for i, k in enumerate(chosen)})
         return found[chosen]
 
-    best = min((chosen for chosen, _ in laid), key=lambda chosen: round(solved(chosen).cost, 6))
-    order = dict(laid)[best]
+    best = min((chosen for chosen, _ in tracks_on), key=lambda chosen: round(solved(chosen).cost, 6))
+    order = dict(tracks_on)[best]
     for _ in range(_SWAPS):  # one vehicle at a time, the one by which most is won
         swapped = [(*best[:i], k, *best[i + 1 :]) for i in range(len(tracks)) for k in order[i][:_OTHERS]]
         other = min(swapped, key=lambda chosen: round(solved(chosen).cost, 6), default=best)

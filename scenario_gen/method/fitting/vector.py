@@ -11,7 +11,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.kept import keeps_conflicts
 from scenario_gen.method.fitting.placement import max_repair, Placement, SCALES, separated
-from scenario_gen.roads import Course, laid, placements
+from scenario_gen.roads import Course, placements, tracks_on
 from scenario_gen.template import Track
 from scenario_gen.types import LaneNetwork, Road
 
@@ -37,7 +37,7 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
         notes = [*network.notes, *(_note(c, t, network) for c, t in zip(one.courses, tracks, strict=True))]
         if scale != 1.0:
             notes.append(f"scaled by {scale:g} to fit the lanes")
-        placement = Placement.of(laid(one, tracks, scale), scale, notes, map(_manoeuvre, one.courses))
+        placement = Placement.of(tracks_on(one, tracks, scale), scale, notes, map(_manoeuvre, one.courses))
         try:
             placement = separated(placement, config, sideways=0.0)
             max_repair(placement.tracks, road, config.max_move)

@@ -6,7 +6,7 @@
 from dataclasses import replace
 
 from scenario_gen.method.sampling.config import SamplingConfig
-from scenario_gen.method.sampling.freedom import freed_states
+from scenario_gen.method.sampling.freedom import relaxed_states
 from scenario_gen.method.sampling.plan import Callbacks, Plan
 from scenario_gen.method.sampling.prepare import kept_reactions
 from scenario_gen.method.sampling.sample import draw_scenarios
@@ -60,7 +60,7 @@ def plan_of(planned: GenerationResult, sampling: SamplingConfig, request: Reques
         InputError: road or fit are not known.
     """
     encounter, segmentation, (road, fit) = planned.encounter, planned.segmentation, planned.placed()
-    states = freed_states(fit.asked, encounter, sampling, request)
+    states = relaxed_states(fit.asked, encounter, sampling, request)
     waits = waits_to_keep(encounter, segmentation) if waits is None else waits
     return Plan(encounter, segmentation, road, planned.routes, states, waits)
 

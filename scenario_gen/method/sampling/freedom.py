@@ -43,15 +43,15 @@ def cut(z: Floats, bound: float) -> Floats:
     return np.asarray(exact.ndtri(low + (1.0 - 2.0 * low) * exact.ndtr(z)))
 
 
-def freed_states(asked: BoundaryStates, encounter: Encounter, config: SamplingConfig, request: Request) -> BoundaryStates:
+def relaxed_states(asked: BoundaryStates, encounter: Encounter, config: SamplingConfig, request: Request) -> BoundaryStates:
     """Return the states with how far each may be left: 0 where it was asked for, or nothing is freed.
 
     A vehicle that starts a seconds later or earlier, starts as far along its lane as it drives in that time.
     """
     if config.variety != "wide":
-        return replace(asked, freed=np.zeros_like(asked.freed)) if asked.freed.any() else asked
+        return replace(asked, relaxed=np.zeros_like(asked.relaxed)) if asked.relaxed.any() else asked
     ego = request.ego_of(encounter)
-    freed = np.zeros((len(encounter.vehicles), 2, 2))
+    relaxed = np.zeros((len(encounter.vehicles), 2, 2))
     own = [np.asarray(np.isfinite(request.rows(end, encounter)).any(axis=1)) for end in ("starts", "goals")]
     if ego is not None:
         for rows in own:
@@ -73,8 +73,8 @@ def freed_states(asked: BoundaryStates, encounter: Encounter, config: SamplingCo
             faster = config.freedom * config.end_speed_sigma
             along = 0.0 if tied[end] else slowest * seconds * (top + faster)
             off = 0.0 if tied[end] else max(slowest * top - there, there - float(near.min()))
-            freed[n, end] = along + across, off + faster + _FASTEST
-    return replace(asked, freed=np.ceil(1000.0 * freed) / 1000.0)
+            relaxed[n, end] = along + across, off + faster + _FASTEST
+    return replace(asked, relaxed=np.ceil(1000.0 * relaxed) / 1000.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +260,7 @@ def freedom_of(
     vehicle: Vehicle,
     arc: Floats,
     clock: OwnClock,
-    freed: Floats,
+    relaxed: Floats,
     asked: Bools,
     ahead: Floats,
     gap: float,
@@ -272,7 +272,7 @@ def freedom_of(
         vehicle: itself.
         arc: (G,) arc lengths [m] of its route's nodes.
         clock: how its clock leaves the shared one.
-        freed: (2, 2) metres and m/s by which its start and end may differ from what is given.
+        relaxed: (2, 2) metres and m/s by which its start and end may differ from what is given.
         asked: (2,) whether start and end states are asked of any vehicle.
         ahead: (2,) metres of free road straight on before its route and behind it.
         gap: metres of its least gap to any other vehicle in the template.
@@ -280,16 +280,16 @@ def freedom_of(
     """
     place = np.ones(len(arc))
     for end, since in ((0, arc - arc[0]), (1, arc[-1] - arc)):
-        if freed[end, 0] == 0.0:
+        if relaxed[end, 0] == 0.0:
             place = place * _smooth_step(since / max(min(_TAPER, _RAMP_SHARE * float(arc[-1])), 1e-9))[0]
-    still = len(arc) == 1 or freed[:, 0].min() == 0.0
+    still = len(arc) == 1 or relaxed[:, 0].min() == 0.0
     sizes = np.array([size for size in CATALOGUE if size[0] - vehicle.length <= max(_GROWS * gap, 0.0)]).reshape(-1, 2)
     other_size = config.sizes == "catalogue" and _CARS[0] <= vehicle.length <= _CARS[1] and not still
     return Freedom(
         clock,
         place if len(arc) > 1 else np.zeros(1),
         config.place_sigma,
-        np.where(freed[:, 1] > 0.0, config.end_speed_sigma, 0.0),
+        np.where(relaxed[:, 1] > 0.0, config.end_speed_sigma, 0.0),
         config.freedom,
         sizes if other_size else np.zeros((0, 2)),
         np.where(asked, 0.0, ahead),

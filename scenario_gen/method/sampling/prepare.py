@@ -216,9 +216,9 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
     warp = TimeWarp(clock_of(clock.grid, stretch * clock.rate), config, least_shares(clock.grid, waits))
     vehicles = [_model(d, road, *mean, config, sentences) for d, mean in zip(drives, found, strict=True)]
     if config.variety == "wide":
-        tied, gaps = (requested.freed[..., 0] == 0.0).any(axis=0), least_gaps(encounter).tolist()
+        tied, gaps = (requested.relaxed[..., 0] == 0.0).any(axis=0), least_gaps(encounter).tolist()
         vehicles = [
-            replace(v, freedom=_freedom(drive, v, warp.nominal, requested.freed[n], tied, road, gaps[n], config))
+            replace(v, freedom=_freedom(drive, v, warp.nominal, requested.relaxed[n], tied, road, gaps[n], config))
             for n, (v, drive) in enumerate(zip(vehicles, drives, strict=True))
         ]
     reactions = kept_reactions(encounter, config, order)
@@ -237,13 +237,20 @@ def kept_reactions(encounter: Encounter, config: SamplingConfig, order: str = "k
 
 
 def _freedom(
-    drive: _Drive, model: VehicleModel, nominal: Clock, freed: Floats, tied: Bools, road: Road, gap: float, config: SamplingConfig
+    drive: _Drive,
+    model: VehicleModel,
+    nominal: Clock,
+    relaxed: Floats,
+    tied: Bools,
+    road: Road,
+    gap: float,
+    config: SamplingConfig,
 ) -> Freedom:
     """What preset `wide` frees of a vehicle, that came so near [m] to others in the template."""
     fastest = drive.speed[[0, -1]] + config.freedom * config.end_speed_sigma + 2.0 * config.max_acceleration * FADES
     ahead = road_ahead(drive.path, drive.vehicle, road, MOST_ONWARD * fastest)
     clock = OwnClock.of(nominal, drive.rests, (bool(tied[0]), bool(tied[1])), config)
-    return freedom_of(drive.vehicle, drive.path.arc, clock, freed, tied, ahead, gap, config)
+    return freedom_of(drive.vehicle, drive.path.arc, clock, relaxed, tied, ahead, gap, config)
 
 
 def _slowed(drives: Sequence[_Drive], grid: Floats, config: SamplingConfig) -> tuple[Clock, list[str]]:
@@ -285,7 +292,7 @@ def _drive(
     anchor, times = route.anchor[own], np.concatenate([time[:1], times[own[1:-1]], time[-1:]])
     dwells = anchor[:-1] == anchor[1:]
     path = BasePath.of(route)
-    stands, creeps = lengthened(n, waits, creeping=False), lengthened(n, waits, creeping=True)
+    stands, moves_slowly = lengthened(n, waits, creeping=False), lengthened(n, waits, creeping=True)
     ends = (float(asked.start[n, 3]), float(asked.end[n, 3]))
     if dwells.all():
         ends = (0.0, 0.0)
@@ -293,7 +300,7 @@ def _drive(
     scale = min(path.length / driven, _MOST_SCALE) if driven > 1e-3 else 1.0
     if not dwells.all():
         stands, dwells = standing_within(times, dwells, stands, time, speed)
-    knots = speed_knots(times, dwells, stands, time, speed, ends, 0.0, creeps)
+    knots = speed_knots(times, dwells, stands, time, speed, ends, 0.0, moves_slowly)
     standing = [v if v > STAND or not still else 0.0 for v, still in zip(ends, knots.still[[0, -1]], strict=True)]
     rests = _at_rest(knots, times)
     spline = SpeedSpline.over(float(times[0]), float(times[-1]), rests)

@@ -18,7 +18,7 @@ from scenario_gen.method.validity.limits import Limits
 from scenario_gen.method.validity.presence import driven_on
 from scenario_gen.numerics import Bools, exact, Floats, runs
 from scenario_gen.roads import clearance_in_cells, drives_against
-from scenario_gen.template import Conflict, conflict_of, find_conflicts, lag_behind, orders_asked, time_gaps, Wait
+from scenario_gen.template import Conflict, conflict_of, find_conflicts, lag_behind, required_orders, time_gaps, Wait
 from scenario_gen.types import (
     at_ends,
     BoundaryStates,
@@ -49,8 +49,8 @@ class Checker:
         conflicts: the template's conflicts, whose order must be kept, unless `first` says otherwise.
         waits: the template's waits; in every scenario the vehicle stands, or moves slowly, as often, one after the other.
         limits: the limits; the default ones if None.
-        first: who must go first at each of the conflicts, by index, None for anyone (`orders_asked`); a conflict whose order is
-            not the template's must be there.
+        first: who must go first at each of the conflicts, by index, None for anyone (`required_orders`); a conflict whose order
+            is not the template's must be there.
         reactions: of the template, which every scenario keeps.
         ends: (N, 2) whether each vehicle is there at the template's first and last instant, as it then must be at the
             scenario's; None if that is not known.
@@ -92,7 +92,7 @@ class Checker:
             asked: start and end states of all vehicles.
             waits: the template's waits that are kept.
             limits: the limits; the default ones if None.
-            order: who goes first, see `orders_asked`.
+            order: who goes first, see `required_orders`.
             reactions: of the template, that are kept.
 
         Raises:
@@ -101,7 +101,7 @@ class Checker:
         conflicts = find_conflicts(encounter.vehicles, encounter.time, encounter.position, encounter.heading, encounter.present)
         own = (limits or Limits()).for_template(encounter)
         ends = at_ends(encounter.present, len(encounter.time))
-        return cls(road, asked, conflicts, waits, own, orders_asked(conflicts, order), reactions, ends)
+        return cls(road, asked, conflicts, waits, own, required_orders(conflicts, order), reactions, ends)
 
     @property
     def not_applicable(self) -> tuple[str, ...]:
@@ -157,7 +157,7 @@ class Checker:
             raise InputError(f"{where}: a vehicle's length or width is not positive")
         if self.road is not None and scenario.frame_id != self.road.frame_id:
             raise InputError(f"{where} is in frame {scenario.frame_id!r}, its road in {self.road.frame_id!r}")
-        known = () if self.asked is None else (self.asked.start, self.asked.end, self.asked.freed)
+        known = () if self.asked is None else (self.asked.start, self.asked.end, self.asked.relaxed)
         counts = sorted({len(states) for states in (*known, *(() if self.ends is None else (self.ends,)))} - {n})
         if counts:
             raise InputError(f"{where} has {n} vehicle(s), but states were asked for {counts[0]}")
@@ -186,7 +186,7 @@ class Checker:
         if self.asked is None:
             return
         limits = self._limits
-        relaxed = self.asked.freed.tolist()
+        relaxed = self.asked.relaxed.tolist()
         for name, k, requested in (("start", 0, self.asked.start), ("end", -1, self.asked.end)):  # too few numbers for arrays
             # a vehicle's row is held outside of its presence: its first or last value is that at its own first or last instant
             ends = zip(scenario.position[:, k].tolist(), scenario.speed[:, k].tolist(), requested.tolist(), strict=True)
@@ -368,7 +368,7 @@ class Checker:
                 message = f"vehicle {i}: waits throughout in the template, but reaches {scenario.speed[i, k]:.3f} m/s"
                 yield Violation(Cause.STOP_NOT_KEPT, float(scenario.time[k]), (i,), message)
                 continue
-            standing = [wait for wait in requested if not wait.creeps]
+            standing = [wait for wait in requested if not wait.moves_slowly]
             for wanted, limit, verb in (
                 (standing, self._limits.stand_speed, "stands"),
                 (requested, self._limits.creep_speed, "waits"),

@@ -25,7 +25,7 @@ class Limits(Parameters):
     speed_tolerance: float = parameter(0.1, "start and end speeds are this near to what was asked", unit="m/s", low=0.0)
     stand_speed: float = parameter(0.1, "a vehicle that stands in the template is slower than this", unit="m/s", low=0.0)
     creep_speed: float = parameter(
-        0.5, "a vehicle that waits in the template, but creeps, is slower than this", unit="m/s", low=0.0
+        0.5, "a vehicle that waits in the template, but moves slowly, is slower than this", unit="m/s", low=0.0
     )
     stand_duration: float = parameter(1.0, "shortest stand or creep that counts as a wait", unit="s", low=0.01)
     min_clearance: float = parameter(

@@ -16,7 +16,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation import coverage_of, evaluate_scenarios, EvaluationConfig
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.output.review.validation import kept_reactions, Reference
-from scenario_gen.template import find_conflicts, find_waits, orders_asked, reactions_of
+from scenario_gen.template import find_conflicts, find_waits, reactions_of, required_orders
 from scenario_gen.types import at_ends, CheckCounts, EgoSlot, GenerationResult, join_ego, Scenario, ScenarioSet, Verdict, WITHOUT
 
 
@@ -107,7 +107,7 @@ def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Lim
             road = namespace.road
             if namespace.roads_differ:
                 road = namespace.road_of(entry, encounter.start_ns) if map_hash else None
-            first, ends = orders_asked(conflicts, order), at_ends(encounter.present, len(encounter.time))
+            first, ends = required_orders(conflicts, order), at_ends(encounter.present, len(encounter.time))
             reference = Reference(road, names, tuple(conflicts), waits, first, reactions, ends=ends)
             checkers[key] = reference.checker(scenario, limits, None)
         verdicts += checkers[key].check([scenario])

@@ -22,7 +22,7 @@ from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.numerics import Bools
-from scenario_gen.template import Conflict, find_conflicts, find_waits, orders_asked, reactions_of, Wait
+from scenario_gen.template import Conflict, find_conflicts, find_waits, reactions_of, required_orders, Wait
 from scenario_gen.types import at_ends, BoundaryStates, Cause, Encounter, join_ego, Reaction, Road, Scenario, tokens
 
 UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
@@ -197,6 +197,6 @@ def _reference(namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is
         waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
     reactions = kept_reactions(encounter, names, entry)
-    first = orders_asked(conflicts, entry.order if entry else "keep")
+    first = required_orders(conflicts, entry.order if entry else "keep")
     ends = at_ends(encounter.present, len(encounter.time))
     return Reference(road, names, tuple(conflicts), waits, first, reactions, ends)

@@ -85,7 +85,7 @@ def placements(
     raise RefusedError(f"the template fits no place on map {network.name}: {why or 'it has no lanes of its directions'}")
 
 
-def laid(placement: Match, tracks: Sequence[Track], scale: float) -> tuple[Track, ...]:
+def tracks_on(placement: Match, tracks: Sequence[Track], scale: float) -> tuple[Track, ...]:
     """The template's tracks on their courses."""
     placed = []
     for course, track in zip(placement.courses, tracks, strict=True):
@@ -105,7 +105,7 @@ def best_part(network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[i
     reason = ""
     for placement, scale in placements(network, tracks, lanes):
         try:
-            separate(laid(placement, tracks, scale), 0.0, _SHIFT, sideways=0.0)
+            separate(tracks_on(placement, tracks, scale), 0.0, _SHIFT, sideways=0.0)
         except RefusedError as error:
             reason = reason or str(error)
             continue

@@ -43,9 +43,9 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
-from scenario_gen.base.errors import ScenarioGenError, tell
+from scenario_gen.base.errors import print_error, ScenarioGenError
 from scenario_gen.base.interrupts import end_orderly, ending, hear
-from scenario_gen.numerics.compiling import end_workers, make_ready, Told, words
+from scenario_gen.numerics.compiling import end_workers, make_ready, Progress, words
 from scenario_gen.ros.plumbing.ros_parameters import help_of, USAGE
 
 OFTEN = 5.0  # seconds between two reports of how many kernels are there
@@ -82,7 +82,7 @@ def run_nodes(makers: Sequence[Maker], arguments: Sequence[str] | None = None) -
         except ExternalShutdownException:
             pass
         except (ScenarioGenError, OSError) as error:
-            code = tell(error)
+            code = print_error(error)
         except Exception:
             traceback.print_exc()
             code = 1
@@ -113,7 +113,7 @@ def namespaces(arguments: Sequence[str]) -> list[str | None]:
     return [name or None for name in rest[1::2]] or [None]
 
 
-def kernels_ready(stages: Iterable[str], progress: Told = lambda *_: None) -> tuple[int, float]:
+def kernels_ready(stages: Iterable[str], progress: Progress = lambda *_: None) -> tuple[int, float]:
     """Load the kernels of some stages, compile what is not in the cache; return their number and the seconds it took.
 
     Only those of the node's own stages: to import all of them would cost every node seconds.
@@ -213,14 +213,14 @@ def _end(nodes: Sequence[Any], executor: SingleThreadedExecutor, code: int) -> i
         try:
             getattr(node, "close", list)()
         except (ScenarioGenError, OSError) as error:  # a bag that cannot be closed, say
-            code = tell(error)
+            code = print_error(error)
     _flush()
     _leave_within(ENDING, code)  # nothing is lost from here on
     for node in nodes:
         try:
             node.destroy_node()
         except (ScenarioGenError, OSError) as error:
-            code = tell(error)
+            code = print_error(error)
     executor.shutdown(timeout_sec=1.0)
     for node in nodes:
         # rclpy lets it keep its node, so that others would not hear of the end for 20 s

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from sampling_scenes import scene
 
-from scenario_gen.method.sampling import draw_scenarios, freed_states, Plan, SamplingConfig
+from scenario_gen.method.sampling import draw_scenarios, Plan, relaxed_states, SamplingConfig
 from scenario_gen.method.sampling.candidates import Scale
 from scenario_gen.method.sampling.freedom import CATALOGUE, cut, FADES, freedom_of, onward, OwnClock, seconds_onward
 from scenario_gen.method.sampling.pace import clock_of
@@ -32,7 +32,7 @@ def normal(count, size, seed=0):
 def batch(count=300, request=Request(), **parameters):
     encounter, segmentation, road, routes, asked, waits = scene()
     config = replace(SamplingConfig(), **parameters)
-    states = freed_states(asked, encounter, config, request)
+    states = relaxed_states(asked, encounter, config, request)
     model = prepare(Plan(encounter, segmentation, road, routes, states, waits), config).model
     return model, model.draw(normal(count, model.size), Scale())
 
@@ -94,9 +94,9 @@ def test_what_is_asked_holds_and_what_is_freed_keeps_its_bounds():
     config = SamplingConfig()
     x, y, yaw, speed = asked.start[0]
     request = Request(starts=f"a: {x} {y} {yaw} {speed}")
-    states = freed_states(asked, encounter, config, request)
-    assert (states.freed[0, 0] == 0.0).all()
-    assert (states.freed[0, 1] > 0.0).all()
+    states = relaxed_states(asked, encounter, config, request)
+    assert (states.relaxed[0, 0] == 0.0).all()
+    assert (states.relaxed[0, 1] > 0.0).all()
     check = Checker(None, states, None, None).check
     made = draw_scenarios(Plan(encounter, segmentation, road, routes, states, waits), check, config, count=40, request=request)
     assert len(made.scenarios) == 40
@@ -109,17 +109,17 @@ def test_what_is_asked_holds_and_what_is_freed_keeps_its_bounds():
 
 def test_nothing_is_freed_by_preset_narrow():
     encounter, *_, asked, _ = scene()
-    assert freed_states(asked, encounter, SamplingConfig(variety="narrow"), Request()) is asked
+    assert relaxed_states(asked, encounter, SamplingConfig(variety="narrow"), Request()) is asked
 
 
 def test_a_start_off_its_bounds_is_refused():
     encounter, segmentation, road, routes, asked, waits = scene()
     config = SamplingConfig()
-    states = freed_states(asked, encounter, config, Request())
+    states = relaxed_states(asked, encounter, config, Request())
     given = (encounter, segmentation, road, routes, states)
     made = draw_scenarios(Plan(*given, waits), Checker(None, states, None, None).check, config, count=20)
     assert len(made.scenarios) == 20
-    tight = replace(states, freed=0.0 * states.freed)
+    tight = replace(states, relaxed=0.0 * states.relaxed)
     verdicts = Checker(None, tight, None, None).check(made.scenarios)
     assert any("from what was asked" in v.message for verdict in verdicts for v in verdict.violations)
 

@@ -251,13 +251,13 @@ def test_a_creeping_wait_stays_slow_and_does_not_stand():
     ends = np.array(asked.end)
     ends[1] = [*own.points[-1], 6.0]
     waits = tuple(wait for wait in find_waits(creeping) if wait.vehicle == 1)
-    assert [wait.creeps for wait in waits] == [True]
+    assert [wait.moves_slowly for wait in waits] == [True]
     given = (creeping, segmentation, road, (routes[0], own, routes[2]), BoundaryStates(asked.start, ends))
     made = draw_scenarios(Plan(*given, waits), all_valid, PLAIN, count=20, seed=1).scenarios
     verdicts = Checker(None, None, None, waits).check(made)
     assert not any(violation.cause is Cause.STOP_NOT_KEPT for verdict in verdicts for violation in verdict.violations)
     assert all((s.speed[1] > 0.0).all() for s in made)
-    stands = Plan(*given, (replace(waits[0], creeps=False),))
+    stands = Plan(*given, (replace(waits[0], moves_slowly=False),))
     stood = draw_scenarios(stands, all_valid, PLAIN, count=20, seed=1).scenarios
     assert all((s.speed[1] == 0.0).sum() > 30 for s in stood)
 

@@ -114,7 +114,7 @@ def _while_there(scenario, road, asked, conflicts, waits, limits, dt):
             without_gaps = (found for found in oracle_violations(part, None, None, both, None, limits, dt) if found[:4] != "over")
             yield from without_gaps
             continue
-        states = None if asked is None else BoundaryStates(asked.start[rows], asked.end[rows], asked.freed[rows])
+        states = None if asked is None else BoundaryStates(asked.start[rows], asked.end[rows], asked.relaxed[rows])
         wide = limits
         if rows[0] not in always:  # it comes and goes between two instants
             step = np.diff(part.time).max()
@@ -188,7 +188,7 @@ def _off_road(instants, position, heading, scenario, road):
 def _boundary(scenario, asked, limits):
     for name, k, states in (("start", 0, asked.start), ("end", -1, asked.end)):
         for i in range(len(scenario.vehicles)):
-            free, faster = asked.freed[i, k]
+            free, faster = asked.relaxed[i, k]
             if np.linalg.norm(scenario.position[i, k] - states[i, :2]) > limits.position_tolerance + free + 1e-6:
                 yield f"boundary_state: vehicle {i} {name} position"
             if abs(scenario.speed[i, k] - states[i, 3]) > limits.speed_tolerance + faster + 1e-6:
@@ -260,7 +260,7 @@ def _leads(instants, first, second):
 def _stands(scenario, instants, velocity, asked, waits, limits):
     for i in sorted({wait.vehicle for wait in waits}):
         own = [wait for wait in waits if wait.vehicle == i]
-        for wanted, limit in ((len(own), limits.creep_speed), (sum(not wait.creeps for wait in own), limits.stand_speed)):
+        for wanted, limit in ((len(own), limits.creep_speed), (sum(not wait.moves_slowly for wait in own), limits.stand_speed)):
             slow = np.interp(instants, scenario.time, scenario.speed[i]) < limit
             slow &= np.linalg.norm(velocity[i], axis=-1) < 2.0 * limit
             edges = np.flatnonzero(np.diff(np.concatenate(([False], slow, [False]))))

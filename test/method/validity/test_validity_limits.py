@@ -187,11 +187,11 @@ def test_a_wait_must_stand_for_a_second():
 
 
 def test_a_creeping_wait_must_be_slow_for_a_second():
-    waits = (Wait(0, 7.0, 10.0, creeps=True),)
+    waits = (Wait(0, 7.0, 10.0, moves_slowly=True),)
     assert causes(stopping(3.0, crawl=0.4), waits=waits) == []
     assert causes(stopping(1.2), waits=waits) == []
     assert causes(stopping(3.0, crawl=0.6), waits=waits) == [Cause.STOP_NOT_KEPT]
-    both = (Wait(0, 2.0, 3.5), Wait(0, 7.0, 10.0, creeps=True))
+    both = (Wait(0, 2.0, 3.5), Wait(0, 7.0, 10.0, moves_slowly=True))
     assert causes(stopping(3.0, crawl=0.4), waits=both) == [Cause.STOP_NOT_KEPT]
     assert causes(stopping(3.0), waits=both) == []
 

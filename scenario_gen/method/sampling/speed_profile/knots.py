@@ -74,7 +74,7 @@ def speed_knots(
     speed: Floats,
     ends: tuple[float, float],
     knot_share: float | None = None,
-    creeps: Sequence[tuple[float, float]] = (),
+    moves_slowly: Sequence[tuple[float, float]] = (),
 ) -> SpeedKnots:
     """Place the knots of one vehicle.
 
@@ -89,9 +89,9 @@ def speed_knots(
         ends: asked speeds [m/s] at start and end.
         knot_share: where in each primitive a knot lies, as a share of its duration; 0 for none, None for where the template
             bends.
-        creeps: begin and end [s] of the waits in which it rolls on slowly; they become knots.
+        moves_slowly: begin and end [s] of the waits in which it moves slowly; they become knots.
     """
-    cuts, still = _cuts(clock, dwells, waits, ends, creeps)
+    cuts, still = _cuts(clock, dwells, waits, ends, moves_slowly)
     knots, stands, interior = [cuts[0]], [], []
     for a, b, stand in zip(cuts[:-1], cuts[1:], still, strict=True):
         if not stand and knot_share != 0.0:
@@ -105,7 +105,7 @@ def speed_knots(
     knot, standing = np.array(knots), np.array(stands)
     middle = 0.5 * (knot[:-1] + knot[1:])
     piece = np.clip(np.searchsorted(clock, middle, side="right") - 1, 0, len(clock) - 2)
-    slow = ~standing & np.array([any(a < t < b for a, b in creeps) for t in middle.tolist()])
+    slow = ~standing & np.array([any(a < t < b for a, b in moves_slowly) for t in middle.tolist()])
     group, bounds = _groups(piece, standing, dwells)
     given = np.full(len(knot), np.nan)
     given[[0, -1]] = ends
@@ -136,14 +136,14 @@ def _cuts(
     dwells: Bools,
     waits: list[tuple[float, float]],
     ends: tuple[float, float],
-    creeps: Sequence[tuple[float, float]],
+    moves_slowly: Sequence[tuple[float, float]],
 ) -> tuple[list[float], list[bool]]:
     """Times at which a primitive, a wait or a roll begins or ends, none nearer than `SHORTEST`; where the vehicle stands."""
     cuts = [float(t) for t in clock]
     if dwells.all():
         return cuts, [True] * len(dwells)
     rolls = _ramps(clock, dwells, waits, ends)
-    for t in [*rolls, *(t for wait in (*waits, *creeps) for t in wait)]:
+    for t in [*rolls, *(t for wait in (*waits, *moves_slowly) for t in wait)]:
         if clock[0] < t < clock[-1] and min(abs(t - c) for c in cuts) >= SHORTEST - 1e-9:
             cuts.append(float(t))
     cuts.sort()

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Waits on a sample's clock: which part stands, which creeps, and how short they may become."""
+"""Waits on a sample's clock: which part stands, which moves slowly, and how short they may become."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,13 +18,13 @@ _LEAST_WAIT = 1.15  # s, to which a fast clock may shorten one
 
 
 def standing_part(encounter: Encounter, wait: Wait) -> Wait:
-    """The part of a wait in which the vehicle stands, not yet or no longer creeps; a creeping wait as it is.
+    """The part of a wait in which the vehicle stands, not yet or no longer moves slowly; a slow wait as it is.
 
     A wait begins below 0.5 m/s, so a vehicle that brakes gently still rolls for a while.
     """
     inside = (encounter.time >= wait.start) & (encounter.time <= wait.end)
     stands = encounter.time[inside & (encounter.speed[wait.vehicle] <= STAND_SPEED)]
-    if wait.creeps or len(stands) == 0:
+    if wait.moves_slowly or len(stands) == 0:
         return wait
     start = wait.start if wait.start <= encounter.time[0] else float(stands[0])
     end = wait.end if wait.end >= encounter.time[-1] else float(stands[-1])
@@ -70,6 +70,6 @@ def least_shares(grid: Floats, waits: Sequence[Wait]) -> Floats:
 
 def lengthened(n: int, waits: Sequence[Wait], *, creeping: bool) -> list[tuple[float, float]]:
     """Begin and end [s] of vehicle n's waits of one kind, short ones lengthened."""
-    own = [wait for wait in waits if wait.vehicle == n and wait.creeps == creeping]
+    own = [wait for wait in waits if wait.vehicle == n and wait.moves_slowly == creeping]
     pads = [max(0.0, 0.5 * (SHORTEST_WAIT - (wait.end - wait.start))) for wait in own]
     return [(wait.start - pad, wait.end + pad) for wait, pad in zip(own, pads, strict=True)]
