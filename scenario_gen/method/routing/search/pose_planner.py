@@ -189,6 +189,23 @@ class _Search:
         return path[:count].copy(), float(self.setting[trees.LENGTH])
 
 
+def _refuse_blocked(road: Road, query: PoseQuery) -> None:
+    """Refuse a start or goal at which the footprint has no room.
+
+    Raises:
+        BlockedError: one has none; it names it.
+    """
+    ends = np.stack((query.start, query.goal))
+    fits = footprint_fits(road, ends, query.length, query.width)
+    for name, pose, fit in zip(("start", "goal"), ends, fits, strict=True):
+        if not fit:
+            raise BlockedError(
+                name,
+                f"the {name} ({pose[0]:.2f}, {pose[1]:.2f}) m has no room on road {road.name!r} for a footprint of "
+                f"{query.length:.2f} m by {query.width:.2f} m",
+            )
+
+
 class PoseRrtStarConnect:
     """RRT*-Connect for a car: poses for points, Dubins curves for straight lines, the rectangle for the disc.
 
@@ -209,15 +226,7 @@ class PoseRrtStarConnect:
             BudgetSpentError: none was found within the budget.
         """
         started = thread_time()
-        ends = np.stack((query.start, query.goal))
-        fits = footprint_fits(road, ends, query.length, query.width)
-        for name, pose, fit in zip(("start", "goal"), ends, fits, strict=True):
-            if not fit:
-                raise BlockedError(
-                    name,
-                    f"the {name} ({pose[0]:.2f}, {pose[1]:.2f}) m has no room on road {road.name!r} for a footprint of "
-                    f"{query.length:.2f} m by {query.width:.2f} m",
-                )
+        _refuse_blocked(road, query)
         search = _Search(road, query, wishes, self.config, seed)
         look, end = 1, 0  # iterations at which the way of a disc is looked for, and at which enough was made for a better path
         search.grow(1)  # the direct curve
