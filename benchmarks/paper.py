@@ -3,7 +3,8 @@
 
 """The paper's figures 2 to 5 on its own settings, each beside its claim and what we measure: one page and one JSON file.
 
-`--out` names their folder (out/paper), `--count` the scenarios of each case (50).
+`--out` names their folder (out/paper), `--count` the scenarios of each case (50), `--log` other files than the bundled cases,
+`--seed` the seed (7).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -145,11 +146,11 @@ def reproduce(
     return cases
 
 
-def run(out: str = "out/paper", count: int | None = None) -> list[Row]:
-    """Measure the bundled cases on the paper's settings, and write the page and its figures to `out`."""
+def run(out: str = "out/paper", count: int | None = None, log: Sequence[str] = (), seed: int = SEED) -> list[Row]:
+    """Measure the bundled cases, or a log, on the paper's settings, and write the page and its figures to `out`."""
     count = count or sized(50, quick=2)
-    logs = [[bundled(case)] for case in CASES]
-    cases = reproduce(logs, Path(out), count=count, seed=SEED, report=lambda line: print(line, file=sys.stderr))
+    logs = [[Path(name) for name in log]] if log else [[bundled(case)] for case in CASES]
+    cases = reproduce(logs, Path(out), count=count, seed=seed, report=lambda line: print(line, file=sys.stderr))
     rows = []
     for case in cases:
         holds = [claim.holds for claim in claims_of(case) if claim.holds is not None]

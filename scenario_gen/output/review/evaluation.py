@@ -67,8 +67,7 @@ def _result(namespace: Namespace, config: EvaluationConfig, limits: Limits | Non
     if witness is not None:
         first, last = (np.array([*witness.position[0, k], witness.heading[0, k], witness.speed[0, k]]) for k in (0, -1))
         ego = EgoSlot(witness.vehicles[0], first, last)
-    names = [vehicle.id for vehicle in encounter.vehicles]
-    held = [kept_reactions(encounter, names, namespace.entry(k)) for k in range(len(scenarios))]
+    held = [kept_reactions(encounter, namespace.entry(k)) for k in range(len(scenarios))]
     generated = ScenarioSet(
         len(scenarios), scenarios, counts.candidates, Counter(counts.refused), _left_out(namespace), ego,
         reactions=tuple(edge for edge in graph.edges if all(edge in kept for kept in held)), graph=graph,
@@ -101,7 +100,7 @@ def _verdicts(namespace: Namespace, scenarios: tuple[Scenario, ...], limits: Lim
         map_hash = entry.map_hash if entry else None
         scenario = join_ego(one)
         order = entry.order if entry else "keep"
-        reactions = kept_reactions(encounter, names, entry)
+        reactions = kept_reactions(encounter, entry)
         key = (map_hash or "", order, *reactions, *(vehicle.id for vehicle in scenario.vehicles))
         if key not in checkers:
             road = namespace.road

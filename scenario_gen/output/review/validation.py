@@ -166,8 +166,9 @@ def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
     return result
 
 
-def kept_reactions(encounter: Encounter, names: Sequence[str], entry: ScenarioEntry | None) -> tuple[Reaction, ...]:
-    """Return the reactions of a template, whose vehicles have these names, that an entry says its scenario keeps."""
+def kept_reactions(encounter: Encounter, entry: ScenarioEntry | None) -> tuple[Reaction, ...]:
+    """Return the reactions of a template that an entry says its scenario keeps."""
+    names = tokens(vehicle.id for vehicle in encounter.vehicles)
     kept = entry.facts.get("reactions", "").split("; ") if entry else []
     return tuple(edge for edge in reactions_of(encounter).edges if edge.name(names) in kept) if any(kept) else ()
 
@@ -196,7 +197,7 @@ def _reference(namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is
     if segmentation is not None:
         waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
-    reactions = kept_reactions(encounter, names, entry)
+    reactions = kept_reactions(encounter, entry)
     first = required_orders(conflicts, entry.order if entry else "keep")
     ends = at_ends(encounter.present, len(encounter.time))
     return Reference(road, names, tuple(conflicts), waits, first, reactions, ends)
