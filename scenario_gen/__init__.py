@@ -12,16 +12,21 @@ The public names are listed in `__init__.pyi`; each is imported when it is first
     print(made.evaluation.to_markdown())
 """
 
-import ast
+from functools import cache
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 __version__ = "0.6.0"
 
-_STUB = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
-_MODULE = {alias.name: str(node.module) for node in _STUB.body if isinstance(node, ast.ImportFrom) for alias in node.names}
-__all__ = [*_MODULE]  # noqa: PLE0604 - strings all
+
+@cache
+def _modules() -> dict[str, str]:
+    """Return the module of each public name."""
+    import ast
+
+    with open(f"{__file__}i", encoding="utf-8") as stub:  # noqa: PTH123 - pathlib takes longer to load than to read it
+        tree = ast.parse(stub.read())
+    return {alias.name: str(node.module) for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
 
 
 def __getattr__(name: str) -> Any:
@@ -30,12 +35,14 @@ def __getattr__(name: str) -> Any:
     Raises:
         AttributeError: there is no such name.
     """
-    if name not in _MODULE:
+    if name == "__all__":
+        return [*_modules()]
+    if name.startswith("__") or name not in _modules():
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_MODULE[name]), name)
+    value = getattr(import_module(_modules()[name]), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *_modules()})
