@@ -27,7 +27,7 @@ for group in (generation, bags, corpus):
 @app.command()
 def doctor() -> None:
     """Say what is wrong with this environment: Python, packages, ROS, DDS, QoS of visible topics, kernels."""
-    from scenario_gen.cli.doctor import main as examined
+    from scenario_gen.ros.plumbing.doctor import main as examined
 
     raise typer.Exit(examined())
 

@@ -45,7 +45,6 @@ OF_TARGETS = {
     "message_fit": ("fits.py",),
 }
 OWN = {  # modules that parse, but no file that a user is given by others, and why that is so
-    "cli/doctor.py": "what its own probes write",
     "cli/launching.py": "parameter files, through `documents`",
     "cli/suite.py": "what its own processes write",
     "corpus/batch.py": "its own notes in its own folder, through `documents`",
@@ -57,7 +56,6 @@ OWN = {  # modules that parse, but no file that a user is given by others, and w
     "base/folders/marker.py": "what is none is no marker: test/base/folders",
     "numerics/kernel_cache.py": "source files of the package, for a digest",
     "numerics/kernels.py": "source files of the package, to see which have kernels",
-    "__init__.py": "its own stub, for the public names",
     "output/report/html.py": "assets of the package",
     "output/results.py": "whether a folder is an earlier result: anything else is none",
     "bags/storage/definitions.py": "definitions of messages that ROS 2 has installed",

@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from scenario_gen.cli.doctor import discovery, ERROR, examine, OK, packages, python, variables, WARNING
+from scenario_gen.ros.plumbing.doctor import discovery, ERROR, examine, OK, packages, python, variables, WARNING
 
 ROOT = Path(__file__).resolve().parents[2]
 MISFITS = """
@@ -81,7 +81,7 @@ def test_an_rmw_that_is_not_there_is_an_error(domain):
 def test_without_ros_and_without_packages_it_still_answers():
     """-S hides all that is installed."""
     answer = subprocess.run(
-        [sys.executable, "-S", "-m", "scenario_gen.cli.doctor"],
+        [sys.executable, "-S", "-m", "scenario_gen.ros.plumbing.doctor"],
         cwd=ROOT,
         capture_output=True,
         text=True,

@@ -3,9 +3,9 @@
 
 """doctor: what is wrong with an environment, and what to do about it; works without ROS, and says so.
 
-Only the standard library is imported here: `python -m scenario_gen.cli.doctor` still answers where
+Only the standard library is imported here: `python -m scenario_gen.ros.plumbing.doctor` still answers where
 `scenario-gen doctor` cannot start for want of a package. What needs rclpy or numba runs in processes of its own, the probes: a
-crash there is a finding. Each is `python -m scenario_gen.cli.doctor PROBE TOPIC`, and answers with a line of JSON.
+crash there is a finding. Each is `python -m scenario_gen.ros.plumbing.doctor PROBE TOPIC`, and answers with a line of JSON.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -182,7 +182,7 @@ def _last_line(text: str) -> str:
 
 def _child(probe: str, topic: str, environment: Mapping[str, str]) -> "subprocess.Popen[str]":
     return subprocess.Popen(
-        [sys.executable, "-m", "scenario_gen.cli.doctor", probe, topic],
+        [sys.executable, "-m", "scenario_gen.ros.plumbing.doctor", probe, topic],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
