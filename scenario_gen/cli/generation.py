@@ -86,14 +86,14 @@ def generate(options: Generate) -> None:
     from scenario_gen.base.terminal import progress_bars
     from scenario_gen.cli.batch import FolderRequest, generate_folder
     from scenario_gen.roads import read_obstacles
-    from scenario_gen.types import Request
+    from scenario_gen.types import join_pieces, Request
 
     allowed = [f"fitting.allow={options.allow}"] if options.allow else []
     config = configured(options.parameter_file, [*(options.assignments or []), *allowed])
     for text in options.obstacle or []:
         read_obstacles(text, "--obstacle")
-    config = updated(config, {"road.obstacles": "; ".join(filter(None, [config.road.obstacles, *(options.obstacle or [])]))})
-    starts, goals, targets = ("; ".join(texts or []) for texts in (options.start, options.goal, options.target))
+    config = updated(config, {"road.obstacles": join_pieces(filter(None, [config.road.obstacles, *(options.obstacle or [])]))})
+    starts, goals, targets = (join_pieces(texts or []) for texts in (options.start, options.goal, options.target))
     request = FolderRequest(
         jobs=[(options.log, options.road)],
         config=config,

@@ -143,9 +143,6 @@ class _Search:
 
     def __init__(self, requested: Attempt, cancelled: Cancelled) -> None:
         self.requested, self.cancelled = requested, cancelled
-        self.asked, self.encounter, self.road, self.config = (
-            requested.request, requested.encounter, requested.road, requested.config,
-        )  # fmt: skip
         self._plans: dict[tuple[str, str], GenerationResult | None] = {}
 
     @cached_property
@@ -161,7 +158,7 @@ class _Search:
         """Whether scenarios of the request can be had within its budget."""
         if self.cancelled():
             return False
-        config, planned = self.config, self._planned(request)
+        config, planned = self.requested.config, self._planned(request)
         if stretch is not None:
             config = replace(config, sampling=replace(config.sampling, max_stretch=stretch))
         if planned is None:
@@ -185,7 +182,7 @@ class _Search:
     def run(self) -> Iterator[Suggestion]:
         """Yield suggestions: the plain repair alone if it suffices, else every single change that does, else all at once."""
         start = self._repaired()
-        if start != self.asked and self.possible(start):
+        if start != self.requested.request and self.possible(start):
             yield Suggestion(start, self._difference(start))
             return
         found = False
@@ -206,16 +203,16 @@ class _Search:
 
     def _repaired(self) -> Request:
         """The request with each state moved as little as it takes to have room, and its speed within the limit."""
-        request = self.asked
+        request = self.requested.request
         for end, name in elements(request):
-            vehicle = self.encounter.vehicles[vehicle_index(self.encounter, name, end)]
+            vehicle = self.requested.encounter.vehicles[vehicle_index(self.requested.encounter, name, end)]
             state = request.states(end)[name]
             pose = np.array(state[:3])
-            answer = nearest_pose_with_room(self.road, pose, vehicle.length, vehicle.width, FAR)
+            answer = nearest_pose_with_room(self.requested.road, pose, vehicle.length, vehicle.width, FAR)
             if answer is not None and answer[1] > 0.0:
-                state = _with_room(self.road, vehicle, answer[0], pose) + state[3:]
+                state = _with_room(self.requested.road, vehicle, answer[0], pose) + state[3:]
             if len(state) == 4:
-                state = (*state[:3], min(state[3], self.config.sampling.max_speed))
+                state = (*state[:3], min(state[3], self.requested.config.sampling.max_speed))
             request = with_state(request, end, name, state)
         for end, name in elements(request):
             request = self._apart(request, end, name)
@@ -223,9 +220,9 @@ class _Search:
 
     def _apart(self, request: Request, end: str, name: str) -> Request:
         """Move a footprint that overlaps another one along its heading until it no longer does; as it was, if nowhere is room."""
-        vehicles = self.encounter.vehicles
-        n = vehicle_index(self.encounter, name, end)
-        rows = request.rows(end, self.encounter)[:, :3]
+        vehicles = self.requested.encounter.vehicles
+        n = vehicle_index(self.requested.encounter, name, end)
+        rows = request.rows(end, self.requested.encounter)[:, :3]
         if self.base:
             rows = np.where(np.isnan(rows), self.base[end][:, :3], rows)
         others = [m for m in range(len(rows)) if m != n and not np.isnan(rows[m, 0])]
@@ -241,8 +238,8 @@ class _Search:
         for offset in (sign * step for step in _OFFSETS for sign in (1.0, -1.0)):
             tried = moved(state, np.array(state[:3]) + offset * ahead)
             pose = np.array(tried[:3])
-            fits = footprint_fits(self.road, pose[None], vehicles[n].length, vehicles[n].width)[0]
-            if fits and gap(pose) >= self.config.fitting.clearance:
+            fits = footprint_fits(self.requested.road, pose[None], vehicles[n].length, vehicles[n].width)[0]
+            if fits and gap(pose) >= self.requested.config.fitting.clearance:
                 return with_state(request, end, name, tried)
         return request
 
@@ -250,7 +247,7 @@ class _Search:
 
     def _paths(self, request: Request, end: str, name: str) -> Iterator[Path]:
         """The speed towards the template's, the pose along the drawn route, the pose towards where the fitting has it."""
-        n = vehicle_index(self.encounter, name, end)
+        n = vehicle_index(self.requested.encounter, name, end)
         state = request.states(end)[name]
         base = self.base[end][n] if self.base else None
         if len(state) == 4:
@@ -284,7 +281,7 @@ class _Search:
             if requested is None and not self.base:
                 return None
             ends.append(self.base[end][n, :3] if requested is None else np.array(requested[:3]))
-        vehicle, road = self.encounter.vehicles[n], self.road
+        vehicle, road = self.requested.encounter.vehicles[n], self.requested.road
         return draw_route(ends[0], ends[1], lambda poses: bool(footprint_fits(road, poses, vehicle.length, vehicle.width).all()))
 
     def _bisected(self, path: Path) -> Request | None:
@@ -301,10 +298,10 @@ class _Search:
     def _stretched(self, request: Request) -> Suggestion | None:
         """The same states on a longer clock."""
         for stretch in _STRETCHES:
-            if stretch > self.config.sampling.max_stretch and self.possible(request, stretch):
-                before = self.encounter.duration
+            if stretch > self.requested.config.sampling.max_stretch and self.possible(request, stretch):
+                before = self.requested.encounter.duration
                 message = f"sampling.max_stretch:={stretch:g} (up to {before * (1.0 + stretch):.1f} s instead of {before:.1f} s)"
-                other = "" if request == self.asked else f" with {self._difference(request)}"
+                other = "" if request == self.requested.request else f" with {self._difference(request)}"
                 return Suggestion(request, message + other, stretch)
         return None
 
@@ -312,7 +309,7 @@ class _Search:
         """What differs from what was asked, as parameters to be set, and by how much."""
         messages = []
         for end in ENDS:
-            before, after = self.asked.states(end), request.states(end)
+            before, after = self.requested.request.states(end), request.states(end)
             changes = []
             for name in (name for name in after if after[name] != before[name]):
                 a, b = before[name], after[name]

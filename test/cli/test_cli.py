@@ -15,24 +15,7 @@ import pytest
 import yaml
 
 from scenario_gen.bags.storage.bag import read_messages
-from scenario_gen.cli.commands import main
 from scenario_gen.logs.synthetic import bundled
-
-
-@pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
-    """Run `scenario-gen` in this process, in an empty folder; return its exit code and all that it printed."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["scenario-gen", *map(str, arguments)])
-        with pytest.raises(SystemExit) as end:
-            main()
-        printed = capsys.readouterr()
-        return end.value.code or 0, printed.out + printed.err
-
-    return call
 
 
 def table(path, change=lambda rows: rows):

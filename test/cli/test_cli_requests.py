@@ -5,33 +5,15 @@
 
 import json
 import re
-import sys
 
 import pytest
 
 from msg_conventions.scenarios import decode_scenario
 from scenario_gen.bags.storage.bag import read_messages
-from scenario_gen.cli import commands as cli
 from scenario_gen.logs.synthetic import bundled
 
 LOG = bundled("b")
 QUICK = ("--road", "t_intersection", "--seed", "7", "--set", "evaluation.uniform=false", "--set", "evaluation.resamples=10")
-
-
-@pytest.fixture
-def run(monkeypatch, capsys, tmp_path):
-    """Run `scenario-gen` in this process, in an empty folder; return its exit code and all that it printed."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["scenario-gen", *map(str, arguments)])
-        with pytest.raises(SystemExit) as end:
-            cli.main()
-        printed = capsys.readouterr()
-        return end.value.code or 0, printed.out + printed.err
-
-    return call
 
 
 def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(run, tmp_path):

@@ -3,39 +3,16 @@
 
 """Two oriented footprints, at many instants at once: their distance, and the time until they meet."""
 
-from collections.abc import Callable
-from functools import wraps
-from typing import Any, TypeVar
-from weakref import WeakKeyDictionary
-
 import numpy as np
 
 from scenario_gen.method.evaluation.motion import Motion
 from scenario_gen.numerics import exact, Floats
-from scenario_gen.types import Vehicle
+from scenario_gen.types import once_per_object, Vehicle
 
 STILL = 1e-6  # m/s; what closes more slowly does not close: rounding alone makes equal velocities differ
 
 
-Derived = TypeVar("Derived")
-_found: WeakKeyDictionary[Motion, dict[tuple[str, int, int], Any]] = WeakKeyDictionary()
-
-
-def _once(function: Callable[[Motion, int, int], Derived]) -> Callable[[Motion, int, int], Derived]:
-    """Keep what is found of two vehicles as long as their motion: distributions and criticality ask for the same."""
-
-    @wraps(function)
-    def kept(motion: Motion, a: int, b: int) -> Derived:
-        known, key = _found.setdefault(motion, {}), (function.__name__, a, b)
-        if key not in known:
-            known[key] = function(motion, a, b)
-        found: Derived = known[key]
-        return found
-
-    return kept
-
-
-@_once
+@once_per_object
 def footprint_distance(motion: Motion, a: int, b: int) -> Floats:
     """Return the distance (T,) in metres between the footprints of vehicles a and b; 0 where they overlap.
 
@@ -70,7 +47,7 @@ def time_to_collision(motion: Motion, a: int, b: int) -> Floats:
     return np.where((begin < end) & (end > 0.0), np.maximum(begin, 0.0), np.inf)
 
 
-@_once
+@once_per_object
 def _separation(motion: Motion, a: int, b: int) -> tuple[Floats, Floats, Floats]:
     """Project b relative to a on the four separating axes: offset, summed half extents, closing speed; (4, T) each."""
     heading = motion.heading

@@ -57,7 +57,7 @@ def fit_template(
         RefusedError: it does not fit, or a state that is asked for cannot be had; the message says why, with figures.
         InputError: `starts` and `goals` disagree with the encounter, or a vehicle that is named does not exist.
     """
-    request.ego_of(encounter)
+    request.ego_of(encounter)  # no such vehicle: refused before anything is placed
     if request.moves:
         return _fit_asked(encounter, segmentation, road, config, request, max_speed)
     if starts is not None or goals is not None:

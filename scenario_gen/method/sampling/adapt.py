@@ -14,7 +14,7 @@ from scenario_gen.method.sampling.plan import Cancelled
 from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
 from scenario_gen.numerics import Floats
 from scenario_gen.template import closest_crossing, Conflict, find_conflicts, pair_conflict
-from scenario_gen.types import Cause, Encounter, Measures, Reaction, Request, Scenario, Target, token, Verdict
+from scenario_gen.types import Cause, Encounter, join_pieces, Measures, Reaction, Request, Scenario, Target, token, Verdict
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
 
@@ -91,7 +91,7 @@ def _conflicts(encounter: Encounter) -> tuple[Conflict, ...]:
 def label_of(encounter: Encounter, request: Request, aim: Aim | None, reactions: Sequence[Reaction] = ()) -> Label:
     """Return what says a scenario's facts: figures of targets, reactions that it keeps, orders if they are not kept."""
     names = [token(vehicle.id) for vehicle in encounter.vehicles] if reactions else []
-    held = {"reactions": "; ".join(edge.name(names) for edge in reactions)} if reactions else {}
+    held = {"reactions": join_pieces(edge.name(names) for edge in reactions)} if reactions else {}
     conflicts = () if request.order == "keep" else _conflicts(encounter)
 
     def label(whole: Scenario) -> dict[str, str]:

@@ -13,6 +13,9 @@ from scenario_gen.method.sampling.time_warp import TimeWarp
 from scenario_gen.numerics import Floats
 from scenario_gen.types import ReactionGraph
 
+NOBODY = ReactionGraph((), ())
+"""Nobody reacts to anybody."""
+
 
 class CandidateModel:
     """Draws candidates of one encounter on its routes.
@@ -20,7 +23,7 @@ class CandidateModel:
     Source: paper III-C.
     """
 
-    def __init__(self, vehicles: tuple[VehicleModel, ...], warp: TimeWarp, reactions: ReactionGraph | None = None) -> None:
+    def __init__(self, vehicles: tuple[VehicleModel, ...], warp: TimeWarp, reactions: ReactionGraph = NOBODY) -> None:
         self.vehicles, self.warp, self.reactions = vehicles, warp, reactions
         self._parts = np.cumsum([warp.size] + [v.size for v in vehicles]).tolist()
         self._mixings: dict[Scale, Mixing] = {}
@@ -32,7 +35,7 @@ class CandidateModel:
 
     def draw(self, eps: Floats, scale: Scale) -> Batch:
         """Candidates from independent numbers eps (S, size), their standard deviations multiplied by `scale`."""
-        z = eps if self.reactions is None else self._mixing(scale).mixed(eps)
+        z = self._mixing(scale).mixed(eps) if self.reactions.edges else eps
         clock = self.warp.sample(z[:, : self.warp.size], scale.time)
         drawn = [
             v.draw(z[:, a:b], scale, clock, self.warp.nominal)
@@ -42,6 +45,6 @@ class CandidateModel:
 
     def _mixing(self, scale: Scale) -> Mixing:
         """The mixing at a scale, made once."""
-        if scale not in self._mixings and self.reactions is not None:
+        if scale not in self._mixings:
             self._mixings[scale] = Mixing.of(self.vehicles, self._parts, self.warp.nominal, self.reactions, scale)
         return self._mixings[scale]

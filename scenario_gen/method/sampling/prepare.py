@@ -222,7 +222,7 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
             for n, (v, drive) in enumerate(zip(vehicles, drives, strict=True))
         ]
     reactions = kept_reactions(encounter, config, order)
-    return Prepared(CandidateModel(tuple(vehicles), warp, reactions if reactions.edges else None), tuple(sentences))
+    return Prepared(CandidateModel(tuple(vehicles), warp, reactions), tuple(sentences))
 
 
 def kept_reactions(encounter: Encounter, config: SamplingConfig, order: str = "keep") -> ReactionGraph:

@@ -81,8 +81,7 @@ def draw_scenarios(
         aim = aim_of(encounter, request, measures)
         sampler = Sampler(prepared.model, seed, plan.road.frame_id, ego, label=label_of(encounter, request, aim))
         judge = Judge.of(sampler, check, _enough(config, request))
-        graph = prepared.model.reactions
-        kept = tuple(edge for edge in (graph.edges if graph is not None else ()) if (edge.who, edge.whom) not in judge.lost)
+        kept = tuple(edge for edge in prepared.model.reactions.edges if (edge.who, edge.whom) not in judge.lost)
         sampler = replace(sampler, label=label_of(encounter, request, aim, kept))
         loop = _Loop(sampler, judge, count, callbacks, lambda scenario: callbacks.found(scenario, plan.asked, slot))
         loop.aim, loop.measures = aim, measures

@@ -83,7 +83,7 @@ class Sampler:
 
     def undisturbed(self) -> Scenario | None:
         """The drive without deviations; None where nothing is free and nobody reacts, or it has no speed profile."""
-        if not self.free and self.model.reactions is None:
+        if not self.free and not self.model.reactions.edges:
             return None
         return self.model.draw(np.zeros((1, self.model.size)), LEVELS[0]).scenarios(self.seed, [0], self.frame_id)[0]
 

@@ -23,7 +23,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.numerics import Bools
 from scenario_gen.template import Conflict, find_conflicts, find_waits, reactions_of, required_orders, Wait
-from scenario_gen.types import at_ends, BoundaryStates, Cause, Encounter, join_ego, Reaction, Road, Scenario, tokens
+from scenario_gen.types import at_ends, BoundaryStates, Cause, Encounter, join_ego, Reaction, Road, Scenario, split_pieces, tokens
 
 UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
 NO_WITNESS = f"the ego: its witness is not on {WITNESS}"
@@ -169,8 +169,8 @@ def _validate(namespace: Namespace, limits: Limits | None) -> Validation:
 def kept_reactions(encounter: Encounter, entry: ScenarioEntry | None) -> tuple[Reaction, ...]:
     """Return the reactions of a template that an entry says its scenario keeps."""
     names = tokens(vehicle.id for vehicle in encounter.vehicles)
-    kept = entry.facts.get("reactions", "").split("; ") if entry else []
-    return tuple(edge for edge in reactions_of(encounter).edges if edge.name(names) in kept) if any(kept) else ()
+    kept = split_pieces(entry.facts.get("reactions", "")) if entry else []
+    return tuple(edge for edge in reactions_of(encounter).edges if edge.name(names) in kept) if kept else ()
 
 
 def _altered(k: int, sha256: str, entry: ScenarioEntry) -> str:

@@ -7,32 +7,26 @@ Between two near poses the convex hull of both footprints, widened by what an ar
 cells: the swept area lies in it, so nothing slips between two poses.
 """
 
-from weakref import WeakKeyDictionary
-
 import numpy as np
 
 from scenario_gen.method.routing.search.dubins import shortest, TURNS
 from scenario_gen.numerics import exact, Floats, Ints
 from scenario_gen.numerics.kernels import F, F2, I2, kernel, OUT2
 from scenario_gen.roads import clearance_in_cells, CONTACT, to_cells
-from scenario_gen.types import Road
+from scenario_gen.types import once_per_object, Road
 
 SWEEP = 0.2  # [m] between two poses that are compared with the grid
 FEELERS = 6  # most discs that cover a footprint
 FAR = 1e9  # [cells] room where nothing is near
 
-_counts: "WeakKeyDictionary[Road, Ints]" = WeakKeyDictionary()
 
-
+@once_per_object
 def blocked_before(road: Road) -> Ints:
-    """(H, W + 1): how many cells left of each column are not drivable: any run of a row is asked in one step; cached."""
-    known = _counts.get(road)
-    if known is None:
-        counts = np.zeros((road.drivable.shape[0], road.drivable.shape[1] + 1), dtype=np.int64)
-        np.cumsum(~road.drivable, axis=1, out=counts[:, 1:])
-        counts.setflags(write=False)
-        known = _counts.setdefault(road, counts)
-    return known
+    """(H, W + 1): how many cells left of each column are not drivable: any run of a row is looked up in one step; cached."""
+    counts = np.zeros((road.drivable.shape[0], road.drivable.shape[1] + 1), dtype=np.int64)
+    np.cumsum(~road.drivable, axis=1, out=counts[:, 1:])
+    counts.setflags(write=False)
+    return counts
 
 
 @kernel(inline=True)
