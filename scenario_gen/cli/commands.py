@@ -11,7 +11,7 @@ from typing import NoReturn
 import typer
 
 from scenario_gen.base.errors import InputError, of_system, presentable, ScenarioGenError
-from scenario_gen.cli import bags, corpus, generation
+from scenario_gen.cli import bags, corpus, generation, searching
 
 app = typer.Typer(
     help="Turn recorded vehicle encounters into new, valid ones on other roads.",
@@ -20,7 +20,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-for group in (generation, bags, corpus):
+for group in (generation, bags, searching, corpus):
     app.add_typer(group.commands)
 
 

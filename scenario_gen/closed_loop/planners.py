@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Planners of our own, to start from and to compare with: one that keeps its distance, and one that looks at nobody."""
+"""Planners of our own: one that keeps its distance, one that looks at nobody, and the witness, who knows the way."""
 
 from dataclasses import dataclass
 import math
 
 import numpy as np
 
-from scenario_gen.closed_loop.ego import Command, EgoState
-from scenario_gen.closed_loop.simulation import Observation, Task
+from scenario_gen.closed_loop.ego import Command, EgoState, Pose
+from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Task
 from scenario_gen.numerics import exact
 from scenario_gen.numerics.curve import Curve
 
@@ -114,3 +114,21 @@ class IdmFollower(RouteFollower):
                         nearest, speed = float(gap[k, m]), float(seen.others[k, 3]) * max(same_way, 0.0)
                     break
         return max(nearest, 0.0), speed
+
+
+class WitnessFollower:
+    """Is where the certificate has the ego: proof that a test can be passed."""
+
+    def __init__(self, loop: ClosedLoop) -> None:
+        self.scenario, self.ego, self.begin = loop.scenario, loop.ego, loop.begin
+
+    def reset(self, task: Task) -> None:
+        """Begin."""
+        self.step = task.step
+
+    def act(self, observation: Observation) -> Pose:
+        """Be where the witness is next."""
+        s, n = self.scenario, self.ego
+        k = min(round((self.begin + observation.time + self.step) / float(s.time[1])), len(s.time) - 1)
+        x, y = s.position[n, k].tolist()
+        return Pose(x, y, float(s.heading[n, k]), float(s.speed[n, k]))

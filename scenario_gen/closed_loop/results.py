@@ -77,12 +77,7 @@ def as_page(
     """Return the page: the summary, all verdicts, the worst first, and replays of the worst."""
     order = sorted(range(len(outcomes)), key=lambda k: (*(-value for value in outcomes[k].verdict.severity), k))
     drawn = order[:MOST_DRAWN]
-    roads = {id(trials[k].road): trials[k].road for k in drawn}
-    place = {key: number for number, key in enumerate(roads)}
-    data = {
-        "roads": [road_data(road) if road is not None else None for road in roads.values()],
-        "drives": [_drawing(outcomes[k], trials[k], place[id(trials[k].road)]) for k in drawn],
-    }
+    data = drawings(outcomes, trials, drawn)
     rows = [(number if number < len(drawn) else None, outcomes[k]) for number, k in enumerate(order)]
     return render_page(
         "drives.html.j2",
@@ -95,6 +90,16 @@ def as_page(
         broken=broken,
         parameters={name: value for name, (_, value) in flatten(config).items()},
     )
+
+
+def drawings(outcomes: Sequence[Outcome], trials: Sequence[Trial], drawn: Sequence[int]) -> dict[str, Any]:
+    """Return what a page replays: the drives of some indices, and their roads."""
+    roads = {id(trials[k].road): trials[k].road for k in drawn}
+    place = {key: number for number, key in enumerate(roads)}
+    return {
+        "roads": [road_data(road) if road is not None else None for road in roads.values()],
+        "drives": [_drawing(outcomes[k], trials[k], place[id(trials[k].road)]) for k in drawn],
+    }
 
 
 def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:

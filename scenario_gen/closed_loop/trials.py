@@ -6,6 +6,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 import importlib
 import math
@@ -151,6 +152,9 @@ def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
     return wanted
 
 
+RunTrials = Callable[[Sequence[Trial]], Iterator["Outcome"]]
+
+
 def run_trials(
     trials: Sequence[Trial],
     planner: MakePlanner | str,
@@ -165,40 +169,53 @@ def run_trials(
         planner: makes a planner, or its name as MODULE:CLASS; with several workers, a name or what can be pickled.
         config: the parameters.
         workers: processes.
-        progress: told how many are done, and how many there are.
+        progress: called with how many are done, and how many there are.
 
     Raises:
         InputError: the planner is not found, or fails; the message names the scenario.
     """
-    if isinstance(planner, str):
-        find_planner(planner)  # what is wrong with it is said before there are processes
-    tasks = [(trial, planner, config) for trial in trials]
     outcomes: list[Outcome] = []
-    if workers <= 1:
-        results: Iterator[Outcome] = map(_run, tasks)
-        return _gathered(results, outcomes, len(trials), progress)
-    context = multiprocessing.get_context("spawn")
-    workers = min(workers, max(len(tasks), 1))
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent) as pool:
-        try:
-            at_once = min(max(len(tasks) // workers, 1), 4)
-            with starting():
-                results = pool.map(_run, tasks, chunksize=at_once)
-            return _gathered(results, outcomes, len(trials), progress)
-        except BrokenProcessPool as error:
-            raise InputError(
-                f"a process that drove the planner has ended after {len(outcomes)} of {len(tasks)} drives: it crashed, called "
-                "os._exit, or was killed for want of memory; --workers 1 shows where"
-            ) from error
-
-
-def _gathered(
-    results: Iterator[Outcome], outcomes: list[Outcome], total: int, progress: Callable[[int, int], None]
-) -> list[Outcome]:
-    for outcome in results:
-        outcomes.append(outcome)
-        progress(len(outcomes), total)
+    with trial_runner(planner, config, min(workers, max(len(trials), 1))) as run:
+        for outcome in run(trials):
+            outcomes.append(outcome)
+            progress(len(outcomes), len(trials))
     return outcomes
+
+
+@contextmanager
+def trial_runner(planner: MakePlanner | str, config: ClosedLoopConfig, workers: int) -> Iterator[RunTrials]:
+    """Yield what drives trials, in their order, again and again with the same processes; arguments as in `run_trials`.
+
+    Raises:
+        InputError: as `run_trials`.
+    """
+    if isinstance(planner, str):
+        find_planner(planner)  # what is wrong with it is reported before there are processes
+
+    def tasks(trials: Sequence[Trial]) -> list[tuple[Trial, MakePlanner | str, ClosedLoopConfig]]:
+        return [(trial, planner, config) for trial in trials]
+
+    if workers <= 1:
+        yield lambda trials: map(_run, tasks(trials))
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent) as pool:
+
+        def run(trials: Sequence[Trial]) -> Iterator[Outcome]:
+            with starting():
+                results = pool.map(_run, tasks(trials), chunksize=min(max(len(trials) // workers, 1), 4))
+            done = 0
+            try:
+                for outcome in results:
+                    yield outcome
+                    done += 1
+            except BrokenProcessPool as error:
+                raise InputError(
+                    f"a process that drove the planner has ended after {done} of {len(trials)} drives: it crashed, called "
+                    "os._exit, or was killed for want of memory; --workers 1 shows where"
+                ) from error
+
+        yield run
 
 
 def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:

@@ -16,7 +16,7 @@ from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held
 from scenario_gen.types.reaction import Reaction, ReactionGraph
 from scenario_gen.types.target import Reached
 
-FACTS = ("weight", "target.", "order", "passing_order", "reactions")
+FACTS = ("weight", "target.", "order", "passing_order", "reactions", "search.")
 """How the names of a scenario's facts begin."""
 
 
@@ -39,7 +39,8 @@ class Scenario:
         present: (N, 2) first and last instant at which each vehicle is there, as in `Tracks`; default: everybody throughout.
         witness: of a scenario with an ego slot: a trajectory of the vehicle that was left out, as a scenario of that vehicle
             alone on the same clock. Both together were proven valid, so the slot can be driven.
-        facts: what else its entry in `scenarios/info` says: `weight`, `target.…`, `order`, `passing_order`, `reactions` (FACTS).
+        facts: what else its entry in `scenarios/info` says: `weight`, `target.…`, `order`, `passing_order`, `reactions`,
+            `search.…` (FACTS).
     """
 
     vehicles: tuple[Vehicle, ...]

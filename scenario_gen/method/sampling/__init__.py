@@ -5,9 +5,10 @@
 
 from scenario_gen.method.sampling.checked import checker_of, plan_of, sample_scenarios
 from scenario_gen.method.sampling.config import SamplingConfig
-from scenario_gen.method.sampling.directed import TargetError
+from scenario_gen.method.sampling.directed import directions, TargetError
 from scenario_gen.method.sampling.freedom import relaxed_states
 from scenario_gen.method.sampling.gp import Features, Observations, Posterior, Regression
+from scenario_gen.method.sampling.natural import NaturalScenarios
 from scenario_gen.method.sampling.plan import Callbacks, Cancelled, Plan, Progress
 from scenario_gen.method.sampling.prepare import kept_reactions
 from scenario_gen.method.sampling.sample import draw_scenarios, regenerate
@@ -17,6 +18,7 @@ __all__ = [
     "Callbacks",
     "Cancelled",
     "Features",
+    "NaturalScenarios",
     "Observations",
     "Plan",
     "Posterior",
@@ -26,6 +28,7 @@ __all__ = [
     "SpeedKnots",
     "TargetError",
     "checker_of",
+    "directions",
     "draw_scenarios",
     "kept_reactions",
     "plan_of",

@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+import hashlib
 
 import numpy as np
 
@@ -28,6 +29,7 @@ LEVEL_SIZE = 1 << 20  # candidates of one level whose indices follow each other
 LEVEL_SLOTS = 8  # levels that an index has room for; after them come the next LEVEL_SIZE candidates of the first
 BLOCK = 32  # candidates whose random numbers are drawn together
 DIRECTED, STAGED = 5, 6  # slots of the candidates of a proposal, and of those by which it is found
+SEARCHED = 7  # slot of scenarios whose numbers a search chose
 ENOUGH = {"narrow": 0.3, "wide": 0.1}  # share of valid candidates below which the next level is tried
 
 
@@ -35,6 +37,12 @@ def index_of(level: int, candidate: int) -> int:
     """Return the index of a level's candidate: level * LEVEL_SIZE + candidate while that suffices, and unique beyond."""
     page, within = divmod(candidate, LEVEL_SIZE)
     return (page * LEVEL_SLOTS + level) * LEVEL_SIZE + within
+
+
+def searched_index(numbers: Floats) -> int:
+    """Return the index of a scenario whose numbers, an array of shape (size,), a search chose: made of their SHA-256."""
+    page, within = divmod(int.from_bytes(hashlib.sha256(numbers.tobytes()).digest()[:5]), LEVEL_SIZE)
+    return (page * LEVEL_SLOTS + SEARCHED) * LEVEL_SIZE + within
 
 
 def place_of(index: int) -> tuple[int, int]:

@@ -4,7 +4,7 @@
 """One published scenario again, bit for bit, from what its bag says: template, road, parameters, seed and index."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from scenario_gen.bags.recordings.provenance import read_parameters, versions
@@ -79,6 +79,68 @@ def regenerate_scenario(
 def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
     """Make the scenario that was found; `what` names bag and request in messages."""
     values, seed, index = found.summary.values, found.entry.seed, found.entry.index
+    known = _replan(found, what, log)
+    encounter, requested, sampling = known.planned.encounter, known.request, known.sampling
+    plan = plan_of(known.planned, sampling, requested)
+    check = None
+    if requested.target or requested.order == "swap":  # a proposal is found again with them
+        check = checker_of(plan, sampling, known.limits, requested).check
+    scenario = regenerate(plan, sampling, seed=seed, index=index, request=requested, check=check, measures=MEASURES)
+    data, sha256 = (b"", "") if scenario is None else scenario_bytes(scenario, encounter)
+    witness = None if scenario is None else scenario.witness
+    own = "" if witness is None else scenario_bytes(witness, encounter)[1]
+    if scenario is None or sha256 != found.entry.sha256 or own != found.entry.witness:
+        now = versions()
+        other = [f"{name} {values[name]} there, {now[name]} here" for name in now if values.get(name, now[name]) != now[name]]
+        why = ", ".join(other) or "the versions agree, so the bag was changed"
+        raise ScenarioGenError(f"{what}: scenario {index} comes out differently: {why}")
+    return Regenerated(scenario, data, found.messages, sha256)
+
+
+@dataclass(frozen=True, eq=False)
+class Replanned:
+    """What the scenarios of a recorded request were drawn from: the template on its road, the request and the parameters."""
+
+    planned: GenerationResult
+    request: Request
+    sampling: SamplingConfig
+    limits: Limits
+
+
+def replanned(bag: Path, namespace: str | None = None, config: BagConfig = BagConfig()) -> Replanned:
+    """Return what the scenarios of a bag were drawn from; those of its first request, if there are several.
+
+    Args:
+        bag: its folder.
+        namespace: where several hold scenarios.
+        config: what is read of the bag at most.
+
+    Raises:
+        InputError: the bag or something that is needed is not there, or several namespaces hold scenarios.
+    """
+    with within(bag):
+        entries = _entries(bag, config)
+        names = sorted({where.name for where, _, _ in entries})
+        if namespace is None and len(names) > 1:
+            raise InputError(f"{bag}: {len(names)} namespaces hold scenarios; choose one: --namespace {' or '.join(names)}")
+        own = [entry for where, entry, _ in entries if namespace in (None, where.name)]
+        if not own:
+            raise InputError(f"{bag}: no namespace {namespace!r}; there is {', '.join(map(repr, names))}")
+        found = _find(bag, own[0].index, namespace, own[0].request, config)
+        known = _replan(found, f"{bag}: request {found.entry.request}", None)
+        facts, planned = found.entry.status.values, known.planned
+        road, placed = planned.placed()
+        fit = found.namespace.fit[0]  # with what was decided, which the messages of one request do not hold
+        if fit is not None and not known.request.moves:
+            placed = replace(fit, asked=placed.asked)
+        encounter = replace(planned.encounter, name=facts.get("template", planned.encounter.name))
+        planned = replace(planned, encounter=encounter, road=replace(road, name=facts.get("road", road.name)), fit=placed)
+        return replace(known, planned=planned)
+
+
+def _replan(found: "_Found", what: str, log: Path | None) -> Replanned:
+    """Return what a scenario was drawn from; `what` names bag and request in messages."""
+    values, seed = found.summary.values, found.entry.seed
     requested = Request(**{entry.name: values.get(entry.name, str(entry.default)) for entry in fields(Request)})
     template = found.template(what)
     encounter, segmentation, routes, (road, fit) = template.encounter, template.segmentation, template.routes, template.placed()
@@ -90,21 +152,8 @@ def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
         planning = read_parameters(PlanningConfig(), values, "planning.", what)
         fit = fit_template(encounter, segmentation, road, fitting, request=requested, max_speed=sampling.max_speed)
         routes = plan_routes(road, fit, planning, seed)
-    plan = plan_of(GenerationResult(encounter, segmentation, road, fit, routes, seed=seed), sampling, requested)
-    check = None
-    if requested.target or requested.order == "swap":  # a proposal is found again with them
-        limits = read_parameters(Limits(), values, "limits.", what)
-        check = checker_of(plan, sampling, limits, requested).check
-    scenario = regenerate(plan, sampling, seed=seed, index=index, request=requested, check=check, measures=MEASURES)
-    data, sha256 = (b"", "") if scenario is None else scenario_bytes(scenario, encounter)
-    witness = None if scenario is None else scenario.witness
-    own = "" if witness is None else scenario_bytes(witness, encounter)[1]
-    if scenario is None or sha256 != found.entry.sha256 or own != found.entry.witness:
-        now = versions()
-        other = [f"{name} {values[name]} there, {now[name]} here" for name in now if values.get(name, now[name]) != now[name]]
-        why = ", ".join(other) or "the versions agree, so the bag was changed"
-        raise ScenarioGenError(f"{what}: scenario {index} comes out differently: {why}")
-    return Regenerated(scenario, data, found.messages, sha256)
+    planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed)
+    return Replanned(planned, requested, sampling, read_parameters(Limits(), values, "limits.", what))
 
 
 def write_regenerated(made: Regenerated, folder: Path, inputs: Sequence[Path] = ()) -> Path:
@@ -168,19 +217,28 @@ class _Found:
         return decode_template(newest)
 
 
+def _entries(bag: Path, config: BagConfig) -> list[tuple[Namespace, ScenarioEntry, BagMessage]]:
+    """Return every scenario's entry with its namespace and message.
+
+    Raises:
+        InputError: there is none.
+    """
+    entries = []
+    for one in read_recording(bag, config).namespaces.values():
+        one.check_infos()
+        entries += [(one, info, message) for message, infos in one.infos for info in infos if isinstance(info, ScenarioEntry)]
+    if not entries:
+        raise InputError(f"{bag}: no scenario has an entry on `{INFO}`; only what this suite published can be made again")
+    return entries
+
+
 def _find(bag: Path, index: int, namespace: str | None, request: str | None, config: BagConfig) -> _Found:
     """Find the one scenario of that index.
 
     Raises:
         InputError: there is none, several, or its request was not closed.
     """
-    namespaces = read_recording(bag, config).namespaces.values()
-    entries = []
-    for one in namespaces:
-        one.check_infos()
-        entries += [(one, info, message) for message, infos in one.infos for info in infos if isinstance(info, ScenarioEntry)]
-    if not entries:
-        raise InputError(f"{bag}: no scenario has an entry on `{INFO}`; only what this suite published can be made again")
+    entries = _entries(bag, config)
     own = [found for found in entries if namespace in (None, found[0].name) and request in (None, found[1].request)]
     same = [found for found in own if found[1].index == index]
     if not same:

@@ -1,0 +1,280 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The work of `scenario-gen search`: a template on its road and a planner in; its failures and their rate out."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+import json
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+from scenario_gen.bags.recordings.provenance import versions
+from scenario_gen.bags.recordings.write import add_results
+from scenario_gen.bags.storage.writer import BagWriter
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.folders import replaced_folder, sha256_of, write_text
+from scenario_gen.base.folders.marker import Kind
+from scenario_gen.base.parameters import assigned, flatten
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.results import as_junit, drawings, JUNIT
+from scenario_gen.closed_loop.search.estimate import Estimate, LEVEL, Search
+from scenario_gen.closed_loop.search.findings import Finding, findings_of
+from scenario_gen.closed_loop.search.objective import Objective
+from scenario_gen.closed_loop.search.problem import DrivenScenarios, open_journal
+from scenario_gen.closed_loop.trials import find_planner, Rate, trial_runner
+from scenario_gen.method.evaluation import wilson
+from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of, SamplingConfig
+from scenario_gen.method.validity import Limits
+from scenario_gen.numerics import exact
+from scenario_gen.output.report.html import render_page
+from scenario_gen.types import EgoSlot, GenerationResult, Request, ScenarioSet, token, with_witness
+
+JSON, PAGE, BAG = "search.json", "search.html", "bag"
+SEARCHED = Kind("searched")
+JOURNAL = ".journal.jsonl"  # behind the name of the results' folder
+
+
+@dataclass(frozen=True, eq=False)
+class SearchRequest:
+    """What is searched, and how.
+
+    Attributes:
+        planned: a template on its road, with no scenarios.
+        request: of the scenarios; sampling, limits: the parameters of scenarios.
+        planner: MODULE:CLASS.
+        ego: id of the vehicle in whose place it drives; "": that of the request, or the first.
+        objective: what counts as a failure.
+        budget: drives at most.
+        seed: of the search; by it, planner and scenarios everything is determined.
+        worst: look for the worst failure, not for the rate.
+        assignments: parameters of a drive as name=value.
+    """
+
+    planned: GenerationResult
+    request: Request
+    sampling: SamplingConfig
+    limits: Limits
+    planner: str
+    ego: str = ""
+    objective: Objective = Objective()  # noqa: RUF009 - frozen
+    budget: int = 1000
+    seed: int = 0
+    worst: bool = False
+    assignments: Sequence[str] = ()
+
+    def ego_id(self) -> str:
+        """Return the id of the vehicle in whose place the planner drives.
+
+        Raises:
+            InputError: there is no such vehicle.
+        """
+        ids = [vehicle.id for vehicle in self.planned.encounter.vehicles]
+        wanted = self.ego or self.request.ego or ids[0]
+        found = next((one for one in ids if wanted in (one, token(one))), None)
+        if found is None:
+            raise InputError(f"--ego {wanted}: there is no such vehicle; there are {', '.join(ids)}")
+        return found
+
+    def identity(self) -> dict[str, Any]:
+        """Return what the drives hang on; the budget does not change them."""
+        make = find_planner(self.planner)
+        source = Path(getattr(__import__(make.__module__, fromlist=["_"]), "__file__", None) or "")
+        encounter, config = self.planned.encounter, self.drive_config()
+        return {
+            "template": encounter.name,
+            "road": self.planned.placed()[0].name,
+            "scenarios": str(self.planned.seed),
+            "request": {name: str(value) for name, (_, value) in flatten(self.request).items()},
+            "sampling": {name: str(value) for name, (_, value) in flatten(self.sampling).items()},
+            "limits": {name: str(value) for name, (_, value) in flatten(self.limits).items()},
+            "planner": self.planner,
+            "planner's file": sha256_of(source) if source.is_file() else "",
+            "drive": {name: str(value) for name, (_, value) in flatten(config).items()},
+            "ego": self.ego_id(),
+            "objective": str(self.objective),
+            "seed": self.seed,
+            "worst": self.worst,
+            "versions": versions(),
+        }
+
+    def drive_config(self) -> ClosedLoopConfig:
+        """Return the parameters of a drive.
+
+        Raises:
+            InputError: a name is unknown, or a value does not suit.
+        """
+        config = ClosedLoopConfig()
+        for assignment in self.assignments:
+            config = assigned(config, assignment)
+        return config
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """What a search came to, and the files written."""
+
+    estimate: Estimate
+    findings: Sequence[Finding]
+    worst: bool
+    written: Sequence[Path]
+
+    @property
+    def kinds(self) -> dict[str, list[Finding]]:
+        """Findings by kind, the kind with the greatest share of the rate first."""
+        kinds: dict[str, list[Finding]] = {}
+        for one in self.findings:
+            kinds.setdefault(one.kind, []).append(one)
+        return dict(sorted(kinds.items(), key=lambda item: -sum(one.weight or 0.0 for one in item[1])))
+
+    @property
+    def plain(self) -> Rate:
+        """The rate by natural drives alone."""
+        hits, total = self.estimate.plain
+        return Rate(hits, total, wilson(hits, total, LEVEL))
+
+    @property
+    def equal_plain(self) -> float:
+        """Natural drives that would give an interval as narrow; NaN where no failure was found."""
+        rate = self.estimate.rate
+        half = 0.5 * (rate.high - rate.low)
+        z = float(exact.ndtri(0.5 + 0.5 * LEVEL))
+        return z * z * rate.value * (1.0 - rate.value) / (half * half) if rate.value > 0.0 and half > 0.0 else math.nan
+
+    def sentences(self) -> list[str]:
+        """Return what it came to, in sentences."""
+        e, rate = self.estimate, self.estimate.rate
+        messages = []
+        if self.worst:
+            messages.append(f"{len(self.findings)} failure(s) kept of {e.drives} drives; a search for the worst gives no rate")
+        elif e.first:
+            messages.append(f"failure rate {_share(rate.value)} (95 % interval {_share(rate.low)} to {_share(rate.high)})")
+            messages.append(f"first failure: drive {e.first} of {e.drives}")
+        else:
+            messages.append(
+                f"no failure in {e.drives} drives; by the natural ones the rate is at most {_share(rate.high)} (95 %)"
+            )
+        if not self.worst:
+            messages.append(f"natural drives alone: {self.plain}")
+        if not math.isnan(self.equal_plain) and not self.worst:
+            messages.append(f"plain sampling would need {self.equal_plain:,.0f} drives for an interval as narrow")
+        if e.first and not self.worst:
+            messages.append(f"failures unlike those found: at most {_share(e.unseen)} (95 %), by the natural drives")
+        return messages
+
+
+def _share(value: float) -> str:
+    return "–" if math.isnan(value) else f"{100.0 * value:.3g} %"
+
+
+def search_failures(
+    request: SearchRequest, out: Path, *, workers: int = 0, progress: Callable[[int, int], None] = lambda *_: None
+) -> SearchResult:
+    """Search, and write search.json, search.html, junit.xml and a bag of the failures.
+
+    Every drive is kept in a journal beside the folder: the same search goes on where it was stopped, and with a larger budget.
+
+    Args:
+        request: what is searched.
+        out: folder of the results.
+        workers: processes; 0: one for each core.
+        progress: called with how many drives are done, of how many.
+
+    Raises:
+        InputError: the planner fails, a vehicle or parameter is wrong, the journal is of another search, or a file cannot be
+            written; the message names it.
+        RefusedError: no scenario can be drawn.
+    """
+    if request.budget < 1:
+        raise InputError(f"--budget {request.budget}: at least one drive is needed")
+    config, ego = request.drive_config(), request.ego_id()
+    identity = request.identity()
+    plan = plan_of(request.planned, request.sampling, replace(request.request, target="", choose="natural"))
+    check = checker_of(plan, request.sampling, request.limits, request.request).check
+    natural = NaturalScenarios.of(plan, check, request.sampling, request.planned.seed)
+    if not natural.size:
+        raise InputError("the scenarios have no freedom: all are the same, so there is nothing to search")
+    journal_path = out.with_name(out.name + JOURNAL)
+    with replaced_folder(out, SEARCHED) as folder, open_journal(journal_path, identity) as journal:
+        with trial_runner(request.planner, config, workers or os.cpu_count() or 1) as run:
+            problem = DrivenScenarios(
+                natural, ego, plan.road, request.objective, run, journal, lambda done: progress(done, request.budget)
+            )
+            search = Search(problem, request.seed, request.budget, request.worst)
+            estimate = search.run()
+            findings = findings_of(search, problem, config)
+        names = (JSON, PAGE, JUNIT, *((BAG,) if findings else ()))
+        result = SearchResult(estimate, findings, request.worst, (*(out / name for name in names), journal_path))
+        _write(folder, result, request, identity, plan.asked)
+    return result
+
+
+def _write(folder: Path, result: SearchResult, request: SearchRequest, identity: dict[str, Any], asked: Any) -> None:
+    document = _document(result, request, identity)
+    write_text(folder / JSON, json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(folder / JUNIT, as_junit([one.outcome for one in result.findings], request.planner))
+    write_text(folder / PAGE, _page(result, request))
+    if result.findings:
+        encounter, fit = request.planned.encounter, request.planned.placed()[1]
+        scenarios = tuple(one.scenario() for one in sorted(result.findings, key=lambda one: one.drive))
+        ego = request.request.ego_of(encounter)
+        slot = None
+        if ego is not None:  # the request left it out
+            slot = EgoSlot(encounter.vehicles[ego], asked.start[ego], asked.end[ego])
+            scenarios = tuple(with_witness(one, ego) for one in scenarios)
+        note = f"failures of {request.planner}, found by a search: they are no sample of the natural scenarios"
+        drawn = ScenarioSet(len(scenarios), scenarios, len(scenarios), Counter(), (note,), slot)
+        facts = {
+            name: value if isinstance(value, str) else json.dumps(value, ensure_ascii=False) for name, value in identity.items()
+        }
+        provenance = {f"search.{name}": value for name, value in facts.items()} | versions()
+        delivered = replace(request.planned, fit=replace(fit, asked=asked), generated=drawn, provenance=provenance)
+        with BagWriter(folder / BAG) as bag:
+            add_results(bag, {"": delivered})
+
+
+def _document(result: SearchResult, request: SearchRequest, identity: dict[str, Any]) -> dict[str, Any]:
+    e = result.estimate
+
+    def rounded(value: float) -> float | None:
+        return None if math.isnan(value) else float(f"{value:.6g}")
+
+    plain = result.plain
+    share = {"value": rounded(plain.share.value), "low": rounded(plain.share.low), "high": rounded(plain.share.high)}
+    return {
+        "rate": None if request.worst else {name: rounded(getattr(e.rate, name)) for name in ("value", "low", "high")},
+        "plain": {"failures": plain.count, "drives": plain.of, **share},
+        "drives": e.drives,
+        "first_failure": e.first or None,
+        "plain_drives_for_the_same_interval": None if request.worst else rounded(result.equal_plain),
+        "unlike_those_found_at_most": rounded(e.unseen),
+        "valid_share_of_candidates": rounded(e.valid),
+        "shares": {kind: rounded(value) for kind, value in sorted(e.shares.items())},
+        "kinds": [{"kind": kind, "kept": len(own), "likeliest": own[0].trial.name} for kind, own in result.kinds.items()],
+        "findings": [one.document() for one in result.findings],
+        "sentences": result.sentences(),
+        "search": {**identity, "budget": request.budget},
+    }
+
+
+def _page(result: SearchResult, request: SearchRequest) -> str:
+    ordered = [one for own in result.kinds.values() for one in own]
+    outcomes, trials = [one.outcome for one in ordered], [one.trial for one in ordered]
+    return render_page(
+        "search.html.j2",
+        ("scene.js", "drives.js"),
+        drawings(outcomes, trials, range(len(ordered))),
+        plotly=False,
+        planner=request.planner,
+        objective=str(request.objective),
+        ego=request.ego_id(),
+        title=request.planned.title,
+        sentences=result.sentences(),
+        kinds=result.kinds,
+        shares=result.estimate.shares,
+        rows=list(enumerate(ordered)),
+        parameters={name: value for name, (_, value) in flatten(request.drive_config()).items()},
+    )

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What counts as a failure of a planner, and how near to one a drive was."""
+
+from dataclasses import dataclass
+import math
+import re
+
+import numpy as np
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.closed_loop.search.estimate import Response
+from scenario_gen.closed_loop.trials import Outcome
+from scenario_gen.closed_loop.verdict import Runner
+from scenario_gen.method.evaluation import footprint_distance, Motion
+
+AT_FAULT, COLLISION, OFF_ROAD, GOAL, TTC, PET = "at_fault", "collision", "off_road", "goal", "ttc", "pet"
+NAMES = (AT_FAULT, COLLISION, OFF_ROAD, GOAL)
+CONTACT = 0.1  # added to the speed of an impact, so that every contact is a failure
+FAR = 100.0  # margin where a figure does not exist and nothing says how near it is
+
+
+@dataclass(frozen=True)
+class Objective:
+    """A failure: at_fault, collision, off_road, goal (missed), or ttc or pet below a limit [s]."""
+
+    name: str = AT_FAULT
+    limit: float = 0.0
+
+    @classmethod
+    def parsed(cls, text: str) -> "Objective":
+        """Return the objective of a text: a name, or e.g. `ttc<1.5`.
+
+        Raises:
+            InputError: it is none of these.
+        """
+        bound = re.fullmatch(rf"({TTC}|{PET})\s*<\s*(\d+\.?\d*|\.\d+)", text.strip())
+        if bound is not None:
+            return cls(bound[1], float(bound[2]))
+        if text.strip() not in NAMES:
+            raise InputError(f"objective {text!r} is not known; take {', '.join(NAMES)}, or e.g. {TTC}<1.5, {PET}<1 (seconds)")
+        return cls(text.strip())
+
+    def __str__(self) -> str:
+        return f"{self.name}<{self.limit:g}" if self.limit else self.name
+
+    def response(self, outcome: Outcome) -> Response:
+        """Return how near to failure a drive was; its guides are the least gaps to each of the others [m]."""
+        verdict = outcome.verdict
+        gaps = _gaps(outcome)
+        hit = verdict.collision
+        contact = -math.inf if hit is None else -(CONTACT + hit.speed)
+        nearest = min(gaps, default=FAR)
+        if self.name in (AT_FAULT, COLLISION):
+            counts = hit is not None and (self.name == COLLISION or hit.ran is not Runner.OTHER)
+            margin = contact if counts else max(nearest, CONTACT)
+        elif self.name == OFF_ROAD:
+            margin = 1.0 if math.isnan(verdict.off_road) else -1.0
+        elif self.name == GOAL:
+            margin = verdict.progress - 1.0 - 1e-3 if math.isnan(verdict.goal) else 1.0 / (1.0 + max(verdict.delay, 0.0))
+        elif self.name == TTC:
+            margin = verdict.min_ttc - self.limit if hit is None else contact
+            if margin > 0.0:
+                margin += 0.1 * nearest  # many drives have no time to collision: the nearer, the better
+        else:
+            margin = FAR + nearest if math.isnan(verdict.min_pet) else verdict.min_pet - self.limit
+        margin = FAR if math.isnan(margin) else float(margin)
+        return Response(margin, gaps, _kind(outcome, self.name) if margin <= 0.0 else "")
+
+
+def _gaps(outcome: Outcome) -> tuple[float, ...]:
+    """Return the least distance [m] of the ego's footprint to each of the others'; FAR for one that is never there."""
+    drive = outcome.drive
+    motion, found = drive.motion, []
+    step = float(motion.time[1]) if len(motion.time) > 1 else 0.1
+    whole = Motion(motion.vehicles, step, motion.position, motion.heading, motion.speed)
+    for i in range(len(motion.vehicles)):
+        if i != drive.ego:
+            gap = np.where(drive.here[i], footprint_distance(whole, drive.ego, i), np.inf).min()
+            found.append(float(min(gap, FAR)))
+    return tuple(found)
+
+
+def _kind(outcome: Outcome, name: str) -> str:
+    """Return which failure it was: who and how."""
+    hit = outcome.verdict.collision
+    if name in (AT_FAULT, COLLISION, TTC) and hit is not None:
+        words = {Runner.EGO: "the ego runs into {}", Runner.OTHER: "{} runs into the ego", Runner.BOTH: "the ego and {} meet"}
+        return words[hit.ran].format(hit.vehicle)
+    if name == OFF_ROAD:
+        return "the ego leaves the road"
+    if name == GOAL:
+        return "the ego does not come to its goal" if hit is None else "the ego does not come to its goal after a collision"
+    others = [i for i in range(len(outcome.drive.motion.vehicles)) if i != outcome.drive.ego]
+    nearest = others[int(np.argmin(_gaps(outcome)))] if others else 0
+    return f"{name} too short with {outcome.drive.motion.vehicles[nearest].id}"

@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The distribution of a request's scenarios as a function of standard normal numbers, for who chooses the numbers himself."""
+
+from dataclasses import dataclass
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.sampling.adapt import Check, Judge
+from scenario_gen.method.sampling.config import SamplingConfig
+from scenario_gen.method.sampling.plan import Plan
+from scenario_gen.method.sampling.prepare import prepare
+from scenario_gen.method.sampling.sample import PILOT
+from scenario_gen.method.sampling.sampler import BLOCK, ENOUGH, LEVELS, Sampler, searched_index
+from scenario_gen.numerics import Floats
+from scenario_gen.types import Scenario
+
+
+@dataclass(frozen=True, eq=False)
+class NaturalScenarios:
+    """Certified scenarios by their numbers; those of independent standard normal ones are natural.
+
+    Attributes:
+        sampler: draws candidates.
+        judge: refuses them.
+        level: whose standard deviations they have, as in a set.
+    """
+
+    sampler: Sampler
+    judge: Judge
+    level: int
+
+    @classmethod
+    def of(cls, plan: Plan, check: Check, config: SamplingConfig, seed: int) -> "NaturalScenarios":
+        """Prepare a template on its road; the level is the first of which enough candidates are valid, or the best.
+
+        Raises:
+            RefusedError: no speed profile exists, or no candidate is valid.
+        """
+        prepared = prepare(plan, config, "keep")
+        if prepared.model is None:
+            raise RefusedError(prepared.refusal)
+        sampler = Sampler(prepared.model, seed, plan.road.frame_id)
+        judge = Judge.of(sampler, check, ENOUGH[config.variety])
+        shares: list[float] = []
+        for level in range(len(LEVELS)):
+            drawn = [one for k in range(PILOT // BLOCK) for one in _scenarios(sampler, level, k) if one is not None]
+            shares.append(judge(drawn).count(None) / PILOT if drawn else 0.0)
+            if shares[-1] >= judge.enough:
+                break
+        if not any(shares):
+            raise RefusedError(f"none of {PILOT * len(shares)} candidates is valid; there is nothing to search in")
+        return cls(sampler, judge, shares.index(max(shares)))
+
+    @property
+    def size(self) -> int:
+        """Numbers of a scenario."""
+        return self.sampler.model.size
+
+    def scenarios(self, numbers: Floats) -> list[Scenario | None]:
+        """Return the certified scenarios, of all vehicles, of numbers (S, size); None where a candidate is refused."""
+        batch = self.sampler.model.draw(numbers, LEVELS[self.level])
+        drawn = batch.scenarios(self.sampler.seed, [searched_index(row) for row in numbers], self.sampler.frame_id)
+        causes = iter(self.judge([one for one in drawn if one is not None]))
+        return [one if one is not None and next(causes) is None else None for one in drawn]
+
+
+def _scenarios(sampler: Sampler, level: int, number: int) -> list[Scenario | None]:
+    batch, index = sampler.block(level, number)
+    return batch.scenarios(sampler.seed, index, sampler.frame_id)

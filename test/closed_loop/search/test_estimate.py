@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The failure search on problems whose failure rate is known."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from scenario_gen.closed_loop.search.estimate import Response, Search
+
+DIMENSIONS = 200
+
+
+class Plane:
+    """Fails where a sum of numbers is large: with a probability that is given. Candidates of a large 8th number are refused."""
+
+    def __init__(self, rate, allowed=math.inf):
+        direction = np.zeros(DIMENSIONS)
+        direction[[3, 50, 120]] = 0.6, 0.5, 0.624
+        self.direction, self.rate, self.allowed = direction / np.linalg.norm(direction), rate, allowed
+        self.driven = []
+
+    size = DIMENSIONS
+
+    def candidates(self, z):
+        return [row if row[7] < self.allowed else None for row in z]
+
+    def margin(self, row):
+        return float(-norm.ppf(self.rate) - self.direction @ row)
+
+    def drive(self, candidates):
+        self.driven += [row.copy() for row in candidates]
+        margins = [self.margin(row) for row in candidates]
+        return [Response(margin, (margin,), "fails" if margin <= 0.0 else "") for margin in margins]
+
+
+class TwoPlanes(Plane):
+    """Fails in either of two ways, of equal probability."""
+
+    def margins(self, row):
+        return self.margin(row), float(-norm.ppf(self.rate) - row[100])
+
+    def drive(self, candidates):
+        both = [self.margins(row) for row in candidates]
+        return [Response(min(pair), pair, ("first", "second")[int(np.argmin(pair))] if min(pair) <= 0.0 else "") for pair in both]
+
+
+@pytest.mark.parametrize(("rate", "budget"), [(1e-2, 600), (1e-3, 800), (1e-4, 1000)])
+def test_the_interval_holds_the_rate_and_costs_fewer_drives_than_plain_sampling(rate, budget):
+    held, share = 0, []
+    for seed in range(12):
+        search = Search(Plane(rate, allowed=1.0), seed, budget)
+        found = search.run()
+        held += found.rate.low <= rate <= found.rate.high
+        half = 0.5 * (found.rate.high - found.rate.low)
+        share.append(found.drives * half * half / (1.96**2 * rate * (1.0 - rate)))
+        assert found.drives == len(search.z) == budget and 0.8 < found.valid < 0.88  # norm.cdf(1) is 0.84
+    assert held >= 10  # of 12 at 95 %: fewer have a probability of 0.02
+    assert np.median(share) < {1e-2: 1 / 3, 1e-3: 1 / 8, 1e-4: 1 / 20}[rate]
+
+
+def test_both_of_two_kinds_are_found():
+    seen = Search(TwoPlanes(1e-3), 1, 1500).run()
+    assert min(seen.shares["first"], seen.shares["second"]) > 0.2
+    assert seen.rate.low <= 2e-3 <= seen.rate.high
+
+
+def test_a_weight_is_the_natural_density_over_the_proposals():
+    search = Search(Plane(1e-2), 3, 500)
+    search.run()
+    proposal = search._last
+    rng = np.random.default_rng(0)
+    z = proposal.sample(rng.standard_normal((20000, DIMENSIONS)), rng.standard_normal(20000))
+    weights = 1.0 / proposal.ratio(z)
+    assert weights.max() <= 1.0 / 0.15 + 1e-9
+    assert weights.mean() == pytest.approx(1.0, abs=0.05)  # the natural distribution has the whole mass
+    below = z @ Plane(1e-2).direction > -norm.ppf(1e-2)
+    assert (weights * below).mean() == pytest.approx(1e-2, rel=0.1)
+
+
+def test_a_smaller_budget_is_the_beginning_of_a_larger_one():
+    small, large = Plane(1e-2), Plane(1e-2)
+    Search(small, 5, 333).run()
+    Search(large, 5, 700).run()
+    assert len(small.driven) == 333 and all(np.array_equal(a, b) for a, b in zip(small.driven, large.driven[:333], strict=True))
+
+
+def test_what_is_refused_costs_no_drive():
+    problem = Plane(1e-2, allowed=0.0)
+    assert Search(problem, 0, 200).run().valid == pytest.approx(0.5, abs=0.1)
+    assert len(problem.driven) == 200 and all(row[7] < 0.0 for row in problem.driven)
+
+
+@pytest.mark.parametrize("budget", [1, 10, 30, 100])
+def test_small_budgets_give_what_they_can(budget):
+    found = Search(Plane(1e-2), 0, budget).run()
+    assert found.drives == budget and 0.0 <= found.rate.low <= found.rate.high <= 1.0
+
+
+def test_no_failure_leaves_an_upper_bound():
+    class Never(Plane):
+        def margin(self, row):
+            return 1.0 + float(row[0] ** 2)
+
+    found = Search(Never(1e-2), 0, 400).run()
+    assert (found.first, found.rate.low) == (0, 0.0)
+    assert found.rate.high == pytest.approx(1.0 - 0.05 ** (1.0 / found.plain[1]), rel=0.5)
+
+
+def test_failure_everywhere_is_a_rate_of_one():
+    class Always(Plane):
+        def margin(self, row):
+            return -1.0 - float(row[0] ** 2)
+
+    found = Search(Always(1e-2), 0, 300).run()
+    assert found.first == 1 and found.rate.high == 1.0 and found.rate.low > 0.8
+
+
+def test_nothing_valid_ends_the_search():
+    found = Search(Plane(1e-2, allowed=-math.inf), 0, 100).run()
+    assert found.drives == 0 and math.isnan(found.rate.value)
+
+
+def test_the_worst_is_worse_than_what_the_rate_needs():
+    calm, worst = Search(Plane(1e-2), 2, 600), Search(Plane(1e-2), 2, 600, worst=True)
+    calm.run(), worst.run()
+    assert min(one.margin for one in worst.responses) < min(one.margin for one in calm.responses)
+    assert np.median([one.margin for one in worst.responses]) < np.median([one.margin for one in calm.responses])

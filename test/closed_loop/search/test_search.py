@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The failure search from end to end: a bag and a planner in; a rate, findings and a bag of failures out."""
+
+from dataclasses import replace
+import json
+import math
+from xml.etree import ElementTree
+
+import pytest
+from typer.testing import CliRunner
+
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.base.errors import InputError
+from scenario_gen.cli.commands import app
+from scenario_gen.closed_loop.ego import Command
+from scenario_gen.closed_loop.planners import IdmFollower
+from scenario_gen.closed_loop.search.command import JOURNAL, search_failures, SearchRequest
+from scenario_gen.closed_loop.search.objective import Objective
+from scenario_gen.closed_loop.trials import read_trials, run_trials
+from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
+from scenario_gen.method.evaluation import EvaluationConfig
+from scenario_gen.output.results import provenance_of
+from scenario_gen.output.review.regenerate import replanned
+from scenario_gen.output.review.validation import validate_bag
+from scenario_gen.pipeline import generate, PipelineConfig
+
+LOG, ROAD = bundled("b"), "t_intersection"
+
+
+class Blind(IdmFollower):
+    """Keeps no distance to anybody, but drives slowly: it fails now and then."""
+
+    def act(self, observation):
+        return super().act(replace(observation, ids=(), others=observation.others[:0], sizes=observation.sizes[:0]))
+
+
+class Leaves(IdmFollower):
+    def act(self, observation):
+        raise RuntimeError("no idea")
+
+
+class Stands(IdmFollower):
+    def act(self, observation):
+        return Command(-9.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    """A bag of one request."""
+    (encounter,) = read_log([LOG]).encounters
+    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10, uniform=False))
+    case = generate(encounter, ROAD, config, count=2, seed=7)
+    case = replace(case, provenance=provenance_of([LOG], 7, 2, [ROAD], config))
+    return write_recording(tmp_path_factory.mktemp("search") / "bag", case)
+
+
+def request_of(bag, planner, **further):
+    source = replanned(bag)
+    known = {"ego": "2", "objective": Objective("collision"), "budget": 60} | further
+    return SearchRequest(source.planned, source.request, source.sampling, source.limits, f"{__name__}:{planner}", **known)
+
+
+@pytest.fixture(scope="module")
+def found(bag, tmp_path_factory):
+    out = tmp_path_factory.mktemp("found") / "out"
+    return search_failures(request_of(bag, "Blind", budget=150), out, workers=1), out
+
+
+def test_every_finding_is_certified_and_its_witness_passes(found):
+    result, out = found
+    assert result.findings and all(one.passed and not one.outcome.verdict.passed for one in result.findings)
+    (validation,) = validate_bag(out / "bag")
+    assert (validation.scenarios, validation.invalid) == (len(result.findings), 0)
+
+
+def test_the_bag_of_failures_fails_again(found):
+    result, out = found
+    outcomes = run_trials(read_trials(out / "bag", "2"), f"{__name__}:Blind")
+    assert all(one.verdict.collision is not None for one in outcomes)
+    own = {one.trial.scenario.index: one.outcome.verdict.document() for one in result.findings}
+    assert {one.verdict.index: one.verdict.document() for one in outcomes} == own
+
+
+def test_files_say_what_was_found(found):
+    result, out = found
+    document = json.loads((out / "search.json").read_text())
+    assert document["drives"] == 150 and document["rate"]["low"] <= document["rate"]["value"] <= document["rate"]["high"]
+    assert len(document["findings"]) == len(result.findings) and document["kinds"]
+    suite = ElementTree.parse(out / "junit.xml").getroot()
+    assert int(suite.get("failures")) == len(result.findings)
+    page = (out / "search.html").read_text()
+    assert "Kinds of failure" in page and result.sentences()[0] in page
+
+
+def test_a_stopped_search_goes_on_with_the_same_bytes(bag, found, tmp_path):
+    """A smaller budget first, its last line cut off, then the whole one, in two processes."""
+    search_failures(request_of(bag, "Blind", budget=70), tmp_path / "out", workers=1)
+    journal = tmp_path / f"out{JOURNAL}"
+    whole = journal.read_bytes()
+    assert whole.count(b"\n") == 71
+    journal.write_bytes(whole[:-7])
+    search_failures(request_of(bag, "Blind", budget=150), tmp_path / "out", workers=2)
+    for name in ("search.json", "search.html", "junit.xml", "bag/bag_0.mcap"):
+        assert (tmp_path / "out" / name).read_bytes() == (found[1] / name).read_bytes()
+
+
+def test_the_journal_of_another_search_is_refused(bag, tmp_path):
+    search_failures(request_of(bag, "Blind", budget=30), tmp_path / "out", workers=1)
+    with pytest.raises(InputError, match="drives of another search \\(objective differ"):
+        search_failures(request_of(bag, "Blind", budget=30, objective=Objective("goal")), tmp_path / "out", workers=1)
+    (tmp_path / f"out{JOURNAL}").write_text("nothing\n")
+    with pytest.raises(InputError, match="is no journal of a search"):
+        search_failures(request_of(bag, "Blind", budget=30), tmp_path / "out", workers=1)
+
+
+def test_a_planner_that_fails_is_named_and_its_drives_are_kept(bag, tmp_path):
+    with pytest.raises(InputError, match="the planner failed: RuntimeError: no idea"):
+        search_failures(request_of(bag, "Leaves"), tmp_path / "out", workers=1)
+    assert (tmp_path / f"out{JOURNAL}").is_file() and not (tmp_path / "out").exists()
+
+
+def test_a_planner_that_stands_misses_every_goal(bag, tmp_path):
+    result = search_failures(request_of(bag, "Stands", objective=Objective("goal"), budget=40), tmp_path / "out", workers=1)
+    assert result.estimate.first == 1 and result.estimate.rate.high == 1.0
+    assert result.estimate.rate.low > 0.7
+
+
+@pytest.mark.parametrize(
+    ("further", "message"),
+    [({"ego": "9"}, "--ego 9: there is no such vehicle; there are 1, 2"), ({"budget": 0}, "--budget 0: at least one drive")],
+)
+def test_bad_requests_are_refused(bag, tmp_path, further, message):
+    with pytest.raises(InputError, match=message):
+        search_failures(request_of(bag, "Blind", **further), tmp_path / "out")
+
+
+@pytest.mark.parametrize("text", ["speed", "ttc", "ttc<", "ttc<-1", "pet<1s", ""])
+def test_unknown_objectives_are_refused(text):
+    with pytest.raises(InputError, match="is not known; take at_fault"):
+        Objective.parsed(text)
+
+
+@pytest.mark.parametrize(("text", "name", "limit"), [("ttc<1.5", "ttc", 1.5), (" pet < 1 ", "pet", 1.0), ("goal", "goal", 0.0)])
+def test_objectives_are_read(text, name, limit):
+    assert Objective.parsed(text) == Objective(name, limit)
+
+
+def test_margins_are_zero_or_less_in_failures_alone(bag):
+    outcomes = run_trials(read_trials(bag, "2") + read_trials(bag, "1"), f"{__name__}:Blind")
+    for text in ("at_fault", "collision", "off_road", "goal", "ttc<3", "pet<1"):
+        for outcome in outcomes:
+            response, verdict = Objective.parsed(text).response(outcome), outcome.verdict
+            failed = {
+                "at_fault": verdict.collision is not None and verdict.collision.ran.value != "other",
+                "collision": verdict.collision is not None,
+                "off_road": not math.isnan(verdict.off_road),
+                "goal": math.isnan(verdict.goal),
+                "ttc": verdict.collision is not None or verdict.min_ttc <= 3.0,
+                "pet": not math.isnan(verdict.min_pet) and verdict.min_pet <= 1.0,
+            }[text.split("<")[0]]
+            assert response.failed == failed and bool(response.kind) == failed and len(response.guides) == 1
+
+
+def test_the_command_says_what_it_found(bag, tmp_path):
+    words = ["search", str(bag), "--planner", f"{__name__}:Blind", "--ego", "2", "--budget", "40", "--workers", "1"]
+    done = CliRunner().invoke(app, [*words, "--out", str(tmp_path / "out"), "--max-rate", "0.0", "--objective", "collision"])
+    assert done.exit_code == 1 and "the failure rate may be above 0" in done.output, done.output
+    assert "natural drives alone" in done.output and str(tmp_path / "out" / "search.html") in done.output
