@@ -14,7 +14,7 @@ from typing import Any
 
 STARTED = process_time()
 PARTS = {  # by the module that calls them
-    "scenario_gen.cli.batch": {"read_log": "read", "write_results": "figures"},
+    "scenario_gen.cli.folder": {"read_log": "read", "write_results": "figures"},
     "scenario_gen.pipeline": {
         "road_and_template": "road",
         "segment": "segment",

@@ -21,8 +21,8 @@ import numpy as np
 from benchmarks._size import sized
 from benchmarks.row import Row
 from scenario_gen.bags.recordings.write import write_recording
-from scenario_gen.cli.batch import generate_all
 from scenario_gen.cli.demo import ROADS
+from scenario_gen.cli.folder import generate_all
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases

@@ -67,14 +67,14 @@ def decode_diagnostics(data: bytes, what: str = "diagnostics") -> tuple[int, tup
     return stamp_ns, tuple(statuses)
 
 
-def written(stamp_ns: int) -> str:
+def decimal_stamp(stamp_ns: int) -> str:
     """Return a stamp as seconds and nine digits behind the point."""
     return f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
 
 
 def of_template(status: Status, stamp_ns: int) -> Status:
     """Return a status with the stamp of the template that it is about, as the value `template_stamp`."""
-    return replace(status, values={**status.values, TEMPLATE: written(stamp_ns)})
+    return replace(status, values={**status.values, TEMPLATE: decimal_stamp(stamp_ns)})
 
 
 def template_of(status: Status, stamp_ns: int) -> int:

@@ -82,9 +82,8 @@ LATE_OURS = {
     "logs/tables.py": "needs pyarrow",
     "method/routing/search/ompl/planners.py": "needs ompl",
     "ros/plumbing/doctor.py": "works without what it looks for",
-    "ros/plumbing/sampling_answer.py": "loads all stages, and few requests need them",
+    "ros/plumbing/sampling_requests.py": "loads all stages, and few requests need them",
     "ros/plumbing/start.py": "loads rclpy",
-    "ros/plumbing/topics.py": "loads rclpy",
 }
 PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob("*.py")])
 

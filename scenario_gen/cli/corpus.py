@@ -108,15 +108,15 @@ class Batch:
 @takes(Batch)
 def batch(options: Batch) -> None:
     """Generate scenarios of all templates of a corpus on all roads."""
-    from scenario_gen.corpus.batch import run_batch
+    from scenario_gen.corpus.batch import BatchRequest, run_batch
     from scenario_gen.method.config import PipelineConfig
 
     config = assigned_all(PipelineConfig(), options.assignments)
     names = [name for text in options.roads for name in text.split(",") if name]
     with workers_of(options.workers, options.scheduler) as who:
         result = run_batch(
-            options.corpus, names, options.out, config,
-            count=options.count, seed=options.seed, templates=options.templates, workers=who,
+            options.corpus, names, options.out, BatchRequest(config, options.count, options.seed),
+            templates=options.templates, workers=who,
         )  # fmt: skip
     lines(result.lines())
     conclude(result.failed, options.out)

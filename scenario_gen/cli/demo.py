@@ -10,7 +10,7 @@ from pathlib import Path
 from scenario_gen.bags.recordings.read import read_recording, SCENARIOS
 from scenario_gen.bags.recordings.write import scenario_bytes
 from scenario_gen.base.errors import InputError, ScenarioGenError
-from scenario_gen.cli.batch import Advance, FolderRequest, generate_folder
+from scenario_gen.cli.folder import Advance, FolderRequest, generate_folder
 from scenario_gen.logs import bundled
 from scenario_gen.output.results import namespaces
 from scenario_gen.pipeline import PipelineConfig

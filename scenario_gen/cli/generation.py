@@ -84,7 +84,7 @@ def generate(options: Generate) -> None:
     """Generate new encounters from a log: bag, report and figures in one folder."""
     from scenario_gen.base.parameters import updated
     from scenario_gen.base.terminal import progress_bars
-    from scenario_gen.cli.batch import FolderRequest, generate_folder
+    from scenario_gen.cli.folder import FolderRequest, generate_folder
     from scenario_gen.roads import read_obstacles
     from scenario_gen.types import join_pieces, Request
 

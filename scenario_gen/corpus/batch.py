@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`batch`: templates × roads × samples. A task makes all scenarios of a few templates on one road, and writes three things.
+"""`batch`: templates × roads × samples. A task generates all scenarios of ten templates on one road, and writes three files.
 
     bags/road=NAME/part-00000/              a bag as `generate` writes it, a namespace for each template
     scenarios/road=NAME/part-00000.parquet  a row for each scenario: where it is, and how critical
     cases/road=NAME/part-00000.parquet      a row for each template: how many there are, and why not more
 
-The table of cases comes last: where it is, the part is done. So the manifest is what is there.
+The table of cases is written last, so a part is done where that table is; no other record of progress is kept.
 """
 
 from collections import Counter
@@ -46,18 +46,35 @@ LOST_CONFLICT = "lost conflict"  # the cause of every case whose encounter is lo
 
 
 @dataclass(frozen=True)
+class BatchRequest:
+    """What is generated from each template on each road.
+
+    Attributes:
+        config: of the pipeline.
+        count: scenarios of each template on each road.
+        seed: of all; each case has its own seed, which follows from this one, its template's name and its road.
+    """
+
+    config: PipelineConfig = PipelineConfig()
+    count: int = 50
+    seed: int = 0
+
+
+@dataclass(frozen=True)
 class PartTask:
     """Templates (table, row) to place on a road, and where the three files go: `out`/…/road=`token`/part-`number`."""
 
-    name: str
     templates: tuple[tuple[Path, int], ...]
     road: str
     token: str
     number: int
     out: Path
-    count: int
-    seed: int
-    config: PipelineConfig
+    request: BatchRequest
+
+    @property
+    def name(self) -> str:
+        """The task in messages."""
+        return f"part {self.number} on {self.token}"
 
     def place(self, what: str, ending: str = ".parquet") -> Path:
         """Return the path of one of the three."""
@@ -66,22 +83,29 @@ class PartTask:
 
 @dataclass(frozen=True)
 class Batch:
-    """What a batch came to: cases (template and road), scenarios, those refused by cause, and what went wrong."""
+    """The figures of a batch.
+
+    Attributes:
+        cases: number of pairs of template and road.
+        scenarios: number of all scenarios.
+        requested: number of scenarios requested.
+        failures: cases without any scenario, by cause.
+        refused: candidates refused, by cause.
+        failed: messages of the tasks that failed.
+    """
 
     cases: int
     scenarios: int
-    wanted: int
+    requested: int
     failures: dict[str, int]
     refused: dict[str, int]
     failed: list[str]
 
     def lines(self) -> list[str]:
         """Return the summary for people."""
-        messages = [f"{self.scenarios} of {self.wanted} scenarios of {self.cases} cases (template and road)"]
-        messages += [f"{count} cases without any: {why}" for why, count in sorted(self.failures.items(), key=lambda one: -one[1])]
-        messages += [
-            f"{count} candidates refused: {cause}" for cause, count in sorted(self.refused.items(), key=lambda one: -one[1])
-        ]
+        messages = [f"{self.scenarios} of {self.requested} scenarios of {self.cases} cases (template and road)"]
+        messages += [f"{count} cases without any: {cause}" for cause, count in Counter(self.failures).most_common()]
+        messages += [f"{count} candidates refused: {cause}" for cause, count in Counter(self.refused).most_common()]
         return messages + self.failed
 
 
@@ -89,10 +113,8 @@ def run_batch(
     corpus: Path,
     roads: Sequence[str],
     out: Path,
-    config: PipelineConfig = PipelineConfig(),
+    request: BatchRequest = BatchRequest(),
     *,
-    count: int = 50,
-    seed: int = 0,
     templates: int = 0,
     workers: Workers = Workers(),
 ) -> Batch:
@@ -101,10 +123,8 @@ def run_batch(
     Args:
         corpus: that `mine` wrote.
         roads: names or paths, as `build_road` takes them.
-        out: of the tables and bags; an unfinished batch of the same corpus, roads and parameters is gone on with.
-        config: of the pipeline.
-        count: scenarios of each template on each road.
-        seed: of all; each case has its own seed, which follows from this one, its template's name and its road.
+        out: of the tables and bags; an unfinished batch of the same corpus, roads and parameters is continued.
+        request: what is generated from each template on each road.
         templates: the first so many of the corpus; 0 takes all.
         workers: who does it.
 
@@ -119,45 +139,32 @@ def run_batch(
     if not rows:
         raise InputError(f"{corpus} holds no encounter")
     first = encounter_of(_row(*rows[0]), rows[0][0])
-    for road in roads:  # a name that is none is an error, not a cause in every case
+    for road in roads:  # an unknown name ends the batch; it is no cause of single cases
         with suppress(RefusedError):
-            build_road(road, first, config.road)
+            build_road(road, first, request.config.road)
     document = {
         "format": 1,
         "corpus": [sha256_of(table) for table in tables],
         "roads": list(roads),
-        "count": count,
-        "seed": seed,
+        "count": request.count,
+        "seed": request.seed,
         "templates": len(rows),
-        "parameters": parameter_texts(config),
+        "parameters": parameter_texts(request.config),
     }
     out.mkdir(parents=True, exist_ok=True)
     with alone(out), ending(partial(sweep_tree, out)), spread(workers) as go:
         _agree(out, document)
         sweep_tree(out)
-        return summary(
-            out, go(make_part, [t for t in parts(rows, roads, out, config, count, seed) if not t.place("cases").exists()])
-        )
+        tasks = [task for task in parts(rows, roads, out, request) if not task.place("cases").exists()]
+        return summary(out, go(generate_part, tasks))
 
 
-def parts(
-    rows: Sequence[tuple[Path, int]], roads: Sequence[str], out: Path, config: PipelineConfig, count: int, seed: int
-) -> list[PartTask]:
-    """Return the tasks: ten templates on one road each, the same whoever does them."""
+def parts(rows: Sequence[tuple[Path, int]], roads: Sequence[str], out: Path, request: BatchRequest) -> list[PartTask]:
+    """Return the tasks: ten templates on one road each, whatever the number of workers."""
     tokens = tokens_of(roads)
     return [
-        PartTask(
-            f"part {k // TEMPLATES} on {token}",
-            tuple(rows[k : k + TEMPLATES]),
-            road,
-            token,
-            k // TEMPLATES,
-            out,
-            count,
-            seed,
-            config,
-        )
-        for k in range(0, len(rows), TEMPLATES)
+        PartTask(tuple(templates), road, token, number, out, request)
+        for number, templates in enumerate(rows[k : k + TEMPLATES] for k in range(0, len(rows), TEMPLATES))
         for road, token in zip(roads, tokens, strict=True)
     ]
 
@@ -174,10 +181,10 @@ def seed_of(seed: int, template: str, road: str) -> int:
 
 
 def _agree(out: Path, document: Mapping[str, Any]) -> None:
-    """Write down what the batch is of; or see that it is of the same.
+    """Write the request of a batch to its folder, or compare it with the one that is there.
 
     Raises:
-        InputError: it is of something else.
+        InputError: the folder holds something else, or a batch of another request.
     """
     place = out / BATCH
     if place.exists():
@@ -192,7 +199,7 @@ def _agree(out: Path, document: Mapping[str, Any]) -> None:
         write_text(part, json.dumps(document, indent=1) + "\n")
 
 
-def make_part(task: PartTask) -> None:
+def generate_part(task: PartTask) -> None:
     """Generate a part's scenarios and write its bag and its two tables; done if the table of cases is there.
 
     Raises:
@@ -202,7 +209,7 @@ def make_part(task: PartTask) -> None:
         return
     cases, results = [], dict[str, GenerationResult]()
     for k, (table, row) in enumerate(task.templates):
-        case, result = _case(_row(table, row), table, f"/case_{k}", task)
+        case, result = _generate_case(_row(table, row), table, f"/case_{k}", task)
         cases.append(case)
         if result is not None and len(result.generated.scenarios):
             results[f"/case_{k}"] = result
@@ -219,34 +226,36 @@ def _row(table: Path, row: int) -> dict[str, Any]:
     return next(islice(rows_of([table]), row, None))
 
 
-def _case(row: Mapping[str, Any], table: Path, namespace: str, task: PartTask) -> tuple[dict[str, Any], GenerationResult | None]:
+def _generate_case(
+    row: Mapping[str, Any], table: Path, namespace: str, task: PartTask
+) -> tuple[dict[str, Any], GenerationResult | None]:
     """Generate one template's scenarios; a refusal is a case without any, with the reason."""
-    seed = seed_of(task.seed, row["name"], task.road)
+    request, seed = task.request, seed_of(task.request.seed, row["name"], task.road)
     case = {
         "template": row["name"], "kind": row["kind"], "vehicles": row["count"], "namespace": namespace, "seed": seed,
-        "wanted": task.count, "published": 0, "candidates": 0, "refused": "{}", "cause": "", "why": "", "part": task.number,
+        "wanted": request.count, "published": 0, "candidates": 0, "refused": "{}", "cause": "", "why": "", "part": task.number,
         "changepoints": 0,
     }  # fmt: skip
     try:
         encounter = encounter_of(row, table)
-        road, encounter = road_and_template(task.road, encounter, task.config.road)
-        segmentation = segment(encounter, task.config.segmentation, seed)
-        result = Attempt(encounter, segmentation, road, task.config, count=task.count, seed=seed).run()
+        road, encounter = road_and_template(task.road, encounter, request.config.road)
+        segmentation = segment(encounter, request.config.segmentation, seed)
+        result = Attempt(encounter, segmentation, road, request.config, count=request.count, seed=seed).run()
     except (RefusedError, InputError) as error:
         message = LOST_CONFLICT if isinstance(error, LostConflictError) else str(error).partition(":")[0]
         cause = message if isinstance(error, RefusedError) else "input"
         return case | {"cause": _cause(cause), "why": str(error)}, None
     generated = result.generated
-    facts = {"template": row["name"], "roads": task.road, "seed": str(seed), "count": str(task.count)}
-    provenance = facts | versions() | parameter_texts(task.config)
-    found = case | {
+    facts = {"template": row["name"], "roads": task.road, "seed": str(seed), "count": str(request.count)}
+    provenance = facts | versions() | parameter_texts(request.config)
+    finished = case | {
         "published": len(generated.scenarios),
         "candidates": generated.candidates,
         "refused": json.dumps({str(cause): number for cause, number in sorted(generated.refused.items()) if number}),
         "changepoints": len(segmentation.changepoints),
         "cause": "" if len(generated.scenarios) else "no valid candidate",
     }
-    return found, GenerationResult(
+    return finished, GenerationResult(
         encounter, segmentation, road, result.fit, result.routes, generated, seed, provenance=provenance
     )
 
@@ -257,19 +266,19 @@ def _cause(text: str) -> str:
 
 
 def _scenario_rows(
-    namespace: str, made: GenerationResult, cases: Sequence[Mapping[str, Any]], task: PartTask
+    namespace: str, result: GenerationResult, cases: Sequence[Mapping[str, Any]], task: PartTask
 ) -> list[dict[str, Any]]:
     """A row for each scenario of a case."""
-    case = next(one for one in cases if one["namespace"] == namespace)
+    case = next(case for case in cases if case["namespace"] == namespace)
     rows = []
-    for scenario in made.generated.scenarios:
-        motion = at_period(scenario, task.config.evaluation.period)
-        found = criticality(motion, task.config.evaluation.ttc_horizon)
+    for scenario in result.generated.scenarios:
+        motion = at_period(scenario, task.request.config.evaluation.period)
+        measures = criticality(motion, task.request.config.evaluation.ttc_horizon)
         rows.append({
             "template": case["template"], "kind": case["kind"], "vehicles": case["vehicles"], "namespace": namespace,
             "part": task.number, "index": scenario.index, "seed": scenario.seed,
-            "sha256": scenario_bytes(scenario, made.encounter)[1], "seconds": float(scenario.time[-1]),
-            "distance": found.min_distance, "ttc": found.min_ttc, "pet": found.pet,
+            "sha256": scenario_bytes(scenario, result.encounter)[1], "seconds": float(scenario.time[-1]),
+            "distance": measures.min_distance, "ttc": measures.min_ttc, "pet": measures.pet,
             "speed": float(scenario.speed.max()), "braking": float(-scenario.acceleration.min()),
         })  # fmt: skip
     return rows
@@ -299,7 +308,7 @@ def _write(target: Path, rows: Sequence[Mapping[str, Any]], columns: Mapping[str
 
 
 def summary(out: Path, failed: list[str]) -> Batch:
-    """Return what is there, by listing it."""
+    """Return the figures of the parts that are done."""
     cases = list(rows_of(sorted((out / "cases").rglob("*.parquet"))))
     refused: Counter[str] = Counter()
     for case in cases:
@@ -307,7 +316,7 @@ def summary(out: Path, failed: list[str]) -> Batch:
     return Batch(
         cases=len(cases),
         scenarios=sum(int(case["published"]) for case in cases),
-        wanted=sum(int(case["wanted"]) for case in cases),
+        requested=sum(int(case["wanted"]) for case in cases),
         failures=dict(Counter(case["cause"] for case in cases if not case["published"])),
         refused=dict(refused),
         failed=failed,

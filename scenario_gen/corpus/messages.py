@@ -22,7 +22,7 @@ from scenario_gen.logs.tables import COLUMNS
 
 HOUR = 3_600_000_000  # µs
 CLOCK = 1500  # ms by which the two clocks of a message may differ
-MOST_WRONG = 0.5  # of a file's rows whose clocks differ: beyond, the second clock is something else and is not asked
+MOST_WRONG = 0.5  # of a file's rows whose clocks differ: beyond, the second clock is something else and is not used
 UNKNOWN_SECOND = 65_535  # DSecond of a sender that does not know
 LAST_STAMP = 40 * 365 * 24 * HOUR  # from 2004 on
 SMALLER = "see the parameters memory, task_rows and range_size"

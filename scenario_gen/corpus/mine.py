@@ -231,7 +231,7 @@ def hour_tasks(ranged: Sequence[RangeTask], out: Path, config: CorpusConfig) -> 
         if task.target.exists():
             for hour, count in read_json(task.target.with_suffix(".json"), ACCOUNT)["hours"].items():
                 seen.add(int(hour))
-                if count >= least_rows(config):  # else every range is asked for the hours of its wrong stamps
+                if count >= least_rows(config):  # else every range is searched for hours that only wrong stamps name
                     rows[int(hour)] += count
                     files.setdefault(int(hour), []).append(task.target)
     tasks: list[list[tuple[int, tuple[Path, ...]]]] = []

@@ -3,10 +3,10 @@
 
 """Synthetic archives in the format of the Safety Pilot, of any size, whose encounters are known: for tests and benchmarks.
 
-Nothing in them was recorded. Vehicles drive along straights and arcs in closed form, so that a whole archive is a few operations
-on arrays. Each encounter has a tile of its own; half of those that are planted lie just inside of one threshold of the miner, and
-others just outside. The rest of the rows are vehicles that meet nobody: some drive on streets 60 m apart, where the proximity
-alone would find them. Clocks are asynchronous, rows are lost, repeated, stamped wrongly and damaged, ids repeat.
+Vehicles drive along straights and arcs in closed form, so that a whole archive is a few operations on arrays. Each encounter has
+a tile of its own. Half of those to be found lie just inside one threshold of the miner; further ones lie just outside one. All
+other rows are vehicles that meet nobody: some drive on streets 60 m apart, which a search by distance alone would report. Clocks
+are asynchronous, rows are lost, repeated, stamped wrongly and damaged, ids repeat.
 """
 
 from collections.abc import Callable, Iterator
@@ -93,8 +93,8 @@ class Planted:
 
 
 @dataclass
-class _Plan:
-    """Drives while they are collected."""
+class _Draft:
+    """Collects the drives of an archive, as rows, and the encounters planted among them."""
 
     random: np.random.Generator
     rows: list[dict[str, float]] = field(default_factory=list)
@@ -108,22 +108,22 @@ class _Plan:
         """Put drives, given about an encounter's own middle, to a place (east, north, turned by, time); return their devices."""
         east, north, turned, when = place
         cos, sin = exact.cos(turned), exact.sin(turned)
-        found = []
+        devices = []
         for drive in drives:
-            one = {"radius": 1.0, "turn": 0.0, "dip": 0.0, "dip_at": 0.0, "dip_width": 4.0, "x": 0.0, "y": 0.0, "at": 0.0} | drive
-            x, y = one["x"], one["y"]
-            one |= {
+            row = {"radius": 1.0, "turn": 0.0, "dip": 0.0, "dip_at": 0.0, "dip_width": 4.0, "x": 0.0, "y": 0.0, "at": 0.0} | drive
+            x, y = row["x"], row["y"]
+            row |= {
                 "x": cos * x - sin * y,
                 "y": sin * x + cos * y,
-                "heading": one["heading"] + turned,
+                "heading": row["heading"] + turned,
                 "east": east,
                 "north": north,
             }
-            one |= {name: one[name] + when for name in ("at", "begin", "dip_at")}
+            row |= {name: row[name] + when for name in ("at", "begin", "dip_at")}
             self.device += 1
-            found.append(int(one.setdefault("device", self.device)))
-            self.rows.append(one)
-        return found
+            devices.append(int(row.setdefault("device", self.device)))
+            self.rows.append(row)
+        return devices
 
 
 def write_archive(folder: Path, config: ArchiveConfig = ArchiveConfig(), seed: int = 0) -> Path:
@@ -148,7 +148,7 @@ def write_archive(folder: Path, config: ArchiveConfig = ArchiveConfig(), seed: i
             "synthetic": True,
             "seed": seed,
             **counts,
-            "planted": [vars(one) for one in planted],
+            "planted": [vars(encounter) for encounter in planted],
         }
         write_text(place / TRUTH, json.dumps(document, indent=1) + "\n")
     return folder
@@ -156,8 +156,8 @@ def write_archive(folder: Path, config: ArchiveConfig = ArchiveConfig(), seed: i
 
 def read_planted(folder: Path) -> list[Planted]:
     """Return what is planted in an archive that `write_archive` wrote."""
-    found = json.loads((folder / TRUTH).read_text(encoding="utf-8"))["planted"]
-    return [Planted(**one | {"devices": tuple(one["devices"])}) for one in found]
+    entries = json.loads((folder / TRUTH).read_text(encoding="utf-8"))["planted"]
+    return [Planted(**entry | {"devices": tuple(entry["devices"])}) for entry in entries]
 
 
 def plan(config: ArchiveConfig, seed: int) -> tuple[Drives, list[Planted]]:
@@ -166,32 +166,32 @@ def plan(config: ArchiveConfig, seed: int) -> tuple[Drives, list[Planted]]:
     Raises:
         InputError: the encounters alone take more than the rows.
     """
-    result = _Plan(np.random.default_rng([seed, 0]))
+    draft = _Draft(np.random.default_rng([seed, 0]))
     wide = int(np.ceil(np.sqrt(config.encounters + config.outside)))
     for k in range(config.encounters + config.outside):
         inside = k < config.encounters
         nth = k // 2 if inside else k - config.encounters
         threshold = THRESHOLDS[nth % len(THRESHOLDS)] if k % 2 or not inside else ""
-        when = result.between(60.0, 3600.0 * config.hours - 60.0)
+        when = draft.between(60.0, 3600.0 * config.hours - 60.0)
         if k % 7 == 0 and config.hours >= 2.0:  # across the full hour, where tasks meet
-            when = 3600.0 * (1 + k % int(config.hours - 1)) + result.between(-3.0, 3.0)
-        place = ((k % wide) * TILE, (k // wide + 1) * TILE, result.between(-3.1, 3.1), when)
+            when = 3600.0 * (1 + k % int(config.hours - 1)) + draft.between(-3.0, 3.0)
+        place = ((k % wide) * TILE, (k // wide + 1) * TILE, draft.between(-3.1, 3.1), when)
         kind = KINDS[k % len(KINDS)]
         if threshold:
-            kind, drives = _at_threshold(result, threshold, inside=inside)
+            kind, drives = _at_threshold(draft, threshold, inside=inside)
         else:
-            drives = _OF_KIND[kind](result)
-        devices = result.add(place, drives)
-        result.planted.append(Planted(kind, tuple(devices), when, threshold, inside))
-    used = sum(int(10.0 * row["lasts"]) for row in result.rows)
-    shared = [row for row in result.rows if result.random.random() < config.repeated_ids]
-    _lone(result, config, config.rows / (1.0 - config.loss) / (1.0 + config.duplicates) - used, shared)
+            drives = _OF_KIND[kind](draft)
+        devices = draft.add(place, drives)
+        draft.planted.append(Planted(kind, tuple(devices), when, threshold, inside))
+    used = sum(int(10.0 * row["lasts"]) for row in draft.rows)
+    shared = [row for row in draft.rows if draft.random.random() < config.repeated_ids]
+    _lone(draft, config, config.rows / (1.0 - config.loss) / (1.0 + config.duplicates) - used, shared)
     names = Drives.__dataclass_fields__
-    columns = {name: np.array([row[name] for row in result.rows], dtype=np.float64) for name in names}
-    return Drives(columns.pop("device").astype(np.int64), **columns), result.planted
+    columns = {name: np.array([row[name] for row in draft.rows], dtype=np.float64) for name in names}
+    return Drives(columns.pop("device").astype(np.int64), **columns), draft.planted
 
 
-def _lone(made: _Plan, config: ArchiveConfig, rows: float, shared: list[dict[str, float]]) -> None:
+def _lone(draft: _Draft, config: ArchiveConfig, rows: float, shared: list[dict[str, float]]) -> None:
     """Add vehicles that meet nobody: for ten minutes each, a fifth of them side by side, and somebody for each shared id.
 
     Raises:
@@ -206,76 +206,76 @@ def _lone(made: _Plan, config: ArchiveConfig, rows: float, shared: list[dict[str
         block = k % 20 < 4  # side by side, at the same time
         north -= BLOCK if block and k % 20 else STREET
         if not block or k % 20 == 0:
-            begin = made.between(0.0, 3600.0 * config.hours - lasts)
+            begin = draft.between(0.0, 3600.0 * config.hours - lasts)
         column = k // 2000
         if column and k % 2000 == 0:
             north = -STREET
         drive = {
             "heading": np.pi if k % 3 == 0 else 0.0,
-            "speed": made.between(8.0, 15.0),
+            "speed": draft.between(8.0, 15.0),
             "begin": begin,
             "lasts": lasts,
             "at": begin + 300.0,
         }
         if k < len(shared):
             drive |= {"device": shared[k]["device"], "begin": max(shared[k]["begin"] - 300.0, 0.0), "at": shared[k]["begin"]}
-        made.add(
+        draft.add(
             (column * COLUMN, north, 0.0, 0.0),
-            [drive | {"dip": 0.9 * made.random.random(), "dip_at": begin + 200.0, "dip_width": 20.0}],
+            [drive | {"dip": 0.9 * draft.random.random(), "dip_at": begin + 200.0, "dip_width": 20.0}],
         )
 
 
-def _recorded(made: _Plan, low: float = 18.0, high: float = 25.0) -> dict[str, float]:
-    begin = -made.between(low, high)
-    return {"begin": begin, "lasts": made.between(low, high) - begin}
+def _recorded(draft: _Draft, low: float = 18.0, high: float = 25.0) -> dict[str, float]:
+    begin = -draft.between(low, high)
+    return {"begin": begin, "lasts": draft.between(low, high) - begin}
 
 
-def _crossing(made: _Plan, late: tuple[float, float] = (1.0, 2.4)) -> list[dict[str, float]]:
-    angle = made.between(1.1, 2.0) * (1.0 if made.random.random() < 0.5 else -1.0)
-    dip = {"dip": made.between(0.0, 0.5), "dip_at": made.between(-7.0, -4.0), "dip_width": 2.0}
+def _crossing(draft: _Draft, late: tuple[float, float] = (1.0, 2.4)) -> list[dict[str, float]]:
+    angle = draft.between(1.1, 2.0) * (1.0 if draft.random.random() < 0.5 else -1.0)
+    dip = {"dip": draft.between(0.0, 0.5), "dip_at": draft.between(-7.0, -4.0), "dip_width": 2.0}
     return [
-        {"heading": 0.0, "speed": made.between(7.0, 14.0), **_recorded(made)},
-        {"heading": angle, "speed": made.between(7.0, 14.0), "at": made.between(*late), **_recorded(made), **dip},
+        {"heading": 0.0, "speed": draft.between(7.0, 14.0), **_recorded(draft)},
+        {"heading": angle, "speed": draft.between(7.0, 14.0), "at": draft.between(*late), **_recorded(draft), **dip},
     ]
 
 
-def _opposing(made: _Plan, beside: tuple[float, float] = (3.2, 4.5)) -> list[dict[str, float]]:
+def _opposing(draft: _Draft, beside: tuple[float, float] = (3.2, 4.5)) -> list[dict[str, float]]:
     return [
-        {"heading": 0.0, "speed": made.between(6.0, 14.0), **_recorded(made)},
-        {"heading": np.pi, "speed": made.between(6.0, 14.0), "y": made.between(*beside), **_recorded(made)},
+        {"heading": 0.0, "speed": draft.between(6.0, 14.0), **_recorded(draft)},
+        {"heading": np.pi, "speed": draft.between(6.0, 14.0), "y": draft.between(*beside), **_recorded(draft)},
     ]
 
 
-def _following(made: _Plan) -> list[dict[str, float]]:
-    speed, headway, dip = made.between(7.0, 15.0), made.between(1.1, 2.4), made.between(0.0, 0.8)
-    same = {"heading": 0.0, "speed": speed, "dip": dip, **_recorded(made)}
-    count = 3 if made.random.random() < 0.2 else 2
+def _following(draft: _Draft) -> list[dict[str, float]]:
+    speed, headway, dip = draft.between(7.0, 15.0), draft.between(1.1, 2.4), draft.between(0.0, 0.8)
+    same = {"heading": 0.0, "speed": speed, "dip": dip, **_recorded(draft)}
+    count = 3 if draft.random.random() < 0.2 else 2
     return [same | {"at": k * headway, "dip_at": k * headway} for k in range(count)]
 
 
-def _merging(made: _Plan) -> list[dict[str, float]]:
-    angle, radius, speed, times = made.between(0.8, 1.55), made.between(9.0, 14.0), made.between(6.0, 8.0), _recorded(made)
-    side = 1.0 if made.random.random() < 0.5 else -1.0
+def _merging(draft: _Draft) -> list[dict[str, float]]:
+    angle, radius, speed, times = draft.between(0.8, 1.55), draft.between(9.0, 14.0), draft.between(6.0, 8.0), _recorded(draft)
+    side = 1.0 if draft.random.random() < 0.5 else -1.0
     x, y = -radius * exact.sin(angle), side * radius * (1.0 - exact.cos(angle))  # where the arc begins that ends at (0, 0)
-    at = made.between(1.2, 2.4) - radius * angle / speed
+    at = draft.between(1.2, 2.4) - radius * angle / speed
     return [
         {"heading": 0.0, "speed": speed, **times},
         {"heading": -side * angle, "turn": side * angle, "radius": radius, "x": x, "y": y, "at": at, "speed": speed, **times},
     ]
 
 
-def _turning(made: _Plan) -> list[dict[str, float]]:
-    radius, lane, speed, other = made.between(8.0, 11.0), 3.5, made.between(5.0, 8.0), made.between(8.0, 14.0)
+def _turning(draft: _Draft) -> list[dict[str, float]]:
+    radius, lane, speed, other = draft.between(8.0, 11.0), 3.5, draft.between(5.0, 8.0), draft.between(8.0, 14.0)
     beta = exact.arctan2(float(np.sqrt(2.0 * radius * lane - lane * lane)), radius - lane)  # where it crosses the other's lane
     passes = -radius * exact.sin(beta) / other
-    at = passes + made.between(1.3, 2.4) - radius * beta / speed
+    at = passes + draft.between(1.3, 2.4) - radius * beta / speed
     return [
-        {"heading": 0.0, "speed": other, **_recorded(made)},
-        {"heading": np.pi, "y": lane, "radius": radius, "turn": np.pi / 2.0, "speed": speed, "at": at, **_recorded(made)},
+        {"heading": 0.0, "speed": other, **_recorded(draft)},
+        {"heading": np.pi, "y": lane, "radius": radius, "turn": np.pi / 2.0, "speed": speed, "at": at, **_recorded(draft)},
     ]
 
 
-_OF_KIND: dict[str, Callable[[_Plan], list[dict[str, float]]]] = {
+_OF_KIND: dict[str, Callable[[_Draft], list[dict[str, float]]]] = {
     "crossing": _crossing,
     "opposing": _opposing,
     "following": _following,
@@ -284,11 +284,11 @@ _OF_KIND: dict[str, Callable[[_Plan], list[dict[str, float]]]] = {
 }
 
 
-def _at_threshold(made: _Plan, threshold: str, *, inside: bool) -> tuple[str, list[dict[str, float]]]:
+def _at_threshold(draft: _Draft, threshold: str, *, inside: bool) -> tuple[str, list[dict[str, float]]]:
     """Return the kind and the drives of an encounter just inside or just outside of a threshold (the miner's defaults)."""
 
     def margin(limit: float, by: float) -> float:  # `by` on the side on which it is found
-        return limit + (by if inside else -by) * made.between(1.0, 1.5)
+        return limit + (by if inside else -by) * draft.between(1.0, 1.5)
 
     if threshold == "proximity":  # behind each other, almost 100 m apart
         apart, times = margin(100.0, -4.0), {"begin": -6.0, "lasts": 12.0}
@@ -300,9 +300,9 @@ def _at_threshold(made: _Plan, threshold: str, *, inside: bool) -> tuple[str, li
         ]
     if threshold == "presence":  # the second is recorded for almost 5 s
         lasts = margin(5.0, 0.6)
-        one, other = _opposing(made)
-        return "opposing", [one | {"speed": 7.0}, other | {"speed": 7.0, "begin": -lasts / 2.0, "lasts": lasts}]
-    if threshold == "travel":  # one stands, the other creeps
+        first, second = _opposing(draft)
+        return "opposing", [first | {"speed": 7.0}, second | {"speed": 7.0, "begin": -lasts / 2.0, "lasts": lasts}]
+    if threshold == "travel":  # one stands, the other moves slowly
         speed, times = margin(5.0, 1.2) / 30.0, {"begin": -15.0, "lasts": 30.0}
         return "following", [
             {"heading": 0.0, "speed": speed, **times},
@@ -310,9 +310,9 @@ def _at_threshold(made: _Plan, threshold: str, *, inside: bool) -> tuple[str, li
         ]
     if threshold == "beside":  # on two roads side by side
         beside = margin(6.0, -1.3)
-        return "opposing", _opposing(made, (beside, beside))
+        return "opposing", _opposing(draft, (beside, beside))
     late = margin(3.0, -0.5)
-    return "crossing", _crossing(made, (late, late))
+    return "crossing", _crossing(draft, (late, late))
 
 
 def _write(folder: Path, drives: Drives, config: ArchiveConfig, random: np.random.Generator) -> dict[str, int]:

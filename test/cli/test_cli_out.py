@@ -182,7 +182,7 @@ def test_whatever_the_system_says_is_one_message(run, monkeypatch, error, words)
     def broken(*_):
         raise error
 
-    monkeypatch.setattr("scenario_gen.cli.batch.read_log", broken)
+    monkeypatch.setattr("scenario_gen.cli.folder.read_log", broken)
     code, said = run(*GENERATE, "--out", "out")
     assert code == 2 and words in said and "Traceback" not in said
     assert list(Path().iterdir()) == []

@@ -16,7 +16,7 @@ from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.corpus import batch as batches
-from scenario_gen.corpus.batch import LOST_CONFLICT, run_batch, seed_of, tokens_of
+from scenario_gen.corpus.batch import BatchRequest, LOST_CONFLICT, run_batch, seed_of, tokens_of
 from scenario_gen.corpus.encounters import rows_of
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
 from scenario_gen.corpus.tasks import spread, Workers
@@ -33,13 +33,13 @@ def digests(out):
 @pytest.fixture(scope="module")
 def batch(corpus, tmp_path_factory):
     out = tmp_path_factory.mktemp("batch") / "out"
-    return out, run_batch(corpus[0], ROADS, out, count=3, seed=5, templates=4)
+    return out, run_batch(corpus[0], ROADS, out, BatchRequest(count=3, seed=5), templates=4)
 
 
 def test_every_case_is_accounted_for(batch):
     out, made = batch
     cases = list(rows_of(sorted((out / "cases").rglob("*.parquet"))))
-    assert made.cases == len(cases) == 8 and made.wanted == 24 and not made.failed
+    assert made.cases == len(cases) == 8 and made.requested == 24 and not made.failed
     assert sum(case["published"] for case in cases) == made.scenarios == len(find(out).rows) > 10
     assert all(case["cause"] and (case["why"] or case["candidates"]) for case in cases if not case["published"])
     assert len({case["seed"] for case in cases}) == 8
@@ -78,10 +78,10 @@ def test_a_batch_is_gone_on_with_but_not_as_another_one(batch, corpus):
     before = digests(out)
     (out / "cases" / "road=straight" / "part-00000.parquet").unlink()  # as if killed before its last file
     assert not find(out, "road = 'straight'").rows
-    run_batch(corpus[0], ROADS, out, count=3, seed=5, templates=4)
+    run_batch(corpus[0], ROADS, out, BatchRequest(count=3, seed=5), templates=4)
     assert digests(out) == before
     with pytest.raises(InputError, match="other count"):
-        run_batch(corpus[0], ROADS, out, count=4, seed=5, templates=4)
+        run_batch(corpus[0], ROADS, out, BatchRequest(count=4, seed=5), templates=4)
 
 
 @pytest.mark.long
@@ -95,7 +95,7 @@ def test_a_killed_run_with_two_processes_ends_with_the_same_bytes(batch, corpus,
             time.sleep(0.01)
         assert run.poll() is None, "it ended before it could be killed"
         os.killpg(run.pid, signal.SIGKILL)
-    made = run_batch(corpus[0], ROADS, out, count=3, seed=5, templates=4, workers=Workers(2))
+    made = run_batch(corpus[0], ROADS, out, BatchRequest(count=3, seed=5), templates=4, workers=Workers(2))
     assert digests(out) == digests(batch[0]) and made.lines() == batch[1].lines()
 
 
@@ -156,7 +156,7 @@ def interruptible():
 
 def test_a_road_that_is_none_is_an_error_at_once(corpus, tmp_path):
     with pytest.raises(InputError, match="nowhere"):
-        run_batch(corpus[0], ["straight", "nowhere"], tmp_path / "out", count=1, templates=1)
+        run_batch(corpus[0], ["straight", "nowhere"], tmp_path / "out", BatchRequest(count=1), templates=1)
     assert not (tmp_path / "out").exists()
 
 
@@ -165,7 +165,7 @@ def test_lost_encounters_are_counted_under_one_cause(corpus, tmp_path, monkeypat
         raise LostConflictError(f"road {attempt.road.name} has no place that keeps the encounter: vehicles 1 and 2 do not meet")
 
     monkeypatch.setattr(batches.Attempt, "run", lost)
-    made = run_batch(corpus[0], ROADS, tmp_path / "out", count=1, templates=2, workers=Workers(1))
+    made = run_batch(corpus[0], ROADS, tmp_path / "out", BatchRequest(count=1), templates=2, workers=Workers(1))
     assert made.failures == {LOST_CONFLICT: 4} and not made.failed
     cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))
     assert {case["why"].split()[1] for case in cases} == set(ROADS)

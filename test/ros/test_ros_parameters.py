@@ -16,8 +16,8 @@ import yaml
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
 from scenario_gen.logs import LogConfig
+from scenario_gen.ros.nodes.gp_sampler import Config
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters, meant, values_of_call, with_values
-from scenario_gen.ros.plumbing.sampling_answer import Config
 
 DECLARED = {name: entry for name, (entry, _) in flatten(Config()).items()}
 RESERVED = "start_type_description_service"  # read-only, of every rclpy node

@@ -8,19 +8,19 @@ from pathlib import Path
 
 from msg_conventions.changepoints import encode_changepoints, encode_posterior, segmentation_status
 from msg_conventions.diagnostics import encode_diagnostics
-from msg_conventions.ego import ego_messages, WITNESS
+from msg_conventions.ego import ego_messages
 from msg_conventions.fits import anchor_stamps, encode_fit, fit_statuses
 from msg_conventions.hashes import encode_hashes, template_hashes
 from msg_conventions.lanes import encode_lanes
 from msg_conventions.lanes import TOPIC as LANES
 from msg_conventions.paths import encode_route
-from msg_conventions.pictures import encode_footprint, scenario_markers
+from msg_conventions.pictures import scenario_markers
+from msg_conventions.request_messages import footprint_messages, RequestMessages
 from msg_conventions.roads import encode_map, encode_poses
-from msg_conventions.scenario_info import encode_info, INFO, request_summary, scenario_entry
-from msg_conventions.scenarios import digest, encode_scenario, messages_of
+from msg_conventions.scenario_info import encode_info, INFO, request_summary
+from msg_conventions.scenarios import digest, encode_scenario
 from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import encode_tracks
-from scenario_gen.bags.recordings.scenarios import SCENARIOS
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
 from scenario_gen.types import Encounter, GenerationResult, Scenario, tokens
@@ -59,8 +59,8 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
     for topic, data in (*template.items(), *infos.items()):
         yield topic, data, stamp
     yield "posterior", encode_posterior(encounter, result.segmentation), stamp
-    for name, vehicle in zip(names, encounter.vehicles, strict=True):
-        yield vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}"), stamp
+    for topic, data in footprint_messages(encounter):
+        yield topic, data, stamp
     statuses = (
         segmentation_status(result.segmentation, "/segmenter", result.encounter.duration),
         *fit_statuses(fit, "/planner", hashes, result.routes),
@@ -69,18 +69,11 @@ def result_messages(result: GenerationResult, request: str = "1") -> Iterator[tu
     ego = result.generated.ego
     for topic, data in () if ego is None else ego_messages(ego, road.frame_id, stamp):
         yield topic, data, stamp
-    about = {"template": encounter.name, "road": road.name, **hashes}
+    messages = RequestMessages(encounter, request, "/gp_sampler", {"template": encounter.name, "road": road.name, **hashes})
     logged = stamp
     for scenario in result.generated.scenarios:
-        data = encode_scenario(scenario, stamp)
-        entry = scenario_entry(
-            scenario, data, request, "/gp_sampler", template=encounter.vehicles, asked=fit.asked, ego=ego, about=about
-        )
-        if scenario.witness is not None:
-            yield WITNESS, encode_scenario(scenario.witness, stamp), logged
-        for message in (data,) if scenario.all_present else messages_of(data):
-            yield SCENARIOS, message, logged
-        yield INFO, encode_info(entry, stamp), logged
+        for topic, data in messages.of_scenario(scenario, fit.asked, ego):
+            yield topic, data, logged
         yield "markers", scenario_markers(scenario, stamp), logged
         logged += SCENARIO_STEP_NS
     provenance = {**result.provenance, **hashes}

@@ -3,7 +3,8 @@
 
 """Definitions and hashes of types: Jazzy's from rosbags, Autoware's by definition, others from an installed package.
 
-Those of our own bags are kept in `resources/definitions.json`, as rosbags gives them: it reads seven releases of ROS for them.
+Those of our own bags are kept in `resources/definitions.json`, in rosbags' words: to load rosbags' types takes long, because it
+parses seven releases of ROS.
 """
 
 from functools import cache
@@ -34,15 +35,15 @@ def _register_installed(kind: str) -> None:
     package, _, name = kind.partition("/msg/")
     prefixes = [Path(p) for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
     paths = [prefix / "share" / package / "msg" / f"{name}.msg" for prefix in prefixes]
-    found = next((path for path in paths if path.is_file()), None)
-    if found is None:
+    file = next((path for path in paths if path.is_file()), None)
+    if file is None:
         raise InputError(
             f"message type {kind} is unknown: no {package}/msg/{name}.msg on AMENT_PREFIX_PATH; source its workspace"
         )
     from rosbags.typesys import get_types_from_msg
 
     store = type_store()
-    types = get_types_from_msg(found.read_text(encoding="utf-8"), kind)
+    types = get_types_from_msg(file.read_text(encoding="utf-8"), kind)
     for _constants, fields in types.values():
         for _field, (node, what) in fields:
             inner = what[0][1] if node.name in ("ARRAY", "SEQUENCE") else what

@@ -24,7 +24,7 @@ from scenario_gen.types import WITH
 
 Entries = Sequence[tuple[bytes, ScenarioEntry]]  # scenarios, each with its entry of `scenarios/info`
 SCENARIOS = ("scenarios", INFO)
-SETTLED = 5.0  # seconds without news after which it is said what a closed request lacks
+SETTLED = 5.0  # seconds without messages after which a closed request's missing messages are reported
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Evaluator(StageNode):
             self._forget(next(iter(requests)))
 
     def _forget(self, request: str) -> None:
-        """Give up a request, and say what of it has not come."""
+        """Give up a request, and report its missing messages."""
         message = self._requests.open[request].sentence()
         self._requests.forget(request)
         self.status(Level.WARN, f"{message}; it is not evaluated; see keep and wait", "requests", request=request)

@@ -15,12 +15,12 @@ from msg_conventions.lanes import TOPIC as LANES
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.method.sampling import Cancelled
-from scenario_gen.ros.plumbing.sampling_answer import Answer, answer_request, Config, OpenRequest, OpenRequests
+from scenario_gen.ros.plumbing.sampling_requests import Answer, answer_request, Config, OpenRequest, OpenRequests
 from scenario_gen.ros.plumbing.stage_node import Inputs, StageNode
 from scenario_gen.ros.plumbing.topics import unacknowledged
 from scenario_gen.types import tokens
 
-ENDS = ("road/entries", "road/exits")  # of use only where start or end states are asked for
+ENDS = ("road/entries", "road/exits")  # needed only for requests with start or end states
 
 
 class GpSampler(StageNode):
@@ -78,10 +78,10 @@ class GpSampler(StageNode):
             self.listen(topic)
 
     def _generate_on_input(self, messages: Mapping[str, bytes], config: Config, cancelled: Cancelled) -> None:
-        self.generate(messages, self._requests.add(job="inputs", wanted=config.count), config, cancelled)
+        self.generate(messages, self._requests.add(job="inputs", n_requested=config.count), config, cancelled)
 
     def given_up(self, messages: Mapping[str, bytes], cancelled: Cancelled) -> str:
-        """Say why a request is to be given up; nothing if it is not."""
+        """Return why a request is given up; "" if it is not."""
         return "given up: its inputs were replaced" if self.inputs.replaced(messages) else "cancelled" if cancelled() else ""
 
     def generate(
@@ -89,7 +89,7 @@ class GpSampler(StageNode):
     ) -> Answer | None:
         """Sample, check and publish; the request's summary closes `scenarios/info`. None if it was given up before its end."""
 
-        def stop() -> bool:  # also amid a set: nothing of an old map is said beside the new one
+        def stop() -> bool:  # also within a set, so that no scenario of an old map follows a new one
             return bool(self.given_up(messages, cancelled))
 
         level, words, more = Level.WARN, "", dict[str, str]()

@@ -42,7 +42,7 @@ class Config(Parameters):
 
 
 class LogPlayer(StageNode):
-    """Reads a log and publishes the encounter that is asked for."""
+    """Reads a log and publishes the encounter named by the parameters."""
 
     OUTPUTS = ("tracks",)
 

@@ -20,7 +20,7 @@ from rclpy.time import Time
 from std_srvs.srv import Trigger
 
 from msg_conventions.changepoints import decode_changepoints
-from msg_conventions.diagnostics import Level, written
+from msg_conventions.diagnostics import decimal_stamp, Level
 from msg_conventions.fits import anchor_stamps, encode_fit, fit_statuses
 from msg_conventions.hashes import encode_hashes, template_hashes
 from msg_conventions.lanes import TOPIC as LANES
@@ -65,7 +65,7 @@ class Planner(StageNode):
         self.serve(Trigger, "~/explain", self._explain)
         self._reasons: deque[tuple[int, str]] = deque(maxlen=EXPLAINED)  # stamp of a request, and why there is no path
         paired = self.config.pair_map
-        self._asked = 0
+        self._requests = 0
         self.inputs = Inputs(("tracks", "changepoints", *(ROAD if paired else ())), () if paired else ("map",), (LANES,))
 
     def stopped(self) -> None:
@@ -105,8 +105,8 @@ class Planner(StageNode):
         """Plan for a caller, off the executor's thread."""
         grid = self.inputs.get("map")
         stamp = Time.from_msg(request.start.header.stamp).nanoseconds
-        self._asked += 1
-        name = f"get_plan {self._asked}"
+        self._requests += 1
+        name = f"get_plan {self._requests}"
 
         def job(cancelled: Callable[[], bool]) -> tuple[bytes, str]:
             try:
@@ -118,7 +118,7 @@ class Planner(StageNode):
                 return encode_path(poses, np.full(len(poses), stamp), road.frame_id, stamp), ""
             except ScenarioGenError as error:
                 kind = type(error).__name__
-                self.status(Level.ERROR, str(error), "get_plan", error=kind, job=name, request_stamp=written(stamp))
+                self.status(Level.ERROR, str(error), "get_plan", error=kind, job=name, request_stamp=decimal_stamp(stamp))
                 return b"", str(error)
 
         response.plan.header.stamp = request.start.header.stamp
@@ -135,7 +135,7 @@ class Planner(StageNode):
 
         nav_msgs/GetPlan has no place for it.
         """
-        lines = [f"{written(stamp)}: {reason or 'a path was found'}" for stamp, reason in self._reasons]
+        lines = [f"{decimal_stamp(stamp)}: {reason or 'a path was found'}" for stamp, reason in self._reasons]
         response.success = bool(lines) and not self._reasons[0][1]
         response.message = "\n".join(lines) or "no plan has been asked for"
         return response

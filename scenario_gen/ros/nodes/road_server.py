@@ -44,7 +44,7 @@ class Config(Parameters):
 
 
 def road_of_url(url: str) -> str:
-    """Return the built-in name or file path that a LoadMap request means.
+    """Return the built-in name or file path of a LoadMap request's URL.
 
     Raises:
         InputError: another scheme than file:// and package://, or a package that is not installed.
@@ -74,9 +74,9 @@ class RoadServer(StageNode):
         self._tracks: bytes | None = None
         self._name = self.config.road_name
         self._grid: bytes | None = None
-        self._with_lanes = False  # whether the road before had lanes, which are to be taken back then
+        self._with_lanes = False  # whether the last road had lanes: an empty message then replaces them
         self.serve(GetMap, "~/get_map", self._get_map)
-        self._asked = 0
+        self._requests = 0
         self.create_service(LoadMap, "~/load_map", self._load_map, qos_profile=REQUESTS)
 
     def started(self) -> None:
@@ -100,7 +100,7 @@ class RoadServer(StageNode):
             "map": encode_map(road, stamp_ns),
         }
         if road.lanes is not None:
-            messages = {LANES: encode_lanes(road.lanes, road.frame_id, stamp_ns), **messages}  # before the map that they are of
+            messages = {LANES: encode_lanes(road.lanes, road.frame_id, stamp_ns), **messages}  # published before their map
         stop_if_cancelled()
         if self._with_lanes and road.lanes is None:
             self.outputs.send(LANES, encode_lanes(None, road.frame_id, stamp_ns))
@@ -122,7 +122,7 @@ class RoadServer(StageNode):
     async def _load_map(self, request: LoadMap.Request, response: LoadMap.Response) -> LoadMap.Response:
         """Load another road, off the executor's thread; it stays until the next request or restart."""
         codes = LoadMap.Response
-        self._asked += 1
+        self._requests += 1
 
         def job(cancelled: Callable[[], bool]) -> int:
             if cancelled():
@@ -134,13 +134,15 @@ class RoadServer(StageNode):
                 return int(codes.RESULT_SUCCESS)
             except ScenarioGenError as reason:
                 message = f"load_map {request.map_url!r}: {reason}"
-                self.status(Level.ERROR, message, "load_map", error=type(reason).__name__)  # which is over when the job is done
+                self.status(Level.ERROR, message, "load_map", error=type(reason).__name__)  # cleared when the job ends
                 missing = not Path(request.map_url.removeprefix("file://")).exists()
                 return int(codes.RESULT_MAP_DOES_NOT_EXIST if missing else codes.RESULT_INVALID_MAP_METADATA)
 
         response.result = codes.RESULT_UNDEFINED_FAILURE
         if self.active:
-            response.result = await self.result_of(f"load_map {self._asked}", job, lambda _: int(codes.RESULT_UNDEFINED_FAILURE))
+            response.result = await self.result_of(
+                f"load_map {self._requests}", job, lambda _: int(codes.RESULT_UNDEFINED_FAILURE)
+            )
             if response.result == codes.RESULT_SUCCESS:
                 self._get_map(request, response)
         return response

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""segmenter: `tracks`, or the vehicles' streams, in; `changepoints` and `posterior` out; `~/segment` does it again.
+"""segmenter: `tracks`, or the vehicles' streams, in; `changepoints` and `posterior` out; `~/segment` repeats it.
 
 While `vehicle_<id>/fix` and `vehicle_<id>/speed` come in, changepoints are published on `changepoints/live` as they are
 confirmed. At the end of the streams, or on `~/segment`, what was buffered is read as a log is, and published as `tracks`: for
@@ -42,7 +42,7 @@ class Config(Parameters):
 
 
 class Segmenter(StageNode):
-    """Finds the driving primitives of every encounter it hears."""
+    """Finds the driving primitives of every encounter that it receives."""
 
     INPUTS = ("tracks",)
     STAGES = ("method.segmentation",)
@@ -91,7 +91,7 @@ class Segmenter(StageNode):
             self.outputs.send("changepoints/live", encode_live_changepoints(found))
 
     def _ended(self, log: RawLog, config: LogConfig) -> None:
-        """Read what the streams amount to, off the executor's thread."""
+        """Read the buffered log as encounters, off the executor's thread."""
         self._encounters += 1
 
         def job(_: Callable[[], bool]) -> None:

@@ -12,11 +12,11 @@ Topics, frames and units: msg_conventions/driving.py. What is wrong with the ego
 """
 
 from collections.abc import Callable
+from functools import partial
 import json
 from pathlib import Path
 from time import monotonic
 
-import numpy as np
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -25,32 +25,29 @@ from std_srvs.srv import Trigger
 
 from msg_conventions.autoware import EGO, OBJECTS
 from msg_conventions.diagnostics import Level
-from msg_conventions.ego import encode_state
-from msg_conventions.hashes import hash_of
-from msg_conventions.paths import encode_path
-from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
-from scenario_gen.bags.recordings.arriving import ArrivingScenarios, TOPICS
+from scenario_gen.bags.recordings.arriving import TOPICS
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.results import write_verdicts
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
-from scenario_gen.closed_loop.trials import Outcome, read_trials, Trial, trial_of
+from scenario_gen.closed_loop.trials import Outcome, read_trials, Trial
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
 from scenario_gen.ros.plumbing.driving import (
+    ArrivingTrials,
     Config,
+    decode_command,
+    EgoCommand,
     encode_verdict,
-    FIRST_STAMP,
-    Heard,
     INPUTS,
     stamp_of,
     surroundings,
-    understood,
+    task_messages,
 )
 from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
 from scenario_gen.ros.plumbing.topics import create_publisher, create_subscription, publish
-from scenario_gen.types import Road, tokens
+from scenario_gen.types import tokens
 
 OUTPUTS = ("/clock", "/tf", "traffic/markers", "traffic/local_map", "verdicts", "ego/goal", "ego/route")
 LOOK_AROUND = 10  # steps between two looks at who commands the ego
@@ -69,21 +66,21 @@ class Traffic(Node):  # type: ignore[misc]
         self._at = self.config.index
         self._loop: ClosedLoop | None = None
         self._states: list[State] = []
-        self._heard: Heard | None = None
+        self._received: EgoCommand | None = None
         self._waiting: Future | None = None
         self._until = 0.0  # when that ends, on the steady clock [s]
         self.create_timer(LOOK, self._end_waiting, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._paused = False
         self._sources: list[str] = []
-        self._outcomes: list[Outcome] = []
-        self._roads: dict[str, Road] = {}  # by the hash of their map
-        self._arriving = ArrivingScenarios()
+        self.outcomes: list[Outcome] = []  # of the drives that are over
+        self._arriving = ArrivingTrials()
         self._verdict = ""
         self._out = {topic: create_publisher(self, topic) for topic in OUTPUTS}
         self._autoware: tuple[str, ...] = ()
         for topic in INPUTS:
-            create_subscription(self, topic, lambda data, topic=topic: self._hear(topic, data))
-        for name, action in (("next", self._next), ("reset", self._reset), ("pause", self._pause), ("resume", self._resume)):
+            create_subscription(self, topic, lambda data, topic=topic: self._receive_command(topic, data))
+        pause, resume = partial(self._pause, paused=True), partial(self._pause, paused=False)
+        for name, action in (("next", self._next), ("reset", self._reset), ("pause", pause), ("resume", resume)):
             self.create_service(Trigger, f"~/{name}", lambda _, response, action=action: self._answer(action, response))
         self.create_service(Trigger, "~/step", self._serve_step)
 
@@ -113,8 +110,7 @@ class Traffic(Node):  # type: ignore[misc]
                 raise InputError(f"parameter index is {config.index}; {config.bag} has {len(self._trials)} scenarios, from 0")
             self._load(config.index)
         else:
-            create_subscription(self, "map", self._take_map)
-            for topic in TOPICS:
+            for topic in ("map", *TOPICS):
                 create_subscription(self, topic, lambda data, topic=topic: self._take(topic, data))
         if not config.lock_step:
             period = config.drive.step / config.rate
@@ -122,23 +118,14 @@ class Traffic(Node):  # type: ignore[misc]
 
     # --- scenarios --------------------------------------------------------------------------------------------
 
-    def _take_map(self, data: bytes) -> None:
-        try:
-            self._roads[hash_of("map", data)] = decode_map(data)[1]
-        except InputError as error:
-            self._say(Level.ERROR, str(error), "map")
-
     def _take(self, topic: str, data: bytes) -> None:
-        """Take a message of a live scenario; what is whole waits for its turn, on the road that its entry names."""
+        """Take a map or a message of a live scenario; complete scenarios are driven in the order in which they arrive."""
         try:
-            for entry, _, scenario in self._arriving.take(topic, data):
-                road = self._roads.get(entry.map_hash or "")
-                name = f"{entry.request} {entry.index}"
-                self._trials.append(trial_of(name, scenario, entry, road, self.config.ego, f"scenario {name}"))
+            self._trials += self._arriving.take(topic, data, self.config.ego)
             if self._loop is None and len(self._trials) > self._at:
                 self._load(self._at)
         except ScenarioGenError as error:
-            self._say(Level.ERROR, str(error), topic)
+            self._report_status(Level.ERROR, str(error), topic)
 
     def _load(self, number: int) -> None:
         """Begin a scenario.
@@ -148,47 +135,44 @@ class Traffic(Node):  # type: ignore[misc]
         """
         trial = self._trials[number]
         self._loop = ClosedLoop(trial.scenario, trial.ego, trial.road, self.config.drive)
-        self._at, self._states, self._heard, self._verdict = number, [self._loop.start()], None, ""
-        scenario, ego = self._loop.scenario, self._loop.ego
-        self._names = tokens(vehicle.id for vehicle in scenario.vehicles)
+        self._at, self._states, self._received, self._verdict = number, [self._loop.start()], None, ""
+        self._names = tokens(vehicle.id for vehicle in self._loop.scenario.vehicles)
         self._children = tuple(f"vehicle_{name}" for name in self._names)
         for name in self._names:
             topic = vehicle_topic(name, "odom")
             if topic not in self._out:
                 self._out[topic] = create_publisher(self, topic)
-        task = self._loop.task()
-        stamps = np.full(len(task.route), FIRST_STAMP, dtype=np.int64)
-        self._publish("ego/goal", encode_state(task.goal, self._children[ego], scenario.frame_id, FIRST_STAMP))
-        self._publish("ego/route", encode_path(task.route, stamps, scenario.frame_id, FIRST_STAMP))
-        self._tell()
+        for topic, data in task_messages(self._loop, self._children[self._loop.ego]):
+            self._publish(topic, data)
+        self._publish_state()
         self._report()
 
     # --- the ego ----------------------------------------------------------------------------------------------
 
-    def _hear(self, topic: str, data: bytes) -> None:
-        """Take a command; whatever is wrong with it, the node lives on."""
+    def _receive_command(self, topic: str, data: bytes) -> None:
+        """Keep a command; a damaged one is reported and counts as none."""
         if self._loop is None:
             return
-        heard = understood(topic, data, self._loop, self._children[self._loop.ego], self._states[-1].step)
-        if heard.fault:
-            self._say(Level.WARN, heard.fault, "ego")
-        self._heard = heard
+        command = decode_command(topic, data, self._loop, self._children[self._loop.ego], self._states[-1].step)
+        if command.fault:
+            self._report_status(Level.WARN, command.fault, "ego")
+        self._received = command
         if self._waiting is not None and not self._waiting.done():
             self._waiting.set_result(None)
 
     def _command(self, state: State) -> tuple[Command | Pose | None, str]:
-        """Return what is asked of the ego now, and what is wrong with it."""
-        heard = self._heard
-        if heard is None:
+        """Return the command to the ego for this state, and its fault or a note."""
+        command = self._received
+        if command is None:
             return None, ""
-        if fault := heard.fault_at(state, self.config.drive.step, self.config.silence):
+        if fault := command.fault_at(state, self.config.drive.step, self.config.silence):
             return None, fault
         if state.step % LOOK_AROUND == 0:
-            self._sources = self._commanding()
+            self._sources = self.commanding()
         note = f"several egos: {', '.join(self._sources)}; what came last counts" if len(self._sources) > 1 else ""
-        return heard.ask(state), note
+        return command.at(state), note
 
-    def _commanding(self) -> list[str]:
+    def commanding(self) -> list[str]:
         """Return the nodes that publish commands."""
         found = [info for topic in INPUTS for info in self.get_publishers_info_by_topic(topic)]
         return sorted({f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in found})
@@ -202,14 +186,14 @@ class Traffic(Node):  # type: ignore[misc]
     @property
     def _waits_for_ego(self) -> bool:
         """Whether the drive begins with the ego's first command, and none has come."""
-        return self._heard is None and (self.config.wait_for_ego or self.config.lock_step)
+        return self._received is None and (self.config.wait_for_ego or self.config.lock_step)
 
     def _advance(self, loop: ClosedLoop) -> None:
         requested, note = self._command(self._states[-1])
         self._states.append(loop.step(self._states[-1], requested, note))
         if fault := self._states[-1].fault:
-            self._say(Level.WARN, fault, "ego")
-        self._tell()
+            self._report_status(Level.WARN, fault, "ego")
+        self._publish_state()
         if loop.over(self._states[-1]):
             self._conclude(loop)
 
@@ -218,12 +202,12 @@ class Traffic(Node):  # type: ignore[misc]
         drive = loop.record(self._states)
         verdict, trial = judge(loop, drive), self._trials[self._at]
         self._verdict = verdict.sentence()
-        self._outcomes.append(Outcome(trial.name, verdict, drive))
-        self._publish("verdicts", encode_verdict(self.get_name(), self._outcomes[-1], stamp_of(self._states[-1])))
+        self.outcomes.append(Outcome(trial.name, verdict, drive))
+        self._publish("verdicts", encode_verdict(self.get_name(), self.outcomes[-1], stamp_of(self._states[-1])))
         self.get_logger().info(f"scenario {trial.name}: {self._verdict}")
         if self.config.results:
             Path(self.config.results).mkdir(parents=True, exist_ok=True)
-            write_verdicts(Path(self.config.results), self._outcomes, f"{self.get_name()} over ROS 2", self.config.drive)
+            write_verdicts(Path(self.config.results), self.outcomes, f"{self.get_name()} over ROS 2", self.config.drive)
         if self.config.follow_on and not self.config.lock_step and self._at + 1 < len(self._trials):
             self._load(self._at + 1)
 
@@ -241,13 +225,13 @@ class Traffic(Node):  # type: ignore[misc]
     async def _step_once(self, loop: ClosedLoop) -> None:
         """Go one step of a drive when a command that answers its last one is there, or patience is at its end."""
         state = self._states[-1]
-        await self._answered(state, self.config.patience)
+        await self._wait_for_command(state, self.config.patience)
         if self._loop is loop and self._states[-1] is state:
             self._advance(loop)
 
-    async def _answered(self, state: State, patience: float) -> None:
-        """Return when a command has come since this state was told, or after `patience` [s] of real time."""
-        if self._heard is not None and self._heard.step >= state.step:
+    async def _wait_for_command(self, state: State, patience: float) -> None:
+        """Return when a command has come since this state was published, or after `patience` [s] of real time."""
+        if self._received is not None and self._received.step >= state.step:
             return
         await self._next_command(monotonic() + patience)
 
@@ -290,42 +274,38 @@ class Traffic(Node):  # type: ignore[misc]
         self._load(self._at)
         return f"scenario {self._trials[self._at].name}, from its start"
 
-    def _pause(self) -> str:
-        self._paused = True
-        return "paused"
-
-    def _resume(self) -> str:
-        self._paused = False
-        return "driving"
+    def _pause(self, *, paused: bool) -> str:
+        self._paused = paused
+        return "paused" if paused else "driving"
 
     # --- what is published ------------------------------------------------------------------------------------
 
     def _publish(self, topic: str, data: bytes) -> None:
         publish(self, self._out[topic], data)
 
-    def _tell(self) -> None:
-        """Publish where everyone is now; the ego's odometry last, so that who answers it has heard of all else."""
+    def _publish_state(self) -> None:
+        """Publish the state of all vehicles; the ego's odometry last, so that a reply to it knows the others."""
         if self._loop is not None:
-            for topic, data in surroundings(self._loop, self._states[-2:], self._names, self._autoware, self._is_heard):
+            for topic, data in surroundings(self._loop, self._states[-2:], self._names, self._autoware, self._has_subscribers):
                 self._publish(topic, data)
 
-    def _is_heard(self, topic: str) -> bool:
-        """Whether somebody listens: what is dear to make and not latched is made for nobody else."""
+    def _has_subscribers(self, topic: str) -> bool:
+        """Whether the topic has subscribers; messages that are slow to encode are left out without."""
         return int(self._out[topic].get_subscription_count()) > 0
 
-    def _say(self, level: Level, message: str, subject: str) -> None:
+    def _report_status(self, level: Level, message: str, subject: str) -> None:
         self.diagnostics.status(level, message, subject, {}, log=False)
 
     def _report(self) -> None:
-        """Say each second what is driven; a fault of the ego that is over clears."""
+        """Report each second which scenario is driven; clear a fault of the ego that is over."""
         if self._loop is None:
             waiting = f": {self._arriving.unmatched} messages wait for scenarios/info" if self._arriving.unmatched else ""
-            self._say(Level.WARN, f"there is no scenario yet{waiting}", "driving")
+            self._report_status(Level.WARN, f"there is no scenario yet{waiting}", "driving")
             return
         state, trial = self._states[-1], self._trials[self._at]
         doing = self._verdict or ("paused" if self._paused else "waiting for the ego" if self._waits_for_ego else "driving")
-        self._say(Level.OK, f"scenario {trial.name}, {state.time:.1f} s: {doing}", "driving")
+        self._report_status(Level.OK, f"scenario {trial.name}, {state.time:.1f} s: {doing}", "driving")
         if self._waits_for_ego and not self._verdict:
-            self._tell()  # who came late has not heard where everyone is
-        if not state.fault and not (self._heard and self._heard.fault):
+            self._publish_state()  # for planners that started late
+        if not state.fault and not (self._received and self._received.fault):
             self.diagnostics.resolve("ego")

@@ -15,74 +15,64 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.simulation import State
 from scenario_gen.closed_loop.trials import Outcome, Trial
 from scenario_gen.ros.nodes.traffic import Traffic
-from scenario_gen.ros.plumbing.driving import Config, INPUTS
+from scenario_gen.ros.plumbing.driving import (
+    Config,
+    INPUTS,
+)
 
-Progress = Callable[[int, int], None]
 START = 60.0  # seconds that a planner's node may take until it publishes commands
-SETTLE = 1.0  # seconds from its first publisher until it has found the topics that it hears
-LAST = 1.0  # seconds in which an answer to a drive's last state is waited for, that it is not taken for the next drive's first
-AGAIN = 2.0  # seconds without an answer after which a drive's first state is sent again, to who has come late
+SETTLE = 1.0  # seconds from its first publisher until it has found the topics that it listens to
+LAST = 1.0  # seconds to wait for a reply to a drive's last state, which would else count as a reply to the next drive's first
+AGAIN = 2.0  # seconds without a reply after which a drive's first state is sent again, for a planner that started late
+Progress = Callable[[int, int], None]
 
 
 class TrafficOfTrials(Traffic):
-    """Drives trials one after the other, each step when the planner has answered the one before."""
+    """Drives trials one after the other for `scenario-gen drive --ros`; each step waits for the planner's reply."""
 
     def __init__(self, trials: Sequence[Trial], config: ClosedLoopConfig, progress: Progress) -> None:
         super().__init__(config=Config(lock_step=True, follow_on=False, drive=config))
         self._trials, self._progress = list(trials), progress
-        self._told: State | None = None  # the state that was told last, when it was [s], and how many times
-        self._told_at, self._tellings = 0.0, 0
+        self._sent: State | None = None  # the state that was published last, when [s], and how many times
+        self._sent_at, self._times_sent = 0.0, 0
 
-    @property
-    def outcomes(self) -> list[Outcome]:
-        """What the trials came to, so far."""
-        return self._outcomes
-
-    def steered(self) -> bool:
-        """Whether somebody publishes commands."""
-        return bool(self._commanding())
-
-    def _tell(self) -> None:
-        """Tell the last state; once more only if nobody has answered for `AGAIN`, for each telling may be answered."""
-        at, state = monotonic(), self._states[-1]
-        if state is not self._told:
-            self._told, self._tellings = state, 0
-        elif at < self._told_at + AGAIN:
+    def _publish_state(self) -> None:
+        """Publish the last state; again only after `AGAIN`, because the planner may reply to each copy."""
+        now, state = monotonic(), self._states[-1]
+        if state is not self._sent:
+            self._sent, self._times_sent = state, 0
+        elif now < self._sent_at + AGAIN:
             return
-        self._told_at, self._tellings = at, self._tellings + 1
-        super()._tell()
+        self._sent_at, self._times_sent = now, self._times_sent + 1
+        super()._publish_state()
 
     async def drive_all(self) -> None:
         """Drive all trials."""
         for number in range(len(self._trials)):
             self._load(number)
             loop = self._loop
-            await self._answered(self._states[-1], self.config.patience)
-            if self._tellings > 1:
-                await self._silence(LAST)
+            await self._wait_for_command(self._states[-1], self.config.patience)
+            if self._times_sent > 1:
+                until = monotonic() + LAST  # each copy may get a reply, of which the last one counts
+                while monotonic() < until:
+                    await self._next_command(until)
             while loop is not None and not self._verdict:
                 await self._step_once(loop)
             self._progress(number + 1, len(self._trials))
-            await self._answered(self._states[-1], LAST)
-
-    async def _silence(self, duration: float) -> None:
-        """Return after `duration` [s] of real time, in which commands are heard; what came last counts."""
-        until = monotonic() + duration
-        while monotonic() < until:
-            await self._next_command(until)
+            await self._wait_for_command(self._states[-1], LAST)
 
 
 def drive_trials(
     trials: Sequence[Trial], config: ClosedLoopConfig, progress: Progress, planner: str, check: Callable[[], None]
 ) -> list[Outcome]:
-    """Drive a planner that is a node through every trial, each step when it has answered; results are in the trials' order.
+    """Drive a planner that is a node through every trial, in lock-step; return the outcomes in the trials' order.
 
     Args:
-        trials: what is driven.
+        trials: scenarios, each with an ego and a road.
         config: the parameters of a drive.
-        progress: called with how many are done, and how many there are.
-        planner: its command, which the error names.
-        check: called while the planner is waited for; it raises when the planner's process has ended.
+        progress: called with the number of finished trials and the number of all.
+        planner: its command, for the error.
+        check: called while waiting for the planner; it raises when the planner's process has ended.
 
     Raises:
         InputError: the planner publishes no command.
@@ -93,12 +83,11 @@ def drive_trials(
         executor.add_node(node)
         try:
             until = monotonic() + START
-            while not node.steered():
+            while not node.commanding():
                 check()
                 if monotonic() > until:
-                    ways = ", ".join(INPUTS)
                     raise InputError(
-                        f"--planner {planner}: no command from it in {START:.0f} s; it must publish one of {ways} "
+                        f"--planner {planner}: no command from it in {START:.0f} s; it must publish one of {', '.join(INPUTS)} "
                         "(docs/closed_loop.md)"
                     )
                 executor.spin_once(timeout_sec=0.05)

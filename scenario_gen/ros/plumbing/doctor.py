@@ -205,7 +205,7 @@ def _speak(topic: str) -> None:
 
 
 def _listen(topic: str) -> None:
-    """Count what arrives, look around, and say so."""
+    """Count received messages, look for peers, and report both."""
     import rclpy
     from rclpy.utilities import get_rmw_implementation_identifier
     from std_msgs.msg import String

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What traffic and a planner under test tell each other: parameters of the node, commands to the ego, messages of a drive."""
+"""Between traffic and a planner under test: parameters, commands to the ego, arriving trials, messages of a drive."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -12,10 +12,15 @@ import numpy as np
 from msg_conventions import driving
 from msg_conventions.autoware import EGO, encode_kinematic_state, encode_predicted_objects, HORIZON_NS, OBJECTS, STEP_NS
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
+from msg_conventions.ego import encode_state
 from msg_conventions.frames import encode_frames
+from msg_conventions.hashes import hash_of
 from msg_conventions.odometry import decode_odometry, encode_odometry
+from msg_conventions.paths import encode_path
 from msg_conventions.pictures import vehicle_markers
+from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
+from scenario_gen.bags.recordings.arriving import ArrivingScenarios
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.closed_loop.config import ClosedLoopConfig
@@ -23,8 +28,9 @@ from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.local_map import local_map
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.tracking import of_twist, Track
-from scenario_gen.closed_loop.trials import Outcome
+from scenario_gen.closed_loop.trials import Outcome, Trial, trial_of
 from scenario_gen.numerics import Floats
+from scenario_gen.types import Road
 
 
 @dataclass(frozen=True)
@@ -53,13 +59,21 @@ FIRST_STAMP = 1_000_000_000  # ns of a drive's clock at its start: a time of 0 m
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
-    """A command: which step of the drive was the last when it came, its stamp [ns, 0: none], and what it gives at an instant."""
+class EgoCommand:
+    """A message that commands the ego.
+
+    Attributes:
+        topic: where it came from.
+        step: the drive's last step when it came.
+        stamp_ns: its stamp [ns]; 0 if it has none.
+        at: returns the command for a state.
+        fault: why it does not count; "" if it does.
+    """
 
     topic: str
     step: int
     stamp_ns: int
-    ask: Callable[[State], Command | Pose | None]
+    at: Callable[[State], Command | Pose | None]
     fault: str = ""
 
     def fault_at(self, state: State, period: float, silence: float) -> str:
@@ -83,8 +97,8 @@ def stamp_of(state: State) -> int:
     return FIRST_STAMP + round(state.time * 1e9)
 
 
-def understood(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -> Heard:
-    """Return what a message asks; one that is damaged, or in another frame, asks nothing and has a fault.
+def decode_command(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -> EgoCommand:
+    """Return the command of a message; a message that is damaged, or in another frame, has none, and a fault.
 
     Args:
         topic: one of `INPUTS`.
@@ -96,29 +110,63 @@ def understood(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int)
     try:
         return _decoded(topic, data, loop, child, step)
     except ScenarioGenError as error:
-        return Heard(topic, step, 0, lambda _: None, str(error))
+        return EgoCommand(topic, step, 0, lambda _: None, str(error))
 
 
-def _decoded(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -> Heard:
+def _decoded(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -> EgoCommand:
     period, frame, own = loop.config.step, loop.scenario.frame_id, (child, "base_link", "")
     if topic.startswith("ego/cmd_vel"):
-        stamp, message, speed, rate = driving.decode_twist(data, topic, stamped=topic.endswith("stamped"))
-        if message not in own and message != frame:
-            raise InputError(f"{topic}: frame {message!r} is not the ego's; {', '.join(map(repr, own[:2]))} are")
-        return Heard(topic, step, stamp, lambda state: of_twist(state.ego, speed, rate, period))
+        stamp, given_frame, speed, rate = driving.decode_twist(data, topic, stamped=topic.endswith("stamped"))
+        if given_frame not in own and given_frame != frame:
+            raise InputError(f"{topic}: frame {given_frame!r} is not the ego's; {', '.join(map(repr, own[:2]))} are")
+        return EgoCommand(topic, step, stamp, lambda state: of_twist(state.ego, speed, rate, period))
     if topic in WAYS:
         decode = driving.decode_trajectory if topic == "ego/trajectory" else driving.decode_timed_path
         way = decode(data, topic)
-        stamp, message = 0, way.frame_id
+        stamp, given_frame = 0, way.frame_id
         track = Track.of((way.time_ns - FIRST_STAMP) * 1e-9, way.poses)
-        requested: Callable[[State], Command | Pose | None] = lambda state: track.command(state.ego, state.time, period)  # noqa: E731
+        command: Callable[[State], Command | Pose | None] = lambda state: track.command(state.ego, state.time, period)  # noqa: E731
     else:
-        stamp, message, _, state = decode_odometry(data, topic)
+        stamp, given_frame, _, state = decode_odometry(data, topic)
         pose = Pose(*state[:4].tolist())
-        requested = lambda _: pose  # noqa: E731
-    if message != frame:
-        raise InputError(f"{topic}: frame {message!r} is not that of the scenario, {frame!r}")
-    return Heard(topic, step, stamp, requested)
+        command = lambda _: pose  # noqa: E731
+    if given_frame != frame:
+        raise InputError(f"{topic}: frame {given_frame!r} is not that of the scenario, {frame!r}")
+    return EgoCommand(topic, step, stamp, command)
+
+
+class ArrivingTrials:
+    """Makes trials of scenarios that arrive live, each on the road that its entry names."""
+
+    def __init__(self) -> None:
+        self._roads: dict[str, Road] = {}  # by the hash of their map
+        self._scenarios = ArrivingScenarios()
+
+    @property
+    def unmatched(self) -> int:
+        """The number of messages that wait for their entry."""
+        return self._scenarios.unmatched
+
+    def take(self, topic: str, data: bytes, ego: str) -> Iterator[Trial]:
+        """Take a map, or a message of a scenario; yield the trials that are complete by it, driven in the place of `ego`.
+
+        Raises:
+            ScenarioGenError: the message is damaged, or the scenario has no such vehicle.
+        """
+        if topic == "map":
+            self._roads[hash_of("map", data)] = decode_map(data)[1]
+            return
+        for entry, _, scenario in self._scenarios.take(topic, data):
+            name, road = f"{entry.request} {entry.index}", self._roads.get(entry.map_hash or "")
+            yield trial_of(name, scenario, entry, road, ego, f"scenario {name}")
+
+
+def task_messages(loop: ClosedLoop, child: str) -> Iterator[tuple[str, bytes]]:
+    """Yield the ego's goal and route as CDR bytes, by topic; `child` is the ego's own frame."""
+    task, frame = loop.task(), loop.scenario.frame_id
+    stamps = np.full(len(task.route), FIRST_STAMP, dtype=np.int64)
+    yield "ego/goal", encode_state(task.goal, child, frame, FIRST_STAMP)
+    yield "ego/route", encode_path(task.route, stamps, frame, FIRST_STAMP)
 
 
 GRID_EVERY = 0.2  # seconds of the drive between two local maps
@@ -196,16 +244,20 @@ def encode_verdict(node: str, outcome: Outcome, stamp_ns: int) -> bytes:
 
 
 def surroundings(
-    loop: ClosedLoop, states: Sequence[State], names: Sequence[str], autoware: Sequence[str], is_heard: Callable[[str], bool]
+    loop: ClosedLoop,
+    states: Sequence[State],
+    names: Sequence[str],
+    autoware: Sequence[str],
+    heard: Callable[[str], bool],
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield the messages that tell of the last state, by topic; the ego's odometry comes last.
+    """Yield the messages of the last state, by topic; the ego's odometry comes last.
 
     Args:
         loop: the drive.
         states: the last state, and the one before it if there is one.
         names: tokens of the vehicles.
-        autoware: those of Autoware's topics that are wanted.
-        is_heard: whether somebody listens to a topic.
+        autoware: Autoware's topics to publish.
+        heard: whether a topic has subscribers.
     """
     state, frame = states[-1], loop.scenario.frame_id
     stamp, children = stamp_of(state), tuple(f"vehicle_{name}" for name in names)
@@ -215,11 +267,11 @@ def surroundings(
     for i, data in odometries.items():
         yield vehicle_topic(names[i], "odom"), data
     yield "/tf", encode_poses(state, children, frame)
-    if is_heard("traffic/markers"):
+    if heard("traffic/markers"):
         vehicles = loop.scenario.vehicles
         yield "traffic/markers", vehicle_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp)
     every = max(round(GRID_EVERY / loop.config.step), 1)
-    if state.step % every == 0 and loop.road is not None and is_heard("traffic/local_map"):
+    if state.step % every == 0 and loop.road is not None and heard("traffic/local_map"):
         yield "traffic/local_map", encode_surroundings(loop, state)
     for topic in autoware:
         yield topic, (encode_predictions if topic == OBJECTS else encode_ego)(loop, states)

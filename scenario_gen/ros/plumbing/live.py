@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The vehicles' streams in a node's namespace: found, taken in, sampled, and ended."""
+"""The vehicles' streams in a node's namespace: subscribed to, sampled, buffered, and ended."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from scenario_gen.ros.plumbing.topics import adapted_quality
 from scenario_gen.template import MOST_VEHICLES
 from scenario_gen.types import Sample, token
 
-LOOK = 0.2  # seconds between two looks for new streams, and for silence
+CHECK_PERIOD = 0.2  # seconds between two checks for new streams, and for silence
 TYPES = {"fix": FIX_TYPE, "speed": TWIST_TYPE}
 
 
@@ -34,9 +34,10 @@ class LiveConfig(Parameters):
 
 
 class LiveStreams:
-    """Listens for a node: `sampled` gets every sample on the common clock, `ended` what was buffered, and how to read it.
+    """Subscribes to the vehicles' streams for a node and buffers them.
 
-    That is when they are silent, when `log.max_duration` seconds are buffered, or when the clock was set.
+    `sampled` is called with every sample on the common clock. `ended` is called with the buffered log and how to read it: after
+    silence, when `log.max_duration` seconds are buffered, or when the clock was set.
     """
 
     def __init__(
@@ -47,17 +48,17 @@ class LiveStreams:
         sampled: Callable[[Sample], None],
         ended: Callable[[RawLog, LogConfig], None],
     ) -> None:
-        """Look for streams at once and from then on; real time counts, for a simulated one may stand."""
+        """Check for streams periodically, in real time, because a simulated clock may stand."""
         self._node, self._config, self._log = node, config, log
         self._sampled, self._ended = sampled, ended
         self._streams = Streams(log, config.late)
-        self._heard = monotonic()
-        self._topics: dict[str, tuple[str, str]] = {}  # full name -> vehicle, kind
-        self._left_out: set[str] = set()  # of them
-        self._timer = node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._last_message = monotonic()
+        self._topics: dict[str, tuple[str, str]] = {}  # by full name: vehicle, kind
+        self._left_out: set[str] = set()  # topics that are not subscribed to, with the reason on /diagnostics
+        self._timer = node.create_timer(CHECK_PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _look(self) -> None:
-        """Find new streams, forget those that were left out and are gone; notice silence."""
+        """Subscribe to new streams, forget ended ones that were left out, and end the log after silence."""
         for topic in [topic for topic in self._left_out if not self._node.get_publishers_info_by_topic(topic)]:
             self._left_out.discard(topic)
             self._topics.pop(topic)
@@ -67,7 +68,7 @@ class LiveStreams:
             self._subscribe()
         except InputError as error:
             self._node.diagnostics.failed("streams", error)
-        if monotonic() - self._heard > self._config.silence:
+        if monotonic() - self._last_message > self._config.silence:
             self.end()
 
     def _subscribe(self) -> None:
@@ -81,7 +82,7 @@ class LiveStreams:
                 self._topics[topic] = (name, kind)
                 self._left_out.add(topic)
                 if name not in list(dict.fromkeys(vehicle for vehicle, _ in self._topics.values()))[:MOST_VEHICLES]:
-                    raise InputError(f"{topic} is left out: {MOST_VEHICLES} others are heard; name those wanted in log.vehicles")
+                    raise InputError(f"{topic} is left out: {MOST_VEHICLES} others are in use; choose vehicles with log.vehicles")
                 if publishers[0].topic_type != kind_type:
                     raise InputError(f"{topic} is a {publishers[0].topic_type}; {kind_type} is needed, so it is left out")
                 self._left_out.discard(topic)
@@ -104,7 +105,7 @@ class LiveStreams:
         vehicle, kind = self._topics[topic]
         stamp_ns, *values = decode_fix(data, topic) if kind == "fix" else decode_speed(data, topic)
         stamp_ns = stamp_ns or self._node.get_clock().now().nanoseconds
-        self._heard = monotonic()
+        self._last_message = monotonic()
         if self._streams.breaks(stamp_ns) or self._streams.seconds > self._log.max_duration:
             self.end()
         (self._streams.put_fix if kind == "fix" else self._streams.put_speed)(vehicle, stamp_ns, *values)
@@ -116,10 +117,10 @@ class LiveStreams:
         log = self._streams.take("live")
         if log is not None:
             for topic in self._topics:
-                self._node.diagnostics.resolve(topic)  # whatever was wrong with its messages, no more of them are to come
+                self._node.diagnostics.resolve(topic)  # its stream has ended, and so have its faults
             self._ended(log, self._streams.config)
         return log is not None
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop checking for streams."""
         self._node.destroy_timer(self._timer)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The life of a process of nodes: made, started once their kernels are there, spun, ended by a signal or because all is done.
+"""The life of a process of nodes: created, started when their kernels are ready, spun, ended by a signal or when all are done.
 
 Signals are heard by a thread of their own (`scenario_gen/base/interrupts.py`), and rclpy's handlers are not installed: nothing is
 raised in the midst of a callback, and the context is valid until the nodes have ended.
@@ -50,8 +50,8 @@ from scenario_gen.ros.plumbing.ros_parameters import help_of, USAGE
 
 OFTEN = 5.0  # seconds between two reports of how many kernels are there
 SIGEV_THREAD = 2  # <signal.h>
-TOLD_WITHIN = 0.5  # seconds that writing down where it stood may take
-ENDING = 5.0  # seconds that a node, asked to end, may take to look up, and then to leave its ROS domain
+DUMP_SECONDS = 0.5  # seconds that writing the stack traces may take
+ENDING = 5.0  # seconds that a node may take to react to a signal, and again to leave its ROS domain
 Maker = Callable[[str | None], Any]
 
 
@@ -93,7 +93,7 @@ def run_nodes(makers: Sequence[Maker], arguments: Sequence[str] | None = None) -
 
 
 def asks_for_help(arguments: Sequence[str]) -> bool:
-    """Say whether `--help` stands among the words that are not ROS's."""
+    """Return whether `--help` stands among the words that are not ROS's."""
     return bool({"-h", "--help"} & set(remove_ros_args(list(arguments))[1:]))
 
 
@@ -206,9 +206,9 @@ def _spin(executor: SingleThreadedExecutor, nodes: Sequence[Any]) -> int:
 
 
 def _end(nodes: Sequence[Any], executor: SingleThreadedExecutor, code: int) -> int:
-    """Destroy the nodes, whatever one of them says to it; return the exit code, `code` if all goes well."""
+    """Destroy the nodes, also after an error of one of them; return the exit code, `code` if all goes well."""
     for node in nodes:
-        getattr(node, "cancel", list)()  # all at once, so that none is waited for before another is told
+        getattr(node, "cancel", list)()  # all at once, so that no node waits for the end of another
     for node in nodes:
         try:
             getattr(node, "close", list)()
@@ -249,7 +249,7 @@ def _leave_within(seconds: float, code: int = 1) -> None:
     timer, event = ctypes.c_void_p(), _TimerEvent(value=code, notify=SIGEV_THREAD, function=leave)
     if create(CLOCK_MONOTONIC, ctypes.byref(event), ctypes.byref(timer)) == 0:
         _timers.append(timer)
-        after = int((seconds + TOLD_WITHIN) * 1e9)
+        after = int((seconds + DUMP_SECONDS) * 1e9)
         settime(timer, 0, (ctypes.c_long * 4)(0, 0, after // 10**9, after % 10**9), None)
 
 

@@ -107,13 +107,13 @@ class Inputs:
         self._paired |= set(topics)
 
     def forget(self, topics: Iterable[str]) -> None:
-        """Remove topics and what they said."""
+        """Remove topics and their messages."""
         for topic in topics:
             self._paired.discard(topic)
             self._newest.pop(topic, None)
 
     def clear(self) -> None:
-        """Forget what was said."""
+        """Forget all messages."""
         self._newest.clear()
 
     def put(self, topic: str, data: bytes) -> None:
@@ -297,7 +297,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     # --- lifecycle --------------------------------------------------------------------------------------------
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Advertise the outputs; `run_nodes` has made the kernels ready."""
+        """Advertise the outputs; the kernels are ready by then."""
         for topic in self.OUTPUTS:
             self.outputs.advertise(topic)
         self.diagnostics.state("inactive")

@@ -26,6 +26,7 @@ from scenario_gen.base.interrupts import hear
 
 PATIENCE = 20.0  # seconds that a node has to end by itself; far more than it needs, for machines that are busy
 NODES = ("recorder", "evaluator", "gp_sampler", "planner", "segmenter", "road_server", "log_player", "player")
+WATCHER = "watcher"  # reports to the runner of a suite; no executable
 SUITE = """\
 suite: all nodes in one process with one executor, for small machines: `ros2 run scenario_gen suite`.
 
@@ -37,7 +38,8 @@ stands in a parameter file, or, where there is no namespace, behind its name: `-
 
 def node_class(name: str) -> Any:
     """Return the class of a node: GpSampler of `gp_sampler`."""
-    return getattr(importlib.import_module(f"scenario_gen.ros.nodes.{name}"), name.title().replace("_", ""))
+    module = "plumbing.diagnostics" if name == WATCHER else f"nodes.{name}"
+    return getattr(importlib.import_module(f"scenario_gen.ros.{module}"), name.title().replace("_", ""))
 
 
 def chosen(arguments: list[str]) -> tuple[list[str], list[str]]:
@@ -60,7 +62,7 @@ def start(name: str) -> None:
     gc.disable()  # what the libraries make while they load stays: to look for garbage in it takes a sixth of the time
     from scenario_gen.ros.plumbing.process import asks_for_help, run_nodes, show
 
-    nodes = [node_class(one) for one in names]
+    nodes = [node_class(node) for node in names]
     gc.freeze()
     gc.enable()
     if name == "suite" and asks_for_help(arguments):
@@ -83,7 +85,7 @@ suite = partial(start, "suite")
 # --- several nodes, each a process ----------------------------------------------------------------------------
 
 
-def say(**event: object) -> None:
+def emit(**event: object) -> None:
     """Write one event; a line is short enough to arrive unbroken from any process."""
     os.write(sys.__stdout__.fileno() if sys.__stdout__ else 1, (json.dumps(event) + "\n").encode())
 
@@ -97,7 +99,7 @@ def _become(node: str, arguments: list[str], log: str) -> None:
         os.setpgid(0, 0)  # the terminal's Ctrl-C reaches the suite, which ends its nodes in order
         descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
         os.dup2(descriptor, 2)
-        if node != "watcher":
+        if node != WATCHER:
             os.dup2(descriptor, 1)
         null = os.open(os.devnull, os.O_RDONLY)
         os.dup2(null, 0)
@@ -118,11 +120,11 @@ def _load(nodes: list[str]) -> None:
 
     stages = dict.fromkeys(stage for node in nodes for stage in getattr(node_class(node), "STAGES", ()))
     count, seconds = kernels_ready(stages)
-    say(event="loaded", kernels=count, seconds=seconds)
+    emit(event="loaded", kernels=count, seconds=seconds)
 
 
 def fork(specification: list[dict[str, Any]]) -> None:
-    """Fork the nodes, report those that end, and end them all when asked."""
+    """Fork the nodes, report those that end, and end them all after a signal or the end of standard input."""
     signals = (signal.SIGINT, signal.SIGTERM)
     for number in signals:
         signal.signal(number, lambda number, _: os._exit(128 + number))  # there is nobody to be ended yet
@@ -136,7 +138,7 @@ def fork(specification: list[dict[str, Any]]) -> None:
         if pid == 0:
             _become(entry["node"], entry["arguments"], entry["log"])
         children[pid] = entry["node"]
-        say(event="started", node=entry["node"], pid=pid)
+        emit(event="started", node=entry["node"], pid=pid)
     while not requested and children:
         readable, _, _ = select.select([0], [], [], 0.1)
         if readable and not os.read(0, 1):
@@ -155,7 +157,7 @@ def _reap(children: dict[int, str]) -> None:
     for pid in list(children):
         done, status = os.waitpid(pid, os.WNOHANG)
         if done:
-            say(event="exited", node=children.pop(pid), code=os.waitstatus_to_exitcode(status))
+            emit(event="exited", node=children.pop(pid), code=os.waitstatus_to_exitcode(status))
 
 
 if __name__ == "__main__":

@@ -22,8 +22,12 @@ from rclpy.executors import Executor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.utilities import get_rmw_implementation_identifier
 
 from msg_conventions.topics import topic_entry
+from scenario_gen.bags.storage.type_support import KIND as TF_TYPE
+from scenario_gen.bags.storage.type_support import PART as TRANSFORM_TYPE
+from scenario_gen.bags.storage.type_support import raw_tf_message
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.types import Quality
@@ -43,10 +47,12 @@ def message_class(kind: str) -> Any:
     try:
         return getattr(importlib.import_module(f"{package}.msg"), name)
     except (ImportError, AttributeError, ValueError):
-        if kind == "tf2_msgs/msg/TFMessage":
-            from scenario_gen.ros.plumbing.raw_tf import raw_tf_message
-
-            return raw_tf_message()
+        if kind == TF_TYPE:
+            if (rmw := get_rmw_implementation_identifier()) == "rmw_fastrtps_cpp":
+                return raw_tf_message(message_class(TRANSFORM_TYPE))
+            raise InputError(
+                f"message type {kind} is not installed, and {rmw} asks for it; source the workspace that has tf2_msgs"
+            ) from None
         raise InputError(f"message type {kind} is not installed; source the workspace that has {package or 'it'}") from None
 
 
@@ -276,5 +282,5 @@ def unacknowledged(node: Node, topic: str, count: int) -> str:
     message = f"a subscriber of {name} acknowledges nothing; it is not waited for any more"
     if count:
         message = f"{count} messages of {name} were published without acknowledgement, a subscriber may lack them"
-    who = ", ".join(sorted({one.node_name for one in node.get_subscriptions_info_by_topic(name)})) or "none any more"
+    who = ", ".join(sorted({info.node_name for info in node.get_subscriptions_info_by_topic(name)})) or "none any more"
     return f"{message} (subscribers: {who}); see which one hangs, or raise patience; who joins anew gets the last 1000"

@@ -1,11 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The sampler's requests: who waits, how far the one at work is, its services, and how one request is answered.
-
-`~/generate`, `~/cancel_request` for one of the requests, `~/cancel` for all. A template's messages and the caller's values come
-in, scenarios and a summary go out.
-"""
+"""The sampler's requests: its parameters, the open requests and their services, and how a request is answered."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,13 +16,11 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 from msg_conventions.diagnostics import Level
-from msg_conventions.ego import ego_messages, WITNESS
 from msg_conventions.hashes import template_hashes
-from msg_conventions.pictures import encode_footprint, scenario_markers
-from msg_conventions.scenario_info import encode_info, INFO, request_summary, RequestSummary, scenario_entry
-from msg_conventions.scenarios import encode_scenario, messages_of
-from msg_conventions.topics import vehicle_topic
+from msg_conventions.request_messages import RequestMessages
+from msg_conventions.scenario_info import request_summary, RequestSummary
 from scenario_gen.bags.recordings.provenance import parameter_texts, versions
+from scenario_gen.bags.recordings.sending import RequestSender, Send
 from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.parameters import parameter
@@ -37,15 +31,17 @@ from scenario_gen.method.sampling import Callbacks, sample_scenarios, SamplingCo
 from scenario_gen.method.validity import Limits
 from scenario_gen.ros.plumbing.ros_parameters import values_of_call
 from scenario_gen.ros.plumbing.stage_node import REQUESTS
-from scenario_gen.types import BoundaryStates, EgoSlot, Encounter, GenerationResult, Request, Scenario, ScenarioSet, tokens
+from scenario_gen.types import GenerationResult, Request
 
-Answer = tuple[GenerationResult, RequestSummary]  # what a request came to; its scenarios are published by then
-Send = Callable[[str, bytes], None]  # of topic and CDR bytes
+SHOWN = 20  # waiting requests that are named
+SILENCE = 10.0  # seconds after which a line on the terminal says how far a request is, though it is hardly farther
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
+Answer = tuple[GenerationResult, RequestSummary]  # the result of a request, whose scenarios are published by then
 
 
 @dataclass(frozen=True)
 class Config(Request):
-    """The sampler's parameters; `fitting` and `planning` are used where start or end states are asked for."""
+    """The sampler's parameters; `fitting` and `planning` are used for requests with start or end states."""
 
     count: int = parameter(50, "scenarios to generate", low=1, high=100_000)
     seed: int = parameter(0, "seed of the samples, and of the planner where states are asked for", low=0)
@@ -66,118 +62,13 @@ class Config(Request):
         super().__post_init__()
 
 
-class _Messages:
-    """Sends a request's messages in order, each scenario as it comes, so that a set need never be in memory."""
-
-    def __init__(
-        self, encounter: Encounter, frame_id: str, request: str, node: str, about: Mapping[str, str], send: Send
-    ) -> None:
-        """Take the template, the road's frame, the request's id, the node's name, what every entry says, and what sends."""
-        self._encounter, self._frame_id, self._request, self._node = encounter, frame_id, request, node
-        self._about, self._send = about, send
-        self._begun = False
-
-    def _begin(self, ego: EgoSlot | None) -> None:
-        """Send what stands before the first scenario, once."""
-        if self._begun:
-            return
-        self._begun = True
-        stamp, vehicles = self._encounter.start_ns, self._encounter.vehicles
-        for vehicle, name in zip(vehicles, tokens(vehicle.id for vehicle in vehicles), strict=True):
-            self._send(vehicle_topic(name, "footprint"), encode_footprint(vehicle, stamp, f"vehicle_{name}"))
-        for topic, data in () if ego is None else ego_messages(ego, self._frame_id, stamp):
-            self._send(topic, data)
-
-    def scenario(self, scenario: Scenario, asked: BoundaryStates, ego: EgoSlot | None) -> None:
-        """Send a scenario and its entry."""
-        self._begin(ego)
-        stamp = self._encounter.start_ns
-        data = encode_scenario(scenario, stamp)
-        if scenario.witness is not None:
-            self._send(WITNESS, encode_scenario(scenario.witness, stamp))
-        for message in (data,) if scenario.all_present else messages_of(data):
-            self._send("scenarios", message)
-        entry = scenario_entry(
-            scenario, data, self._request, self._node, template=self._encounter.vehicles, asked=asked, ego=ego, about=self._about
-        )
-        self._send(INFO, encode_info(entry, stamp))
-
-    def close(self, result: ScenarioSet, summary: RequestSummary) -> None:
-        """Send the picture of the first scenario and the request's summary."""
-        self._begin(result.ego)
-        stamp = self._encounter.start_ns
-        if result.scenarios:
-            self._send("markers", scenario_markers(result.scenarios[0], stamp))
-        self._send(INFO, encode_info(summary, stamp))
-
-
-def answer_request(
-    messages: Mapping[str, bytes],
-    config: Config,
-    request: str,
-    node: str,
-    progress: Callable[[int, int, int], None],
-    cancelled: Callable[[], bool],
-    send: Send,
-) -> Answer:
-    """Sample, check and publish; fit and plan anew if start or end states are asked for.
-
-    Args:
-        messages: of the template, by topic.
-        config: the values of this request.
-        request: its id.
-        node: the node's full name.
-        progress: called with the scenarios and candidates so far, and the template's stamp [ns].
-        cancelled: whether to stop early; what was published by then stays, and the summary says so.
-        send: called with topic and CDR bytes of every message, scenarios as they are drawn.
-
-    Raises:
-        InputError: a message is damaged, or a vehicle that is named does not exist.
-        RefusedError: what is asked cannot be had; the message says why, and what nearby can.
-    """
-    template = decode_template(messages)
-    encounter, segmentation, (road, _) = template.encounter, template.segmentation, template.placed()
-
-    def advance(done: int, _total: int, candidates: int) -> None:
-        progress(done, candidates, encounter.start_ns)
-
-    hashes = template_hashes(messages)
-    out = _Messages(encounter, road.frame_id, request, node, hashes, send)
-    callbacks = Callbacks(advance, cancelled, out.scenario)
-    if config.moves:
-        from scenario_gen.method.attempt import Attempt  # these load all stages, and few requests need them
-        from scenario_gen.method.config import PipelineConfig
-        from scenario_gen.method.nearest import nearest_if_impossible
-
-        stages = PipelineConfig(fitting=config.fitting, planning=config.planning, sampling=config.sampling, limits=config.limits)
-        attempt = Attempt(encounter, segmentation, road, stages, config, config.count, config.seed)
-        with nearest_if_impossible(attempt, cancelled):
-            outcome = attempt.run(callbacks)
-    else:
-        outcome = sample_scenarios(
-            replace(template, seed=config.seed), config.sampling, config.limits, config,
-            count=config.count, callbacks=callbacks, measures=MEASURES,
-        )  # fmt: skip
-    result = outcome.generated
-    provenance = parameter_texts(config) | versions() | hashes
-    stopped = cancelled() and len(result.scenarios) < result.requested
-    summary = request_summary(result, request, node, config.seed, provenance, cancelled=stopped, reactions=outcome.reacting)
-    out.close(result, summary)
-    return outcome, summary
-
-
-SHOWN = 20  # waiting requests that are named
-SILENCE = 10.0  # seconds after which a line on the terminal says how far a request is, though it is hardly farther
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
-
-
 @dataclass
 class OpenRequest:
-    """One request: its name, the job that does it, and how far it is."""
+    """An open request: its name, its job, and its progress."""
 
     name: str
     job: str
-    wanted: int
+    n_requested: int
     began: float | None = None
     accepted: int = 0
     candidates: int = 0
@@ -185,18 +76,18 @@ class OpenRequest:
     logged: tuple[int, float] = field(default=(0, 0.0))  # tenths and time of the last line on the terminal
 
     def progress(self, accepted: int, candidates: int, stamp_ns: int) -> None:
-        """Take in how far it is."""
+        """Set the progress."""
         self.accepted, self.candidates, self.stamp_ns = accepted, candidates, stamp_ns
 
     def seconds(self) -> float:
-        """For how long it has been at work."""
+        """Seconds since its job began."""
         return 0.0 if self.began is None else monotonic() - self.began
 
     def values(self) -> dict[str, str]:
         """What /diagnostics reports of it."""
         return {
             "request": self.name,
-            "requested": str(self.wanted),
+            "requested": str(self.n_requested),
             "accepted": str(self.accepted),
             "candidates": str(self.candidates),
             "seconds": f"{self.seconds():.1f}",
@@ -207,7 +98,7 @@ class OpenRequests:
     """The open requests of a sampler, which its statuses `progress` and `generate` report, and its services."""
 
     def __init__(self, node: Any) -> None:
-        """Offer the services. `node`: the sampler; it generates, and says what is missing for that."""
+        """Offer the services. `node`: the sampler; it generates, and returns the topics still missing."""
         self._node = node
         self._open: dict[str, OpenRequest] = {}
         self._numbers = count(1)
@@ -216,29 +107,29 @@ class OpenRequests:
         node.serve(SetParametersAtomically, "~/cancel_request", self._cancel_request)
         node.serve(Trigger, "~/cancel", self._cancel_all)
 
-    def add(self, asked: str = "", job: str = "", wanted: int = 0) -> OpenRequest:
+    def add(self, given: str = "", job: str = "", n_requested: int = 0) -> OpenRequest:
         """Open a request; without a name of its own, or a job's, it has the next number.
 
         Raises:
             InputError: the name is none, or that of an open request.
         """
         with self._lock:
-            if asked and not NAME.fullmatch(asked):
-                raise InputError(f"request is {asked!r}; a letter and up to 63 letters, digits, `_`, `-` or `.` are a name")
-            if asked in self._open:
-                raise InputError(f"request {asked!r} is open already; give another name, or wait for its answer")
-            name = asked or str(next(self._numbers))
-            self._open[name] = OpenRequest(name, job or f"request {name}", wanted)
+            if given and not NAME.fullmatch(given):
+                raise InputError(f"request is {given!r}; a letter and up to 63 letters, digits, `_`, `-` or `.` are a name")
+            if given in self._open:
+                raise InputError(f"request {given!r} is open already; give another name, or wait for its answer")
+            name = given or str(next(self._numbers))
+            self._open[name] = OpenRequest(name, job or f"request {name}", n_requested)
             return self._open[name]
 
     def begin(self, request: OpenRequest) -> None:
-        """Its turn has come."""
+        """Start the clock of a request whose job begins."""
         request.began = monotonic()
         request.logged = (0, request.began)
         self.report()
 
     def end(self, request: OpenRequest, level: Level, message: str, **more: str) -> None:
-        """It is done, cancelled or refused; `more` is reported on /diagnostics beside how far it came."""
+        """Close a request that is done, cancelled or refused; `more` is reported on /diagnostics beside how far it came."""
         with self._lock:
             self._open.pop(request.name, None)
         self._node.status(level, f"request {request.name}: {message}", "generate", request.stamp_ns, **request.values(), **more)
@@ -255,7 +146,7 @@ class OpenRequests:
             request, known = self._open.get(name), ", ".join(list(self._open)[:SHOWN])
         if request is None or not self._node.cancel(request.job):
             raise InputError(f"no request {name!r} is open; open: {known or 'none'}")
-        return f"request {name} is cancelled, {request.accepted} of {request.wanted} scenarios were found"
+        return f"request {name} is cancelled, {request.accepted} of {request.n_requested} scenarios were found"
 
     def report(self) -> None:
         """Report on /diagnostics how far the request at work is, and on the terminal, if it is a good deal farther."""
@@ -266,10 +157,10 @@ class OpenRequests:
             self._node.diagnostics.status(Level.OK, "no request is at work", "progress", {}, log=False)
             return
         values = running.values() | {"waiting": str(len(waiting))}
-        values |= {f"waiting.{request.name}": f"{request.wanted} scenarios" for request in waiting[:SHOWN]}
-        found = f"{running.accepted} of {running.wanted} scenarios from {running.candidates} candidates"
+        values |= {f"waiting.{request.name}": f"{request.n_requested} scenarios" for request in waiting[:SHOWN]}
+        found = f"{running.accepted} of {running.n_requested} scenarios from {running.candidates} candidates"
         message = f"request {running.name}: {found}, {running.seconds():.0f} s"
-        tenths, now = 10 * running.accepted // max(running.wanted, 1), monotonic()
+        tenths, now = 10 * running.accepted // max(running.n_requested, 1), monotonic()
         farther = now - running.logged[1] >= 1.0 and running.logged[0] < tenths < 10
         log = farther or now - running.logged[1] >= SILENCE
         if log:
@@ -291,7 +182,7 @@ class OpenRequests:
             return response
         try:
             config, messages = self._inputs_of_call(requested)
-            opened.wanted = config.count
+            opened.n_requested = config.count
         except ScenarioGenError as error:
             self.end(opened, Level.ERROR, str(error), error=type(error).__name__)
             response.result.reason = f"request {opened.name}: {error}"
@@ -311,10 +202,10 @@ class OpenRequests:
         response.result.reason = f"request {opened.name}: {reason}"
         return response
 
-    def _inputs_of_call(self, asked: Sequence[Any]) -> tuple[Any, Mapping[str, bytes]]:
+    def _inputs_of_call(self, parameters: Sequence[Any]) -> tuple[Any, Mapping[str, bytes]]:
         if not self._node.active:
             raise RefusedError("the node is not active; activate it first")
-        config = values_of_call(self._node.config, asked)
+        config = values_of_call(self._node.config, parameters)
         if missing := self._node.missing(config):
             raise RefusedError(f"nothing to generate from yet: waiting for {', '.join(missing)}")
         return config, self._node.messages()
@@ -339,3 +230,58 @@ def _named(parameters: Sequence[Any]) -> tuple[list[Any], str]:
     """Return a caller's parameters but `request`, and what that is, "" if there is none; the tools of ROS make 7 of '7'."""
     names = [Parameter.from_parameter_msg(parameter).value for parameter in parameters if parameter.name == "request"]
     return [parameter for parameter in parameters if parameter.name != "request"], str(names[0]) if names else ""
+
+
+def answer_request(
+    messages: Mapping[str, bytes],
+    config: Config,
+    request: str,
+    node: str,
+    progress: Callable[[int, int, int], None],
+    cancelled: Callable[[], bool],
+    send: Send,
+) -> Answer:
+    """Sample, check and publish; fit and plan anew if start or end states are requested.
+
+    Args:
+        messages: of the template, by topic.
+        config: the values of this request.
+        request: its id.
+        node: the node's full name.
+        progress: called with the scenarios and candidates so far, and the template's stamp [ns].
+        cancelled: whether to stop early; what was published by then stays, and the summary says so.
+        send: called with topic and CDR bytes of every message, scenarios as they are drawn.
+
+    Raises:
+        InputError: a message is damaged, or a vehicle that is named does not exist.
+        RefusedError: the request is impossible; the message says why, and which similar request is possible.
+    """
+    template = decode_template(messages)
+    encounter, segmentation, (road, _) = template.encounter, template.segmentation, template.placed()
+
+    def advance(done: int, _total: int, candidates: int) -> None:
+        progress(done, candidates, encounter.start_ns)
+
+    hashes = template_hashes(messages)
+    sender = RequestSender(RequestMessages(encounter, request, node, hashes), road.frame_id, send)
+    callbacks = Callbacks(advance, cancelled, sender.scenario)
+    if config.moves:
+        from scenario_gen.method.attempt import Attempt  # these load all stages, and few requests need them
+        from scenario_gen.method.config import PipelineConfig
+        from scenario_gen.method.nearest import nearest_if_impossible
+
+        stages = PipelineConfig(fitting=config.fitting, planning=config.planning, sampling=config.sampling, limits=config.limits)
+        attempt = Attempt(encounter, segmentation, road, stages, config, config.count, config.seed)
+        with nearest_if_impossible(attempt, cancelled):
+            outcome = attempt.run(callbacks)
+    else:
+        outcome = sample_scenarios(
+            replace(template, seed=config.seed), config.sampling, config.limits, config,
+            count=config.count, callbacks=callbacks, measures=MEASURES,
+        )  # fmt: skip
+    result = outcome.generated
+    provenance = parameter_texts(config) | versions() | hashes
+    stopped = cancelled() and len(result.scenarios) < result.requested
+    summary = request_summary(result, request, node, config.seed, provenance, cancelled=stopped, reactions=outcome.reacting)
+    sender.close(result, summary)
+    return outcome, summary

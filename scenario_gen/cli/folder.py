@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""From logs to one folder of results: every encounter on every road."""
+"""A folder of results from logs: scenarios of every encounter on every road, with bag, report and figures."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -16,7 +16,7 @@ from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types import Encounter, GenerationResult, Request
 
 Advance = Callable[[str, int, int], None]
-"""Told how far a case is: its name, scenarios so far, scenarios wanted."""
+"""Called with the progress of a case: its name, scenarios so far, scenarios requested."""
 OPTIONS = {
     "starts:='": "--start '", "goals:='": "--goal '", "sampling.max_stretch:=": "--set sampling.max_stretch=",
     "fitting.allow=": "--allow ",
@@ -61,7 +61,7 @@ class FolderRequest:
 
 def generate_folder(
     out: Path,
-    wanted: FolderRequest,
+    requested: FolderRequest,
     *,
     record: Callable[[Path, Sequence[GenerationResult]], None] | None = None,
     progress: Callable[[], AbstractContextManager[Advance]] = lambda: nullcontext(lambda *_: None),
@@ -70,9 +70,9 @@ def generate_folder(
 
     Args:
         out: the folder; an earlier result there is replaced.
-        wanted: what it is to hold.
+        requested: what it is to hold.
         record: writes the bag (its path and the cases are given) instead of this process.
-        progress: a context that gives what is told how far each case is.
+        progress: a context whose value is called with the progress of each case.
 
     Returns:
         The cases, and a sentence for each encounter and road that was refused or came out short.
@@ -81,17 +81,17 @@ def generate_folder(
         InputError: a log cannot be read, an encounter is unknown, or `out` may not be replaced.
         RefusedError: nothing could be generated.
     """
-    logs, roads, config, count, seed = wanted.logs, wanted.roads, wanted.config, wanted.count, wanted.seed
-    with replaced_folder(out, GENERATED, [*logs, *map(Path, roads), *wanted.also_read]) as folder:
-        found = [read_log(group, config.log) for group, _ in wanted.jobs]
+    logs, roads, config, count, seed = requested.logs, requested.roads, requested.config, requested.count, requested.seed
+    with replaced_folder(out, GENERATED, [*logs, *map(Path, roads), *requested.also_read]) as folder:
+        readings = [read_log(group, config.log) for group, _ in requested.jobs]
         pairs = [
             (encounter, road)
-            for log, (_, names) in zip(found, wanted.jobs, strict=True)
-            for encounter in chosen(log.encounters, wanted.encounters)
+            for log, (_, names) in zip(readings, requested.jobs, strict=True)
+            for encounter in chosen(log.encounters, requested.encounters)
             for road in names
         ]
         with progress() as advance:
-            cases, refusals = generate_all(pairs, config, count=count, seed=seed, request=wanted.request, advance=advance)
+            cases, refusals = generate_all(pairs, config, count=count, seed=seed, request=requested.request, advance=advance)
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
         if record is not None:
@@ -100,9 +100,9 @@ def generate_folder(
             folder,
             cases,
             seed=seed,
-            title=wanted.title or ", ".join(path.stem for path in logs),
-            quality=[*(line for log in found for line in log.quality.lines()), *refusals],
-            provenance=provenance_of(logs, seed, count, roads, config, wanted.request),
+            title=requested.title or ", ".join(path.stem for path in logs),
+            quality=[*(line for log in readings for line in log.quality.lines()), *refusals],
+            provenance=provenance_of(logs, seed, count, roads, config, requested.request),
         )
     return cases, refusals
 
@@ -123,19 +123,19 @@ def generate_all(
         name = f"{encounter.name} on {Path(road).stem}"
         advance(name, 0, count)
 
-        def told(done: int, total: int, _candidates: int, name: str = name) -> None:
+        def report(done: int, total: int, _candidates: int, name: str = name) -> None:
             advance(name, done, total)
 
         try:
-            case = generate(encounter, road, config, count=count, seed=seed, request=request, progress=told)
+            case = generate(encounter, road, config, count=count, seed=seed, request=request, progress=report)
         except RefusedError as error:
             refusals.append(f"{encounter.name} on {road}: {as_options(str(error))}")
             continue
         cases.append(case)
-        got, refused = len(case.generated.scenarios), case.generated.refused
-        if got < count:
+        n_scenarios, refused = len(case.generated.scenarios), case.generated.refused
+        if n_scenarios < count:
             causes = ", ".join(f"{number} × {cause}" for cause, number in refused.most_common()) or "no candidate was drawn"
-            refusals.append(f"{encounter.name} on {road}: only {got} of {count} scenarios: {causes}")
+            refusals.append(f"{encounter.name} on {road}: only {n_scenarios} of {count} scenarios: {causes}")
     return cases, refusals
 
 

@@ -14,15 +14,10 @@ import ctypes
 from functools import cache
 from typing import Any, ClassVar
 
-from geometry_msgs.msg import TransformStamped
-from rclpy.utilities import get_rmw_implementation_identifier
-
 from scenario_gen.bags.storage.definitions import definition
-from scenario_gen.base.errors import InputError
 
 KIND = "tf2_msgs/msg/TFMessage"
 PART = "geometry_msgs/msg/TransformStamped"
-RMW = "rmw_fastrtps_cpp"
 FAST, INTROSPECTION = b"rosidl_typesupport_fastrtps_c", b"rosidl_typesupport_introspection_c"  # Fast DDS asks for both
 SEQUENCE = 145  # FieldType.FIELD_TYPE_NESTED_TYPE_UNBOUNDED_SEQUENCE
 MESSAGE = 18  # rosidl_typesupport_introspection_c__ROS_TYPE_MESSAGE
@@ -91,12 +86,12 @@ def _sequence(kind: Any, items: list[Any], kept: list[Any]) -> Any:
     return _Sequence(ctypes.addressof(kept[-1]), len(items), len(items))
 
 
-def _donor() -> Any:
-    """The type support of TransformStamped."""
-    TransformStamped.__class__.__import_type_support__()
+def _type_support(message: Any) -> Any:
+    """Return the type support of an installed message class."""
+    message.__class__.__import_type_support__()
     pointer = ctypes.pythonapi.PyCapsule_GetPointer
     pointer.restype, pointer.argtypes = _Pointer, (ctypes.py_object, ctypes.c_char_p)
-    return _Support.from_address(pointer(TransformStamped.__class__._TYPE_SUPPORT, None))
+    return _Support.from_address(pointer(message.__class__._TYPE_SUPPORT, None))
 
 
 def _description(donor: Any, kept: list[Any]) -> Any:
@@ -120,15 +115,13 @@ def _getter(answer: ctypes.Structure) -> Any:
 
 
 @cache
-def raw_tf_message() -> type:
-    """Return a class for raw publishers and subscriptions of /tf and /tf_static.
+def raw_tf_message(transform: Any) -> type:
+    """Return a class for raw publishers and subscriptions of /tf and /tf_static, with Fast DDS.
 
-    Raises:
-        InputError: the middleware is another than Fast DDS.
+    Args:
+        transform: the class geometry_msgs.msg.TransformStamped, whose type support lends its parts.
     """
-    if (rmw := get_rmw_implementation_identifier()) != RMW:
-        raise InputError(f"message type {KIND} is not installed, and {rmw} asks for it; source the workspace that has tf2_msgs")
-    donor = _donor()
+    donor = _type_support(transform)
     for_fast, for_introspection = (_Find(donor.find)(ctypes.addressof(donor), name) for name in (FAST, INTROSPECTION))
     callbacks = _Callbacks(
         b"tf2_msgs::msg", b"TFMessage", _Callbacks.from_address(_Support.from_address(for_fast).data).functions
@@ -138,7 +131,7 @@ def raw_tf_message() -> type:
     kept: list[Any] = [callbacks, member, members]  # all that C points to; it lives as long as the process
     digest = _Hash(1, (ctypes.c_uint8 * 32)(*bytes.fromhex(definition(KIND)[1].removeprefix("RIHS01_"))))
     answers = (digest, _description(donor, kept), _sources(donor, kept))
-    getters = [_getter(one) for one in answers]
+    getters = [_getter(answer) for answer in answers]
     addresses = [ctypes.cast(getter, _Pointer).value for getter in getters]
     supports: dict[bytes, Any] = {}
     find = _Find(lambda _, name: ctypes.addressof(supports[name]) if name in supports else None)
