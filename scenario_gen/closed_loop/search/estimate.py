@@ -34,7 +34,8 @@ LEVELS = 12  # of one exploration at most
 EXPLORED = 0.5  # share of the drives that explore
 BATCH = 64  # numbers drawn from one proposal
 NATURAL_SHARE = 0.15  # of a proposal, so that no weight exceeds 1 / NATURAL_SHARE
-NEAREST = 400  # drives, those nearest to failure, from which the directions are learned
+LEARNED = 500  # drives from which the directions are learned, at most
+ADDED = 0.3  # share of a direction that the others before it must leave, else it is noise
 FEWEST = 4  # failures of a kind that make a component of their own
 TRUSTED = 20.0  # effective number of weighted failures from which on those of the explorations are left out
 CHECKED = 512  # natural candidates that are checked, without a drive, for the share of valid ones
@@ -121,7 +122,7 @@ def _orthonormal(rows: Sequence[Floats]) -> Floats:
         for other in basis:
             left = left - exact.dot(left, other) * other
         length, whole = (float(np.sqrt(np.square(one).sum())) for one in (left, row))
-        if length > max(0.05 * whole, 1e-9):
+        if length > max(ADDED * whole, 1e-9):
             basis.append(left / length)
     return np.array(basis).reshape(len(basis), len(rows[0]) if rows else 0)
 
@@ -315,7 +316,7 @@ class Search:
             weights = np.ones(len(failures))
         if len(failures) < FEWEST:
             return None
-        basis = self._basis(failures, weights)
+        basis = self._basis()
         if not len(basis):
             return None
         u = exact.matmul(np.stack([self.z[k] for k in failures]), basis.T)
@@ -340,17 +341,13 @@ class Search:
         z = self.z[k]
         return float(np.sqrt(np.square(z if self._last is None else exact.matmul(self._last.basis, z)).sum()))
 
-    def _basis(self, failures: list[int], weights: Floats) -> Floats:
-        """Return orthonormal rows (k, d): the directions in which margin and guides change, far from failure and near to it.
-
-        Then that of the failures' mean beyond these, if it is more than chance.
-        """
+    def _basis(self) -> Floats:
+        """Return orthonormal rows (k, d): the directions in which margin and guides change, over drives near to failure and far."""
         figures = np.array([(one.margin, *one.guides) for one in self.responses])
-        z = np.stack(self.z)
-        order = np.array(sorted(range(len(z)), key=lambda k: (self.responses[k].margin, k)))
-        near = order[:NEAREST]
-        rows = list(directions(z[near], figures[near]))
-        return _orthonormal(rows)
+        order = np.array(sorted(range(len(self.z)), key=lambda k: (self.responses[k].margin, k)))
+        spread = order[np.linspace(0, len(order) - 1, min(len(order), LEARNED)).astype(np.int64)]
+        z = np.stack([self.z[k] for k in spread])
+        return _orthonormal([row for figure in figures[spread].T for row in directions(z, figure[:, None])])
 
     def _of_kinds(self, failures: list[int]) -> list[Ints]:
         """Return the rows of failures of each kind that has enough of them."""

@@ -11,13 +11,14 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.search.estimate import Response
+from scenario_gen.closed_loop.search.nearness import time_apart
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.closed_loop.verdict import Runner
-from scenario_gen.method.evaluation import footprint_distance, Motion
 
 AT_FAULT, COLLISION, OFF_ROAD, GOAL, TTC, PET = "at_fault", "collision", "off_road", "goal", "ttc", "pet"
 NAMES = (AT_FAULT, COLLISION, OFF_ROAD, GOAL)
 CONTACT = 0.1  # added to the speed of an impact, so that every contact is a failure
+LEAST = 1e-3  # s, margin of a drive in which footprints met at no instant that counts
 FAR = 100.0  # margin where a figure does not exist and nothing says how near it is
 
 
@@ -46,15 +47,15 @@ class Objective:
         return f"{self.name}<{self.limit:g}" if self.limit else self.name
 
     def response(self, outcome: Outcome) -> Response:
-        """Return how near to failure a drive was; its guides are the least gaps to each of the others [m]."""
+        """Return how near to failure a drive was; its guides say how far in time [s] each of the others was from a collision."""
         verdict = outcome.verdict
-        gaps = _gaps(outcome)
+        apart = _apart(outcome)
         hit = verdict.collision
         contact = -math.inf if hit is None else -(CONTACT + hit.speed)
-        nearest = min(gaps, default=FAR)
+        nearest = min(apart, default=FAR)
         if self.name in (AT_FAULT, COLLISION):
             counts = hit is not None and (self.name == COLLISION or hit.ran is not Runner.OTHER)
-            margin = contact if counts else max(nearest, CONTACT)
+            margin = contact if counts else max(nearest, LEAST)
         elif self.name == OFF_ROAD:
             margin = 1.0 if math.isnan(verdict.off_road) else -1.0
         elif self.name == GOAL:
@@ -66,20 +67,14 @@ class Objective:
         else:
             margin = FAR + nearest if math.isnan(verdict.min_pet) else verdict.min_pet - self.limit
         margin = FAR if math.isnan(margin) else float(margin)
-        return Response(margin, gaps, _kind(outcome, self.name) if margin <= 0.0 else "")
+        return Response(margin, apart, _kind(outcome, self.name) if margin <= 0.0 else "")
 
 
-def _gaps(outcome: Outcome) -> tuple[float, ...]:
-    """Return the least distance [m] of the ego's footprint to each of the others'; FAR for one that is never there."""
+def _apart(outcome: Outcome) -> tuple[float, ...]:
+    """Return how far in time [s] each of the others was from a collision with the ego."""
     drive = outcome.drive
-    motion, found = drive.motion, []
-    step = float(motion.time[1]) if len(motion.time) > 1 else 0.1
-    whole = Motion(motion.vehicles, step, motion.position, motion.heading, motion.speed)
-    for i in range(len(motion.vehicles)):
-        if i != drive.ego:
-            gap = np.where(drive.here[i], footprint_distance(whole, drive.ego, i), np.inf).min()
-            found.append(float(min(gap, FAR)))
-    return tuple(found)
+    others = (i for i in range(len(drive.motion.vehicles)) if i != drive.ego)
+    return tuple(time_apart(drive.motion, drive.here, drive.ego, i) for i in others)
 
 
 def _kind(outcome: Outcome, name: str) -> str:
@@ -93,5 +88,5 @@ def _kind(outcome: Outcome, name: str) -> str:
     if name == GOAL:
         return "the ego does not come to its goal" if hit is None else "the ego does not come to its goal after a collision"
     others = [i for i in range(len(outcome.drive.motion.vehicles)) if i != outcome.drive.ego]
-    nearest = others[int(np.argmin(_gaps(outcome)))] if others else 0
+    nearest = others[int(np.argmin(_apart(outcome)))] if others else 0
     return f"{name} too short with {outcome.drive.motion.vehicles[nearest].id}"
