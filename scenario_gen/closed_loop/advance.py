@@ -5,10 +5,11 @@
 
 import numpy as np
 
-from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at
+from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
+from scenario_gen.closed_loop.driver import Manner
 from scenario_gen.closed_loop.others import react
-from scenario_gen.numerics import Bools, exact, Floats
-from scenario_gen.numerics.kernels import B, B1, F, F1, F2, F3, I, kernel, OUT2, OUTB1
+from scenario_gen.numerics import Bools, exact, Floats, Ints
+from scenario_gen.numerics.kernels import B, B1, F, F1, F2, F3, I, I1, kernel, OUT2, OUTB1
 
 WINDOW = 5.0  # metres beyond what the ego has moved in which its place on the witness' path is looked for
 BESIDE = 1.5  # metres beside that path at which the ego has left it
@@ -78,7 +79,7 @@ def place(time: Floats, motion: Floats, clock: Floats, rate: Floats, out: Floats
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = pose[0], pose[1], pose[2], pose[3] * rate[i]
 
 
-@kernel(F, F, F1, F3, F2, F2, B1, F3, F, F3, I, F1, F1, F2, OUT2, OUT2, OUTB1)
+@kernel(F, F, F1, F3, F2, F2, B1, F3, F, F3, I, F1, I1, F2, OUT2, OUT2, OUT2, OUTB1)
 def advance(
     h: float,
     now: float,
@@ -91,9 +92,10 @@ def advance(
     cell: float,
     order: Floats,
     ego: int,
-    body: Floats,
     driving: Floats,
+    delay: Ints,
     before: Floats,
+    seen: Floats,
     after: Floats,
     vehicles: Floats,
     there: Bools,
@@ -112,25 +114,24 @@ def advance(
         cell: length of a cell [s].
         order: (N, N, K) as in `Certified`.
         ego: index of the ego's witness.
-        body: (6,) the ego at the end of the step, as in `EgoState`.
         driving: (7,) headway [s], standstill gap [m], acceleration, comfortable and strongest braking [m/s²], whether the others
             yield to the ego as the template did, and whether they react at all.
+        delay: (N,) reaction time of each driver in steps.
         before: (N, 2) clocks [s] and their rates.
+        seen: (K, 9) as in `State`, at the end of the step; the ego's clock, its rate and whether it is on its path are written.
         after: (N, 3) clocks and rates at the end of the step, and 1 where one of the others brakes harder than the strongest.
         vehicles: (N, 4) x, y [m], yaw [rad], speed [m/s] at the end of the step.
         there: (N,) who is on the scene then.
     """
     n, last = motion.shape[0], time[-1]
-    witness, pose = np.empty(3), np.empty(5)
+    pose, body, witness = np.empty(5), seen[0, :6], seen[0, 6:]
     locate(now, time, motion[ego], body, before[ego, 0], witness)
     clock, rate = before[:, 0].copy(), before[:, 1].copy()
     new_clock, new_rate, forced = np.empty(n), np.empty(n), np.zeros(n)
     if driving[6] > 0.0:
-        yields = driving[5] > 0.0
-        react(
-            h, time, motion, half, spans, leaves, cells, cell, order, ego, body, witness, yields, driving,
-            clock, rate, new_clock, new_rate, forced,
-        )  # fmt: skip
+        world = World(h, time, motion, half, spans, leaves, cells, cell, order, ego)
+        manner = Manner(driving[0], driving[1], driving[2], driving[3], driving[4], driving[5] > 0.0)
+        react(world, manner, seen, delay, clock, rate, new_clock, new_rate, forced)
     else:
         new_clock[:], new_rate[:] = min(now, last), 1.0
     new_clock[ego], new_rate[ego] = witness[0], witness[1]

@@ -26,6 +26,13 @@ class ClosedLoopConfig(Parameters):
         "at conflicts the others wait for the ego as in the template, or never (they still brake for what is in their way)",
         choices=(TEMPLATE, NEVER),
     )
+    reaction: float = parameter(
+        1.0,
+        "mean reaction time to the ego; each driver's is drawn from half to one and a half of it",
+        unit="s",
+        low=0.0,
+        high=5.0,
+    )
     headway: float = parameter(1.2, "time gap that reactive vehicles keep (IDM)", unit="s", low=0.0, high=5.0)
     standstill_gap: float = parameter(2.0, "gap at which they stop behind another (IDM)", unit="m", low=0.0, high=20.0)
     acceleration: float = parameter(2.0, "with which they take up their certified speed again", unit="m/s²", low=0.1, high=10.0)
