@@ -12,7 +12,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import kernel
 
 AHEAD = 60.0  # metres of its path that it looks along for who is ahead
-SLOW = 0.2  # m/s, certified speed below which a clock runs or stands, for there is nothing to brake
+FREE = -1e3  # m/s²; a braking that does not hinder at all
 STAND = 0.02  # m/s, certified speed of a stand, which passes whatever there is
 NEARER = 0.1  # metres by which a gap must be smaller than the certified one to be minded
 
@@ -25,26 +25,47 @@ class Manner(NamedTuple):
     acceleration: float
     comfortable: float
     strongest: float
+    jerk: float
+    patience: float
     yields: bool
 
 
 @kernel(inline=True)
-def _going_on(r: float, v: float, a: float, taking_up: float, h: float) -> float:
-    """Rate after a step with nothing in the way: back to 1, with the given acceleration at most."""
-    if v < SLOW:
-        return 1.0
-    return min(r + max((taking_up - r * r * a) / v, 0.0) * h, 1.0)
+def _eased(short: float, jerk: float, h: float) -> float:
+    """Largest change of speed [m/s²] towards a speed that is `short` [m/s] away, so that the jerk lets it end evenly there."""
+    if short <= 0.5 * jerk * h * h:
+        return max(short, 0.0) / h
+    return float(np.sqrt(2.0 * jerk * short)) - 0.5 * jerk * h
 
 
 @kernel(inline=True)
-def rate_after(r: float, v: float, a: float, braking: float, taking_up: float, h: float) -> float:
-    """Rate after a step of braking [m/s²]; at rate r the speed is r v, and its change v dr/dt + r² a."""
-    on = _going_on(r, v, a, taking_up, h)
-    if braking <= 0.0:
+def rate_after(manner: Manner, r: float, v: float, a: float, was: float, braking: float, floor: float, h: float) -> float:
+    """Rate of a clock after a step in which its driver brakes, as far as its foot gets: acceleration changes by the jerk at most.
+
+    With nothing in the way the rate goes back to 1; at 1 the motion is the certified one, whatever jerk that has.
+
+    Args:
+        manner: how it drives.
+        r: rate of its clock; its speed is r v.
+        v: certified speed there [m/s].
+        a: certified acceleration there [m/s²].
+        was: its acceleration in the step before [m/s²].
+        braking: m/s²; below 0 it speeds up by no more than that, FREE goes on.
+        floor: m/s; braking ends there.
+        h: the step [s].
+    """
+    if v < STAND:
+        return 1.0
+    u, jerk = r * v, manner.jerk
+    end = max(v + r * a * h, STAND)  # certified speed where the step ends, about
+    on = 1.0
+    if r < 1.0:
+        gain = min(max(manner.acceleration, r * r * a), r * a + _eased(v - u, jerk, h), was + jerk * h)
+        on = min(max((u + gain * h) / end, 0.0), 1.0)
+    if braking <= FREE:
         return on
-    if v < SLOW:
-        return 1.0 if v < STAND else 0.0
-    return min(max(r + (-braking - r * r * a) / v * h, 0.0), on)
+    least = max(-min(braking, _eased(u - floor, jerk, h)), was - jerk * h) if u > floor or braking <= 0.0 else 0.0
+    return min(max(u + least * h, floor) / end, on)
 
 
 @kernel(inline=True)
@@ -87,17 +108,17 @@ def minded(
 ) -> float:
     """Braking [m/s²] of vehicle i, at speed u [m/s], for j, whose box and speed are given, if it is on its path.
 
-    None if j is no nearer than in the certified execution at the same clock; `later` [s] than that of i is what is given of j.
+    FREE if j is no nearer than in the certified execution at the same clock; `later` [s] than that of i is what is given of j.
     """
     gap, at = gap_ahead(world, i, clock, box, pose)
     if at < 0:
-        return 0.0
+        return FREE
     ahead = speed * max(box[2] * world.cells[i, at, 2] + box[3] * world.cells[i, at, 3], 0.0)
     braking = _idm(gap, u, ahead, manner)
     if braking <= 0.0:
-        return 0.0
+        return FREE
     certain, there = np.empty(5), np.empty(7)
     pose_at(world.time, world.motion[j], clock + later, certain)
     fill_box(certain[0], certain[1], certain[2], world.half[j, 0], world.half[j, 1], there)
     usual, _ = gap_ahead(world, i, clock, there, pose)
-    return braking if gap < usual - NEARER else 0.0
+    return braking if gap < usual - NEARER else FREE

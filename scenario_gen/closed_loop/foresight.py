@@ -8,13 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
-from scenario_gen.closed_loop.driver import Manner, rate_after, SLOW
+from scenario_gen.closed_loop.driver import FREE, Manner, rate_after
 from scenario_gen.closed_loop.order import limit
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import kernel
 
+SLOW = 0.2  # m/s; a certified speed below it counts as this one where it divides
+SPARE = 0.3  # metres that a driver who brakes for the ego leaves
 FORESEEN = 5.0  # seconds that a driver looks ahead
-LEVELS = 5  # brakings it can choose from, none among them
+HALVINGS = 5  # of the range that holds the braking it looks for
 LATE = 0.05  # seconds by which the ego's clock is uncertain
 HARDER = 1.0  # m/s² by which an ego on its witness' path must brake harder than that one to be foreseen to go on so
 
@@ -79,41 +81,62 @@ def foresee_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
             out[m, 0], out[m, 1] = seen[0] + way * c[2], seen[1] + way * c[3]
 
 
+class Self(NamedTuple):
+    """A driver at the begin of a step: which, its clock [s], the clock's rate and its acceleration in the step before [m/s²]."""
+
+    i: int
+    clock: float
+    rate: float
+    was: float
+
+
 @kernel(inline=True)
-def weakest(
-    world: World, manner: Manner, i: int, clock: Floats, rate: Floats, least: float, foreseen: Foreseen, others: bool
-) -> float:
-    """The weakest braking [m/s²], `least` or more, with which vehicle i meets nothing that it foresees; the strongest if none."""
-    comfortable, strongest = manner.comfortable, manner.strongest
-    for k in range(LEVELS):
-        if k == 0:
-            braking = least
-        elif k <= 2:
-            braking = 0.5 * k * comfortable
-        else:
-            braking = comfortable + (strongest - comfortable) * (k - 2) / (LEVELS - 3)
-        if braking < least:
+def weakest(world: World, manner: Manner, me: Self, least: float, foreseen: Foreseen, others: bool) -> float:
+    """The weakest braking [m/s²], `least` or more, with which a driver meets nothing that it foresees; the strongest if none.
+
+    Looked for between a few brakings first, for more is not always better: who brakes more may be there when the ego is.
+    """
+    if _clear(world, manner, me, least, foreseen, others):
+        return least
+    low = max(least, -manner.acceleration)
+    for k in range(5):
+        high = (
+            0.0,
+            0.5 * manner.comfortable,
+            manner.comfortable,
+            0.5 * (manner.comfortable + manner.strongest),
+            manner.strongest,
+        )[k]
+        if high <= low:
             continue
-        if _clear(world, manner, i, clock, rate, braking, foreseen, others):
-            return braking
-    return float(max(strongest, least))
+        if _clear(world, manner, me, high, foreseen, others):
+            for _ in range(HALVINGS):
+                middle = 0.5 * (low + high)
+                if _clear(world, manner, me, middle, foreseen, others):
+                    high = middle
+                else:
+                    low = middle
+            return high
+        low = high
+    return max(manner.strongest, least)
 
 
 @kernel(inline=True)
-def _clear(
-    world: World, manner: Manner, i: int, clock: Floats, rate: Floats, braking: float, foreseen: Foreseen, others: bool
-) -> bool:
-    """Whether vehicle i, braking so, stays clear of the ego ahead of it, and keeps to what the order is foreseen to let it do."""
-    h, time, motion, cell, order = world.step, world.time, world.motion[i], world.cell, world.order[i]
+def _clear(world: World, manner: Manner, me: Self, braking: float, foreseen: Foreseen, others: bool) -> bool:
+    """Whether a driver, braking so, stays clear of the ego ahead of it, and keeps to what the order is foreseen to let it do."""
+    h, time, motion, cell, order = world.step, world.time, world.motion[me.i], world.cell, world.order[me.i]
     pose, box = np.empty(5), np.empty(7)
-    t, r = clock[i], rate[i]
+    t, r, was = me.clock, me.rate, me.was
+    spare = SPARE if braking > FREE else 0.0
     pose_at(time, motion, t, pose)
     for m in range(foreseen.ego.shape[0] - 1):
-        after = rate_after(r, pose[3], pose[4], braking, manner.acceleration, h)
+        u = r * pose[3]
+        after = rate_after(manner, r, pose[3], pose[4], was, braking, 0.0, h)
         t += 0.5 * (r + after) * h
         r = after
         pose_at(time, motion, t, pose)
-        fill_box(pose[0], pose[1], pose[2], world.half[i, 0], world.half[i, 1], box)
+        was = (r * pose[3] - u) / h
+        fill_box(pose[0], pose[1], pose[2], world.half[me.i, 0] + spare, world.half[me.i, 1] + spare, box)
         ego = foreseen.ego[m]
         if boxes_meet(box, ego) and (ego[0] - box[0]) * box[2] + (ego[1] - box[1]) * box[3] > 0.0:
             return False
@@ -122,8 +145,27 @@ def _clear(
             return False
         if others:
             for j in range(foreseen.coming.shape[0]):
-                if j not in (i, world.ego) and t > limit(order[j], cell, foreseen.coming[j, m + 1]) + 1e-09:
+                if j not in (me.i, world.ego) and t > limit(order[j], cell, foreseen.coming[j, m + 1]) + 1e-09:
                     return False
         if braking > 0.0 and r == 0.0:
             return True
     return True
+
+
+@kernel(inline=True)
+def foresee_self(world: World, manner: Manner, me: Self, braking: float, out: Floats) -> None:
+    """Fill `out` (M,) with a driver's clocks [s] at the step's begin and at the end of each, if it brakes so."""
+    h, time, motion, pose = world.step, world.time, world.motion[me.i], np.empty(5)
+    t, r, was = me.clock, me.rate, me.was
+    out[0] = t
+    for m in range(1, out.shape[0]):
+        if r < 1.0 or braking > FREE:
+            pose_at(time, motion, t, pose)
+            after = rate_after(manner, r, pose[3], pose[4], was, braking, 0.0, h)
+            u = r * pose[3]
+            t += 0.5 * (r + after) * h
+            pose_at(time, motion, t, pose)
+            was, r = (after * pose[3] - u) / h, after
+        else:
+            t += h
+        out[m] = t

@@ -8,10 +8,10 @@ things slow it down, the strongest counts:
 
 - who is ahead on its path, the ego included (IDM), but only if nearer than in the certified execution at the same place;
 - the weakest braking that keeps it clear of where the ego will be if it goes on as it does, and behind what the order of events
-  lets it do;
+  lets it do; its acceleration changes by the jerk at most;
 - the order itself, without exception: see order.py.
 
-Each driver sees the ego as it was one reaction time ago.
+Each driver sees the ego as it was one reaction time ago, and goes before one that stands when it has waited long enough.
 """
 
 from typing import NamedTuple
@@ -19,85 +19,88 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
-from scenario_gen.closed_loop.driver import Manner, minded, rate_after
-from scenario_gen.closed_loop.foresight import foresee_ego, FORESEEN, Foreseen, weakest
-from scenario_gen.closed_loop.order import keep_order
+from scenario_gen.closed_loop.driver import FREE, gap_ahead, Manner, minded, rate_after, STAND
+from scenario_gen.closed_loop.foresight import foresee_ego, foresee_self, FORESEEN, Foreseen, Self, weakest
+from scenario_gen.closed_loop.order import keep_order, limit
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
-CREEP = 0.5  # m/s; the foresight lets everyone creep, so that nobody waits for one who waits for it
+CREEP = 0.5  # m/s; the foresight lets everyone creep, so that nobody waits for one who waits for it; who is slower waits
+BEHIND = 1.0  # seconds by which a clock is so far behind that its vehicle does not wait for this one
+APPROACH = 1.0  # seconds in which a creeping driver would drive what the order leaves it
+STILL = 0.1  # m/s below which the ego is seen to stand
 ENTRY = 3.0  # metres ahead of and behind its place that the ego must leave free for one who comes onto the scene
 
 
 class Now(NamedTuple):
-    """All vehicles at the begin of a step.
+    """All vehicles at the begin of a step, and what their drivers expect.
 
     Attributes:
-        clock: (N,) s.
-        rate: (N,) of the clocks.
+        drivers: (N, 4) clock [s], its rate, acceleration [m/s²] and patience spent [s], as in `State`.
         pose: (N, 5) x, y [m], yaw [rad], certified speed [m/s] and acceleration [m/s²] there.
         goes: (N,) whose clock runs.
         here: (N,) who is on the scene.
+        seen: (K, 9) the ego as in `State.seen`, at the end of the step and before.
+        delay: (N,) reaction time of each driver in steps.
+        ahead: (N, M, 8) the ego as each driver expects it, as in `Foreseen`.
+        coming: (N, M) clocks of all, as in `Foreseen`.
     """
 
-    clock: Floats
-    rate: Floats
+    drivers: Floats
     pose: Floats
     goes: Bools
     here: Bools
+    seen: Floats
+    delay: Ints
+    ahead: Floats
+    coming: Floats
 
 
 @kernel(inline=True)
-def react(
-    world: World,
-    manner: Manner,
-    seen: Floats,
-    delay: Ints,
-    clock: Floats,
-    rate: Floats,
-    new_clock: Floats,
-    new_rate: Floats,
-    forced: Floats,
-) -> None:
-    """Write clocks and rates of all vehicles one step later; those of the ego stay as they are.
+def react(world: World, manner: Manner, seen: Floats, delay: Ints, drivers: Floats, after: Floats) -> None:
+    """Write what becomes of all drivers in a step; the row of the ego is left to the caller.
 
     Args:
         world: the scenario and the step.
         manner: how they drive.
         seen: (K, 9) the ego as in `State.seen`, at the end of this step and before.
         delay: (N,) reaction time of each driver in steps.
-        clock: (N,) seconds.
-        rate: (N,) rates of the clocks.
-        new_clock: (N,) likewise, one step later.
-        new_rate: (N,) likewise.
-        forced: (N,) above 0 where the order stopped a vehicle at once.
+        drivers: (N, 4) as in `Now`.
+        after: (N, 5) clock, rate, acceleration that the driver wanted, patience spent, and 1 where the order held it back.
     """
-    n, h, ego = clock.shape[0], world.step, world.ego
-    steps = int(np.ceil(FORESEEN / h))
-    now = Now(clock, rate, np.empty((n, 5)), np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_))
-    for i in range(n):
-        now.goes[i] = not (world.leaves[i] and clock[i] >= world.spans[i, 1])
-        now.here[i] = now.goes[i] and clock[i] >= world.spans[i, 0]
-        new_clock[i], new_rate[i], forced[i] = clock[i], rate[i], 0.0
-        pose_at(world.time, world.motion[i], clock[i], now.pose[i])
-    level, ahead, coming = np.zeros(n), np.empty((n, steps + 1, 8)), np.empty((n, steps + 1))
-    _regard_ego(world, manner, now, seen, delay, ahead, coming, level, new_rate)
+    n = drivers.shape[0]
+    now = _begin(world, drivers, seen, delay)
+    level, rate = np.full(n, FREE), drivers[:, 1].copy()
+    _regard_ego(world, manner, now, level, rate, after)
     if n > 2:
-        _foresee_others(h, now, new_rate, coming)
         for i in range(n):
-            if i != ego and now.here[i]:
-                ago = min(delay[i], seen.shape[0] - 1)
-                foreseen = _expected(seen[ago], ago, h, ahead[i], coming)
-                new_rate[i] = _regard_others(world, manner, now, i, level[i], foreseen, new_rate[i])
+            if i != world.ego and now.goes[i]:
+                foresee_self(world, manner, _me(now, i), level[i], now.coming[i])
+        for i in range(n):
+            if i != world.ego and now.here[i]:
+                rate[i] = _regard_others(world, manner, now, i, level[i], rate[i], after[i, 3])
+    _move(world, now, rate, after)
+
+
+@kernel(inline=True)
+def _begin(world: World, drivers: Floats, seen: Floats, delay: Ints) -> Now:
+    """Where everyone is."""
+    n, steps = drivers.shape[0], int(np.ceil(FORESEEN / world.step))
+    pose, goes, here = np.empty((n, 5)), np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
     for i in range(n):
-        if i != ego and now.goes[i]:
-            new_clock[i] = clock[i] + 0.5 * (rate[i] + new_rate[i]) * h
-            if not now.here[i] and new_rate[i] == 0.0:
-                new_clock[i] = clock[i]
-    keep_order(world, now.goes, clock, rate, new_clock, new_rate, forced)
-    for i in range(n):
-        if i != ego and now.goes[i]:
-            new_clock[i] = min(new_clock[i], world.time[-1])
+        clock = drivers[i, 0]
+        goes[i] = not (world.leaves[i] and clock >= world.spans[i, 1])
+        here[i] = goes[i] and clock >= world.spans[i, 0]
+        pose_at(world.time, world.motion[i], clock, pose[i])
+    coming = np.empty((n, steps + 1))
+    for m in range(steps + 1):
+        coming[:, m] = drivers[:, 0] + m * world.step  # of those who have left
+    return Now(drivers, pose, goes, here, seen, delay, np.empty((n, steps + 1, 8)), coming)
+
+
+@kernel(inline=True)
+def _me(now: Now, i: int) -> Self:
+    return Self(i, now.drivers[i, 0], now.drivers[i, 1], now.drivers[i, 2])
 
 
 @kernel(inline=True)
@@ -113,69 +116,96 @@ def _come(world: World, seen: Floats, clock: float, rate: float, i: int) -> floa
 
 
 @kernel(inline=True)
-def _expected(seen: Floats, ago: int, h: float, ahead: Floats, coming: Floats) -> Foreseen:
-    """What a driver expects who sees the ego as it was `ago` steps ago, which is `seen` (9,)."""
-    rate = seen[7] if seen[8] > 0.0 else -1.0
-    return Foreseen(ahead, seen[6] + seen[7] * ago * h, rate, coming)
+def _expected(world: World, now: Now, i: int, spent: float) -> Foreseen:
+    """What driver i expects; it does not wait for the ego where the template did if its patience is spent for good."""
+    ago = min(now.delay[i], now.seen.shape[0] - 1)
+    ego = now.seen[ago]
+    rate = ego[7] if ego[8] > 0.0 and spent < np.inf else -1.0
+    return Foreseen(now.ahead[i], ego[6] + ego[7] * ago * world.step, rate, now.coming)
 
 
 @kernel(inline=True)
-def _regard_ego(
-    world: World,
-    manner: Manner,
-    now: Now,
-    seen: Floats,
-    delay: Ints,
-    ahead: Floats,
-    coming: Floats,
-    level: Floats,
-    new_rate: Floats,
-) -> None:
-    """Write what each driver expects of the ego into `ahead` (N, M, 8), its braking for it [m/s²], and its rate after the step."""
+def _spent(world: World, manner: Manner, now: Now, i: int) -> float:
+    """Patience [s] that driver i has spent waiting for an ego that stands; infinity once it goes before the ego.
+
+    That it does when its patience is over and its path is free of the ego, whom it sees where it expects it to be now.
+    """
+    spent, u, ego = now.drivers[i, 3], now.drivers[i, 1] * now.pose[i, 3], now.ahead[i, 0]
+    if spent == np.inf:
+        return spent
+    if u > CREEP or now.drivers[i, 1] >= 1.0 or now.pose[i, 3] < STAND or ego[7] > STILL:
+        return 0.0
+    spent += world.step
+    _, at = gap_ahead(world, i, now.drivers[i, 0], ego[:7], now.pose[i])
+    return np.inf if spent >= manner.patience and at < 0 else spent
+
+
+@kernel(inline=True)
+def _regard_ego(world: World, manner: Manner, now: Now, level: Floats, rate: Floats, after: Floats) -> None:
+    """Write each driver's braking with regard to the ego alone [m/s²], its rate after the step, and its patience spent."""
     last = -1
     for i in range(level.shape[0]):
+        after[i, 3] = now.drivers[i, 3]
         if i == world.ego or not now.goes[i]:
             continue
         if not now.here[i]:
-            new_rate[i] = _come(world, seen[0], now.clock[i], now.rate[i], i)
+            rate[i] = _come(world, now.seen[0], now.drivers[i, 0], rate[i], i)
             continue
-        ago = min(delay[i], seen.shape[0] - 1)
-        if last >= 0 and delay[last] == delay[i]:
-            ahead[i] = ahead[last]
+        ago, me, ahead = min(now.delay[i], now.seen.shape[0] - 1), _me(now, i), now.ahead[i]
+        if last >= 0 and now.delay[last] == now.delay[i]:
+            now.ahead[i] = now.ahead[last]
         else:
-            foresee_ego(world, seen[ago], ago, ahead[i])
+            foresee_ego(world, now.seen[ago], ago, ahead)
         last = i
-        foreseen = _expected(seen[ago], ago, world.step, ahead[i], coming)
-        v, a, box = now.pose[i, 3], now.pose[i, 4], ahead[i, 0]
-        least = minded(world, manner, i, world.ego, now.clock[i], now.rate[i] * v, now.pose[i], box[:7], box[7], world.step)
-        level[i] = weakest(world, manner, i, now.clock, now.rate, least, foreseen, False)
-        new_rate[i] = rate_after(now.rate[i], v, a, level[i], manner.acceleration, world.step)
+        after[i, 3] = _spent(world, manner, now, i)
+        v, a = now.pose[i, 3], now.pose[i, 4]
+        least = minded(world, manner, i, world.ego, me.clock, me.rate * v, now.pose[i], ahead[0, :7], ahead[0, 7], world.step)
+        level[i] = weakest(world, manner, me, least, _expected(world, now, i, after[i, 3]), False)
+        rate[i] = rate_after(manner, me.rate, v, a, me.was, level[i], 0.0, world.step)
 
 
 @kernel(inline=True)
-def _foresee_others(h: float, now: Now, new_rate: Floats, coming: Floats) -> None:
-    """Fill `coming` (N, M) with everyone's clocks if their rates go on changing as with regard to the ego alone."""
-    for i in range(coming.shape[0]):
-        r, change = now.rate[i], new_rate[i] - now.rate[i]
-        coming[i, 0] = now.clock[i]
-        for m in range(1, coming.shape[1]):
-            after = min(max(now.rate[i] + change * m, 0.0), 1.0) if now.goes[i] else 1.0
-            coming[i, m] = coming[i, m - 1] + 0.5 * (r + after) * h
-            r = after
-
-
-@kernel(inline=True)
-def _regard_others(world: World, manner: Manner, now: Now, i: int, level: float, foreseen: Foreseen, rate: float) -> float:
+def _regard_others(world: World, manner: Manner, now: Now, i: int, level: float, rate: float, spent: float) -> float:
     """Rate of driver i after the step with regard to the others, too; `rate` is that with its braking for the ego, `level`."""
-    v, a, u, box, least = now.pose[i, 3], now.pose[i, 4], now.rate[i] * now.pose[i, 3], np.empty(7), level
-    for j in range(now.clock.shape[0]):
-        if j not in (i, world.ego) and now.here[j] and now.clock[j] < now.clock[i]:
-            other = now.pose[j]
+    me, v, a, box, least = _me(now, i), now.pose[i, 3], now.pose[i, 4], np.empty(7), level
+    for j in range(now.pose.shape[0]):
+        if j not in (i, world.ego) and now.here[j] and now.drivers[j, 0] < me.clock:
+            other, speed = now.pose[j], now.drivers[j, 1] * now.pose[j, 3]
             fill_box(other[0], other[1], other[2], world.half[j, 0], world.half[j, 1], box)
-            braking = minded(world, manner, i, j, now.clock[i], u, now.pose[i], box, now.rate[j] * other[3], 0.0)
-            least = max(least, braking)
-    least = weakest(world, manner, i, now.clock, now.rate, least, foreseen, True)
+            least = max(least, minded(world, manner, i, j, me.clock, me.rate * v, now.pose[i], box, speed, 0.0))
+    least = weakest(world, manner, me, least, _expected(world, now, i, spent), True)
     if least <= level:
         return rate
-    slower = rate_after(now.rate[i], v, a, least, manner.acceleration, world.step)
-    return min(rate, max(slower, min(CREEP / v, 1.0) if v > CREEP else 1.0))
+    return min(rate, rate_after(manner, me.rate, v, a, me.was, least, _creep(world, now, i), world.step))
+
+
+@kernel(inline=True)
+def _creep(world: World, now: Now, i: int) -> float:
+    """Speed [m/s] to which driver i brakes for the order at most.
+
+    It creeps, so that nobody waits for one who waits for it. For one whose clock is far behind, who cannot be waiting for it, it
+    comes to a stand where the order ends its way.
+    """
+    clock, speed = now.drivers[i, 0], CREEP
+    for j in range(now.pose.shape[0]):
+        if j not in (i, world.ego) and now.goes[j] and now.drivers[j, 0] < clock - BEHIND:
+            room = limit(world.order[i, j], world.cell, now.drivers[j, 0]) - clock
+            speed = min(speed, max(room * now.pose[i, 3] / APPROACH, 0.0))
+    return speed if speed > STAND else 0.0
+
+
+@kernel(inline=True)
+def _move(world: World, now: Now, rate: Floats, after: Floats) -> None:
+    """Move the clocks as the drivers want, as far as the order lets them."""
+    n, h, drivers = rate.shape[0], world.step, now.drivers
+    clock, before, forced = drivers[:, 0].copy(), drivers[:, 1].copy(), np.zeros(n)
+    new_clock, new_rate = clock.copy(), rate.copy()
+    for i in range(n):
+        if i != world.ego and now.goes[i] and (now.here[i] or rate[i] > 0.0):
+            new_clock[i] = clock[i] + 0.5 * (before[i] + rate[i]) * h
+    keep_order(world, now.goes, clock, before, new_clock, new_rate, forced)
+    for i in range(n):
+        end = max(now.pose[i, 3] + before[i] * now.pose[i, 4] * h, 0.0)
+        after[i, 0] = min(new_clock[i], world.time[-1]) if now.goes[i] else new_clock[i]
+        after[i, 1], after[i, 2] = new_rate[i], (rate[i] * end - before[i] * now.pose[i, 3]) / h
+        after[i, 4] = 1.0 if new_rate[i] < rate[i] or forced[i] > 0.0 else 0.0

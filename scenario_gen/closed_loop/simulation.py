@@ -36,9 +36,12 @@ class State:
         here: (N,) whether each is on the scene.
         clock: (N,) certified time [s] at which each one is where it is now; for the ego, on its witness' path.
         rate: (N,) how fast the clocks run; 1 is the certified speed.
+        acceleration: (N,) of the others [m/s²], as their drivers want it.
+        waited: (N,) patience that each driver has spent waiting for an ego that stands [s]; infinity once it goes before the ego.
         seen: (K, 9) the ego now and before, newest first, as far back as the slowest driver's reaction time: `EgoState`, its
             clock on its witness' path [s], the rate of that clock, and 1 if it is on that path.
-        forced: how many times one of the others has braked harder than the strongest braking so far, to keep the order.
+        forced: how many times so far one of the others has braked harder than the strongest braking, or more suddenly than the
+            jerk allows, to keep the order.
         fault: what was wrong with the last command, "" if nothing.
     """
 
@@ -49,6 +52,8 @@ class State:
     here: Bools
     clock: Floats
     rate: Floats
+    acceleration: Floats
+    waited: Floats
     seen: Floats
     forced: int = 0
     fault: str = ""
@@ -116,7 +121,7 @@ class Drive:
         here: (N, T) whether each was on the scene.
         clock: (N, T) as in `State`.
         accelerations: (T,) the ego's own [m/s²].
-        forced: how many times one of the others braked harder than the strongest braking, to keep the order.
+        forced: how many times one of the others braked harder or more suddenly than drivers do, to keep the order.
         faults: what was wrong with commands, by step.
     """
 
@@ -169,6 +174,8 @@ class ClosedLoop:
                 config.acceleration,
                 config.comfortable_braking,
                 config.strongest_braking,
+                config.jerk,
+                config.patience,
                 float(config.yield_to_ego == TEMPLATE),
                 float(config.policy == REACTIVE),
             )
@@ -221,7 +228,7 @@ class ClosedLoop:
         here = (known.spans[:, 0] <= self.begin) & ~(known.leaves & (known.spans[:, 1] <= self.begin))
         ego = EgoState(*vehicles[self.ego].tolist())
         seen = np.array([(*ego, self.begin, 1.0, 1.0)])  # before that it drove as its witness
-        return State(0, 0.0, ego, vehicles, here, np.full(n, self.begin), np.ones(n), seen)
+        return State(0, 0.0, ego, vehicles, here, np.full(n, self.begin), np.ones(n), np.zeros(n), np.zeros(n), seen)
 
     def step(self, state: State, asked: Command | Pose | None, note: str = "") -> State:
         """Return the next instant; `state` stays what it was. `note` says what else was wrong with what was asked."""
@@ -231,8 +238,7 @@ class ClosedLoop:
         number = state.step + 1
         time = number * config.step
         now = self.begin + time
-        before, after = np.empty((n, 2)), np.empty((n, 3))
-        before[:, 0], before[:, 1] = state.clock, state.rate
+        before, after = np.stack([state.clock, state.rate, state.acceleration, state.waited], axis=1), np.empty((n, 5))
         seen = np.concatenate([[(*ego, 0.0, 0.0, 0.0)], state.seen[: self._delays.max()]])
         vehicles, here = np.empty((n, 4)), np.empty(n, dtype=np.bool_)
         advance(
@@ -255,9 +261,9 @@ class ClosedLoop:
             vehicles,
             here,
         )
-        clock, rate, forced = after.T
+        clock, rate, acceleration, waited, forced = after.T
         count = state.forced + int(np.count_nonzero(forced))
-        return State(number, time, ego, vehicles, here, clock, rate, seen, count, note or moved.fault)
+        return State(number, time, ego, vehicles, here, clock, rate, acceleration, waited, seen, count, note or moved.fault)
 
     def observe(self, state: State) -> Observation:
         """Return what a planner sees."""

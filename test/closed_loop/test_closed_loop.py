@@ -67,7 +67,7 @@ def test_with_the_witness_as_ego_everyone_drives_as_certified(seed, policy):
 @given(st.floats(2.0, 20.0), st.floats(0.0, 9.0), st.floats(0.02, 40.0), st.sampled_from([0.05, 0.1]))
 def test_a_follower_stops_for_the_ego_where_braking_at_the_limit_suffices(speed, braking, spare, step):
     """The ego ahead brakes to a stand; the gap holds what the follower needs, less what the ego still drives, and 2 cm more."""
-    config = ClosedLoopConfig(step=step, reaction=0.0)
+    config = ClosedLoopConfig(step=step, reaction=0.0, jerk=1e6)
     strongest = config.strongest_braking
     need = 0.5 * speed**2 / strongest - (0.5 * speed**2 / braking if braking > 0.1 else 0.5 * speed**2 / 0.1)
     gap = max(need, 0.0) + spare
