@@ -39,7 +39,7 @@ class ClosedLoopConfig(Parameters):
     comfortable_braking: float = parameter(3.0, "with which they slow down where that suffices", unit="m/s²", low=0.1, high=10.0)
     strongest_braking: float = parameter(8.0, "with which they brake at most for the ego", unit="m/s²", low=0.5, high=12.0)
     jerk: float = parameter(
-        10.0, "by which they change their acceleration at most, unless the order forces them", unit="m/s³", low=1.0, high=1e6
+        9.8, "by which they change their acceleration at most, unless the order forces them", unit="m/s³", low=1.0, high=1e6
     )
     patience: float = parameter(
         5.0, "after which who waits for an ego that stands goes first where its way is free", unit="s", low=0.0, high=1e6

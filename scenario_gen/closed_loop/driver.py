@@ -12,6 +12,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import kernel
 
 AHEAD = 60.0  # metres of its path that it looks along for who is ahead
+HALVINGS = 4  # of a cell in which a vehicle meets what is ahead
 FREE = -1e3  # m/s²; a braking that does not hinder at all
 STAND = 0.02  # m/s, certified speed of a stand, which passes whatever there is
 NEARER = 0.1  # metres by which a gap must be smaller than the certified one to be minded
@@ -64,7 +65,8 @@ def rate_after(manner: Manner, r: float, v: float, a: float, was: float, braking
         on = min(max((u + gain * h) / end, 0.0), 1.0)
     if braking <= FREE:
         return on
-    least = max(-min(braking, _eased(u - floor, jerk, h)), was - jerk * h) if u > floor or braking <= 0.0 else 0.0
+    wanted = -min(braking, _eased(u - floor, jerk, h)) if u > floor or braking <= 0.0 else 0.0
+    least = max(wanted, was - jerk * h)
     return min(max(u + least * h, floor) / end, on)
 
 
@@ -86,7 +88,19 @@ def gap_ahead(world: World, i: int, clock: float, box: Floats, here: Floats) -> 
             c, s = cells[first, 2], cells[first, 3]
             if (box[0] - here[0]) * c + (box[1] - here[1]) * s <= 0.0:
                 break
-            return float(max(cells[k, 7] - start, 0.0)), k
+            low, high = max(k * cell, clock), (k + 1) * cell
+            pose, mine = np.empty(5), np.empty(7)
+            for _ in range(HALVINGS):  # where in the cell, so that the gap does not change by leaps
+                middle = 0.5 * (low + high)
+                pose_at(world.time, world.motion[i], middle, pose)
+                fill_box(pose[0], pose[1], pose[2], world.half[i, 0], world.half[i, 1], mine)
+                if boxes_meet(mine, box):
+                    high = middle
+                else:
+                    low = middle
+            end = cells[k + 1, 7] if k + 1 < count else cells[k, 7]
+            way = cells[k, 7] + (end - cells[k, 7]) * (high / cell - k)
+            return float(max(way - start, 0.0)), k
     return np.inf, -1
 
 

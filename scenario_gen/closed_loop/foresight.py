@@ -10,7 +10,7 @@ import numpy as np
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
 from scenario_gen.closed_loop.driver import FREE, Manner, rate_after
 from scenario_gen.closed_loop.order import limit
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import exact, Floats
 from scenario_gen.numerics.kernels import kernel
 
 SLOW = 0.2  # m/s; a certified speed below it counts as this one where it divides
@@ -25,7 +25,7 @@ class Foreseen(NamedTuple):
     """What one driver, or all, expect of the steps to come.
 
     Attributes:
-        ego: (M, 8) the ego's box (7,) at the end of this step and of the following ones, and its speed [m/s].
+        ego: (M, 4) the ego's x, y [m], yaw [rad], speed [m/s] at the end of this step and of the following ones.
         clock: of the ego on its witness' path at the end of this step [s].
         rate: of that clock; negative if the ego is not on that path.
         coming: (N, M) clocks of the others at the step's begin and at the end of each [s].
@@ -39,7 +39,7 @@ class Foreseen(NamedTuple):
 
 @kernel(inline=True)
 def foresee_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
-    """Fill `out` (M, 8) with the ego's boxes and speeds at the end of this step and of the following ones.
+    """Fill `out` (M, 4) with the ego's x, y, yaw and speed at the end of this step and of the following ones.
 
     On its witness' path it goes on as the witness did, at its own rate; else straight on. If it brakes, on that path harder than
     the witness, it goes on braking.
@@ -48,12 +48,10 @@ def foresee_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
         world: the scenario.
         seen: (9,) the ego as in `State.seen`.
         ago: how many steps ago that was.
-        out: (M, 8).
+        out: (M, 4).
     """
-    h, time, motion, half = world.step, world.time, world.motion[world.ego], world.half[world.ego]
-    pose = np.empty(5)
-    c, s = np.empty(7), seen[3]
-    fill_box(seen[0], seen[1], seen[2], half[0], half[1], c)
+    h, time, motion, pose, s = world.step, world.time, world.motion[world.ego], np.empty(5), seen[3]
+    cos, sin = exact.cos(seen[2]), exact.sin(seen[2])
     usual = 0.0  # the witness' own braking there, in the step that is over and after it
     for back in range(3):
         pose_at(time, motion, seen[6] - (1.0 - 0.5 * back) * h * seen[7], pose)
@@ -62,7 +60,7 @@ def foresee_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
     keeps = on_path and seen[5] > seen[7] * seen[7] * usual - HARDER
     braking, way, clock = max(-seen[5], 0.0), 0.0, seen[6]
     if ago == 0:
-        out[0, :7], out[0, 7] = c, s
+        out[0] = seen[:4]
     for m in range(1 - ago, out.shape[0]):
         after = max(s - braking * h, 0.0)
         moved = 0.5 * (s + after) * h if after > 0.0 or braking == 0.0 else 0.5 * s * s / braking
@@ -74,11 +72,9 @@ def foresee_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
         if m < 0:
             continue
         if on_path:
-            fill_box(pose[0], pose[1], pose[2], half[0], half[1], out[m])
-            out[m, 7] = seen[7] * pose[3] if keeps else s
+            out[m, :3], out[m, 3] = pose[:3], seen[7] * pose[3] if keeps else s
         else:
-            out[m, :7], out[m, 7] = c, s
-            out[m, 0], out[m, 1] = seen[0] + way * c[2], seen[1] + way * c[3]
+            out[m, 0], out[m, 1], out[m, 2], out[m, 3] = seen[0] + way * cos, seen[1] + way * sin, seen[2], s
 
 
 class Self(NamedTuple):
@@ -125,9 +121,12 @@ def weakest(world: World, manner: Manner, me: Self, least: float, foreseen: Fore
 def _clear(world: World, manner: Manner, me: Self, braking: float, foreseen: Foreseen, others: bool) -> bool:
     """Whether a driver, braking so, stays clear of the ego ahead of it, and keeps to what the order is foreseen to let it do."""
     h, time, motion, cell, order = world.step, world.time, world.motion[me.i], world.cell, world.order[me.i]
-    pose, box = np.empty(5), np.empty(7)
+    pose, mine, ego, half = np.empty(5), np.empty(7), np.empty(7), world.half
     t, r, was = me.clock, me.rate, me.was
-    spare = SPARE if braking > FREE else 0.0
+    length, width = half[me.i, 0], half[me.i, 1]
+    if braking > FREE:
+        length, width = length + SPARE, width + SPARE
+    reach = np.sqrt(length**2 + width**2) + np.sqrt(half[world.ego, 0] ** 2 + half[world.ego, 1] ** 2)
     pose_at(time, motion, t, pose)
     for m in range(foreseen.ego.shape[0] - 1):
         u = r * pose[3]
@@ -136,10 +135,13 @@ def _clear(world: World, manner: Manner, me: Self, braking: float, foreseen: For
         r = after
         pose_at(time, motion, t, pose)
         was = (r * pose[3] - u) / h
-        fill_box(pose[0], pose[1], pose[2], world.half[me.i, 0] + spare, world.half[me.i, 1] + spare, box)
-        ego = foreseen.ego[m]
-        if boxes_meet(box, ego) and (ego[0] - box[0]) * box[2] + (ego[1] - box[1]) * box[3] > 0.0:
-            return False
+        there = foreseen.ego[m]
+        dx, dy = there[0] - pose[0], there[1] - pose[1]
+        if dx * dx + dy * dy < reach * reach:
+            fill_box(pose[0], pose[1], pose[2], length, width, mine)
+            fill_box(there[0], there[1], there[2], half[world.ego, 0], half[world.ego, 1], ego)
+            if dx * mine[2] + dy * mine[3] > 0.0 and boxes_meet(mine, ego):
+                return False
         passed = foreseen.clock + foreseen.rate * m * h
         if manner.yields and foreseen.rate >= 0.0 and t > limit(order[world.ego], cell, passed) + LATE:
             return False

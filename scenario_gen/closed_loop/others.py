@@ -26,7 +26,7 @@ from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
 CREEP = 0.5  # m/s; the foresight lets everyone creep, so that nobody waits for one who waits for it; who is slower waits
-BEHIND = 1.0  # seconds by which a clock is so far behind that its vehicle does not wait for this one
+BEHIND = 1.0  # seconds that the order must leave to one so that it does not wait for another
 APPROACH = 1.0  # seconds in which a creeping driver would drive what the order leaves it
 STILL = 0.1  # m/s below which the ego is seen to stand
 ENTRY = 3.0  # metres ahead of and behind its place that the ego must leave free for one who comes onto the scene
@@ -42,7 +42,7 @@ class Now(NamedTuple):
         here: (N,) who is on the scene.
         seen: (K, 9) the ego as in `State.seen`, at the end of the step and before.
         delay: (N,) reaction time of each driver in steps.
-        ahead: (N, M, 8) the ego as each driver expects it, as in `Foreseen`.
+        ahead: (N, M, 4) the ego as each driver expects it, as in `Foreseen`.
         coming: (N, M) clocks of all, as in `Foreseen`.
     """
 
@@ -95,7 +95,7 @@ def _begin(world: World, drivers: Floats, seen: Floats, delay: Ints) -> Now:
     coming = np.empty((n, steps + 1))
     for m in range(steps + 1):
         coming[:, m] = drivers[:, 0] + m * world.step  # of those who have left
-    return Now(drivers, pose, goes, here, seen, delay, np.empty((n, steps + 1, 8)), coming)
+    return Now(drivers, pose, goes, here, seen, delay, np.empty((n, steps + 1, 4)), coming)
 
 
 @kernel(inline=True)
@@ -108,11 +108,17 @@ def _come(world: World, seen: Floats, clock: float, rate: float, i: int) -> floa
     """Rate of one who is not on the scene yet: it comes when it is due, unless the ego is in its place."""
     if clock + 0.5 * (rate + 1.0) * world.step < world.spans[i, 0]:
         return 1.0
-    pose, place, box, half = np.empty(5), np.empty(7), np.empty(7), world.half
+    pose, place, box, half = np.empty(5), np.empty(7), np.empty(7), world.half[i]
     pose_at(world.time, world.motion[i], world.spans[i, 0], pose)
-    fill_box(pose[0], pose[1], pose[2], half[i, 0] + ENTRY, half[i, 1], place)
-    fill_box(seen[0], seen[1], seen[2], half[world.ego, 0], half[world.ego, 1], box)
+    fill_box(pose[0], pose[1], pose[2], half[0] + ENTRY, half[1], place)
+    _fill_ego(world, seen, box)
     return 0.0 if boxes_meet(place, box) else 1.0
+
+
+@kernel(inline=True)
+def _fill_ego(world: World, pose: Floats, out: Floats) -> None:
+    """Write the box (7,) of the ego at a pose (x, y, yaw, …)."""
+    fill_box(pose[0], pose[1], pose[2], world.half[world.ego, 0], world.half[world.ego, 1], out)
 
 
 @kernel(inline=True)
@@ -130,20 +136,22 @@ def _spent(world: World, manner: Manner, now: Now, i: int) -> float:
 
     That it does when its patience is over and its path is free of the ego, whom it sees where it expects it to be now.
     """
-    spent, u, ego = now.drivers[i, 3], now.drivers[i, 1] * now.pose[i, 3], now.ahead[i, 0]
+    spent: float = now.drivers[i, 3]
+    u, box = now.drivers[i, 1] * now.pose[i, 3], np.empty(7)
     if spent == np.inf:
         return spent
-    if u > CREEP or now.drivers[i, 1] >= 1.0 or now.pose[i, 3] < STAND or ego[7] > STILL:
+    if u > CREEP or now.drivers[i, 1] >= 1.0 or now.pose[i, 3] < STAND or now.ahead[i, 0, 3] > STILL:
         return 0.0
     spent += world.step
-    _, at = gap_ahead(world, i, now.drivers[i, 0], ego[:7], now.pose[i])
+    _fill_ego(world, now.ahead[i, 0], box)
+    _, at = gap_ahead(world, i, now.drivers[i, 0], box, now.pose[i])
     return np.inf if spent >= manner.patience and at < 0 else spent
 
 
 @kernel(inline=True)
 def _regard_ego(world: World, manner: Manner, now: Now, level: Floats, rate: Floats, after: Floats) -> None:
     """Write each driver's braking with regard to the ego alone [m/s²], its rate after the step, and its patience spent."""
-    last = -1
+    last, box = -1, np.empty(7)
     for i in range(level.shape[0]):
         after[i, 3] = now.drivers[i, 3]
         if i == world.ego or not now.goes[i]:
@@ -159,7 +167,8 @@ def _regard_ego(world: World, manner: Manner, now: Now, level: Floats, rate: Flo
         last = i
         after[i, 3] = _spent(world, manner, now, i)
         v, a = now.pose[i, 3], now.pose[i, 4]
-        least = minded(world, manner, i, world.ego, me.clock, me.rate * v, now.pose[i], ahead[0, :7], ahead[0, 7], world.step)
+        _fill_ego(world, ahead[0], box)
+        least = minded(world, manner, i, world.ego, me.clock, me.rate * v, now.pose[i], box, ahead[0, 3], world.step)
         level[i] = weakest(world, manner, me, least, _expected(world, now, i, after[i, 3]), False)
         rate[i] = rate_after(manner, me.rate, v, a, me.was, level[i], 0.0, world.step)
 
@@ -183,13 +192,16 @@ def _regard_others(world: World, manner: Manner, now: Now, i: int, level: float,
 def _creep(world: World, now: Now, i: int) -> float:
     """Speed [m/s] to which driver i brakes for the order at most.
 
-    It creeps, so that nobody waits for one who waits for it. For one whose clock is far behind, who cannot be waiting for it, it
-    comes to a stand where the order ends its way.
+    It creeps, so that nobody waits for one who waits for it. For one whose clock is behind and who does not wait for it, it comes
+    to a stand where the order ends its way. The one with the earliest clock creeps in any case.
     """
     clock, speed = now.drivers[i, 0], CREEP
     for j in range(now.pose.shape[0]):
-        if j not in (i, world.ego) and now.goes[j] and now.drivers[j, 0] < clock - BEHIND:
-            room = limit(world.order[i, j], world.cell, now.drivers[j, 0]) - clock
+        other = now.drivers[j, 0]
+        if j in (i, world.ego) or not now.goes[j] or other >= clock:
+            continue
+        if limit(world.order[j, i], world.cell, clock) > other + BEHIND:
+            room = limit(world.order[i, j], world.cell, other) - clock
             speed = min(speed, max(room * now.pose[i, 3] / APPROACH, 0.0))
     return speed if speed > STAND else 0.0
 

@@ -185,6 +185,7 @@ class ClosedLoop:
             [reaction_time(scenario, vehicle.id, config.reaction * reactive) for vehicle in scenario.vehicles]
         )
         self._delays = np.round(self.reactions / config.step).astype(np.int64)
+        self._slowest = int(self._delays.max())
         self._sizes = 2.0 * self.certified.half
         self._ids = tuple(vehicle.id for vehicle in scenario.vehicles)
         self._others = np.arange(len(self._ids)) != self.certified.ego
@@ -238,8 +239,10 @@ class ClosedLoop:
         number = state.step + 1
         time = number * config.step
         now = self.begin + time
-        before, after = np.stack([state.clock, state.rate, state.acceleration, state.waited], axis=1), np.empty((n, 5))
-        seen = np.concatenate([[(*ego, 0.0, 0.0, 0.0)], state.seen[: self._delays.max()]])
+        before, after = np.empty((n, 4)), np.empty((n, 5))
+        before[:, 0], before[:, 1], before[:, 2], before[:, 3] = state.clock, state.rate, state.acceleration, state.waited
+        seen = np.empty((min(len(state.seen), self._slowest) + 1, 9))
+        seen[0, :6], seen[1:] = ego, state.seen[: len(seen) - 1]
         vehicles, here = np.empty((n, 4)), np.empty(n, dtype=np.bool_)
         advance(
             config.step,
