@@ -66,8 +66,9 @@ def rate_after(manner: Manner, r: float, v: float, a: float, was: float, braking
     if braking <= FREE:
         return on
     wanted = -min(braking, _eased(u - floor, jerk, h)) if u > floor or braking <= 0.0 else 0.0
-    least = max(wanted, was - jerk * h)
-    return min(max(u + least * h, floor) / end, on)
+    least = max(u + max(wanted, was - jerk * h) * h, floor)
+    first = min(least / end, on)
+    return min(least / max(v + 0.5 * (r + first) * a * h, STAND), on)
 
 
 @kernel(inline=True)

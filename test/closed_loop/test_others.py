@@ -12,6 +12,7 @@ from lengths import LONG
 import numpy as np
 import pytest
 
+from benchmarks._drive_others import braking_jerks
 from benchmarks._driving_worlds import Anything, draw_scenario, Witness
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
@@ -118,6 +119,18 @@ def test_acceleration_changes_by_the_jerk_at_most_unless_the_order_forces_it(see
     forced = np.diff([state.forced for state in drive]) > 0
     free = stays & ~(forced[1:] | forced[:-1])[:, None]
     assert np.abs(change[free]).max() <= (jerk * step * step + 0.051) / step
+
+
+def test_braking_is_as_sudden_as_that_of_recorded_drivers_whatever_the_ego_does():
+    """99 of 100 steps in which somebody brakes, those that the order forced among them, in drawn scenarios."""
+    found = []
+    for seed in range(10_000 if LONG else 100):
+        scenario = draw_scenario(seed)
+        loop = ClosedLoop(scenario, seed % len(scenario.vehicles))
+        drive = loop.drive(Anything(seed), lambda state, last=len(scenario.time) // 2: state.step >= last)
+        found.append(braking_jerks(scenario, drive))
+    jerk = np.concatenate(found)
+    assert len(jerk) > 500 and np.percentile(jerk, 99) <= 10.0
 
 
 @settings(max_examples=EXAMPLES)
