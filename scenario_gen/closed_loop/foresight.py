@@ -95,17 +95,12 @@ def weakest(world: World, manner: Manner, me: Self, least: float, foreseen: Fore
     if _clear(world, manner, me, least, foreseen, others):
         return least
     low = max(least, -manner.acceleration)
-    for k in range(5):
-        high = (
-            0.0,
-            0.5 * manner.comfortable,
-            manner.comfortable,
-            0.5 * (manner.comfortable + manner.strongest),
-            manner.strongest,
-        )[k]
-        if high <= low:
+    comfortable, strongest = manner.comfortable, manner.strongest
+    for tried in (0.0, 0.5 * comfortable, comfortable, 0.5 * (comfortable + strongest), strongest):
+        if tried <= low:
             continue
-        if _clear(world, manner, me, high, foreseen, others):
+        if _clear(world, manner, me, tried, foreseen, others):
+            high = tried
             for _ in range(HALVINGS):
                 middle = 0.5 * (low + high)
                 if _clear(world, manner, me, middle, foreseen, others):
@@ -113,8 +108,8 @@ def weakest(world: World, manner: Manner, me: Self, least: float, foreseen: Fore
                 else:
                     low = middle
             return high
-        low = high
-    return max(manner.strongest, least)
+        low = tried
+    return max(strongest, least)
 
 
 @kernel(inline=True)
