@@ -121,7 +121,7 @@ def _idm(gap: float, u: float, ahead: float, manner: Manner) -> float:
 def minded(
     world: World, manner: Manner, i: int, j: int, clock: float, u: float, pose: Floats, box: Floats, speed: float, later: float
 ) -> float:
-    """Braking [m/s²] of vehicle i, at speed u [m/s], for j, whose box and speed are given, if it is on its path.
+    """Braking [m/s²] of vehicle i, at speed u [m/s], for j, whose box (7,) and speed [m/s] are given, if it is on its path.
 
     FREE if j is no nearer than in the certified execution at the same clock; `later` [s] than that of i is what is given of j.
     """

@@ -9,7 +9,7 @@ import numpy as np
 
 from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
 from scenario_gen.closed_loop.driver import FREE, Manner, rate_after
-from scenario_gen.closed_loop.order import limit
+from scenario_gen.closed_loop.order import limit, PARTS
 from scenario_gen.numerics import exact, Floats
 from scenario_gen.numerics.kernels import kernel
 
@@ -142,8 +142,11 @@ def _clear(world: World, manner: Manner, me: Self, braking: float, foreseen: For
             return False
         if others:
             for j in range(foreseen.coming.shape[0]):
-                if j not in (me.i, world.ego) and t > limit(order[j], cell, foreseen.coming[j, m + 1]) + 1e-09:
-                    return False
+                if j not in (me.i, world.ego):
+                    end = foreseen.coming[j, m + 1]
+                    before = end - (end - foreseen.coming[j, m]) / PARTS
+                    if t > max(limit(order[j], cell, before), end) + 1e-09:
+                        return False
         if braking > 0.0 and r == 0.0:
             return True
     return True

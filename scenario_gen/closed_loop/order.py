@@ -75,8 +75,8 @@ def keep_order(
 ) -> None:
     """Hold back who would come to a place before its turn.
 
-    First at the rate of the one it waits for, then at once: where it is by then is within what the order allows, whatever the
-    other does, for at the step's begin it was. Holding one back may hold back others, but each is stopped only once.
+    First at the rate of the one it waits for, then at once, evenly to where the order ends its way at the step's begin: that is
+    allowed whatever the other does. Holding one back may hold back others, but the way of each is cut only once.
 
     Args:
         world: the scenario, whose ego is not held back, and the step.
@@ -85,7 +85,7 @@ def keep_order(
         rate: (N,) how fast these run then.
         new_clock: (N,) at its end; changed.
         new_rate: (N,) likewise.
-        forced: (N,) 1 where one brakes as hard as it can, 2 where it is stopped at once; changed.
+        forced: (N,) 1 where one brakes as hard as it can, 2 where its way is cut; changed.
     """
     n, h, ego = clock.shape[0], world.step, world.ego
     wanted, wanted_rate = new_clock.copy(), new_rate.copy()
@@ -109,7 +109,7 @@ def keep_order(
                     if k not in (i, ego) and goes[k]:
                         room = min(room, limit(world.order[i, k], world.cell, clock[k]) - clock[i])
                 new_clock[i] = clock[i] + max(min(new_clock[i] - clock[i], room), 0.0)
-                new_rate[i] = 0.0
+                new_rate[i] = min(new_rate[i], (new_clock[i] - clock[i]) / h)
                 forced[i] = 2.0
     _go_together(world, goes, clock, wanted, wanted_rate, new_clock, new_rate, forced)
 

@@ -66,7 +66,8 @@ def react(world: World, manner: Manner, seen: Floats, delay: Ints, drivers: Floa
         seen: (K, 9) the ego as in `State.seen`, at the end of this step and before.
         delay: (N,) reaction time of each driver in steps.
         drivers: (N, 4) as in `Now`.
-        after: (N, 5) clock, rate, acceleration that the driver wanted, patience spent, and 1 where the order held it back.
+        after: (N, 5) clock [s], rate, acceleration that the driver wanted [m/s²], patience spent [s], and 1 where the order held
+            it back.
     """
     n = drivers.shape[0]
     now = _begin(world, drivers, seen, delay)
