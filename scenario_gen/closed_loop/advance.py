@@ -5,10 +5,11 @@
 
 import numpy as np
 
-from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at
+from scenario_gen.closed_loop.certified import boxes_meet, fill_box, pose_at, World
+from scenario_gen.closed_loop.driver import Manner
 from scenario_gen.closed_loop.others import react
-from scenario_gen.numerics import Bools, exact, Floats
-from scenario_gen.numerics.kernels import B, B1, F, F1, F2, F3, I, kernel, OUT2, OUTB1
+from scenario_gen.numerics import Bools, exact, Floats, Ints
+from scenario_gen.numerics.kernels import B, B1, F, F1, F2, F3, I, I1, kernel, OUT2, OUTB1
 
 WINDOW = 5.0  # metres beyond what the ego has moved in which its place on the witness' path is looked for
 BESIDE = 1.5  # metres beside that path at which the ego has left it
@@ -16,6 +17,7 @@ ASKEW = 0.5  # rad against that path, likewise
 HURRY = 1.5  # times the witness' speed at which it is not on it either: it will not do what the witness did
 ON = 0.05  # metres and m/s by which an ego that keeps to its witness differs from it
 HARDER = 0.2  # m/s of a step beyond the strongest braking that are counted
+SUDDEN = 0.05  # m/s of a step beyond what the jerk allows that are counted
 PUNCTUAL = 0.15  # seconds by which an ego that stands with its witness may be late
 
 
@@ -70,15 +72,15 @@ def locate(now: float, time: Floats, motion: Floats, body: Floats, before: float
 
 
 @kernel(inline=True)
-def place(time: Floats, motion: Floats, clock: Floats, rate: Floats, out: Floats) -> None:
-    """Write x, y [m], yaw [rad], speed [m/s] (N, 4) of motions (N, T, 6) at their clocks (N,) [s], running at rates (N,)."""
+def place(time: Floats, motion: Floats, drivers: Floats, out: Floats) -> None:
+    """Write x, y [m], yaw [rad], speed [m/s] (N, 4) of motions (N, T, 6); rows (N, 5) begin with clock [s] and rate."""
     pose = np.empty(5)
     for i in range(out.shape[0]):
-        pose_at(time, motion[i], clock[i], pose)
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = pose[0], pose[1], pose[2], pose[3] * rate[i]
+        pose_at(time, motion[i], drivers[i, 0], pose)
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = pose[0], pose[1], pose[2], pose[3] * drivers[i, 1]
 
 
-@kernel(F, F, F1, F3, F2, F2, B1, F3, F, F3, I, F1, F1, F2, OUT2, OUT2, OUTB1)
+@kernel(F, F, F1, F3, F2, F2, B1, F3, F, F3, I, F1, I1, F2, OUT2, OUT2, OUT2, OUTB1)
 def advance(
     h: float,
     now: float,
@@ -91,9 +93,10 @@ def advance(
     cell: float,
     order: Floats,
     ego: int,
-    body: Floats,
     driving: Floats,
+    delay: Ints,
     before: Floats,
+    seen: Floats,
     after: Floats,
     vehicles: Floats,
     there: Bools,
@@ -112,36 +115,41 @@ def advance(
         cell: length of a cell [s].
         order: (N, N, K) as in `Certified`.
         ego: index of the ego's witness.
-        body: (6,) the ego at the end of the step, as in `EgoState`.
-        driving: (7,) headway [s], standstill gap [m], acceleration, comfortable and strongest braking [m/s²], whether the others
-            yield to the ego as the template did, and whether they react at all.
-        before: (N, 2) clocks [s] and their rates.
-        after: (N, 3) clocks and rates at the end of the step, and 1 where one of the others brakes harder than the strongest.
+        driving: (9,) headway [s], standstill gap [m], acceleration, comfortable and strongest braking [m/s²], jerk [m/s³],
+            patience [s], whether the others yield to the ego as the template did, and whether they react at all.
+        delay: (N,) reaction time of each driver in steps.
+        before: (N, 4) clocks [s], their rates, accelerations [m/s²] and patience spent [s], as in `State`.
+        seen: (K, 9) as in `State`, at the end of the step; the ego's clock, its rate and whether it is on its path are written.
+        after: (N, 5) likewise at the end of the step, and 1 where the order makes one of the others brake harder than the
+            strongest, or more suddenly than the jerk allows.
         vehicles: (N, 4) x, y [m], yaw [rad], speed [m/s] at the end of the step.
         there: (N,) who is on the scene then.
     """
-    n, last = motion.shape[0], time[-1]
-    witness, pose = np.empty(3), np.empty(5)
+    n, react_at_all = motion.shape[0], driving[8] > 0.0
+    pose, body, witness = np.empty(5), seen[0, :6], seen[0, 6:]
     locate(now, time, motion[ego], body, before[ego, 0], witness)
-    clock, rate = before[:, 0].copy(), before[:, 1].copy()
-    new_clock, new_rate, forced = np.empty(n), np.empty(n), np.zeros(n)
-    if driving[6] > 0.0:
-        yields = driving[5] > 0.0
-        react(
-            h, time, motion, half, spans, leaves, cells, cell, order, ego, body, witness, yields, driving,
-            clock, rate, new_clock, new_rate, forced,
+    if react_at_all:
+        world = World(h, time, motion, half, spans, leaves, cells, cell, order, ego)
+        manner = Manner(
+            driving[0], driving[1], driving[2], driving[3], driving[4], driving[5], driving[6], driving[7] > 0.0
         )  # fmt: skip
+        react(world, manner, seen, delay, before, after)
     else:
-        new_clock[:], new_rate[:] = min(now, last), 1.0
-    new_clock[ego], new_rate[ego] = witness[0], witness[1]
-    place(time, motion, new_clock, new_rate, vehicles)
+        after[:] = 0.0
+        after[:, 0], after[:, 1] = min(now, time[-1]), 1.0
+    after[ego, 0], after[ego, 1], after[ego, 3], after[ego, 4] = witness[0], witness[1], 0.0, 0.0
+    place(time, motion, after, vehicles)
     vehicles[ego] = body[:4]
     for i in range(n):
-        pose_at(time, motion[i], clock[i], pose)
-        lost = rate[i] * pose[3] - vehicles[i, 3]
-        after[i, 0], after[i, 1] = new_clock[i], new_rate[i]
-        after[i, 2] = 1.0 if i != ego and lost > driving[4] * h + HARDER and new_rate[i] < 1.0 else 0.0
-        there[i] = i == ego or (new_clock[i] >= spans[i, 0] and not (leaves[i] and new_clock[i] >= spans[i, 1]))
+        pose_at(time, motion[i], before[i, 0], pose)
+        gained = (vehicles[i, 3] - before[i, 1] * pose[3]) / h
+        if after[i, 4] > 0.0:
+            hard, sudden = gained + driving[4] + HARDER / h, gained - min(before[i, 2], 0.0) + driving[5] * h + SUDDEN / h
+            after[i, 4] = 1.0 if min(hard, sudden) < 0.0 else 0.0
+        if after[i, 4] == 0.0 or vehicles[i, 3] == 0.0:
+            after[i, 2] = gained if vehicles[i, 3] > 0.0 else 0.0
+        after[i, 2] = min(max(after[i, 2], -driving[4]), driving[2])
+        there[i] = i == ego or (after[i, 0] >= spans[i, 0] and not (leaves[i] and after[i, 0] >= spans[i, 1]))
 
 
 AT = 0.2  # metres before the goal that count as there

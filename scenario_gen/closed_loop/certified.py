@@ -12,6 +12,7 @@ Source: priorities in the coordination space, Gregoire, Bonnabel & de La Fortell
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -56,6 +57,34 @@ class Certified:
     def duration(self) -> float:
         """Length of the scenario [s]."""
         return float(self.scenario.time[-1])
+
+
+class World(NamedTuple):
+    """What kernels are given of a scenario and a step; arrays as in `Certified`.
+
+    Attributes:
+        step: s.
+        time: (T,) the scenario's instants [s].
+        motion: (N, T, 6).
+        half: (N, 2) [m].
+        spans: (N, 2) [s].
+        leaves: (N,).
+        cells: (N, K, 8).
+        cell: length of a cell [s].
+        order: (N, N, K) [s].
+        ego: index of the ego's witness.
+    """
+
+    step: float
+    time: Floats
+    motion: Floats
+    half: Floats
+    spans: Floats
+    leaves: Bools
+    cells: Floats
+    cell: float
+    order: Floats
+    ego: int
 
 
 def certified(scenario: Scenario, ego: int | str) -> Certified:

@@ -8,6 +8,7 @@ Why nobody meets and nobody waits in a circle: docs/closed_loop.md.
 
 import numpy as np
 
+from scenario_gen.closed_loop.certified import World
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.kernels import kernel
 
@@ -35,20 +36,19 @@ def _slope(start: float, end: float, r: float, after: float, forced: bool, h: fl
 
 
 @kernel(inline=True)
-def _ordered(
-    h: float, cell: float, order: Floats, i: int, j: int, clock: Floats, rate: Floats, new: Floats, after: Floats, forced: Floats
-) -> bool:
+def _ordered(world: World, i: int, j: int, clock: Floats, rate: Floats, new: Floats, after: Floats, forced: Floats) -> bool:
     """Whether vehicle i keeps to the order with j throughout the step, proven for each of its parts.
 
     In a part, either the clock of i ends no farther than it may while that of j is where it begins, for that limit only grows; or
     it stays behind the clock of j throughout: their difference is a parabola, least at an end or at its vertex.
     """
+    h, cell, order = world.step, world.cell, world.order[i, j]
     a0, b0 = clock[i], clock[j]
     for k in range(PARTS):
         start, part = k / PARTS, (k + 1.0) / PARTS
         a = _part(clock[i], new[i], rate[i], after[i], forced[i] > 0.0, h, part)
         b = _part(clock[j], new[j], rate[j], after[j], forced[j] > 0.0, h, part)
-        if a > limit(order[i, j], cell, b0):
+        if a > limit(order, cell, b0):
             if b0 < a0 or b < a:
                 return False
             first = _slope(clock[j], new[j], rate[j], after[j], forced[j] > 0.0, h, start) - _slope(
@@ -65,10 +65,7 @@ def _ordered(
 
 @kernel(inline=True)
 def keep_order(
-    h: float,
-    cell: float,
-    order: Floats,
-    ego: int,
+    world: World,
     goes: Bools,
     clock: Floats,
     rate: Floats,
@@ -78,22 +75,19 @@ def keep_order(
 ) -> None:
     """Hold back who would come to a place before its turn.
 
-    First at the rate of the one it waits for, then at once: where it is by then is within what the order allows, whatever the
-    other does, for at the step's begin it was. Holding one back may hold back others, but each is stopped only once.
+    First at the rate of the one it waits for, then at once, evenly to where the order ends its way at the step's begin: that is
+    allowed whatever the other does. Holding one back may hold back others, but the way of each is cut only once.
 
     Args:
-        h: the step [s].
-        cell: length of a cell of `Certified` [s].
-        order: (N, N, K) [s] of `Certified`.
-        ego: index of the ego, which is not held back.
+        world: the scenario, whose ego is not held back, and the step.
         goes: (N,) who is on the way.
         clock: (N,) certified times at the step's begin [s].
         rate: (N,) how fast these run then.
         new_clock: (N,) at its end; changed.
         new_rate: (N,) likewise.
-        forced: (N,) 1 where one brakes as hard as it can, 2 where it is stopped at once; changed.
+        forced: (N,) 1 where one brakes as hard as it can, 2 where its way is cut; changed.
     """
-    n = clock.shape[0]
+    n, h, ego = clock.shape[0], world.step, world.ego
     wanted, wanted_rate = new_clock.copy(), new_rate.copy()
     changed = True
     while changed:
@@ -102,30 +96,27 @@ def keep_order(
             for j in range(n):
                 if i in (j, ego) or j == ego or not goes[i] or not goes[j] or forced[i] > 1.0:
                     continue
-                if _ordered(h, cell, order, i, j, clock, rate, new_clock, new_rate, forced):
+                if _ordered(world, i, j, clock, rate, new_clock, new_rate, forced):
                     continue
                 changed = True
                 if new_rate[i] > new_rate[j] > 0.0 and forced[i] == 0.0:
                     new_rate[i] = new_rate[j]
                     new_clock[i] = clock[i] + 0.5 * (rate[i] + new_rate[i]) * h
-                    if _ordered(h, cell, order, i, j, clock, rate, new_clock, new_rate, forced):
+                    if _ordered(world, i, j, clock, rate, new_clock, new_rate, forced):
                         continue
                 room = np.inf
                 for k in range(n):
                     if k not in (i, ego) and goes[k]:
-                        room = min(room, limit(order[i, k], cell, clock[k]) - clock[i])
+                        room = min(room, limit(world.order[i, k], world.cell, clock[k]) - clock[i])
                 new_clock[i] = clock[i] + max(min(new_clock[i] - clock[i], room), 0.0)
-                new_rate[i] = 0.0
+                new_rate[i] = min(new_rate[i], (new_clock[i] - clock[i]) / h)
                 forced[i] = 2.0
-    _go_together(h, cell, order, ego, goes, clock, wanted, wanted_rate, new_clock, new_rate, forced)
+    _go_together(world, goes, clock, wanted, wanted_rate, new_clock, new_rate, forced)
 
 
 @kernel(inline=True)
 def _go_together(
-    h: float,
-    cell: float,
-    order: Floats,
-    ego: int,
+    world: World,
     goes: Bools,
     clock: Floats,
     wanted: Floats,
@@ -139,7 +130,7 @@ def _go_together(
     That is always allowed, up to the next later clock: on one clock they are certified, and nobody is behind them. Without it
     they could stand for ever: each alone may not leave the others behind, and a whole step would take them beyond the next one.
     """
-    n = clock.shape[0]
+    n, h, ego = clock.shape[0], world.step, world.ego
     least, later = np.inf, np.inf
     for i in range(n):
         if i != ego and goes[i] and clock[i] < least:
@@ -158,7 +149,7 @@ def _go_together(
         for i in range(n):
             for j in range(n):
                 at_once = held[i] and not held[j] and j != ego and goes[j] and clock[j] == least
-                if at_once and until > limit(order[i, j], cell, least):
+                if at_once and until > limit(world.order[i, j], world.cell, least):
                     held[i], changed = False, True
     for i in range(n):
         if held[i]:

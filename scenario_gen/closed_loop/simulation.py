@@ -10,6 +10,7 @@ repeated, branched and searched, and two drives with the same commands are the s
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
+from zlib import crc32
 
 import numpy as np
 
@@ -35,7 +36,12 @@ class State:
         here: (N,) whether each is on the scene.
         clock: (N,) certified time [s] at which each one is where it is now; for the ego, on its witness' path.
         rate: (N,) how fast the clocks run; 1 is the certified speed.
-        forced: how many times one of the others has braked harder than the strongest braking so far, to keep the order.
+        acceleration: (N,) of the others [m/s²], as their drivers want it.
+        waited: (N,) patience that each driver has spent waiting for an ego that stands [s]; infinity once it goes before the ego.
+        seen: (K, 9) the ego now and before, newest first, as far back as the slowest driver's reaction time: `EgoState`, its
+            clock on its witness' path [s], the rate of that clock, and 1 if it is on that path.
+        forced: how many times so far one of the others has braked harder than the strongest braking, or more suddenly than the
+            jerk allows, to keep the order.
         fault: what was wrong with the last command, "" if nothing.
     """
 
@@ -46,6 +52,9 @@ class State:
     here: Bools
     clock: Floats
     rate: Floats
+    acceleration: Floats
+    waited: Floats
+    seen: Floats
     forced: int = 0
     fault: str = ""
 
@@ -112,7 +121,7 @@ class Drive:
         here: (N, T) whether each was on the scene.
         clock: (N, T) as in `State`.
         accelerations: (T,) the ego's own [m/s²].
-        forced: how many times one of the others braked harder than the strongest braking, to keep the order.
+        forced: how many times one of the others braked harder or more suddenly than drivers do, to keep the order.
         faults: what was wrong with commands, by step.
     """
 
@@ -126,6 +135,15 @@ class Drive:
 
 
 WAITS = 1.0  # metres; a witness that drives no farther waits throughout
+
+
+def reaction_time(scenario: Scenario, vehicle: str, mean: float) -> float:
+    """Draw the reaction time [s] of a vehicle's driver, evenly from half to one and a half of the mean.
+
+    It follows from the scenario's seed and index and from the vehicle's id, whoever the ego is and whatever it does.
+    """
+    words = [number % 2**32 for number in (scenario.seed, scenario.seed >> 32, scenario.index, crc32(vehicle.encode()))]
+    return mean * (0.5 + float(np.random.default_rng(words).random()))
 
 
 class ClosedLoop:
@@ -156,10 +174,18 @@ class ClosedLoop:
                 config.acceleration,
                 config.comfortable_braking,
                 config.strongest_braking,
+                config.jerk,
+                config.patience,
                 float(config.yield_to_ego == TEMPLATE),
                 float(config.policy == REACTIVE),
             )
         )
+        reactive = config.policy == REACTIVE
+        self.reactions = np.array(
+            [reaction_time(scenario, vehicle.id, config.reaction * reactive) for vehicle in scenario.vehicles]
+        )
+        self._delays = np.round(self.reactions / config.step).astype(np.int64)
+        self._slowest = int(self._delays.max())
         self._sizes = 2.0 * self.certified.half
         self._ids = tuple(vehicle.id for vehicle in scenario.vehicles)
         self._others = np.arange(len(self._ids)) != self.certified.ego
@@ -202,7 +228,8 @@ class ClosedLoop:
         n = len(vehicles)
         here = (known.spans[:, 0] <= self.begin) & ~(known.leaves & (known.spans[:, 1] <= self.begin))
         ego = EgoState(*vehicles[self.ego].tolist())
-        return State(0, 0.0, ego, vehicles, here, np.full(n, self.begin), np.ones(n))
+        seen = np.array([(*ego, self.begin, 1.0, 1.0)])  # before that it drove as its witness
+        return State(0, 0.0, ego, vehicles, here, np.full(n, self.begin), np.ones(n), np.zeros(n), np.zeros(n), seen)
 
     def step(self, state: State, asked: Command | Pose | None, note: str = "") -> State:
         """Return the next instant; `state` stays what it was. `note` says what else was wrong with what was asked."""
@@ -212,8 +239,10 @@ class ClosedLoop:
         number = state.step + 1
         time = number * config.step
         now = self.begin + time
-        before, after = np.empty((n, 2)), np.empty((n, 3))
-        before[:, 0], before[:, 1] = state.clock, state.rate
+        before, after = np.empty((n, 4)), np.empty((n, 5))
+        before[:, 0], before[:, 1], before[:, 2], before[:, 3] = state.clock, state.rate, state.acceleration, state.waited
+        seen = np.empty((min(len(state.seen), self._slowest) + 1, 9))
+        seen[0, :6], seen[1:] = ego, state.seen[: len(seen) - 1]
         vehicles, here = np.empty((n, 4)), np.empty(n, dtype=np.bool_)
         advance(
             config.step,
@@ -227,16 +256,17 @@ class ClosedLoop:
             CELL,
             known.order,
             self.ego,
-            np.array(ego),
             self._driving,
+            self._delays,
             before,
+            seen,
             after,
             vehicles,
             here,
         )
-        clock, rate, forced = after.T
+        clock, rate, acceleration, waited, forced = after.T
         count = state.forced + int(np.count_nonzero(forced))
-        return State(number, time, ego, vehicles, here, clock, rate, count, note or moved.fault)
+        return State(number, time, ego, vehicles, here, clock, rate, acceleration, waited, seen, count, note or moved.fault)
 
     def observe(self, state: State) -> Observation:
         """Return what a planner sees."""

@@ -6,6 +6,7 @@
 from dataclasses import replace
 from itertools import combinations
 
+from driving_scenes import crossing, following
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from lengths import LONG
@@ -67,7 +68,7 @@ def test_with_the_witness_as_ego_everyone_drives_as_certified(seed, policy):
 @given(st.floats(2.0, 20.0), st.floats(0.0, 9.0), st.floats(0.02, 40.0), st.sampled_from([0.05, 0.1]))
 def test_a_follower_stops_for_the_ego_where_braking_at_the_limit_suffices(speed, braking, spare, step):
     """The ego ahead brakes to a stand; the gap holds what the follower needs, less what the ego still drives, and 2 cm more."""
-    config = ClosedLoopConfig(step=step)
+    config = ClosedLoopConfig(step=step, reaction=0.0, jerk=1e6)
     strongest = config.strongest_braking
     need = 0.5 * speed**2 / strongest - (0.5 * speed**2 / braking if braking > 0.1 else 0.5 * speed**2 / 0.1)
     gap = max(need, 0.0) + spare
@@ -77,29 +78,6 @@ def test_a_follower_stops_for_the_ego_where_braking_at_the_limit_suffices(speed,
     for _ in range(int(12 / step)):
         state = loop.step(state, Command(-max(braking, 0.1), 0.0))
         assert not loop.over(state) or loop.at_goal(state.time, state.vehicles[1])
-
-
-def following(speed, gap):
-    """One vehicle behind another on a straight line, at one speed; the second is 4.5 m long, like the first 4.0 m."""
-    time = np.arange(150) * PERIOD
-    motions = []
-    for start in (0.0, gap + 4.25):
-        xy = np.stack([start + speed * time, np.zeros_like(time)], axis=1)
-        motions.append((xy, np.zeros_like(time), np.full_like(time, speed)))
-    return as_scenario(motions, len(time))
-
-
-def crossing(first_speed=8.0, second_speed=8.0, second_start=-60.0):
-    """Vehicle 0 crosses from the west, then vehicle 1 from the south."""
-    time = np.arange(150) * PERIOD
-    zero = np.zeros_like(time)
-    west = (np.stack([-30.0 + first_speed * time, zero], axis=1), zero, np.full_like(time, first_speed))
-    south = (
-        np.stack([zero, second_start + second_speed * time], axis=1),
-        np.full_like(time, np.pi / 2),
-        np.full_like(time, second_speed),
-    )
-    return as_scenario([west, south], len(time))
 
 
 @pytest.mark.parametrize(("yields", "waits"), [("template", True), ("never", False)])

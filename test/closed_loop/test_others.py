@@ -1,0 +1,191 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The others as people: they react late, brake smoothly, and go before an ego that stands when they have waited long enough."""
+
+from dataclasses import replace
+
+from driving_scenes import crossing, following
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from lengths import LONG
+import numpy as np
+import pytest
+
+from benchmarks._drive_others import braking_jerks
+from benchmarks._driving_worlds import Anything, draw_scenario, Witness
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.ego import Command, Pose
+from scenario_gen.closed_loop.simulation import ClosedLoop, reaction_time
+
+EXAMPLES = 2000 if LONG else 40
+NEVER = 1e6  # s of patience
+
+
+def braking_after(steps, braking):
+    """Commands of an ego that keeps its speed for so many steps, then brakes [m/s²]."""
+    return lambda k: Command(-braking if k >= steps else 0.0, 0.0)
+
+
+def states(loop, commands, count):
+    """The first instants of a drive."""
+    made = [loop.start()]
+    for k in range(count):
+        made.append(loop.step(made[-1], commands(k)))
+    return made
+
+
+def touches(loop, commands, count):
+    """Whether the ego touches somebody."""
+    return any(loop.hit(state) for state in states(loop, commands, count))
+
+
+def test_reaction_times_follow_from_scenario_and_vehicle_alone():
+    scenario = draw_scenario(3)
+    times = [ClosedLoop(scenario, ego).reactions for ego in range(len(scenario.vehicles))]
+    assert all((each == times[0]).all() for each in times) and len(set(times[0])) == len(times[0])
+    turned = replace(scenario, vehicles=scenario.vehicles[::-1])
+    assert (ClosedLoop(turned, 0).reactions == times[0][::-1]).all()
+    assert (ClosedLoop(replace(scenario, index=1), 0).reactions != times[0]).all()
+    assert (ClosedLoop(scenario, 0, config=ClosedLoopConfig(reaction=0.0)).reactions == 0.0).all()
+
+
+def test_reaction_times_are_spread_evenly():
+    scenario = following(10.0, 10.0)
+    drawn = np.sort([reaction_time(replace(scenario, index=k), "v0", 1.0) for k in range(4000)])
+    assert drawn[0] >= 0.5 and drawn[-1] < 1.5
+    even = 0.5 + (np.arange(4000) + 0.5) / 4000
+    assert np.abs(drawn - even).max() < 1.63 / np.sqrt(4000)  # Kolmogorov's bound of 1 %
+
+
+@settings(max_examples=EXAMPLES)
+@given(st.integers(0, 10**9), st.integers(1, 40), st.sampled_from([0.05, 0.1]))
+def test_nobody_answers_before_its_reaction_time_is_over(seed, differ, step):
+    """Two egos that do the same for some steps, and then not: among two vehicles the other one does the same for longer."""
+    scenario = draw_scenario(seed, 2)
+    assume(len(scenario.vehicles) == 2)
+    loop = ClosedLoop(scenario, 0, config=ClosedLoopConfig(step=step))
+    late = round(float(loop.reactions[1]) / step)
+    one, two = (states(loop, braking_after(differ, braking), differ + late + 5) for braking in (0.0, 9.0))
+    for k in range(differ + late + 1):
+        assert one[k].clock[1] == two[k].clock[1] and one[k].rate[1] == two[k].rate[1]
+
+
+def test_and_answers_then():
+    loop = ClosedLoop(following(15.0, 8.0), 1)
+    late = round(float(loop.reactions[0]) / 0.1)
+    drive = states(loop, braking_after(10, 8.0), 12 + late)
+    assert drive[10 + late].rate[0] == 1.0 and drive[11 + late].rate[0] < 1.0
+
+
+@settings(max_examples=EXAMPLES)
+@given(st.floats(2.0, 20.0), st.floats(0.5, 9.0), st.floats(0.0, 20.0), st.sampled_from([0.05, 0.1]))
+def test_a_follower_stops_for_the_ego_with_room_for_its_reaction_and_its_foot(speed, braking, spare, step):
+    """The gap holds what it drives in its reaction time and while its foot gets to full braking, two steps, and 0.6 m."""
+    config = ClosedLoopConfig(step=step)
+    reaction = reaction_time(following(speed, 50.0), "v0", config.reaction)
+    need = 0.5 * speed**2 / config.strongest_braking - 0.5 * speed**2 / braking
+    late = reaction + config.strongest_braking / config.jerk + 2.0 * step
+    loop = ClosedLoop(following(speed, max(need, 0.0) + speed * late + 0.6 + spare), 1, config=config)
+    assert not touches(loop, braking_after(1, braking), int(12 / step))
+
+
+def test_the_slower_they_react_the_more_of_them_touch_an_ego_that_brakes_hard():
+    """One second behind an ego that brakes by 9 m/s²."""
+    hits = dict.fromkeys((0.0, 0.5, 1.0, 1.5), 0)
+    for reaction in hits:
+        for speed in np.linspace(6.0, 18.0, 12).tolist():
+            loop = ClosedLoop(following(speed, speed), 1, config=ClosedLoopConfig(reaction=reaction))
+            hits[reaction] += touches(loop, braking_after(5, 9.0), 80)
+    count = list(hits.values())
+    assert count[0] == 0 and count == sorted(count) and count[-1] == 12
+
+
+@settings(max_examples=EXAMPLES)
+@given(st.integers(0, 10**9), st.sampled_from([0.05, 0.1]), st.sampled_from([3.0, 10.0]), st.integers(2, 4))
+def test_acceleration_changes_by_the_jerk_at_most_unless_the_order_forces_it(seed, step, jerk, vehicles):
+    """On certified motions of one speed, which have no jerk of their own; whatever the ego does."""
+    scenario = replace(following(12.0, 10.0, vehicles) if seed % 2 else crossing(), seed=seed)
+    ego = seed % len(scenario.vehicles)
+    loop, planner = ClosedLoop(scenario, ego, config=ClosedLoopConfig(step=step, jerk=jerk)), Anything(seed)
+    planner.reset(loop.task())
+    drive = [loop.start()]
+    for _ in range(int(12 / step)):
+        drive.append(loop.step(drive[-1], planner.act(loop.observe(drive[-1]))))
+    others = [i for i in range(len(scenario.vehicles)) if i != ego]
+    speed = np.array([state.vehicles[others, 3] for state in drive])
+    change = np.diff(np.diff(speed, axis=0), axis=0) / step
+    stays = np.array([[state.clock[i] < scenario.time[-1] for i in others] for state in drive[2:]])
+    forced = np.diff([state.forced for state in drive]) > 0
+    free = stays & ~(forced[1:] | forced[:-1])[:, None]
+    most = (jerk * step * step + 0.051) / step
+    assert change[free].min() >= -most  # braking grows
+    assert change[free & (speed[2:] > 0.2)].max() <= most  # and lessens, but where the order ends what is left of a stop
+
+
+def test_braking_is_as_sudden_as_that_of_recorded_drivers_whatever_the_ego_does():
+    """99 of 100 steps in which somebody brakes, those that the order forced among them, in drawn scenarios."""
+    found = []
+    for seed in range(10_000 if LONG else 100):
+        scenario = draw_scenario(seed)
+        loop = ClosedLoop(scenario, seed % len(scenario.vehicles))
+        drive = loop.drive(Anything(seed), lambda state, last=len(scenario.time) // 2: state.step >= last)
+        found.append(braking_jerks(scenario, drive))
+    jerk = np.concatenate(found)
+    assert len(jerk) > 500 and np.percentile(jerk, 99) <= 10.0
+
+
+@settings(max_examples=EXAMPLES)
+@given(st.integers(0, 10**9), st.integers(2, 4))
+def test_who_waits_for_nobody_drives_as_certified(seed, vehicles):
+    """The ego keeps to its witness, at any reaction time and without any patience."""
+    scenario = draw_scenario(seed, vehicles)
+    assume(len(scenario.vehicles) > 1)
+    loop = ClosedLoop(scenario, 0, config=ClosedLoopConfig(reaction=3.0, patience=0.0, jerk=1.0))
+    drive = loop.drive(Witness(scenario, 0), lambda state: state.step >= len(scenario.time) - 1)
+    assert np.abs(drive.motion.position - scenario.position).max() < 1e-6 and drive.forced == 0
+
+
+@pytest.mark.parametrize("patience", [2.0, 5.0, NEVER])
+def test_who_waits_for_an_ego_that_stands_goes_first_after_its_patience(patience):
+    """The ego went first in the template, but stands 20 m before the crossing."""
+    loop = ClosedLoop(crossing(), 0, config=ClosedLoopConfig(patience=patience))
+    drive = states(loop, braking_after(3, 4.0), 300)
+    speed = np.array([state.vehicles[1, 3] for state in drive])
+    stands = speed < 0.5
+    assert stands.any()
+    assert (drive[-1].vehicles[1, 1] > 5.0) == (patience < NEVER)
+    if patience < NEVER:
+        assert 0.1 * stands.sum() == pytest.approx(patience, abs=1.0)
+
+
+@pytest.mark.parametrize(("x", "speed"), [(-2.0, 0.0), (-20.0, 0.5)])
+def test_nobody_goes_first_where_the_ego_stands_in_the_way_or_moves(x, speed):
+    scenario = crossing()
+    loop = ClosedLoop(scenario, 0)
+    drive = states(loop, lambda k: Pose(min(-30.0 + 0.8 * k, x), 0.0, 0.0, speed), 300)
+    assert drive[-1].vehicles[1, 1] < -2.0 and not np.isinf(drive[-1].waited[1])
+
+
+def test_a_drive_can_be_branched_anywhere():
+    """What drivers have seen, their patience and their accelerations are in the state: a branch goes on as the drive did."""
+    loop = ClosedLoop(draw_scenario(12), 0)
+    drive = states(loop, braking_after(8, 5.0), 60)
+    for first in (0, 9, 30):
+        state = drive[first]
+        for k in range(first, 60):
+            state = loop.step(state, braking_after(8, 5.0)(k))
+        last = drive[-1]
+        for name in ("vehicles", "clock", "rate", "acceleration", "waited", "seen"):
+            assert (getattr(state, name) == getattr(last, name)).all()
+
+
+def test_nobody_chatters_at_low_speed():
+    """A platoon behind an ego that brakes and goes on: nobody changes more than twice between braking and speeding up."""
+    loop = ClosedLoop(following(14.0, 14.0, 4), 3)
+    drive = states(loop, lambda k: Command(-6.0 if 10 < k < 80 else 2.0 if k >= 80 else 0.0, 0.0), 140)
+    speed = np.array([state.vehicles[:3, 3] for state in drive])
+    change = np.diff(speed, axis=0)
+    for i in range(3):
+        signs = np.sign(change[:, i])[np.abs(change[:, i]) > 0.03]
+        assert np.count_nonzero(np.diff(signs)) <= 2
