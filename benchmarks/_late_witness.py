@@ -71,6 +71,11 @@ class LateWitness:
         """Return the certified scenarios of numbers (S, size)."""
         return self.natural.scenarios(z)
 
+    def features(self, candidate: Scenario) -> tuple[float, ...]:
+        """Return how far in time [s] the witness is from a collision with each of the others."""
+        here = np.ones((len(candidate.vehicles), len(candidate.time)), dtype=np.bool_)
+        return tuple(time_apart(candidate, here, 0, i) for i in range(1, len(candidate.vehicles)))
+
     def drive(self, candidates: Sequence[Scenario]) -> list[Response]:
         """Return how near each came to a contact [s]."""
         return [self._response(late_by(one, self.late)) for one in candidates]

@@ -10,49 +10,66 @@ each other in their lanes are always near, and never meet.
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, exact, Floats
+from scenario_gen.closed_loop.certified import boxes_meet, fill_box
+from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics.kernels import F2, kernel, OUT1
 from scenario_gen.types import Scenario
 
 FINER = 4  # instants of the other vehicle for one of the ego
-APART = 20.0  # s, for two whose ways never meet
+APART = 5.0  # s, at most: what is farther apart, or never meets, is all the same
 
 
 def time_apart(motion: Scenario, here: Bools, ego: int, other: int) -> float:
-    """Return the time [s] by which a vehicle would have to be shifted to meet another; 0 if they do, APART if that is impossible.
+    """Return the time [s] by which a vehicle would have to be shifted to meet another; 0 if they do, at most APART.
 
     Args:
         motion: as driven.
         here: (N, T) who is on the scene.
-        ego, other: indices.
+        ego: index.
+        other: index.
     """
     mine, its = np.flatnonzero(here[ego]), np.flatnonzero(here[other])
     if len(mine) == 0 or len(its) < 2:
         return APART
     time = motion.time
     fine = np.linspace(time[its[0]], time[its[-1]], FINER * (len(its) - 1) + 1)
-    a = np.column_stack([motion.position[ego][mine], motion.heading[ego][mine]])
+    a = np.column_stack([time[mine], motion.position[ego][mine], motion.heading[ego][mine]])
     columns = (*motion.position[other].T, motion.heading[other])
-    b = np.column_stack([np.interp(fine, time[its], column[its]) for column in columns])
-    half = [np.array([0.5 * motion.vehicles[k].length, 0.5 * motion.vehicles[k].width]) for k in (ego, other)]
-    reach = float(sum(np.sqrt(np.square(one).sum()) for one in half))
-    dx, dy = b[None, :, 0] - a[:, None, 0], b[None, :, 1] - a[:, None, 1]
-    rows, columns_near = np.nonzero(dx * dx + dy * dy < reach * reach)
-    if not len(rows):
-        return APART
-    meet = _overlap(a[rows], b[columns_near], half[0], half[1])
-    apart = np.abs(time[mine][rows] - fine[columns_near])[meet]
-    return float(min(apart.min(initial=APART), APART))
+    b = np.column_stack([fine, *(np.interp(fine, time[its], column[its]) for column in columns)])
+    vehicles = motion.vehicles
+    half = np.array([(0.5 * vehicles[k].length, 0.5 * vehicles[k].width) for k in (ego, other)])
+    out = np.array([APART])
+    _least_shift(a, b, half, out)
+    return float(out[0])
 
 
-def _overlap(a: Floats, b: Floats, half_a: Floats, half_b: Floats) -> Bools:
-    """Return whether footprints at poses a (P, 3) and b (P, 3) overlap, by separating axes; half lengths and widths (2,) [m]."""
-    delta = b[:, :2] - a[:, :2]
-    turn = b[:, 2] - a[:, 2]
-    c, s = np.abs(exact.cos(turn)), np.abs(exact.sin(turn))
-    meet = np.ones(len(a), dtype=np.bool_)
-    for yaw, own, its in ((a[:, 2], half_a, half_b), (b[:, 2], half_b, half_a)):
-        cos, sin = exact.cos(yaw), exact.sin(yaw)
-        along, across = delta[:, 0] * cos + delta[:, 1] * sin, delta[:, 1] * cos - delta[:, 0] * sin
-        meet &= np.abs(along) <= own[0] + its[0] * c + its[1] * s
-        meet &= np.abs(across) <= own[1] + its[0] * s + its[1] * c
-    return np.asarray(meet)
+@kernel(F2, F2, F2, OUT1)
+def _least_shift(a: Floats, b: Floats, half: Floats, out: Floats) -> None:
+    """Lower `out` (1,) to the least difference of times [s] at which footprints overlap.
+
+    Args:
+        a: (S, 4) time [s], x, y [m], yaw [rad] of one.
+        b: (R, 4) likewise, of the other.
+        half: (2, 2) half lengths and widths [m].
+        out: (1,) seconds, at first the greatest that counts.
+    """
+    count = b.shape[0]
+    farthest = 0.0  # that the other moves from one of its instants to the next
+    for k in range(1, count):
+        farthest = max(farthest, np.sqrt((b[k, 1] - b[k - 1, 1]) ** 2 + (b[k, 2] - b[k - 1, 2]) ** 2))
+    reach = np.sqrt(half[0, 0] ** 2 + half[0, 1] ** 2) + np.sqrt(half[1, 0] ** 2 + half[1, 1] ** 2)
+    box, its = np.empty(7), np.empty(7)
+    for i in range(a.shape[0]):
+        fill_box(a[i, 1], a[i, 2], a[i, 3], half[0, 0], half[0, 1], box)
+        k = 0
+        while k < count:
+            away = np.sqrt((a[i, 1] - b[k, 1]) ** 2 + (a[i, 2] - b[k, 2]) ** 2) - reach
+            if away > 0.0:  # it cannot be there before it has moved so far
+                k = count if farthest == 0.0 else k + max(int(away / farthest), 1)
+                continue
+            apart = abs(a[i, 0] - b[k, 0])
+            if apart < out[0]:
+                fill_box(b[k, 1], b[k, 2], b[k, 3], half[1, 0], half[1, 1], its)
+                if boxes_meet(box, its):
+                    out[0] = apart
+            k += 1

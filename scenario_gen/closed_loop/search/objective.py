@@ -47,7 +47,7 @@ class Objective:
         return f"{self.name}<{self.limit:g}" if self.limit else self.name
 
     def response(self, outcome: Outcome) -> Response:
-        """Return how near to failure a drive was; its guides say how far in time [s] each of the others was from a collision."""
+        """Return how near to failure a drive was; for collisions by how far in time [s] each of the others was."""
         verdict = outcome.verdict
         apart = _apart(outcome)
         hit = verdict.collision
@@ -67,7 +67,8 @@ class Objective:
         else:
             margin = FAR + nearest if math.isnan(verdict.min_pet) else verdict.min_pet - self.limit
         margin = FAR if math.isnan(margin) else float(margin)
-        return Response(margin, apart, _kind(outcome, self.name) if margin <= 0.0 else "")
+        parts = apart if self.name in (AT_FAULT, COLLISION) else ()
+        return Response(margin, parts, _kind(outcome, self.name) if margin <= 0.0 else "")
 
 
 def _apart(outcome: Outcome) -> tuple[float, ...]:

@@ -13,11 +13,12 @@ from typing import Any, TextIO
 from scenario_gen.base.errors import InputError, of_system
 from scenario_gen.base.folders import write_text
 from scenario_gen.closed_loop.search.estimate import Response
+from scenario_gen.closed_loop.search.nearness import time_apart
 from scenario_gen.closed_loop.search.objective import Objective
 from scenario_gen.closed_loop.trials import RunTrials, Trial
 from scenario_gen.method.sampling import NaturalScenarios
 from scenario_gen.numerics import Floats
-from scenario_gen.types import Road, Scenario
+from scenario_gen.types import mask, Road, Scenario
 
 
 @dataclass(eq=False)
@@ -35,7 +36,7 @@ class Journal:
     def add(self, response: Response) -> None:
         """Write one drive."""
         if self.file is not None:
-            self.file.write(json.dumps([response.margin, response.guides, response.kind], ensure_ascii=False) + "\n")
+            self.file.write(json.dumps([response.margin, response.parts, response.kind], ensure_ascii=False) + "\n")
             self.file.flush()
 
 
@@ -52,7 +53,7 @@ def open_journal(path: Path, identity: Mapping[str, Any]) -> Iterator[Journal]:
         whole = [line for line in lines if line.endswith("\n")]  # the last one may have been cut off
         if whole:
             _same(path, json.loads(whole[0]), json.loads(head))
-        known = [Response(float(margin), tuple(guides), kind) for margin, guides, kind in map(json.loads, whole[1:])]
+        known = [Response(float(margin), tuple(parts), kind) for margin, parts, kind in map(json.loads, whole[1:])]
     except (ValueError, TypeError) as error:
         raise InputError(f"{path} is no journal of a search ({error}); move it away, or give another --out") from error
     except OSError as error:
@@ -107,6 +108,14 @@ class DrivenScenarios:
     def candidates(self, z: Floats) -> list[Scenario | None]:
         """Return the certified scenarios of numbers (S, size)."""
         return self.natural.scenarios(z)
+
+    def features(self, candidate: Scenario) -> tuple[float, ...]:
+        """Return how far in time [s] the witness is from a collision with each of the others, and its first speed [m/s]."""
+        ids = [vehicle.id for vehicle in candidate.vehicles]
+        ego = ids.index(self.ego)
+        here = mask(candidate.present, len(candidate.time))
+        apart = (time_apart(candidate, here, ego, k) for k in range(len(ids)) if k != ego)
+        return (*apart, float(candidate.speed[ego, int(candidate.present[ego, 0])]))
 
     def drive(self, candidates: Sequence[Scenario]) -> list[Response]:
         """Drive in each, unless the journal knows how that ended."""
