@@ -48,7 +48,7 @@ def as_json(outcomes: Sequence[Outcome], planner: str, config: ClosedLoopConfig)
 
 
 def as_junit(outcomes: Sequence[Outcome], planner: str) -> str:
-    """Return one test case per scenario, as JUnit's XML; a collision, leaving the road or missing the goal is a failure."""
+    """Return one test case per scenario, as JUnit's XML; collision, off_road, jump and goal are failures."""
     failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
     lasted = math.fsum(outcome.verdict.duration for outcome in outcomes)
     suite = ElementTree.Element(
@@ -60,8 +60,7 @@ def as_junit(outcomes: Sequence[Outcome], planner: str) -> str:
             suite, "testcase", classname=planner, name=f"scenario {outcome.name}", time=f"{verdict.duration:.3f}"
         )
         if not verdict.passed:
-            kind = "collision" if verdict.collision else "off_road" if not math.isnan(verdict.off_road) else "goal"
-            ElementTree.SubElement(case, "failure", type=kind, message=verdict.sentence())
+            ElementTree.SubElement(case, "failure", type=verdict.failure, message=verdict.sentence())
         message = ElementTree.SubElement(case, "system-out")
         message.text = json.dumps(verdict.document(), ensure_ascii=False)
     ElementTree.indent(suite)
