@@ -24,6 +24,7 @@ from scenario_gen.types import once_per_object, Road, Scenario
 FARTHEST = 10.0  # metres; margins and depths beyond are told as this
 APART = 0.05  # metres that a point of the footprint moves at most between two poses that are looked at
 SPACING = 0.1  # metres between the points of the footprint that are looked at, at most
+CORNER = 0.7072  # cells; from a cell's centre to its corner, rounded up
 PARTS = 200  # of a step, to which the beginning of anything is told
 RESOLUTION = 1e-6  # seconds; what cannot be told apart over such an interval counts
 
@@ -75,6 +76,8 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
             reached = (fine >= limit) & (fine > 0.0)
             part = int(np.argmax(reached)) / PARTS if reached.any() else 1.0
             begin = float(motion.time[k] + part * (motion.time[k + 1] - motion.time[k]))
+        if deepest >= FARTHEST and most > 0.0:
+            break  # nothing more is told
         deepest, most = max(deepest, float(found[:, 0].max())), max(most, float(found[:, 1].max()))
     return RoadUse(-deepest, most, begin)
 
@@ -151,7 +154,7 @@ def measure(solid: Bools, near: Floats, poses: Floats, points: Floats, how: Floa
         poses: (P, 3) x, y [cells], yaw [rad].
         points: (M, 2) of the footprint in its own frame [cells].
         how: the largest depth that is told [cells]; width of the rim of `solid`; 1: the largest depth is wanted, -1: the least.
-        out: (P, 2) that depth [cells], and how many points have one.
+        out: (P, 2) that depth [cells], and how many points are in solid cells.
     """
     height, width = solid.shape
     most, rim, largest = how[0], how[1], how[2] > 0.0
@@ -159,22 +162,25 @@ def measure(solid: Bools, near: Floats, poses: Floats, points: Floats, how: Floa
         c, s = exact.cos(poses[p, 2]), exact.sin(poses[p, 2])
         found = 0.0 if largest else most
         count = 0
-        for m in range(points.shape[0]):
-            u = poses[p, 0] + c * points[m, 0] - s * points[m, 1]
-            v = poses[p, 1] + s * points[m, 0] + c * points[m, 1]
-            aside = max(rim - u, u - (width - rim), 0.0)
-            above = max(rim - v, v - (height - rim), 0.0)
+        for m in range(2 * points.shape[0]):  # once by the distances of centres, then exactly where that leaves it open
+            rough = m < points.shape[0]
+            x, y = points[m % points.shape[0], 0], points[m % points.shape[0], 1]
+            u, v = poses[p, 0] + c * x - s * y, poses[p, 1] + s * x + c * y
+            aside, above = max(rim - u, u - (width - rim), 0.0), max(rim - v, v - (height - rim), 0.0)
             if not aside * aside + above * above < most * most:  # farther from the grid than is told
                 found = most if largest else 0.0
-                count += 1
+                count += rough
                 continue
             i, j = int(np.floor(v)), int(np.floor(u))
             if i < 0 or j < 0 or i >= height or j >= width or not solid[i, j]:
                 found = found if largest else 0.0
                 continue
-            count += 1
-            low, best = near[i, j] - 0.7072, min(near[i, j] + 0.7072, most)
-            if (largest and best <= found) or (not largest and low >= found):
+            low, best = near[i, j] - CORNER, min(near[i, j] + CORNER, most)
+            if rough:
+                count += 1
+                found = max(found, min(low, most)) if largest else min(found, best)
+                continue
+            if best <= found if largest else low >= found:
                 continue
             k = max(int(low / 1.4143), 1)
             while k - 1 < best:
@@ -185,7 +191,5 @@ def measure(solid: Bools, near: Floats, poses: Floats, points: Floats, how: Floa
                         du, dv = max(b - u, u - b - 1.0, 0.0), max(a - v, v - a - 1.0, 0.0)
                         best = min(best, np.sqrt(du * du + dv * dv))
                 k += 1
-            if best < 1e-9:  # it touches
-                count -= 1
             found = max(found, best) if largest else min(found, best)
         out[p, 0], out[p, 1] = found, count
